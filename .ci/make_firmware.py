@@ -1,7 +1,7 @@
 """Make the firmware of one board for a release: ``python .ci/make_firmware.py BOARD CHECKOUT``.
 
 CHECKOUT: a checkout of MicroPython; if there is none, the release that armtempo is built with is fetched, with the
-submodules of the board. The firmware goes to ``armtempo-firmware-BOARD.zip`` here, its sha256 beside it.
+submodules of the board. The firmware goes to ``armtempo-firmware-BOARD.zip`` here, its sha256 next to it.
 """
 
 import hashlib

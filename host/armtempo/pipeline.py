@@ -56,8 +56,8 @@ def plan(arm: Arm | Path | str, job: Job | Path | str, progress: Progress | None
 
     ``arm``, ``job``: or their files, or the name of an arm that ships.
 
-    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where job and
-    arm do not fit each other, PlanError where there is no motion under these limits and ranges.
+    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError if job and
+    arm do not fit each other, PlanError if there is no motion under these limits and ranges.
     """
     arm = Arm.of(arm)
     return planner.plan(arm, Job.of(job, arm), progress)
@@ -77,7 +77,7 @@ def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
     """Plans of the job's parts from rest to rest, each short enough for the board; one where the whole is.
 
     On the spline through the via points, which rests at its ends only, a part for each stretch between stops. Raises
-    PlanError where a part is still too long or there is no stop; else as ``plan``.
+    PlanError if a part is still too long or there is no stop; else as ``plan``.
     """
     if checks.is_free(job) or not job.stops:
         whole = planner.plan(arm, job, progress)
@@ -96,20 +96,20 @@ def corridor_curve(arm: Arm, job: Job, progress: Progress | None = None) -> list
 
 @checked
 def summary(plan: Plan) -> list[str]:
-    """A plan in a few lines: motion times beside their lower bounds, extremes beside their limits."""
+    """A plan in a few lines: motion times next to their lower bounds, extremes next to their limits."""
     return text_summary.lines(plan)
 
 
 def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:
     """The plan of a trajectory file.
 
-    ``altered``: also of one that was altered after it had been written. Raises InputError where the file is none,
-    damaged or altered, or was planned for another arm than ``arm``.
+    ``altered``: also of one that was altered after it had been written. Raises InputError if the file is none,
+    damaged or altered, or was planned for a different arm than ``arm``.
     """
     found = Plan.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
         raise InputError(
-            f"{path} was planned for another arm than {arm.name!r} ({arm.source})",
+            f"{path} was planned for a different arm than {arm.name!r} ({arm.source})",
             "plan it again with this arm",
         )
     return found
@@ -138,9 +138,9 @@ def report(run: Run | SequenceRun) -> Path:
 
 @checked
 def compare(folders: abc.Sequence[Path | str], page: Path | str | None = None) -> Path:
-    """Write one page that compares recorded runs, by default beside the first; gives the page.
+    """Write one page that compares recorded runs, by default next to the first; gives the page.
 
-    A folder that cannot be read is named there. Raises RunFolderError where fewer than two can be read.
+    A folder that cannot be read is named there. Raises RunFolderError if fewer than two can be read.
     """
     paths = [Path(folder) for folder in folders]
     if not paths:

@@ -1,8 +1,14 @@
 """Writes the tables of the pages that follow from the code: ``python host/docs/make_tables.py``."""
 
+import math
+from collections.abc import Callable
+from dataclasses import MISSING
 from pathlib import Path
+from typing import Any
 
 from armtempo import optimise
+from armtempo.formats import part
+from armtempo.model.parts import Driver, Encoder, JointModel, Motor, Safety
 from armtempo.optimise.parameters import Number, Parameter
 
 FOLDER = Path(__file__).parent
@@ -38,7 +44,44 @@ def _parameters() -> str:
     return "\n".join(lines) + "\n"
 
 
-TABLES = {"optimisers.md": {"parameters": _parameters}}
+def _keys(of: type, name: str) -> Callable[[], str]:
+    """The keys of a table of the arm file, from the fields that they are read into."""
+
+    def body() -> str:
+        lines = [f"| key of `{name}` | meaning | default |", "|---|---|---|"]
+        for one, key in part.keys(of):
+            default = "required" if one.default is MISSING else _value(one.default)
+            lines.append(f"| `{one.name}` | {key.meaning}{_allowed(key)} | {default} |")
+        return "\n".join(lines) + "\n"
+
+    return body
+
+
+def _allowed(key: part.Key) -> str:
+    if key.choices:
+        return f": {' or '.join(map(_value, key.choices))}"
+    return "" if math.isinf(key.most) else f"; {_value(key.least)} to {_value(key.most)}"
+
+
+def _value(value: Any) -> str:
+    """As a TOML file has it; thousands apart."""
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, str):
+        return f'`"{value}"`'
+    return f"{value:_.10g}".replace("_", " " if abs(value) >= 10_000 else "")
+
+
+TABLES = {
+    "optimisers.md": {"parameters": _parameters},
+    "files.md": {
+        "keys of driver": _keys(Driver, "[driver]"),
+        "keys of safety": _keys(Safety, "[safety]"),
+        "keys of motor": _keys(Motor, "motor"),
+        "keys of encoder": _keys(Encoder, "encoder"),
+    },
+    "virtual-board.md": {"keys of model": _keys(JointModel, "model")},
+}
 
 if __name__ == "__main__":
     for name in TABLES:

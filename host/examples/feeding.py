@@ -12,7 +12,7 @@ arm = armtempo.Arm.paper()
 plan = armtempo.plan(arm, armtempo.Job.paper())
 print("\n".join(armtempo.summary(plan)))
 with armtempo.connect(port, arm) as board:
-    board.home(arm)  # the arm stands in its home posture: look before you say so
+    board.home(arm)  # the arm is in its home posture: look before you say so
     board.goto(plan)
     run = board.run(plan, repeat=3)
 print(run.report())

@@ -35,7 +35,7 @@ HEAD = (
 )
 FLAG_ENABLE_HIGH = 1  # ENABLE pin is active high
 FLAG_ESTOP_RELEASES = 2  # an E-stop also releases ENABLE
-FLAG_STOP_ON_LINK_LOSS = 4  # brake when the host disappears; otherwise finish the motion
+FLAG_STOP_ON_LINK_LOSS = 4  # brake when the host no longer answers; otherwise finish the motion
 FLAG_ESTOP_ACTIVE_HIGH = 8  # E-stop input trips when high (else when low)
 FLAG_ESTOP_FITTED = 16
 
@@ -130,7 +130,7 @@ def without_limits(head: "dict[str, int]", joints: "list[dict[str, int]]") -> in
 
 
 def unpack(data: bytes) -> "tuple[dict[str, int], list[dict[str, int]], int]":
-    """(head dict, list of joint dicts, crc32) of an arm record; ArmRecordError where it is not one."""
+    """(head dict, list of joint dicts, crc32) of an arm record; ArmRecordError if it is not one."""
     if len(data) < _HEAD_SIZE + 4:
         raise ArmRecordError("too short")
     values = struct.unpack_from(_HEAD_FORMAT, data, 0)
@@ -156,7 +156,7 @@ def unpack_outputs(data: bytes) -> "tuple[list[dict[str, int]], list[dict[str, i
 
 
 def _size(data: bytes, joints: int) -> int:
-    """Bytes of a whole record that begins so; 0 where it cannot be one."""
+    """Bytes of a whole record that begins so; 0 if it cannot be one."""
     size = _HEAD_SIZE + joints * _JOINT_SIZE + 4
     if data[_VERSION_AT] == VERSION:
         return size

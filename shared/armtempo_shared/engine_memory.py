@@ -63,7 +63,7 @@ def needed_bytes(rates: "list[int]") -> int:
 
 
 def room_words(joints: int, room_bytes: int) -> int:
-    """Words that a room leaves for an engine's memory beside the objects of so many joints."""
+    """Words that a room leaves for an engine's memory beside the objects of that many joints."""
     return min(max((room_bytes - object_bytes(joints)) // 4, 0), LARGEST_WORDS)
 
 
@@ -81,7 +81,7 @@ def blocks(memory_words: int) -> "list[int]":
 
 
 def lasting_ms(rates: "list[int]", memory_words: int) -> int:
-    """How long the rings can last in that many words, one of LASTING_MS; 0 where the engine does not fit."""
+    """How long the rings can last in that many words, one of LASTING_MS; 0 if the engine does not fit."""
     for lasts_ms in LASTING_MS:
         if _find_place(rates, memory_words, lasts_ms):
             return lasts_ms
@@ -89,7 +89,7 @@ def lasting_ms(rates: "list[int]", memory_words: int) -> int:
 
 
 def fits(rates: "list[int]", room_bytes: int) -> bool:
-    """Whether the engine fits into a room of so many bytes."""
+    """Whether the engine fits into a room of that many bytes."""
     return lasting_ms(rates, room_words(len(rates), room_bytes)) > 0
 
 

@@ -15,36 +15,36 @@ _ROWS = (
         "the board has no arm record",
         "run 'armtempo home' with your arm file (--arm), which sends it",
     ),
-    ("arm_mismatch", "the motion was planned for another arm file", "plan it again with this arm"),
-    ("unhomed", "the position is unknown", "bring the arm to its posture and run 'armtempo home'"),
+    ("arm_mismatch", "the motion was planned for a different arm file", "plan it again with this arm"),
+    ("unhomed", "the position is unknown", "move the arm to its home posture and run 'armtempo home'"),
     ("not_found", "no trajectory of this name is stored", "see 'armtempo list'"),
     (
         "bad_name",
-        "the name is empty, too long or has other characters than a-z A-Z 0-9 - _",
+        "the name is empty, too long or has characters other than a-z A-Z 0-9 - _",
         "choose another name",
     ),
     (
         "flash_full",
-        "the flash has no room; what was stored is kept",
+        "the flash is full; stored motions are kept",
         "remove motions that are no longer needed: 'armtempo remove'",
     ),
     ("flash_error", "the flash could not be written or read", "see 'armtempo help recovery'"),
     ("bad_record", "the record is damaged or of an unknown kind", "upload it again"),
     ("bad_offset", "a piece of the upload is out of order", "upload it again"),
     ("bad_checksum", "the upload does not match its checksum", "upload it again"),
-    ("exists", "this name is taken, perhaps in other letter case", "remove or rename the other"),
-    ("wrong_joints", "the motion has another number of joints than the arm", "plan it for this arm"),
+    ("exists", "this name is taken, possibly in different letter case", "remove or rename the other"),
+    ("wrong_joints", "the motion and the arm differ in the number of joints", "plan it for this arm"),
     ("time_order", "the time control points do not increase", "plan it again"),
     ("out_of_range", "the motion leaves the joint's range", "check the via points or the range"),
     (
         "too_fast",
         "a joint is faster than its speed limit, or all together faster than the board can step",
-        "plan it again with this arm file; where that does not help, lower the speed limits in it",
+        "plan it again with this arm file; if that does not help, lower its speed limits",
     ),
     (
         "wrong_start",
-        "the arm does not stand where the motion begins",
-        "bring it there: 'armtempo goto' with the motion's name or file",
+        "the arm is not at the start of the motion",
+        "move it there: 'armtempo goto' with the motion's name or file",
     ),
     (
         "too_long",
@@ -54,7 +54,7 @@ _ROWS = (
     ("too_abrupt", "the motion reverses too fast for the step generator", "lower the limits"),
     (
         "no_session",
-        "the board has started anew, or was never greeted in this session",
+        "the board has restarted, or had no hello in this session",
         "run the command again",
     ),
     (
@@ -65,37 +65,37 @@ _ROWS = (
     (
         "no_memory",
         "the board ran out of memory in this command",
-        "try it again; where that fails, 'armtempo status', and report it with the log",
+        "try again; if that fails, run 'armtempo status' and report it with the log",
     ),
     (
         "failed",
-        "the board program failed in this command; its traceback comes as a notice",
+        "the board program failed in this command; its traceback is sent as a notice",
         "report it with the log",
     ),
     (
         "fixed_speed",
-        "the motion has no time in which its speed may change: it is of an older armtempo",
-        "upload it again; it can be run slower from its start",
+        "the motion was stored by an older armtempo, without the times for changes of speed",
+        "upload it again, or set the speed before it starts",
     ),
     (
         "no_output",
         "the arm on the board has no output of this number",
-        "name the arm's file with --arm, or set the board up for it: 'armtempo configure'",
+        "give the arm's file with --arm, or set the board up for it: 'armtempo configure'",
     ),
     (
         "pin_taken",
-        "an output or input of the arm has a pin or timer that is taken",
+        "an output or input of the arm uses a pin or timer that is already in use",
         "give another pin ('armtempo check' names the arm file's key; 'armtempo help hardware' lists what is free)",
     ),
     ("is_sequence", "this is a sequence, not a motion", "run it with 'armtempo run' and its name"),
     (
         "leg_missing",
-        "the board does not have a motion that the sequence runs, or another one under its name",
+        "a motion of the sequence is missing on the board, or differs from the planned one",
         "upload the sequence again, which uploads its motions too",
     ),
     (
         "leg_elsewhere",
-        "a motion of the sequence begins elsewhere than the one before it ends",
+        "a motion of the sequence does not begin where the previous one ends",
         "plan the sequence again and upload it",
     ),
     (
@@ -115,8 +115,7 @@ _ROWS = (
     ),
     (
         "needs_firmware",
-        "the program as files on MicroPython's own firmware can do one motion at a time, and nothing more; nothing has "
-        "moved",
+        "the program as files on MicroPython's own firmware can only run single motions; nothing has moved",
         "put the program into the firmware: 'armtempo flash'",
     ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
@@ -128,24 +127,24 @@ _ROWS = (
     ),
     (
         "underrun",
-        "the board fell behind with the steps",
+        "the board could not make the steps in time",
         "lower the limits and plan again; the position is known",
     ),
     (
         "internal",
         "the board program failed",
-        "report it with the log; home again where the position is unknown",
+        "report it with the log; home again if the position is unknown",
     ),
     ("watchdog", "the watchdog restarted the board", "home again; report it"),
-    ("link_lost", "the host disappeared during the motion", "check the cable, then 'armtempo clear'"),
+    ("link_lost", "the host did not answer during the motion", "check the cable, then 'armtempo clear'"),
     (
         "input_timeout",
-        "an input did not come in time in a sequence",
+        "an input of a sequence did not change in time",
         "find out why, then 'armtempo clear'",
     ),
     (
         "wrong_steps",
-        "a joint made other steps than the motion's record has: a mistake in the board program",
+        "a joint's steps differ from the motion's record: an error in the board program",
         "'armtempo clear', then home; report it with the log",
     ),
     ("start_failed", "the timers did not start as set up", "power-cycle the board"),
@@ -177,83 +176,85 @@ VALUES: "dict[str, str]" = {
     "no_such_pin": "number of the step in the sequence",
     "no_sequence_room": "bytes that are missing",
 }
-"""What ``value`` of a refusal is, by name; the others have none."""
+"""What ``value`` of a refusal means, by name; the others have none."""
 
 COMMANDS: "dict[str, str]" = {
-    "hello": "Begins a session; `session` is a number that differs between hosts, so that the board knows a "
-    "new one. Refused with `protocol` where the versions differ. Answer: who the board is; `joints` and "
-    "`arm_crc` are 0 without an arm record; `boot` differs after every start of the program; "
-    "`engine_room`: bytes of heap (beside the chip's backup SRAM) that an engine and its objects can have; "
+    "hello": "Begins a session; `session` is a number that differs between hosts, so that the board recognises a "
+    "new one. Refused with `protocol` if the versions differ. Answer: the board's identity; `joints` and `arm_crc` "
+    "are 0 without an arm record; `boot` changes at every start of the program; "
+    "`engine_room`: bytes of heap (without the chip's backup SRAM) available to an engine and its objects; "
     "`features`: what the program can do beyond one motion at a time, 1 sequences, 2 outputs and inputs, "
-    "4 held motions, 8 other speeds; "
-    "`arm_problem`: code of "
-    "what is wrong with the stored arm record, 0 where it is in force or there is none; `arm_value`: its value; the "
+    "4 held motions, 8 other speeds; 128: both rates were measured on this board; "
+    "`arm_problem`: code of the error in the stored arm record, 0 if it is valid or missing; `arm_value`: its "
+    "value; the "
     "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: one bit per joint, its position is known. `run`: number of the "
-    "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which is behind the "
-    "clock where the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
-    "`rate`: the speed that is wanted, in thousandths, 0 in a pause; while nothing moves that of the next start. "
-    "`rest_ms`: in how many milliseconds the arm would rest if it were stopped now, or will after a stop; 0 where "
-    "nothing moves, or where a stop freezes. Tail: per joint commanded steps and encoder counts (two i32).",
+    "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which lags behind "
+    "the clock if the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
+    "`rate`: the requested speed in thousandths, 0 in a pause; while nothing moves, that of the next start. "
+    "`rest_ms`: milliseconds until rest if the arm is stopped now, or after a stop; 0 if nothing moves, or if a "
+    "stop freezes. Tail: per joint commanded steps and encoder counts (two i32).",
     "put_begin": "Begins an upload of `size` bytes; the tail is the trajectory's name, or `/arm` for the arm "
-    "record. `crc` is the record's own checksum, its last four bytes. An upload under way is given up.",
-    "put_data": "The bytes from `offset` on; pieces may overlap what came before but leave no hole. Answer: "
-    "the offset that comes next.",
-    "put_commit": "All bytes are there: the record is read back from the flash, checked against `crc` and "
-    "for being whole, and takes the place of the old one. An arm record whose engine would not fit is refused "
-    "before that (`no_room`), and the old one stays in force; else it takes effect at once.",
-    "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` behind "
-    "the last. A damaged one has `crc`, `duration` and `joints` 0. `sequence` 1: it is a sequence, whose `duration` "
+    "record. `crc` is the record's own checksum, its last four bytes. An unfinished upload is discarded.",
+    "put_data": "The bytes from `offset` on; pieces may overlap earlier ones but must leave no gap. Answer: the "
+    "next offset.",
+    "put_commit": "Ends the upload: the record is read back from the flash, checked against `crc` and for "
+    "completeness, and replaces the old one. An arm record whose engine would not fit is refused before that "
+    "(`no_room`), and the old one remains valid; otherwise it takes effect at once.",
+    "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` after the "
+    "last. A damaged one has `crc`, `duration` and `joints` 0. `sequence` 1: it is a sequence, whose `duration` "
     "and `joints` are 0. Tail of the answer: its name.",
-    "sequence": "Where the sequence stands, or where the last one ended. Unknown to a board on which none has been "
-    "started. `ending`: 1 it runs, 2 finished, 3 stopped, 4 an input did not come and the sequence was to stop then, "
-    "5 a fault, 6 a leg was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the "
+    "sequence": "State of the running sequence, or of the last one. Unknown to a board on which none has been "
+    "started. `ending`: 1 running, 2 finished, 3 stopped, 4 stopped by the time-out of an input, 5 a fault, 6 a "
+    "motion was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the "
     "record; `cycle`: finished passes of its outermost repeats. Tail: its name.",
     "counter": "Counter `index` (from 0) of the `count` that the sequence has, or that the last one had: its `value`, "
-    "0 behind the last. They begin at 0 with each start. Unknown as `sequence` is. Tail: its name.",
+    "0 after the last. Each start sets them to 0. Unknown as `sequence` is. Tail: its name.",
     "remove": "Removes the trajectory of that name.",
     "rename": "The tail is the old name (`old_length` bytes), then the new one. The default goes with it.",
     "get": "Up to `length` bytes of a stored record (`/arm`: the arm record) from `offset` on.",
     "set_default": "What the button starts; an empty name for nothing.",
-    "home": "The joints of the mask `joints` stand at these steps; the tail has an i32 for every joint.",
+    "home": "Sets the positions of the joints of the mask `joints` to these steps; the tail has an i32 for every "
+    "joint.",
     "start": "Starts a stored trajectory whose checksum is `crc`. `flags` 1: a limit switch ends it without "
-    "a fault; 2: it is held, and brakes without a fault when no `hold` came for 300 ms. Answer: number of the run and "
+    "a fault; 2: it is held, and brakes without a fault when no `hold` arrives for 300 ms. Answer: number of the "
+    "run and "
     "its length in ticks. Or starts a sequence, each of whose motions is a run of its own; then the answer has the "
     "number of the last run and 0.",
     "stop": "`now` 0: brake along the path (freeze where the motion has no brake times); 1: freeze.",
-    "speed": "Lets the motion's own time go on at `rate` thousandths of its planned rate (10 to 1000), along the same "
-    "path; 0: pause, 65535: as before the pause. Refused with `fixed_speed`, or with `too_long` where the run would "
-    "last longer than 1 h 49 min. While nothing moves: the rate of this session's next start.",
+    "speed": "Sets the rate of the motion's own time in thousandths (10 to 1000), along the same path; 0: pause, "
+    "65535: the rate before the pause. Refused with `fixed_speed`, or with `too_long` if the run would last longer "
+    "than 1 h 49 min. While nothing moves: the rate of this session's next start.",
     "clear": "Clears the fault; refused with `fault_pending` while its cause is still there.",
-    "output": "Sets output `number` of the arm record (from 0) to `value`: 0 to 65535 are its whole range. Also while "
-    "a motion runs. Refused with `fault_pending` while a fault keeps it in its safe state. This and `inputs` are "
-    "unknown to a board whose arm has neither outputs nor inputs.",
-    "inputs": "Answer: `levels` has a bit for each input of the arm record, set where it is active; the tail has "
-    "an u16 for each output, the value that it has. Also while a motion runs.",
-    "leave": "Ends the program; the port becomes MicroPython's prompt.",
-    "hold": "A motion that was started with flag 2 is still wanted; the host says so several times a second.",
-    "drivers": "`on` 0: the motors' current is off, and all positions are unknown; the encoders are followed. 1: it is "
-    "on again, as it is with the next motion. Refused with `fault_pending`, and while something moves.",
-    "samples": "All samples before `acknowledged` have arrived and may go; those from there on, `wanted` of "
-    "them, are to be sent again. Answer: the oldest kept and how many are kept.",
+    "output": "Sets output `number` of the arm record (from 0) to `value`: 0 to 65535 cover its whole range. Also "
+    "while a motion runs. Refused with `fault_pending` while a fault keeps it in its safe state. This command and "
+    "`inputs` are unknown to a board whose arm has neither outputs nor inputs.",
+    "inputs": "Answer: `levels` has one bit per input of the arm record, set if it is active; the tail has a u16 "
+    "per output, its value. Also while a motion runs.",
+    "leave": "Ends the program; MicroPython's prompt is on the port then.",
+    "hold": "Keeps a motion going that was started with flag 2; the host sends it several times a second.",
+    "drivers": "`on` 0: switches the motors' current off; all positions become unknown, the encoders are still "
+    "read. 1: on again, as at the start of the next motion. Refused with `fault_pending`, and while something moves.",
+    "samples": "Acknowledges all samples before `acknowledged`, which the board may drop, and asks for `wanted` "
+    "samples from there on again. Answer: the oldest stored sample and their number.",
 }
 """What each command does and what its answer says."""
 EVENTS: "dict[str, str]" = {
     "sample": "One sample of run `run`, `index` counting from 0. `ticks`: motion clock, `path`: the motion's own "
     "time. `flags` 1: taken while braking. Tail: per joint commanded steps and encoder counts (two i32).",
-    "done": "The run ended without a fault, at its end or after a stop; sent behind its last sample. "
-    "`lost`: samples that gave way before they were acknowledged. Tail as in `sample`.",
-    "fault": "Something went wrong; no step comes any more. `code` from the table below, `joint` 255 where "
-    "it is about none. Tail as in `sample`.",
+    "done": "The run ended without a fault, at its end or after a stop; sent after its last sample. `lost`: samples "
+    "that were overwritten before they were acknowledged. Tail as in `sample`.",
+    "fault": "A fault: no more steps are made. `code` from the table below, `joint` 255 if it concerns no joint. "
+    "Tail as in `sample`.",
     "row": "A row of the sequence has begun, the `passed`-th since its start: `row`, `step` and `cycle` as in "
-    "`sequence`, `run`: the number of the last run that it started, that of this row where it is a motion; `value` of "
-    "the counter where the row counts, else 0. Where the link has no room until the next row it is not sent.",
-    "notice": "Words, such as the traceback behind an `internal` fault; they begin with `button:` where the board's "
+    "`sequence`, `run`: the number of the last run that it started, that of this row if it is a motion; `value` of "
+    "the counter if the row counts, else 0. It is dropped if the link has no room before the next row.",
+    "notice": "Text, such as the traceback after an `internal` fault; it begins with `button:` if the board's "
     "button was pressed and could start nothing, as while an arm is guided by hand.",
-    "ok": "The command was carried out; behind its number the answer's fields.",
-    "error": "The command was refused, nothing was changed (behind `failed` and `no_memory` look at `status`). "
-    "`code` from the table below, `joint` 255 where it is about none, `value` as the code says.",
+    "ok": "The command was carried out; its number is followed by the answer's fields.",
+    "error": "The command was refused, nothing was changed (after `failed` and `no_memory` check `status`). `code` "
+    "from the table below, `joint` 255 if it concerns no joint, `value` as the code says.",
 }
 """What each event and reply says."""
 BUTTON_NOTICE = "button:"
-"""How a notice begins that tells of a press of the board's button."""
+"""Beginning of the notice about a press of the board's button."""

@@ -26,6 +26,8 @@ START_HELD = 2  # flag of start: the motion brakes unless the host says hold aga
 
 FEATURES = ("sequences", "outputs", "jog", "speed")
 """What a program may be able to do beyond one motion at a time; bits of ``features`` in the answer to hello."""
+RATES_MEASURED = 1 << 7
+"""The same: the step rates that hello states were measured by a self-test on this board, else they are estimated."""
 UNCONFIGURED, UNHOMED, IDLE, MOVING, BRAKING, FAULT = 0, 1, 2, 3, 4, 5
 STATES = ("unconfigured", "unhomed", "idle", "moving", "braking", "fault")
 """Names of the states by their number."""

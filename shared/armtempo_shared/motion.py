@@ -94,7 +94,7 @@ def pack(
 class MotionHead:
     """What the head of a motion record says; ``length``: bytes of the whole record.
 
-    Raises MotionError where the record is cut or of an unknown kind. Who subclasses it checks the checksum, and gives
+    Raises MotionError if the record is cut or of an unknown kind. Who subclasses it checks the checksum, and gives
     the control points in ``stream``.
     """
 
@@ -161,7 +161,7 @@ class MotionHead:
 class Motion(MotionHead):
     """A checked view of a motion record in memory; copies nothing but the header.
 
-    Raises MotionError where the record is cut, damaged or of an unknown kind. It does not check the
+    Raises MotionError if the record is cut, damaged or of an unknown kind. It does not check the
     motion itself (ranges, rates, order of times): the board does before a start.
     """
 

@@ -94,7 +94,7 @@ def pack(
 class SequenceRecord:
     """What a record of ``length`` bytes says; who subclasses it gives the bytes in ``part``, and checks the checksum.
 
-    Raises SequenceError where the record is cut or of an unknown kind, OtherVersionError where it is of another
+    Raises SequenceError if the record is cut or of an unknown kind, OtherVersionError if it is of another
     version. What its rows say is judged by ``sequence_check.check``.
     """
 

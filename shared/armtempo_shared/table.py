@@ -11,6 +11,10 @@ where the rest of the payload is such a tail. A line that begins with a blank co
 
 from struct import calcsize
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 _TABLE = """\
 C hello 01 protocol:B session:I
 C status 02
@@ -71,17 +75,15 @@ R error 7f command:B code:B joint:B value:q
 """
 
 
-def rows(kind: str) -> "list[tuple[str, int, str, list[str], str]]":
+def rows(kind: str) -> "Iterator[tuple[str, int, str, list[str], str]]":
     """(name, number, struct format, field names, tail) of each row of a kind, in their order."""
-    found = []
     for line in _TABLE.replace("\n ", " ").split("\n"):
         if line[:1] == kind:
             words = line.split()
             tail = words.pop() if words[-1] in ("text", "bytes") else ""
             fields = [word.split(":") for word in words[3:]]
             layout = "<" + "".join([field[1] for field in fields])
-            found.append((words[1], int(words[2], 16), layout, [field[0] for field in fields], tail))
-    return found
+            yield words[1], int(words[2], 16), layout, [field[0] for field in fields], tail
 
 
 def offset(kind: str, name: str, field: str) -> int:

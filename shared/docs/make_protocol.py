@@ -59,10 +59,10 @@ def _figures() -> str:
 
 
 def _commands() -> str:
-    answers = {row[0]: row for row in rows("A") + rows("P") + rows("T")}
+    answers = {row[0]: row for row in [*rows("A"), *rows("P"), *rows("T")]}
     lines = [
         (f"`{row[0]}`", f"0x{row[1]:02X}", _fields(row), _fields(answers[row[0]]), meanings.COMMANDS[row[0]])
-        for row in rows("C") + rows("O") + rows("S")
+        for row in [*rows("C"), *rows("O"), *rows("S")]
     ]
     return _table(("command", "id", "fields", "answer", "meaning"), *lines)
 
@@ -70,7 +70,7 @@ def _commands() -> str:
 def _events() -> str:
     lines = [
         (f"`{row[0]}`", f"0x{row[1]:02X}", _fields(row), meanings.EVENTS[row[0]])
-        for row in rows("E") + rows("R")
+        for row in [*rows("E"), *rows("R")]
     ]
     return _table(("message", "id", "fields", "meaning"), *lines)
 

@@ -1,4 +1,4 @@
-"""Free paths beside an independent reference: direct collocation by casadi and ipopt, of the same jobs.
+"""Free paths compared with an independent reference: direct collocation by casadi and ipopt, of the same jobs.
 
     pip install --group bench
     python -m tests.benchmark.collocation [--jobs 5] [--pieces 40] [--feeding]

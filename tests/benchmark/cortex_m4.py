@@ -117,7 +117,7 @@ class Count:
             assert parts == self._parts
 
     def walk(self, record: bytes, joint: int, skip: int, steps: int, batch: int = 512) -> dict[str, float]:
-        """Instructions per step of ``steps`` steps behind the first ``skip``, in batches of entries."""
+        """Instructions per step of ``steps`` steps after the first ``skip``, in batches of entries."""
         motion = Motion(record)
         subject = step_generator.StepGenerator(Arrays())
         ring = array("I", bytes(4100))

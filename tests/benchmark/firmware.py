@@ -2,7 +2,7 @@
 
     python -m tests.benchmark.firmware MICROPYTHON [ARM.toml]
 
-MICROPYTHON: sources with what board/docs/firmware.md says beside them. The firmware of the STM32F4DISC is built
+MICROPYTHON: sources with what board/docs/firmware.md says next to them. The firmware of the STM32F4DISC is built
 twice, without the program and with it, and run by QEMU (7.2 or newer). Changed for that are: no clock is set up, the
 REPL is on a UART, and the heap can be made smaller to find out how much is needed. The file system lies where the
 chip's does and is as large, with MicroPython's own files in it; the emulator cannot write it. Timers, DMA and pins are

@@ -3,10 +3,10 @@
     python -m tests.benchmark.firmware_run MICROPYTHON [FOLDER]
 
 MICROPYTHON: a checkout as ``armtempo firmware`` takes it. That command builds the firmware with the program; one
-without is built beside it, and gets the compiled files that ``armtempo deploy`` copies. QEMU (7.2 or newer) runs each;
+without is built next to it, and gets the compiled files that ``armtempo deploy`` copies. QEMU (7.2 or newer) runs each;
 the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board. What stands
 in for timers, DMA, USB, encoders and backup SRAM (loop_board.c, firmware_loop.py, firmware_host.py of
-tests/board/scripts) is a part of both firmwares, so that it takes little of the heap; what it takes is given beside
+tests/board/scripts) is a part of both firmwares, so that it takes little of the heap; what it takes is given next to
 the chip's. FOLDER keeps what was built.
 """
 
@@ -181,7 +181,7 @@ def unwatched(arm: Arm) -> Arm:
 
 
 def run(elf: Path, image: Path) -> dict[str, Heap]:
-    """Drive a board through the shipped motion by the host's own link; AssertionError where it does not end well."""
+    """Drive a board through the shipped motion by the host's own link; AssertionError if it does not end well."""
     arm = unwatched(Arm.paper())
     plan = planner.plan(arm, replace(Job.paper(arm), population=5, iterations=20))
     with running(elf, image) as (port, said), tempfile.TemporaryDirectory() as runs:

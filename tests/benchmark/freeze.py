@@ -4,7 +4,7 @@
 
 MICROPYTHON as for tests/benchmark/firmware.py. MicroPython's own firmware for the chip, with the program's files, is
 run by QEMU, which counts instructions: from the moment at which the interrupt is pending, all that the firmware does
-before and behind the program's callback included. ``store`` puts the figures into freeze.json; a test holds them, and
+before and after the program's callback included. ``store`` puts the figures into freeze.json; a test holds them, and
 the callback's own instructions on an emulated core, against the program.
 """
 

@@ -5,7 +5,7 @@
 For arms that ship: forward kinematics by plain matrix products, scipy's B-splines and rotations, 40 samples a segment.
 Looks for places beyond the tolerance of a line, tools that are too fast, limits exceeded, rests missing. A job that is
 refused is followed in small steps: where that reaches the end within the ranges, it counts as refused wrongly. Prints
-each fault with its seed, and a summary; exits with 1 where a plan is at fault.
+each fault with its seed, and a summary; exits with 1 if a plan is at fault.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ def ways_of(plan: Plan) -> dict[int, Way]:
 
 
 def line_faults(plan: Plan) -> list[str]:
-    """What is wrong with the lines of a plan; empty where nothing is."""
+    """What is wrong with the lines of a plan; empty if nothing is."""
     found = []
     joints = [sampled(spline) for spline in plan.trajectory.joints]
     poses = tool_poses(plan.arm, np.stack([joint.angle_deg for joint in joints], axis=1))

@@ -5,7 +5,7 @@
 MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
 back to too late runs dry as on the chip. What stands in for timers, DMA, USB, encoders, backup SRAM: loop_board.c and
-tests/board/scripts/benchmarks/firmware_loop.py. With ``files`` behind it only the costs of a turn, with the program in
+tests/board/scripts/benchmarks/firmware_loop.py. With ``files`` after it only the costs of a turn, with the program in
 files; only what stands around it is built in, as its heap is not the program's.
 """
 
@@ -59,7 +59,7 @@ include("$(PORT_DIR)/boards/manifest.py")
 module("firmware_loop.py", base_path="{}", opt=3)
 """
 OWN = 6_000
-"""Bytes of heap for what stands in for hardware, given beside the chip's: the stack does not need them."""
+"""Bytes of heap for what stands in for hardware, given next to the chip's: the stack does not need them."""
 COMMANDS = 60  # status and samples in turn, one every 50 ms
 IN_FIRMWARE = {
     "engine": "armtempo_board.motion.engine",
@@ -205,7 +205,7 @@ def _lift_limits(folder: Path) -> None:
     lifted = 0
     for path in folder.rglob("*.py"):
         text = path.read_text()
-        for limit in ("MAX_STEP_RATE", "MAX_STEP_RATE_SUM", MAX_STEP_RATE, MAX_STEP_RATE_SUM):
+        for limit in ("step_rates.one", "step_rates.together", MAX_STEP_RATE, MAX_STEP_RATE_SUM):
             lifted += text.count(f"{limit} + {limit} // 100")
             text = text.replace(f"{limit} + {limit} // 100", "10_000_000")
         path.write_text(text)
@@ -276,7 +276,7 @@ def _read(said: str, scale: float) -> Run:
     for _, number, payload in iter(parser.next, None):
         name, *_ = entry = wire.EVENT_BY_ID[number]
         values, _ = wire.decode(entry, payload)
-        if name == "notice":  # of an exception in the program, behind the fault
+        if name == "notice":  # of an exception in the program, after the fault
             print(payload.decode())
         elif name == "done":
             ends.append(Run(turns[1:-1], 0, values[1] / TICK_HZ))

@@ -12,7 +12,8 @@ size_t *allocated;
 mp_obj_t at_compare;
 mp_obj_t at_feed;
 unsigned looks_per_ms = 1, feed_ticks;
-static uint32_t fed, feeding, vectors[128] __attribute__((aligned(512)));
+static uint32_t fed, feeding;
+static uint32_t (*const vectors)[128] = (void *)0x2002EE00;  // beyond the chip's memory, whose heap is the program's
 
 void SysTick_Handler(void);
 
@@ -56,9 +57,9 @@ static void look(void) {
 
 void SystemClock_Config(void) {
     allocated = &MP_STATE_MEM(gc_alloc_amount);
-    memcpy(vectors, (void *)SCB->VTOR, sizeof(vectors));
-    vectors[16 + TIM6_DAC_IRQn] = (uint32_t)feed;
+    memcpy(*vectors, (void *)SCB->VTOR, sizeof(*vectors));
+    (*vectors)[16 + TIM6_DAC_IRQn] = (uint32_t)feed;
     NVIC_EnableIRQ(TIM6_DAC_IRQn);
-    vectors[15] = (uint32_t)look;
+    (*vectors)[15] = (uint32_t)look;
     SCB->VTOR = (uint32_t)vectors;
 }

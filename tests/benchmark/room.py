@@ -1,4 +1,4 @@
-"""The heap beside every arm on MicroPython's own STM32F407 firmware: the tables of board/docs/memory.md.
+"""The heap that every arm leaves on MicroPython's own STM32F407 firmware: the tables of board/docs/memory.md.
 
     python -m tests.benchmark.room MICROPYTHON [CHANGES]
 
@@ -38,7 +38,7 @@ _BLOCK = 512
 _MOST_ARMS = 10  # whose frames the emulated flash has room for; more come from sending them again
 _PIECE = 200
 OWN = 2_400
-"""Bytes of heap for what this benchmark itself has in it, given beside the chip's: the stack does not need them."""
+"""Bytes of heap for what this benchmark itself has in it, given next to the chip's: the stack does not need them."""
 _DISK_BLOCKS = firmware.FLASH_BLOCKS
 USUAL = 'include("$(PORT_DIR)/boards/manifest.py")\n'
 _SEMIHOSTING = ("-semihosting-config", "enable=on,target=native")
@@ -95,7 +95,7 @@ class Session:
 
 
 def arm_record(rates: list[int]) -> bytes:
-    """An arm of so many joints; encoders and switches stand still in the emulator."""
+    """An arm of that many joints; encoders and switches stand still in the emulator."""
     rows = [row(channel=n, max_rate=rate, counts_num=0, counts_den=1) for n, rate in enumerate(rates)]
     return armrecord.pack({**HEAD, "identity": 1}, rows)
 
@@ -208,7 +208,7 @@ def table(elf: Path, with_library: bool) -> None:
 
 
 def blocks(with_library: bool) -> None:
-    """Print the blocks of the flash that are in use beside MicroPython's own after each stage."""
+    """Print the blocks of the flash that are in use in addition to MicroPython's own after each stage."""
     files = {**program_files.start_files(), **(program_files.library(STM32F4) if with_library else {})}
     folders = 1 + with_library
     sizes = {"deployed": [len(data) for data in files.values()], "the largest motion": [MAX_MOTION_BYTES]}
@@ -219,7 +219,7 @@ def blocks(with_library: bool) -> None:
 
 
 def changes(elf: Path, with_library: bool, count: int, seed: int = 12) -> None:
-    """Print what is left after so many random arms."""
+    """Print what is left after that many random arms."""
     rng = random.Random(seed)
     session = Session(rounds=-(-count // _MOST_ARMS))
     session.command("hello", (wire.PROTOCOL_VERSION, 1))

@@ -1,4 +1,4 @@
-"""Random motions in random rooms, held against dense samples by code of its own.
+"""Random motions in random rooms, checked against dense samples by code of its own.
 
     python -m tests.benchmark.rooms [--first 0] [--count 1000]
 
@@ -50,7 +50,7 @@ def random_room(seed: int) -> tuple[Arm, Trajectory]:
 
 
 def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
-    """Least distance of the links from the boxes at so many times, less the radius."""
+    """Least distance of the links from the boxes at this many times, less the radius."""
     driven = trajectory(np.linspace(0.0, trajectory.duration_s, count))
     angles = np.tile([joint.home_deg for joint in arm.joints], (count, 1)).astype(float)
     angles[:, list(arm.driven_indices)] = driven

@@ -276,7 +276,7 @@ def _raw_code(reader: _Reader) -> _Code:
 
 
 def ring_state(isr: Mapping[str, int], room: int, ring: array[int], queue: array[int]) -> array[int]:
-    """The words by which ``emit`` finds a ring with room for so many entries, and its queue, ``beside`` it.
+    """The words by which ``emit`` finds a ring with room for that many entries, and its queue, ``beside`` it.
 
     ``isr``: what isr.py names. The ring has a word more than entries.
     """

@@ -42,9 +42,7 @@ def measure() -> dict[str, int]:
             (folder / path).write_bytes(data)
         write_session(folder, Arm.paper())
         machine_code = sum(map(machine_code_bytes, library.values()))
-        at_start = sum(
-            machine_code_bytes(library[f"lib/armtempo_board/{name}.mpy"]) for name in ("first", "core")
-        )
+        at_start = machine_code_bytes(library["lib/armtempo_board/core.mpy"])
         lines = _run(folder, HEAP - at_start).splitlines()
         assert accepted((folder / "answers").read_bytes()) == len(SESSION)
     found = {stage: int(value) for stage, value in (line.rsplit(maxsplit=1) for line in lines)}

@@ -56,7 +56,7 @@ def test_the_loop_allocates_nothing_while_moving(name: str, tmp_path: Path) -> N
 
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "fuzz.py"
-FRAMES = {"cpython": 100_000, "micropython": 50_000, "micropython-arm": 10_000}
+FRAMES = {"cpython": 100_000, "micropython": 50_000, "micropython-arm": 4_000}
 SEED = 20261121
 
 

@@ -61,7 +61,7 @@ def board(records: dict[int, bytes]) -> Iterator[Modules]:
 
 
 def put_node(board: Modules, solver: array[int], node: int, ticks: float, slope: float) -> None:
-    """A node at a time, with so many ticks per step."""
+    """A node at a time, with that many ticks per step."""
     fraction, power = frexp(slope)
     solver[node + board.newton.NODE_TIME] = round(ticks * (1 << TIME_SCALE))
     solver[node + board.newton.NODE_MANTISSA] = round(fraction * (1 << MANTISSA_BITS))

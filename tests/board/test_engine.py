@@ -21,7 +21,10 @@ def test_case(case: scripted.Case) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("micropython" not in interpreters.AVAILABLE, reason="needs MicroPython")
+@pytest.mark.skipif(
+    "micropython" not in interpreters.AVAILABLE,
+    reason="no MicroPython here: CI ends at the start, and the summary says so",
+)
 def test_more_changes_of_speed() -> None:
     """Where it is quickest, on more motions; the other interpreters have a few of them above."""
     named = ["case_stops", "case_whole_path"]
@@ -47,6 +50,6 @@ def test_nothing_is_allocated_while_a_motion_runs(name: str) -> None:
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "memory.py"
 
 
-@scripted.each(scripted.cases(SCRIPT))
+@scripted.each(scripted.together(scripted.cases(SCRIPT)))
 def test_case_of_engine_memory(case: scripted.Case) -> None:
     case.run()

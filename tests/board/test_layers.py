@@ -65,7 +65,7 @@ def test_packages_import_those_below(module: str) -> None:
 
 def test_no_module_imports_its_user() -> None:
     graph = {module: imported(path) for module, path in FILES.items()}
-    order = list(TopologicalSorter(graph).static_order())  # CycleError where there is a cycle
+    order = list(TopologicalSorter(graph).static_order())  # CycleError if there is a cycle
     assert len(order) == len(FILES) > 30
     assert order.index("app.controller") < order.index("app.commands") < order.index("app.app")
 

@@ -21,7 +21,7 @@ from tests import interpreters, scripted
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "store_cuts.py"
 
 
-@scripted.each(scripted.cases(SCRIPT))
+@scripted.each(scripted.together(scripted.cases(SCRIPT)))
 def test_old_or_new_after_a_failure_at_every_change(case: scripted.Case) -> None:
     case.run(heap="")
 

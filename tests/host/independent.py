@@ -46,7 +46,7 @@ def _bspline(points: np.ndarray, degree: int, step: float) -> BSpline:
 
 
 def faults(plan: Plan, at_via_deg: float = 1e-7, points: int = POINTS) -> list[str]:
-    """What is wrong with a plan; empty where nothing is. Poses with a tolerance are not looked at."""
+    """What is wrong with a plan; empty if nothing is. Poses with a tolerance are not checked."""
     found = []
     shared = plan.trajectory.shared
     for number, (joint, spline) in enumerate(zip(plan.arm.driven, plan.trajectory.joints, strict=True)):

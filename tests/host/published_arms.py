@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from armtempo.kinematics import Geometry, Ranges
+from armtempo.kinematics import Geometry, Ranges, forward
+from armtempo.kinematics.shape import Shape
 from armtempo.model.arm import Arm
 
-FOLDER = Path(__file__).parents[1] / "data" / "arms"
-FILES = sorted(FOLDER.glob("*.toml"))
+FILE = Path(__file__).parents[1] / "data" / "arms.toml"
 PAPER = Geometry.of(Arm.paper())
 PAPER_FULL_SIZE = Geometry(
     tuple(5 * length / 10 for length in PAPER.d),
@@ -21,9 +22,7 @@ PAPER_FULL_SIZE = Geometry(
 """Table 1: five times the experimental arm, in cm."""
 
 
-def read(path: Path) -> tuple[Geometry, Ranges]:
-    """A published arm."""
-    arm = tomllib.loads(path.read_text())
+def _read(arm: dict[str, Any]) -> tuple[Geometry, Ranges]:
     assert arm["source"]
     low, high = np.radians(arm["range_deg"]).T
     geometry = Geometry(
@@ -44,7 +43,8 @@ def drawn(rng: np.random.Generator) -> Geometry:
     return Geometry(tuple(d), tuple(a), tuple(np.radians(alpha)), tuple(rng.uniform(-np.pi, np.pi, 6)))
 
 
-NAMED = {"paper": PAPER, **{path.stem: read(path)[0] for path in FILES}}
+PUBLISHED = {name: _read(arm) for name, arm in tomllib.loads(FILE.read_text()).items()}
+NAMED = {"paper": PAPER, **{name: geometry for name, (geometry, _) in PUBLISHED.items()}}
 EQ_16 = np.array([[0, 0, -1, -268.202], [0, 1, 0, 0], [1, 0, 0, 217.349], [0, 0, 0, 1]])
 TABLE_2 = (
     (180.0, -38.0, -52.0, 0.0, 0.0, 0.0),
@@ -56,3 +56,25 @@ TABLE_2 = (
     (0.0, 168.3, 14.4, 0.0, 267.3, 180.0),
     (0.0, 168.3, 14.4, 180.0, 92.8, 0.0),
 )
+
+
+SHAPE = Shape.of(PAPER)
+
+
+def worst_error(geometry: Geometry, angles: np.ndarray, poses: np.ndarray) -> float:
+    """Largest element of forward(angles) - pose, lengths relative to the reach; NaN postures left out."""
+    difference = np.abs(forward(geometry, angles) - poses[:, None])
+    difference[..., :3, 3] /= geometry.reach
+    return float(np.nanmax(difference))
+
+
+def turned(difference: np.ndarray) -> np.ndarray:
+    """Size of an angle, whole turns taken off."""
+    return np.abs(np.remainder(difference + np.pi, 2 * np.pi) - np.pi)
+
+
+def with_wrist_at(planar: float, up: float, turn: float = 0.0) -> np.ndarray:
+    """A pose of the paper's arm with its wrist centre there and the tool pointing up."""
+    pose = np.eye(4)
+    pose[:3, 3] = planar * np.cos(turn), planar * np.sin(turn), SHAPE.height + up + 40.0
+    return pose

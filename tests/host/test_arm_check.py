@@ -166,7 +166,7 @@ FOUND = [
             ("home_deg = -60.0", "home_deg = -60\nswitches = { high = 1, high_deg = 12 }"),
         ],
         "error",
-        "switches: input 1 is to trip at low and at high level",
+        "switches: input 1 is set to trip both at low and at high level",
     ),
     (
         "switches crossed",
@@ -216,7 +216,7 @@ FOUND = [
         "note",
         "ranges: from home, the arm goes below its base plane with joint 2 at 10 (271 mm)",
     ),
-    ("ends meet", [], "note", "ranges: from home, links meet each other with"),
+    ("ends meet", [], "note", "ranges: from home, links collide with"),
     (
         "a wide range",
         [("-10.0, 190.0", "-190.0, 190.0")],
@@ -418,4 +418,4 @@ def test_what_looks_wrong_about_a_job(tmp_path: Path, via: str, level: str, said
 def test_a_job_is_not_looked_at_before_its_arm_is_right(tmp_path: Path) -> None:
     path = changed(tmp_path, ("channel = 2, steps", "channel = 1, steps"))
     _, found = check(path, changed_job(tmp_path))
-    assert found[-1].what == "not looked at"
+    assert found[-1].what == "not checked"

@@ -23,7 +23,7 @@ def changed_excess(
 ) -> Array:
     """Largest speed, and acceleration or jerk, over their limits as the rate goes from one to the other: (starts, 2).
 
-    By differences of the stretched motion; behind its end it rests, so differences there do not count.
+    By differences of the stretched motion; after its end it rests, so differences there do not count.
     """
     before, after = rate
     x = np.linspace(0.0, 1.0, 151)
@@ -74,7 +74,7 @@ def test_braking_near_an_end_is_quick() -> None:
 
 
 def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
-    """In a motion of 0.7 s, where it matters how far the motion goes on meanwhile."""
+    """In a motion of 0.7 s, where it matters how far the motion continues meanwhile."""
     arm = Arm.paper()
     motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [1.0, -60.0, 40.0], arm)
     limits = [joint.limits for joint in arm.driven]

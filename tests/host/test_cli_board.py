@@ -87,8 +87,8 @@ def test_store_commands(run: Run, file: str) -> None:
     run("remove", "small-2")
     assert "small" not in run("list").output
     assert "no trajectory of this name" in run("remove", "small", code=1).output
-    assert "is no name for the board" in run("upload", file, "--name", "a b", code=2).output
-    assert "'a b' is no name for a motion on the board" in run("rename", "x", "a b", code=2).output
+    assert "is not a valid name on the board" in run("upload", file, "--name", "a b", code=2).output
+    assert "'a b' is not a valid name of a motion on the board" in run("rename", "x", "a b", code=2).output
 
 
 @pytest.mark.slow
@@ -172,13 +172,13 @@ def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> No
     other.write_text(shipped.arm_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
     run("home")
     refused = run("home", "--arm", str(other), code=1).output
-    assert "set up for another arm" in refused
+    assert "set up for a different arm" in refused
     assert "driver timing" in refused
     assert "armtempo configure" in refused
     assert "idle" in run("status").output
     run("home", "--arm", str(other), "--replace-arm")
-    assert "set up for another arm" in run("home", code=1).output
-    assert "planned for another arm" in run("run", file, "--arm", str(other), code=2).output
+    assert "set up for a different arm" in run("home", code=1).output
+    assert "planned for a different arm" in run("run", file, "--arm", str(other), code=2).output
 
 
 @pytest.mark.slow
@@ -213,7 +213,7 @@ def test_a_typing_error_names_the_file_that_is_meant(run: Run, tmp_path: Path) -
     (tmp_path / "first.json").write_text("{}", encoding="utf-8")
     for wrong in ("first.jsn", "firts.json"):
         said = run("run", wrong, code=2).output
-        assert f"{wrong}: there is no such file; did you mean 'first.json'?" in said
+        assert f"{wrong}: no such file; did you mean 'first.json'?" in said
 
 
 def test_angles_without_commas_are_shown_with_them(run: Run) -> None:

@@ -8,12 +8,12 @@ import sys
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from armtempo.deploy import program_files
 from armtempo.deploy.compact import Compact, compact
-from armtempo.deploy.compact.halve import halve
-from armtempo.deploy.compact.scopes import top_names
+from armtempo_shared import table
 
 pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
 
@@ -336,9 +336,6 @@ def test_packages_that_cannot_go_are_told(more: dict[str, str], words: str) -> N
         compact(PACKAGES | more, "made.inner.main", {"made.inner.main"}, {"run"})
 
 
-SEVEN = 7
-
-
 @pytest.mark.slow
 def test_the_board_program_is_mostly_one_module() -> None:
     made = program_files.compact_program()
@@ -348,70 +345,20 @@ def test_the_board_program_is_mostly_one_module() -> None:
     core = made.sources["armtempo_board.core"]
     assert "armtempo_board.program" in made.sources
     assert "armtempo_board.store" in made.sources
-    first = made.sources["armtempo_board.first"]
-    assert (
-        len(core) + len(first) > sum(len(text) for text in made.sources.values()) / 2.5
-    )  # the rest comes and goes
+    assert len(core) > sum(map(len, made.sources.values())) / 2.5  # the rest comes and goes
 
 
-def test_a_large_module_becomes_two(run) -> None:  # type: ignore[no-untyped-def]
-    """What the second and other modules ask of the first is there."""
-    steps = "".join(
-        f"def step_{n}(value):\n    return step_{n - 1}(value) + time()\n\n" for n in range(1, 120)
-    )
-    sources = {
-        "made": "",
-        "made.main": f"from made import steps\n\n\ndef run():\n    return steps.step_119({SEVEN})\n",
-        "made.steps": f"def time():\n    return 0\n\n\ndef step_0(value):\n    return value\n\n\n{steps}",
-    }
-    made = compact(sources, "made.main", {"made.main"}, {"run"})
-    assert {"made.core", "made.first"} <= made.sources.keys()
-    sizes = [made.sources[f"made.{name}"].count("def ") for name in ("first", "core")]
-    assert min(sizes) > 20, sizes
-    assert run(made.sources, "run()") == SEVEN
-
-
-def _tops(text: str) -> set[str]:
-    """What a module defines by itself."""
-    return top_names(ast.parse(text))
-
-
-def _read(text: str) -> set[str]:
-    return {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
-
-
-@pytest.mark.slow
-def test_the_first_part_mentions_nothing_of_the_second() -> None:
-    """It is carried out before: a name of the second would not be there."""
-    made = program_files.compact_program().sources
-    first, core = made["armtempo_board.first"], made["armtempo_board.core"]
-    assert len(_tops(first)) > 20
-    assert not _read(first) & _tops(core)
-    assert "core" not in _read(first)
-    imports = [node for node in ast.walk(ast.parse(first)) if isinstance(node, ast.ImportFrom)]
-    assert "core" not in [alias.name for node in imports for alias in node.names]
-
-
-@pytest.mark.parametrize(("early", "late"), [(10, 100), (1, 119), (60, 61)])
-def test_the_cut_lies_where_nothing_reaches_over_it(early: int, late: int) -> None:
-    """A function that mentions one behind it stands in the same part."""
-    body = "".join(
-        f"def step_{n}():\n    return {f'step_{late}()' if n == early else n}\n" for n in range(120)
-    )
-    trees = {"made.core": ast.parse(f"{body}last = step_0\n")}
-    halve(trees, "made.core", "first")
-    first, core = (ast.unparse(trees[f"made.{name}"]) for name in ("first", "core"))
-    assert not _read(first) & _tops(core)
-    assert _tops(first) | _tops(core) == {"last", *(f"step_{n}" for n in range(120))}
-    assert f"step_{early}" not in _tops(first) or f"step_{late}" in _tops(first)
-
-
-def test_a_module_that_cannot_be_cut_stays_whole() -> None:
-    body = "".join(f"def step_{n}():\n    return step_{(n + 1) % 120}\n" for n in range(120))
-    trees = {"made.core": ast.parse(body)}
-    halve(trees, "made.core", "first")
-    assert list(trees) == ["made.core"]
-    assert len(trees["made.core"].body) == 120
+def test_the_short_message_table_says_the_same() -> None:
+    """But the names of fields, which only the host asks for, and of messages that the core does not have."""
+    path = Path(table.__file__)
+    short: dict[str, Any] = {"__name__": "short"}
+    exec(program_files._short_table(path.read_text(encoding="utf-8")), short)
+    assert len(short["_TABLE"]) < 0.8 * len(table._TABLE)
+    for kind in "CAER":
+        for mine, whole in zip(short["rows"](kind), table.rows(kind), strict=True):
+            assert (*mine[:3], mine[4]) == (*whole[:3], whole[4])
+    for place in (("E", "sample", "ticks"), ("E", "sample", "flags"), ("A", "status", "ticks")):
+        assert short["offset"](*place) == table.offset(*place)
 
 
 def _frame(label: str) -> str:

@@ -117,7 +117,7 @@ def test_completeness_needs_the_start_files() -> None:
         ({"version": (1, 12, 0)}, "MicroPython 1.12.0; install 1.23"),
         ({"sd_card": True}, "SD card"),
         ({"free_heap": 20_000}, "20000 bytes of free memory"),
-        ({"firmware_crc": own_crc() ^ 1}, "a new firmware is due"),
+        ({"firmware_crc": own_crc() ^ 1}, "the firmware must be updated"),
     ],
 )
 def test_unsuitable_boards_are_refused(change: dict[str, object], words: str) -> None:

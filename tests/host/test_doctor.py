@@ -30,6 +30,7 @@ STATE = BoardState(
     free_heap=40_000,
     max_rate=240_000,
     max_rate_sum=240_000,
+    rates_measured=False,
     room="5820 bytes: 3 x 5000 steps/s",
     arm_problem="",
     state="idle",
@@ -51,7 +52,7 @@ def test_a_sound_board_has_nothing_wrong() -> None:
 @pytest.mark.parametrize(
     ("change", "level", "words", "cure"),
     [
-        ({"program_current": False}, Level.ERROR, "another than", "armtempo deploy"),
+        ({"program_current": False}, Level.ERROR, "differs from", "armtempo deploy"),
         ({"fault": "estop"}, Level.ERROR, "estop", "armtempo clear"),
         (
             {"arm_problem": "not used: the record is damaged"},

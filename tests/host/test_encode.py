@@ -75,7 +75,9 @@ def test_a_ratio_that_a_word_cannot_hold_is_refused() -> None:
         if fits:
             encode.arm_record(arm)
         else:
-            with pytest.raises(InputError, match="joint 1: the ratio of encoder counts to steps is too odd"):
+            with pytest.raises(
+                InputError, match="joint 1: the board cannot represent the ratio of encoder counts"
+            ):
                 encode.arm_record(arm)
 
 

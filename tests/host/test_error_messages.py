@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import ast
 import pickle
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import click
 import pytest
+import serial
 from armtempo import cli
 from armtempo.basics import errors
-from armtempo.cli import LazyGroup
+from armtempo.basics.errors import InputError, LinkError
+from armtempo.cli import LazyGroup, state
+from armtempo.formats import toml_table
 from armtempo.link.refusal import refusal
+from armtempo.link.transport import SerialTransport
+from armtempo.robot import board_state, speed
+from armtempo.robot.board import Board
 from armtempo_shared import codes, wire
 from click.testing import CliRunner, Result
 
 from tests import sources
-from tests.host.error_messages import ErrorMessage, in_host, in_source
+from tests.inprocess import Pipe, ready
+from tests.sources import parsed
 
 TAKES_DASHES = ("goto", "home", "fk", "output")
 """Their argument may begin with a minus: what looks like an option is taken for angles, or for an output."""
@@ -107,7 +117,7 @@ def test_an_error_is_shown_on_two_lines() -> None:
     assert result.exit_code == 2
     first, second = result.stderr.splitlines()
     assert first == "armtempo: WHERE and --switches exclude each other"
-    assert second.startswith("hint: give WHERE ")
+    assert second.startswith("hint: give the present posture as WHERE")
 
 
 def test_files_and_memory_have_a_next_step(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -132,3 +142,127 @@ def test_an_error_reads_as_one_line_too() -> None:
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
     missing = errors.MissingPackageError("a figure", "matplotlib", "plot")
     assert missing.hint == "install it with: pip install 'armtempo[plot]'"
+
+
+HOST = Path(errors.__file__).parents[1]
+MADE_FROM_PARTS = {"MissingPackageError"}
+"""Classes that write their own problem and hint."""
+
+
+@dataclass(frozen=True)
+class ErrorMessage:
+    """One place where an error is made; ``problem`` and ``hint`` are source text, as in an f-string.
+
+    ``hint`` is None if none is given.
+    """
+
+    file: str
+    line: int
+    kind: str
+    problem: str
+    hint: str | None
+
+
+def tree_of(kind: type[Exception] = errors.ArmtempoError) -> Iterator[str]:
+    """Names of the classes of armtempo's errors."""
+    yield kind.__name__
+    for below in kind.__subclasses__():
+        yield from tree_of(below)
+
+
+def in_source(text: str, file: str) -> Iterator[ErrorMessage]:
+    """All errors that a module makes, raised there or not."""
+    kinds = set(tree_of()) - MADE_FROM_PARTS
+    if not any(kind in text for kind in kinds):
+        return
+    for node in ast.walk(parsed(text)):
+        if isinstance(node, ast.Call) and (name := _last_name(node.func)) in kinds:
+            given = {word.arg: word.value for word in node.keywords}
+            arguments = dict(zip(("problem", "hint"), node.args, strict=False)) | given
+            hint = _words(arguments["hint"]) if "hint" in arguments else None
+            yield ErrorMessage(file, node.lineno, name, _words(arguments.get("problem")), hint)
+
+
+def in_host() -> list[ErrorMessage]:
+    """All errors that the host makes."""
+    return [
+        message
+        for path in sorted(HOST.rglob("*.py"))
+        if "hardware" not in path.parts
+        for message in in_source(path.read_text(encoding="utf-8"), str(path.relative_to(HOST)))
+    ]
+
+
+def _last_name(node: ast.expr) -> str:
+    """``C`` of ``a.b.C``; nothing of what has no name."""
+    return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+
+
+def _words(node: ast.expr | None) -> str:
+    """The text of a literal, ``{expression}`` for what is put in; another expression as it stands, in braces."""
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(
+            str(part.value) if isinstance(part, ast.Constant) else f"{{{ast.unparse(part.value)}}}"
+            for part in node.values
+            if isinstance(part, ast.Constant | ast.FormattedValue)
+        )
+    return f"{{{ast.unparse(node)}}}" if node is not None else ""
+
+
+# messages that once left newcomers without a next step
+
+
+def test_a_cable_that_is_out_is_called_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*_: object) -> bytes:
+        raise serial.SerialException(
+            "device reports readiness to read but returned no data (device disconnected or multiple access on port?)"
+        )
+
+    transport = SerialTransport("loop://")
+    monkeypatch.setattr(transport._serial, "read", gone)
+    with pytest.raises(LinkError) as caught:
+        transport.read(0.1)
+    assert caught.value.problem == (
+        "the connection to loop:// broke: its cable was unplugged, or the board was reset"
+    )
+    assert caught.value.hint.startswith("plug it in again")
+    assert "readiness" not in str(caught.value)
+
+
+def test_a_motion_has_to_be_named_where_the_button_starts_none(tmp_path: Path) -> None:
+    client, _ = ready(Pipe(tmp_path / "flash"))
+    client.set_default("")
+    with pytest.raises(InputError) as caught:
+        Board(client, "pipe").fetch(None, tmp_path)
+    assert caught.value.problem.startswith("no motion given")
+    assert "armtempo fetch NAME" in caught.value.hint
+
+
+def test_a_sound_link_is_called_so(tmp_path: Path) -> None:
+    client, _ = ready(Pipe(tmp_path / "flash"))
+    found = board_state.read(client, "pipe")
+    assert "link      OK: no damaged messages, no lost samples" in state.lines(found)
+    worse = state.lines(replace(found, frames_bad=3, samples_lost=2))
+    assert "link      messages damaged 3 times, 2 samples lost: check cable and plugs" in worse
+
+
+def test_a_misspelt_key_is_guessed() -> None:
+    table = toml_table.parse("lenght = 3", "x.toml")
+    table.number("length", 1.0)
+    with pytest.raises(InputError) as caught:
+        table.done()
+    assert caught.value.problem == "x.toml: lenght: unknown key"
+    assert caught.value.hint == "did you mean 'length'? known here: length"
+
+
+def test_a_board_that_takes_nothing_is_not_waited_for_forever() -> None:
+    assert SerialTransport("loop://")._serial.write_timeout == 2.0
+
+
+def test_a_speed_is_1_to_100_percent() -> None:
+    assert [speed.permille(fraction) for fraction in (0.01, 1.0)] == [10, 1000]
+    for fraction in (0.009, 1.001):
+        with pytest.raises(InputError, match=r"give a fraction of 0\.01 to 1"):
+            speed.permille(fraction)

@@ -7,7 +7,7 @@ import pytest
 from armtempo.splines import bernstein, bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline
 
-from tests.host.feeding import dense
+from tests.host.problems import dense
 
 
 def random_joint(seed: int) -> JointSpline:
@@ -57,20 +57,6 @@ def test_range_of_a_path() -> None:
     seen = np.polynomial.polynomial.polyval(np.linspace(0, 1, 10_001), pieces[0].T)
     assert low == pytest.approx([seen.min(), 5.0], abs=1e-9)
     assert high == pytest.approx([seen.max(), 5.0], abs=1e-6)
-
-
-def test_golden_section_finds_single_extremes() -> None:
-    found = extremes.golden_section(lambda x: 3 - (x - 0.3) ** 2, [0.0, 0.25], [1.0, 0.9])
-    assert found == pytest.approx([3.0, 3.0], abs=1e-12)
-
-
-def test_golden_section_agrees_on_the_unoptimised_motion() -> None:
-    """Section 3.1 of the paper, where each segment has one extreme of the speed."""
-    via = np.array([0.0, 20, 40, 90, 130, 160, 180])
-    joint = JointSpline(5, 1, bspline.fit(via, 5), time_axis.control_points([2.0] * 6, 5))
-    times = joint.via_times_s
-    found = extremes.golden_section(lambda t: joint(t, 1), times[:-1], times[1:])
-    assert found.max() == pytest.approx(extremes.of_joint(joint).speed_deg_s, rel=1e-9)
 
 
 def test_bernstein_products_derivatives_and_halves() -> None:

@@ -8,7 +8,7 @@ from armtempo.planning.fitness import Fitness, stretch_of
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline
 
-from tests.host.feeding import FEEDING, LIMITS
+from tests.host.problems import FEEDING, LIMITS
 
 
 def exact_ratios(points: np.ndarray, intervals: np.ndarray, degree: int) -> np.ndarray:

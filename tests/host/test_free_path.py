@@ -144,10 +144,9 @@ def test_wider_corridors_are_never_slower_and_none_is_the_spline() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 3, 11])
-def test_a_corridor_is_never_slower_than_the_spline_nor_than_a_narrower_one(seed: int) -> None:
+def test_a_corridor_is_never_slower_than_the_spline_nor_than_a_narrower_one() -> None:
     """More of them: tests/benchmark/corridors.py."""
-    assert corridors.faults(list(corridors.times(seed))) == []
+    assert corridors.faults(list(corridors.times(1))) == []
 
 
 @pytest.mark.slow
@@ -170,7 +169,7 @@ def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
 @pytest.mark.parametrize("width", [2.0, 20.0])
 def test_a_corridor_of_the_tool_that_the_stops_leave_no_room_in_is_refused(width: float) -> None:
     """The spline through the via points does not rest there, and a motion that is drawn to it would not either."""
-    with pytest.raises(PlanError, match=rf"no path was proven to stay within corridor_mm = {width:g}\b"):
+    with pytest.raises(PlanError, match=rf"no path could be proven to stay within corridor_mm = {width:g}\b"):
         planner.plan(ARM, replace(FEED, corridor_mm=width, stops=(Stop(3),)))
 
 

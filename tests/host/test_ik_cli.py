@@ -87,7 +87,7 @@ def test_a_file_of_poses_is_followed_from_posture_to_posture(tmp_path: Path) -> 
     )
     answers = solutions("--poses", file)
     chosen = [answer["solutions"][answer["chosen"] - 1]["angles_deg"] for answer in answers]
-    # Joint 6 goes on past half a turn, because each pose follows the one before.
+    # Joint 6 continues past half a turn, because each pose follows the one before.
     np.testing.assert_allclose(chosen, np.degrees(path), atol=1e-6)
 
 
@@ -105,7 +105,7 @@ def test_out_of_reach_ends_with_1_and_the_inequality() -> None:
         "rejected: no posture reaches this pose within 0.1 mm and 0.1 deg: the nearest one" in result.stdout
     )
     assert result.stderr.startswith(
-        "armtempo: no solution for pose 1; the reasons are listed with it\nhint: bring it nearer"
+        "armtempo: no solution for pose 1; the reasons are listed with it\nhint: move it nearer"
     )
     unreachable = run("--position", "900", "0", "300", "--rpy", "0", "0", "0", "--json")
     assert unreachable.exit_code == 1
@@ -170,7 +170,7 @@ def test_a_miss_has_units_and_tolerances_can_be_given(four: Path) -> None:
     )
     assert "as it asks for 6 numbers and 4 joints move, ask for less: position and pitch" in refused.stdout
     assert "nearest posture found, deg:" in refused.stdout
-    assert "allow more by --tolerance-mm and --tolerance-deg" in refused.stderr
+    assert "give larger --tolerance-mm and --tolerance-deg" in refused.stderr
     (answer,) = solutions(*form, "--tolerance-mm", "0.5", "--tolerance-deg", "1")
     assert answer["miss"]["position_mm"] <= 0.5
     assert 0.5 < answer["miss"]["rotation_deg"] <= 1.0
@@ -238,7 +238,7 @@ def test_numerical_finds_the_eight_too() -> None:
             "--position goes alone or with one of",
         ),
         ((*POSITION, "--rpy", "0", "0", "0", "--pitch", "0"), "--position goes alone or with one of"),
-        ((*POSITION, "--roll", "0", "--yaw", "0"), "roll and yaw without pitch leave too much open"),
+        ((*POSITION, "--roll", "0", "--yaw", "0"), "roll and yaw without pitch do not define an orientation"),
         (
             (*POSITION, "--approach", "0", "0", "0"),
             "--approach: the approach has length 0",
@@ -246,7 +246,7 @@ def test_numerical_finds_the_eight_too() -> None:
         ((*POSITION, "--pitch", "nan"), "a finite number"),
         ((*POSITION, "--tolerance-mm", "0"), "--tolerance-mm"),
         ((*POSITION, "--tolerance-deg", "181"), "--tolerance-deg"),
-        (("--matrix", "1 2 3"), "--matrix: 3 numbers are no pose\nhint: give 12 (3 rows of a matrix), 16"),
+        (("--matrix", "1 2 3"), "--matrix: 3 numbers are not a pose\nhint: give 12 (3 rows of a matrix), 16"),
         (("--matrix", "1 0 0 0 0 1 0 0 0 0 x 0"), "--matrix: 'x' is not a number"),
         (("--matrix", "2 0 0 0 0 1 0 0 0 0 1 0"), "--matrix: the 3 x 3 part is not a rotation"),
         ((*POSITION, "--quaternion", "1", "1", "0", "0"), "--quaternion: this quaternion has length 1.41421"),

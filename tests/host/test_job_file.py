@@ -16,7 +16,7 @@ TWO = "via_deg = [[0, -60, 40], [20, -75, 50]]\n"
 
 
 def written(tmp_path: Path, text: str) -> Path:
-    """A job file with this text behind its name."""
+    """A job file with this text after its name."""
     path = tmp_path / "job.toml"
     path.write_text('name = "t"\n' + text)
     return path
@@ -95,7 +95,7 @@ def test_a_position_may_ask_for_a_part_of_the_orientation(
         ),
         (
             "position_mm = [1, 2, 3]\nroll_deg = 0\nyaw_deg = 3",
-            "roll and yaw without pitch leave too much open",
+            "roll and yaw without pitch do not define an orientation",
         ),
         ("position_mm = [1, 2, 3]\napproach = [0, 0, 0]", "a direction such as 0 0 -1"),
         ("position_mm = [1, 2, 3]\npitch_deg = nan", "via P0.pitch_deg"),

@@ -76,7 +76,7 @@ def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond() -> None:
             for sign in (1, -1):
                 try:
                     motion = jog_motion.plan("x", arm, here, JogMove(sign * INF, joint=number))
-                except InputError:  # home is there already
+                except InputError:  # it is at home already
                     assert here[number] in joint.range_deg
                     continue
                 assert "end of its range" in motion.ends
@@ -125,7 +125,7 @@ def test_a_stop_is_quick() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("axis", ["x", "y", "z", "tool-x", "tool-y", "tool-z"])
-@pytest.mark.parametrize("by", [INF, -INF, 5.0, -0.1])
+@pytest.mark.parametrize("by", [-INF, 5.0, -0.1])
 def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: float) -> None:
     here = on_steps(AR4, ELBOW_DEG)
     motion = jog_motion.plan("x", AR4, here, JogMove(by, axis=axis))

@@ -10,8 +10,7 @@ from armtempo.kinematics import BRANCHES, Branch, Geometry, Ranges, branch_of, c
 from armtempo.kinematics.choice import Choice
 from armtempo.model.arm import Arm
 
-from tests.host.poses import SHAPE, with_wrist_at
-from tests.host.published_arms import FILES, NAMED, PAPER, read
+from tests.host.published_arms import NAMED, PAPER, PUBLISHED, SHAPE, with_wrist_at
 
 ARM = Arm.paper()
 RANGES = Ranges.of(ARM)
@@ -54,13 +53,12 @@ def test_excess_says_how_far_and_on_which_side() -> None:
 
 def test_the_chosen_solution_is_the_nearest_that_can_be_used() -> None:
     rng = np.random.default_rng(12)
-    for path in FILES:
-        geometry, ranges = read(path)
+    for name, (geometry, ranges) in PUBLISHED.items():
         for _ in range(40):
             angles = rng.uniform(ranges.low, ranges.high)
             previous = rng.uniform(ranges.low, ranges.high)
             choice = choose(geometry, forward(geometry, angles), ranges, previous, "m")
-            assert choice.chosen is not None, path.stem
+            assert choice.chosen is not None, name
             chosen = choice.chosen.angles_rad
             assert (chosen >= ranges.low).all()
             assert (chosen <= ranges.high).all()
@@ -119,7 +117,7 @@ def unreachable(choice: Choice, number: int) -> tuple[float, int | None]:
 @pytest.mark.parametrize(
     ("planar", "up", "number", "amount", "line"),
     [
-        (SHAPE.farthest + 150.0, 0.0, 1, 250.0, 1),  # the front shoulder stands 100 behind axis 1
+        (SHAPE.farthest + 150.0, 0.0, 1, 250.0, 1),  # the front shoulder is 100 behind axis 1
         (SHAPE.farthest + 150.0, 0.0, 5, 50.0, 1),
         (100.0, -SHAPE.farthest - 30.0, 5, 30.0, 2),
         (100.0, SHAPE.farthest + 30.0, 5, 30.0, 3),

@@ -126,3 +126,20 @@ def _turned(lines: list[AxisLine], angles: Array, tool: Array) -> Array:
         turn[:3, 3] = line.point - turn[:3, :3] @ line.point
         pose = turn @ pose
     return pose
+
+
+def test_what_is_far_from_reach_or_range_is_said_without_a_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thousand times as fast; near to them a posture within the tolerance is still looked for."""
+    arm = Arm.load("ar4")
+    outside, barely = forward(
+        Geometry.of(arm), np.radians([[20, 10, 75, 15, 40, 30], [20, 10, 52.02, 15, 40, 30]])
+    )
+    far = outside.copy()
+    far[0, 3] += 5000.0
+    assert any(one.usable and one.miss_mm for one in inverse_of_arm(arm, barely))
+    monkeypatch.setattr(PoseSolver, "solve", None)
+    for pose, why in ((outside, "above its range"), (far, "out of reach by")):
+        found = inverse_of_arm(arm, pose)
+        assert len(found) == 8
+        assert not any(one.usable for one in found)
+        assert why in " ".join(text for one in found for text in one.rejections)

@@ -11,8 +11,16 @@ from armtempo.kinematics.inverse import CHUNK
 from armtempo.kinematics.moved_tool import moved_tool_deg
 from armtempo.kinematics.solutions import OK, WRIST_STRAIGHT
 
-from tests.host.poses import turned, worst_error
-from tests.host.published_arms import EQ_16, NAMED, PAPER, PAPER_FULL_SIZE, TABLE_2, drawn
+from tests.host.published_arms import (
+    EQ_16,
+    NAMED,
+    PAPER,
+    PAPER_FULL_SIZE,
+    TABLE_2,
+    drawn,
+    turned,
+    worst_error,
+)
 
 ACCURACY = 1e-9
 
@@ -166,7 +174,7 @@ def test_rounded_poses_are_put_right_and_the_first_wrong_one_is_named() -> None:
     wrong = np.stack([pose, 2.0 * pose])
     with pytest.raises(armtempo.InputError, match="pose 2"):
         armtempo.inverse_many(arm, wrong)
-    with pytest.raises(armtempo.InputError, match="no list of poses"):
+    with pytest.raises(armtempo.InputError, match="are not a list of poses"):
         armtempo.inverse_many(arm, pose)
     with pytest.raises(armtempo.InputError, match="no closed-form"):
         armtempo.inverse_many("community", [pose])

@@ -15,8 +15,7 @@ from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import WHOLE, Pose
 
-from tests.host.poses import turned
-from tests.host.published_arms import NAMED
+from tests.host.published_arms import NAMED, turned
 from tests.host.small_arms import (
     FITTING,
     FIVE,

@@ -1,4 +1,4 @@
-"""Poses from matrices, roll-pitch-yaw, quaternions and files; and what is no pose."""
+"""Poses from matrices, roll-pitch-yaw, quaternions and files; and what is not a pose."""
 
 from __future__ import annotations
 
@@ -130,10 +130,10 @@ def test_a_line_may_leave_angles_free(tmp_path: Path) -> None:
     [
         (
             b"1 2 3 0 0 0\n1 2\n",
-            "line 2: 2 numbers are no pose; give 3 (x y z: position only), 6 (x y z roll",
+            "line 2: 2 numbers are not a pose; give 3 (x y z: position only), 6 (x y z roll",
         ),
         (b"1 2 - 0 0 0\n", "line 1: '-' is not a number"),
-        (b"1 2 3 10 - 20\n", "line 1: roll and yaw without pitch leave too much open"),
+        (b"1 2 3 10 - 20\n", "line 1: roll and yaw without pitch do not define an orientation"),
         (b"1 2 three 0 0 0\n", "line 1: 'three' is not a number"),
         (b"\n1 2 nan 0 0 0\n", "line 2: 'nan' is not a finite number"),
         (b"# nothing\n", "no pose in it"),

@@ -9,8 +9,7 @@ from armtempo.kinematics import Geometry, forward, inverse, inverse_of_pose
 from armtempo.kinematics.shape import Shape
 from armtempo.kinematics.solutions import DUPLICATE, ELBOW_STRETCHED, OK
 
-from tests.host.poses import turned, worst_error
-from tests.host.published_arms import NAMED, PAPER, drawn
+from tests.host.published_arms import NAMED, PAPER, drawn, turned, worst_error
 
 EQUAL = 1e-12
 

@@ -19,8 +19,7 @@ from armtempo.kinematics.solutions import (
     WRIST_STRAIGHT,
 )
 
-from tests.host.poses import SHAPE, turned, with_wrist_at, worst_error
-from tests.host.published_arms import NAMED, PAPER
+from tests.host.published_arms import NAMED, PAPER, SHAPE, turned, with_wrist_at, worst_error
 
 
 def test_wrist_centre_on_axis_1_keeps_joint_1() -> None:

@@ -175,7 +175,7 @@ def test_a_run_on_the_virtual_board(plan: armtempo.Plan, arm: armtempo.Arm, tmp_
 def test_a_second_run_of_the_same_board_starts_where_it_should(
     plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
 ) -> None:
-    """The virtual arm goes back by itself; what it is told of its position stays true."""
+    """The virtual arm goes back by itself; what it is told about its position stays true."""
     with armtempo.connect("sim", arm) as board:
         for _ in range(2):
             run = board.run(plan, out=tmp_path)
@@ -200,7 +200,7 @@ def test_names_and_files_will_do_for_arm_and_job(tmp_path: Path) -> None:
     [
         (
             {"name": "two words"},
-            r"'two words': the board keeps no such name; give at most 24 of the characters",
+            r"'two words': not a valid name on the board; give at most 24 of the characters",
         ),
         ({"name": "x", "timing": "x"}, r"timing 'x' is not allowed; give 'shared' or 'per-joint'"),
         ({"name": "x", "population": 2}, "population 2 must be a whole number from 4"),
@@ -250,7 +250,7 @@ def test_goto_takes_a_speed_and_a_closed_board_says_so(arm: armtempo.Arm, tmp_pa
             board.speed(50)
         with pytest.raises(armtempo.InputError, match=r"missing\.json"):
             board.run("missing.json")
-        with pytest.raises(armtempo.InputError, match=r"'x\.jsn' is no name for a motion"):
+        with pytest.raises(armtempo.InputError, match=r"'x\.jsn' is not a valid name of a motion"):
             board.run("x.jsn")
     with pytest.raises(armtempo.LinkError, match="the board on sim was closed; open it again"):
         board.status()
@@ -259,12 +259,12 @@ def test_goto_takes_a_speed_and_a_closed_board_says_so(arm: armtempo.Arm, tmp_pa
 @pytest.mark.slow
 def test_a_real_arm_does_not_move_by_surprise(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
     with launch(LaunchOptions(arm=arm)) as process, armtempo.connect(process.port) as board:
-        with pytest.raises(armtempo.InputError, match="no arm is known"):
+        with pytest.raises(armtempo.InputError, match="no arm is set"):
             board.goto(START_DEG)
         with pytest.raises(armtempo.LinkError, match="position of joint 1"):
             board.run(plan, out=tmp_path)
         board.home(arm, END_DEG)
-        with pytest.raises(armtempo.LinkError, match="does not stand where 'small' begins"):
+        with pytest.raises(armtempo.LinkError, match="is not at the start of 'small'"):
             board.run(plan, out=tmp_path)
         assert board.last_run is None
         assert not list(tmp_path.iterdir())

@@ -74,7 +74,7 @@ def test_a_line_and_an_arc_keep_speed_tolerance_and_rests(plan: Plan, tmp_path: 
 
 
 def test_faults_of_a_line_are_seen(plan: Plan) -> None:
-    """The check itself: a plan held against a line nearby, and against a lower speed."""
+    """The check itself: a plan checked against a line nearby, and against a lower speed."""
     ways = (replace(plan.job.ways[0], speed_mm_s=79.0), plan.job.ways[1])
     assert line_faults(replace(plan, job=replace(plan.job, ways=ways)))
     ways = (replace(plan.job.ways[0], tolerance_mm=0.01), plan.job.ways[1])
@@ -82,7 +82,7 @@ def test_faults_of_a_line_are_seen(plan: Plan) -> None:
 
 
 def test_the_bound_holds_and_is_sharp() -> None:
-    """Random splines beside a line: no sample of them is beyond the bound, and it is near to the largest."""
+    """Random splines next to a line: no sample of them is beyond the bound, and it is near to the largest."""
     seed = 31
     rng = np.random.default_rng(seed)
     led = line_path.led_stretches(ARM, replace(JOB, via=JOB.via[:2], ways=JOB.ways[:1]), _via(JOB)[:2])[0]
@@ -151,7 +151,7 @@ def test_arcs_go_through_their_point() -> None:
     ("change", "message"),
     [
         ({"via": (START, moved(400, 0, 0))}, "P0 to P1, at .* of 400.0 mm"),
-        ({"via": (START, moved(0, 0, 0))}, "the tool is there already"),
+        ({"via": (START, moved(0, 0, 0))}, "the tool is at this point already"),
         ({"ways": (ToolWay(1, True, blend_mm=80.0), ToolWay(2, True))}, "more than half"),
         ({"via": FLIPPED}, "joint 4 at -90 degrees, not 90"),
         ({"ways": (ToolWay(1, True, HALF),)}, "one line"),

@@ -16,8 +16,7 @@ from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
-from tests.host.linked import ARM, follow, random_motion, ready, started
-from tests.inprocess import FAULTS, Noise, Pipe, connect
+from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, started
 
 
 @pytest.mark.slow
@@ -86,16 +85,16 @@ def test_a_frame_that_never_ends_hides_the_answer_behind_it_for_an_instant_only(
 
 
 @pytest.mark.slow
-def test_ten_minutes_to_a_host_that_pauses_two_seconds_lose_nothing(tmp_path: Path) -> None:
+def test_three_minutes_to_a_host_that_pauses_two_seconds_lose_nothing(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
-    pipe.run_samples = 6000
+    pipe.run_samples = 1800
     follower = started(pipe)
     indices = []
     for sample in follower.samples():
         indices.append(sample.index)
         if sample.index % 50 == 49:
             pipe.wait_away(2.0)
-    assert indices == list(range(6000))
+    assert indices == list(range(1800))
 
 
 @pytest.mark.slow
@@ -116,7 +115,7 @@ def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_what_arrived_is_not_lost_though_the_board_has_let_it_go(tmp_path: Path) -> None:
-    """The system of a host that is stopped goes on reading: then the board keeps only younger samples."""
+    """The system of a host that is stopped continues reading: then the board keeps only younger samples."""
     pipe = Pipe(tmp_path / "flash")
     pipe.run_samples = 250
     follower = started(pipe)
@@ -159,7 +158,7 @@ def test_a_motion_that_does_not_end_is_given_up(tmp_path: Path, monkeypatch: pyt
     pipe = Pipe(tmp_path / "flash")
     follower = started(pipe)
     monkeypatch.setattr(pipe, "_move", lambda: None)
-    with pytest.raises(LinkError, match="its motion clock stands still"):
+    with pytest.raises(LinkError, match="its motion clock does not advance"):
         follow(follower)
 
 
@@ -237,18 +236,18 @@ def test_no_command_has_ctrl_c_for_its_number(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_three_hundred_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> None:
+def test_a_hundred_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> None:
     to_board, from_board = Noise("to", 0.01), Noise("from", 0.01)
     pipe = Pipe(tmp_path / "flash", to_board, from_board)
     board = connect(pipe)
     numbers = random.Random(1)
     board.upload(wire.ARM_RECORD_NAME, ARM)
-    for number in range(300):
+    for number in range(100):
         data = random_motion(numbers, segments=numbers.randrange(1, 4), joints=1)
         board.upload("feed", data)
         assert (tmp_path / "flash" / "feed.atm").read_bytes() == data, f"upload {number}"
-    assert to_board.hits > 600
-    assert from_board.hits > 90
+    assert to_board.hits > 200
+    assert from_board.hits > 30
 
 
 @pytest.mark.slow

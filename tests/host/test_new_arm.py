@@ -85,8 +85,8 @@ def test_speed_that_motor_and_board_allow(gear_ratio: float, joints: int, most: 
         ("gear=3", "'gear=3' is not one of the keys"),
         ("a_mm", "'a_mm' is not one of the keys"),
         ("a_mm=1,a_mm=2", "is given twice"),
-        ("a_mm=long", "a_mm = 'long' is no number"),
-        ("microsteps=1.5", "microsteps = '1.5' is no number"),
+        ("a_mm=long", "a_mm = 'long' is not a number"),
+        ("microsteps=1.5", "microsteps = '1.5' is not a number"),
     ],
 )
 def test_a_wrong_joint_is_named(text: str, named: str, tmp_path: Path) -> None:
@@ -193,7 +193,7 @@ def test_each_answer_is_checked_where_it_is_given(tmp_path: Path, monkeypatch: p
         "it must be one of paper",
         "a whole number from 1 to 6, such as 3",
         "modified (Craig)",
-        "'x' is no number; write it as 120.5",
+        "'x' is not a number; write it as 120.5",
         "from -180 to 180, such as -90",
         "above the lowest angle, 120, such as 210; '<' goes back",
         "a whole number from 4 to 10000",
@@ -210,7 +210,7 @@ def test_what_was_answered_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     folder = tmp_path / "x"
     left = interview(folder, monkeypatch, ["own", "1", "", "axis"])
     assert left.exit_code == 130
-    assert f"go on with: armtempo new {folder} --resume" in left.output
+    assert f"continue with: armtempo new {folder} --resume" in left.output
     assert not folder.exists()
     done = interview(folder, monkeypatch, ["", "44", *[""] * 9, ""], "--resume")
     assert done.exit_code == 0, done.output

@@ -51,7 +51,7 @@ def test_json_is_one_document_and_quiet_leaves_it_alone() -> None:
     for joint in found["joints"]:
         assert joint["floor_s"] <= joint["duration_s"] <= found["duration_s"]
         assert all(value <= joint["limits"][name] * (1 + 1e-9) for name, value in joint["extremes"].items())
-    assert "no arm and no job are named" in run("--iterations", "5").stderr
+    assert "no arm and no job given" in run("--iterations", "5").stderr
 
 
 COARSE_JOINT_2 = ("microsteps = 8, gear_ratio = 20.0", "microsteps = 1, gear_ratio = 0.5")
@@ -80,7 +80,7 @@ def test_an_arm_that_ships_is_taken_by_its_name() -> None:
     Path("ar4.toml").write_text('name = "lift"\nvia_deg = [[0,0,0,0,0,0],[10,5,5,0,5,0]]\niterations = 5\n')
     result = run("--job", "ar4.toml", "--arm", "ar4")
     assert result.exit_code == 0, result.output
-    assert "arm: AR4-MK3 (as it ships with armtempo)" in result.stdout
+    assert "arm: AR4-MK3 (ships with armtempo)" in result.stdout
     assert Plan.load("lift.json").arm == Arm.load("ar4")
 
 

@@ -1,4 +1,4 @@
-"""Planning: the shipped job, all problems of the file, 2000 random jobs, and what is refused."""
+"""Planning: the shipped job, all problems of the file, 800 random jobs, and what is refused."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armtempo.planning.lower_bounds import Floor
 from armtempo_shared.limits import MAX_STEP_RATE
 
 from tests.host import problems
-from tests.host.feeding import dense
+from tests.host.problems import dense
 
 ARM = Arm.paper()
 JOB = Job.paper(ARM)
@@ -84,9 +84,9 @@ def test_problem(problem: problems.Problem) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(10))
+@pytest.mark.parametrize("part", range(4))
 def test_random_jobs_keep_their_limits_or_say_why_not(part: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """2000 jobs (``tests.benchmark.random_plans`` takes more); floors have their own test."""
+    """800 jobs (``tests.benchmark.random_plans`` takes more); floors have their own test."""
     monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))
     planned = 0
     for seed in range(200 * part, 200 * part + 200):
@@ -232,7 +232,7 @@ def test_refuses_sizes_that_cannot_be_computed_with(
 ) -> None:
     arm = problems.make_arm([limits], (-1e160, 1e160))
     job = Job("far", tuple((angle,) for angle in via), bounds_s=bounds_s, iterations=5)
-    with pytest.raises(PlanError, match="too far apart in size"):
+    with pytest.raises(PlanError, match="too different in magnitude"):
         planner.plan(arm, job)
 
 

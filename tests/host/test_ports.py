@@ -48,7 +48,7 @@ class Silent:
             "armtempo deploy",
         ),
         (b"raw REPL; CTRL-B to exit\r\n>", "armtempo deploy"),
-        (b"$GPGGA,1234,N*5B\r\n", "something else"),
+        (b"$GPGGA,1234,N*5B\r\n", "something other"),
         (b"\xa5\x10", "check cable"),
         (b"\x5d\x00\x01~\x01\x01\x003.4.0; MicroPython v1.29.0", "check cable"),
     ],
@@ -110,7 +110,7 @@ def test_what_is_no_serial_port_is_said_to_be_none(tmp_path: Path) -> None:
             path.write_text("")
         with pytest.raises(InputError, match=f"{path} is not a serial port"):
             SerialTransport(str(path))
-    with pytest.raises(InputError, match="names no folder"):
+    with pytest.raises(InputError, match="has no folder"):
         names.sim_flash("sim:")
 
 

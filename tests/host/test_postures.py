@@ -25,7 +25,7 @@ POSE = "\n[posture.over]\nposition_mm = {}\ntolerance_mm = 0.01\n"
 
 
 def written(tmp_path: Path, more: str) -> Path:
-    """The shipped arm file with more behind it."""
+    """The shipped arm file with more after it."""
     path = tmp_path / "arm.toml"
     path.write_text(shipped.arm_path().read_text() + more)
     return path

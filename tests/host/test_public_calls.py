@@ -91,6 +91,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
     motor = armtempo.Motor(1, 200, 16, 10)
     return {
         "arm": ARM,
+        "ask": bool,
         "job": JOB,
         "sequence": armtempo.Sequence("s", (armtempo.Wait(1.0),)),
         "plan": plan,

@@ -280,12 +280,12 @@ def test_every_column_is_explained(folder: Path) -> None:
         (lambda path: (path / "run.json").write_text("{"), "damaged"),
         (
             lambda path: [(path / name).unlink() for name in ("trajectory.json", MOTION)],
-            "what was to move is not",
+            "the planned motion is not",
         ),
         (lambda path: [(path / "trajectory.json").unlink(), (path / MOTION).write_bytes(b"x")], MOTION),
         (lambda path: describe(path, name=None), "'name' is missing"),
         (lambda path: describe(path, started=None), "'started' is missing"),
-        (lambda path: describe(path, joints=[]), "run.json tells of 0 joints, trajectory.json of 3"),
+        (lambda path: describe(path, joints=[]), "run.json lists 0 joints, trajectory.json has 3"),
         (lambda path: describe(path, joints=[{"name": "a"}]), "is missing or wrong"),
         (lambda path: [file.write_text("") for file in path.glob("samples-*")], "no sample"),
     ],
@@ -302,7 +302,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path, spoil: object, said:
 
 
 def test_two_runs_are_compared_on_one_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    runs = [str(made_runs.make(tmp_path / f"run-{seed}", seed=seed)) for seed in (1, 2)]
+    runs = [str(made_runs.make(tmp_path / f"run-{seed}", repetitions=1, seed=seed)) for seed in (1, 2)]
     draw_nothing(monkeypatch)
     broken = tmp_path / "broken"
     broken.mkdir()
@@ -317,7 +317,7 @@ def test_two_runs_are_compared_on_one_page(tmp_path: Path, monkeypatch: pytest.M
     assert "broken is not a run folder" in (tmp_path / "three.html").read_text()
     alone = CliRunner().invoke(main, ["report", runs[0], "--out", str(tmp_path / "none.html")])
     assert (alone.exit_code, "two or more" in alone.output) == (2, True)
-    with pytest.raises(RunFolderError, match="fewer than two"):
+    with pytest.raises(RunFolderError, match="needs two readable runs"):
         comparison.write([Path(runs[0]), broken], tmp_path / "none.html")
     assert not (tmp_path / "none.html").exists()
 

@@ -154,7 +154,7 @@ def test_a_file_says_walls_and_boxes() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[4, 5, 6]", "[4, 5, 3]", "no corners"),
+        ("[4, 5, 6]", "[4, 5, 3]", "not corners"),
         ("[-100, 300]", "[300, -100]", "smaller first"),
         ("floor_mm = 0", "ceiling_mm = 0\nfloor_mm = 1", "above floor_mm"),
         ("floor_mm", "flor_mm", "unknown key"),

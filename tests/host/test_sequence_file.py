@@ -34,7 +34,7 @@ JOB = 'name = "j"\nrefine = 1\npolish = false\niterations = 2\nvia_deg = [[1, -6
 
 
 def written(folder: Path, *steps: str, top: str = "", name: str = "seq") -> Path:
-    """A sequence file of these steps, each the inside of a table, and a job file beside it."""
+    """A sequence file of these steps, each the inside of a table, and a job file next to it."""
     path = folder / f"{name}.toml"
     rows = "".join(f"[[step]]\n{step}\n" for step in steps)
     path.write_text(f'name = "{name}"\n{top}\n{POSTURES}\n{rows}')
@@ -227,7 +227,7 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("steps", "said"),
     [
-        (['goto = "c"'], r"step\[1\]\.goto = 'c': there is no such posture"),
+        (['goto = "c"'], r"step\[1\]\.goto = 'c': no such posture"),
         (['goto = "hom"'], "did you mean 'home'"),
         (["goto = [0, -60]"], r"step\[1\]\.goto"),
         (["goto = [0, -60, 400]"], "range of joint 3"),
@@ -237,7 +237,7 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (['goto = "a"\nrun = "job.toml"'], "says goto and run"),
         (['goto = "a"\nwait_s = 1'], "says goto and wait_s"),
         (['goto = "a"\ntimeout_s = 1'], "timeout_s = 1 is not allowed; give left out beside goto"),
-        (['run = "none.toml"'], "none.toml: there is no such file"),
+        (['run = "none.toml"'], "none.toml: no such file"),
         (['output = "griper"\nto = 1'], r"step\[1\].*no output 'griper'.*gripper"),
         (['output = "gripper"'], "to is missing"),
         (['output = "gripper"\nto = 200'], r"step\[1\].*cannot take 200"),
@@ -255,13 +255,13 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (["repeat = 2", 'end = "repeat"'], "nothing is repeated"),
         (["repeat = 2"] * 5 + ["wait_s = 1"] + ['end = "repeat"'] * 5, "at most 4 within each other"),
         (['call = "seq.toml"'], "calls itself: seq.toml calls seq.toml"),
-        (['call = "job.toml"'], "no sequence"),
+        (['call = "job.toml"'], "is not a sequence"),
         (
             ['goto = "b"', 'run = "job.toml"'],
             r"step\[2\]\.run: job begins at 1, -60, 40°, but the arm is at b",
         ),
         (["repeat = 2", 'run = "job.toml"', 'end = "repeat"'], r"step\[2\]\.run: job begins at"),
-        (['goto = "home"'], "nothing is left to do"),
+        (['goto = "home"'], "the sequence has no effect"),
         (["wait_s = 1"] * 501, "501 rows"),
     ],
 )
@@ -282,9 +282,9 @@ def test_sequences_that_call_each_other_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("top", "said"),
     [
-        ('start = "c"', "start = 'c': there is no such posture"),
+        ('start = "c"', "start = 'c': no such posture"),
         ('begin = "a"', "begin: unknown key"),
-        ("[posture.home]\nangles_deg = [0, 0, 0]", "posture.home is there already"),
+        ("[posture.home]\nangles_deg = [0, 0, 0]", "posture.home already exists"),
         ("[posture.d]\nangles_deg = [0, 0]", r"posture.d.angles_deg"),
         ("[posture.d]\nangels_deg = [0, 0, 0]", "exactly one of angles_deg"),
     ],
@@ -308,7 +308,7 @@ def test_the_file_of_a_plan_holds_all_of_it(tmp_path: Path) -> None:
     assert encoded_sequence.of_plan(again).data == encoded_sequence.of_plan(plan).data
     assert again.total == plan.total
     plan.save(path)  # an earlier plan of the same sequence gives way
-    with pytest.raises(InputError, match="exists and has other content"):
+    with pytest.raises(InputError, match="exists with other content"):
         replace(plan, name="other").save(path)
     content = json.loads(path.read_text())
     content["sequence"]["rows"][0]["number"] = 7
@@ -334,7 +334,7 @@ def test_a_trajectory_file_is_no_sequence_and_the_other_way_round(tmp_path: Path
 def test_a_plan_of_another_arm_is_no_leg(tmp_path: Path) -> None:
     motion = armtempo.plan(Arm.paper(), Job.load(written(tmp_path, "wait_s = 1").parent / "job.toml", ARM))
     motion.save(tmp_path / "j.json")
-    with pytest.raises(ArmtempoError, match="another arm"):
+    with pytest.raises(ArmtempoError, match="a different arm"):
         planned(tmp_path, 'goto = "a"', 'run = "j.json"')
 
 

@@ -1,4 +1,4 @@
-"""Who has a port: the file that says so, the socket behind it, and what a caller hears."""
+"""Who has a port: the file that says so, its socket, and what a caller hears."""
 
 from __future__ import annotations
 

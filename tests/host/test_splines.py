@@ -8,7 +8,7 @@ from armtempo.basics.errors import InputError
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
-from tests.host.feeding import FEEDING
+from tests.host.problems import FEEDING
 
 
 @pytest.mark.parametrize("degree", [3, 5])

@@ -41,7 +41,7 @@ ORDER = (
     "panel",  # the arm in a browser
     "cli",
 )
-"""Each package or module imports from those before it in this list, never from those behind."""
+"""Each package or module imports from those before it in this list, never from those after."""
 LOWEST = ("__init__",)  # the version; its public names are imported when they are used
 HIGHEST = ("__main__",)
 MOST_PARAMETERS = 6

@@ -11,7 +11,7 @@ from armtempo.link.session import Session
 from armtempo_shared import wire
 
 from tests.inprocess import Pipe
-from tests.replay_transport import ReplayTransport
+from tests.system.relay import ReplayTransport
 
 
 def test_recorded_traffic_replays(tmp_path: Path) -> None:

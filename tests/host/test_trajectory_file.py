@@ -132,7 +132,7 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
         (lambda c: c["plan"].update(via_deg=[]), "via_deg and extremes"),
         (lambda c: c["plan"].update(extremes=[]), "via_deg and extremes"),
         (lambda c: c["plan"]["trajectory"].update(shared=True), "time control points differ"),
-        (lambda c: c["plan"]["searches"][0].update(joints=[7]), "a joint that there is not"),
+        (lambda c: c["plan"]["searches"][0].update(joints=[7]), "a joint that does not exist"),
         (lambda c: c["plan"]["arm"]["joints"][0].update(limits=None), "joint 1: has no limits"),
         (lambda c: c["plan"]["arm"]["joints"][0]["motor"].update(gear_ratio=0), "Motor: "),
         (lambda c: c["plan"]["arm"]["joints"][0]["encoder"].update(counts_per_rev=0), "counts_per_rev"),
@@ -244,7 +244,7 @@ def test_only_an_earlier_plan_of_the_same_job_and_arm_is_replaced(plan: Plan, pa
         replace(plan, job=replace(plan.job, name="another")),
         replace(plan, arm=replace(plan.arm, name="another")),
     ):
-        with pytest.raises(InputError, match=r"exists and has other content.*the same job.*--force"):
+        with pytest.raises(InputError, match=r"exists with other content.*the same job.*--force"):
             other.save(path)
         assert Plan.load(path).job.seed == 9
         other.save(path.with_name("new.json"), force=True)

@@ -14,6 +14,7 @@ import pytest
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
 from armtempo.kinematics import Geometry, forward, of_arm
+from armtempo.kinematics.dynamics import joint_torques
 from armtempo.kinematics.shape import refusals
 from armtempo.model.arm import Arm
 from armtempo.new_arm import urdf_fitting as fitting
@@ -27,6 +28,12 @@ pytestmark = pytest.mark.slow
 Array = NDArray[np.float64]
 FOLDER = Path(__file__).parents[1] / "data" / "urdf"
 SEED = 20_260_102
+
+
+@pytest.fixture(autouse=True)
+def _few_postures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The reader's own forward kinematics takes a millisecond a posture."""
+    monkeypatch.setattr(fitting, "POSTURES", 100)
 
 
 def about(axis: Array, angle: float) -> Array:
@@ -77,7 +84,7 @@ def imported(tmp_path: Path, name: str, *options: str) -> tuple[Path, str]:
 def test_the_written_arm_stands_where_the_urdf_does(tmp_path: Path, name: str, joints: str) -> None:
     """With constant rows only where base or tool need them."""
     out, said = imported(tmp_path, name)
-    assert "worst error at 1000 random postures" in said
+    assert "worst error at 100 random postures" in said
     arm = Arm.read(out)
     assert [joint.name for joint in arm.joints] == joints.split()
     rng = np.random.default_rng(SEED)
@@ -165,7 +172,7 @@ REFUSED = [
             "choose another chain with --base and --tip",
         ],
     ),
-    ("is_not_there", [], ["there is no such file"]),
+    ("is_not_there", [], ["no such file"]),
 ]
 
 
@@ -278,6 +285,45 @@ def test_rows_of_300_random_chains() -> None:
             wanted = wanted @ about(np.array([0.0, 0.0, 1.0]), angle) @ move
         moved = [0.0 if row.joint is None else angles[row.joint] for row in table]
         np.testing.assert_allclose(forward(dh.geometry(table), moved), wanted, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["four_skew", "six_rounded"])
+def test_a_tools_mass_weighs_on_the_joints_as_in_the_urdf(tmp_path: Path, name: str) -> None:
+    """Torque at rest is the slope of the mass's height; four_skew has constant rows at base and tool."""
+    path, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
+    centre, inertia = np.array([0.03, -0.02, 0.05]), 'ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"'
+    inertial = f'<inertial><origin xyz="0.03 -0.02 0.05"/><mass value="0.8"/><inertia {inertia}/></inertial>'
+    text = (FOLDER / f"{name}.urdf").read_text()
+    path.write_text(text.replace('<link name="tool"/>', f'<link name="tool">{inertial}</link>'))
+    assert CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(out)]).exit_code == 0
+    arm = Arm.read(out)
+    assert sum(joint.dynamics.mass_kg for joint in arm.joints if joint.dynamics) == 0.8
+    turning = [number for number, joint in enumerate(arm.joints) if joint.name not in ("base", "tool")]
+    angles = np.zeros(len(arm.joints))
+    angles[turning] = np.random.default_rng(SEED).uniform(-1, 1, len(turning))
+
+    def height(changed: Array) -> float:
+        pose = tool_pose(path, {joint.name: angle for joint, angle in zip(arm.joints, changed, strict=True)})
+        return float(pose[2, 3] / 1000 + pose[2, :3] @ centre)
+
+    step = 1e-5 * np.eye(len(angles))[turning]
+    wanted = [0.8 * 9.80665 * (height(angles + each) - height(angles - each)) / 2e-5 for each in step]
+    still = np.zeros((1, len(angles)))
+    found = joint_torques(arm, angles[None], still, still)[0, turning]
+    np.testing.assert_allclose(found, wanted, atol=2e-4)
+
+
+def test_odd_masses_in_a_urdf_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    path.write_text(
+        text.replace(
+            '<link name="tool"/>', '<link name="tool"><inertial><mass value="-1"/></inertial></link>'
+        )
+    )
+    result = CliRunner().invoke(main, ["import-urdf", str(path), "-o", str(tmp_path / "arm.toml")])
+    assert result.exit_code == 2
+    assert "joint 'j3': a mass" in result.output
 
 
 def test_blank_names_are_replaced(tmp_path: Path) -> None:

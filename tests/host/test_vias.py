@@ -86,7 +86,7 @@ def test_a_pose_that_needs_undriven_joints_is_reported_with_the_miss() -> None:
 
 
 def test_a_solution_with_the_undriven_joints_at_home_comes_before_a_nearer_one() -> None:
-    """Rear, elbow up reaches it with the wrist at home; front would be nearer to where the arm stands."""
+    """Rear, elbow up reaches it with the wrist at home; front would be nearer to where the arm is."""
     wished = pose_of(0.0, -93.0, -140.0)
     assert via_points.resolve(ARM, job((5.0, -93.0, -140.0), wished)).notes == ()
     far = via_points.resolve(ARM, job((180.0, -38.0, -52.0), wished))

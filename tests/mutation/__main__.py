@@ -99,7 +99,7 @@ def tests_for(mistake: Mistake, known: contexts.Known, seconds: float) -> list[s
 
 
 def _around(tree: ast.Module, line: int) -> tuple[set[int], set[int]]:
-    """Lines of the statement, and of the function around it: of all functions where there is none."""
+    """Lines of the statement, and of the function around it: of all functions if there is none."""
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     inside = [set(range(one.body[0].lineno, (one.end_lineno or 0) + 1)) for one in functions]
     around = [lines for lines in inside if line in lines]

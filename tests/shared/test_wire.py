@@ -1,4 +1,4 @@
-"""Frames: every single fault is noticed, nothing behind it is lost, and the board finds the same frames."""
+"""Frames: every single fault is noticed, nothing after it is lost, and the board finds the same frames."""
 
 from __future__ import annotations
 

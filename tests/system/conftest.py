@@ -13,7 +13,7 @@ from tests.system import replays
 from tests.system.replays import Replay
 
 FASTEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
-"""For jobs beside the shipped one: each interpreter has shown there that it makes the same pulses."""
+"""For jobs other than the shipped one: each interpreter has shown there that it makes the same pulses."""
 EMULATED = "micropython-arm"
 BY_JOB = {
     "shipped": [name for name in interpreters.AVAILABLE if name != EMULATED],

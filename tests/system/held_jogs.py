@@ -85,7 +85,7 @@ class HeldEnd:
 
 
 def _seconds(since: Status | None, now: Status) -> float:
-    """By the board's clock; 0 where there is no beginning."""
+    """By the board's clock; 0 if there is no beginning."""
     return (now.ticks - since.ticks) / TICK_HZ if since else 0.0
 
 
@@ -112,7 +112,7 @@ class HeldJogs:
             yield cls(board, to_board, from_board)
 
     def run(self, case: HeldCase) -> HeldEnd | None:
-        """Do it; None where there is no way to go, or the board answered too late while it was still to be held."""
+        """Do it; None if there is no way to go, or the board answered too late while it was still to be held."""
         board = self._board
         board.home(_ARM, case.start_deg)
         self._beyond = False

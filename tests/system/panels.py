@@ -135,7 +135,7 @@ class Panels:
 
 
 def asked(address: str, request: bytes) -> bytes:
-    """The first line of the panel's answer to the bytes of a request; b"" where it hangs up."""
+    """The first line of the panel's answer to the bytes of a request; b"" if it hangs up."""
     host, port = address.removeprefix("http://").strip("/").split(":")
     with socket.create_connection((host, int(port)), timeout=WAIT_S) as line, suppress(ConnectionError):
         line.sendall(request.replace(b"HOST", f"{host}:{port}".encode()))

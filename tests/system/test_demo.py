@@ -1,4 +1,4 @@
-"""``armtempo demo`` from the command line: what it prints and what it leaves behind."""
+"""``armtempo demo`` from the command line: what it prints and what it leaves."""
 
 from __future__ import annotations
 

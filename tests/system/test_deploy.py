@@ -196,5 +196,5 @@ def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
         assert "up to date" in armtempo("deploy", "--port", port, cwd=tmp_path)
         assert "does not start" in armtempo("undeploy", "--port", port, cwd=tmp_path)
         (flash / "armtempo_shared" / "firmware.py").write_text("CRC = 1\n")
-        assert "a new firmware is due" in armtempo("deploy", "--port", port, cwd=tmp_path, code=1)
+        assert "the firmware must be updated" in armtempo("deploy", "--port", port, cwd=tmp_path, code=1)
         assert not (flash / "main.py").exists()

@@ -1,4 +1,4 @@
-"""The page "The first hour": its commands, as they stand, with armtempo installed from its wheel."""
+"""The wheel, the page "The first hour" with armtempo installed from it, and the page "A day with your arm"."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import subprocess
 import sys
 import sysconfig
 import venv
+import zipfile
 from pathlib import Path
 
 import pytest
+from armtempo.cli.help import TOPICS
 from armtempo.simulator import LaunchOptions, launch
 
 from tests import interpreters
@@ -26,15 +28,24 @@ COMMANDS = [
     for block in re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
     for line in block.replace("\\\n", " ").splitlines()
 ]
+TOGETHER = pytest.mark.xdist_group("wheel")  # which is built once
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A freshly built wheel."""
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+    done = subprocess.run(build, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (found,) = folder.glob("*.whl")
+    return found
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the programs of an environment with the wheel; its dependencies are those of the tests."""
     folder = tmp_path_factory.mktemp("installed")
-    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
-    subprocess.run(build, check=True, capture_output=True)
-    (wheel,) = folder.glob("*.whl")
     venv.create(folder / "venv", with_pip=False)
     programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
     install = [
@@ -56,13 +67,15 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return programs
 
 
+@TOGETHER
 def test_an_own_arm_moves_within_ten_commands(installed: Path, tmp_path: Path) -> None:
     assert len(COMMANDS) <= 10
     assert COMMANDS[0].startswith("pipx install")
     environment = {"PATH": f"{installed}{os.pathsep}{os.environ['PATH']}", "HOME": str(tmp_path)}
     outputs = []
     folder = tmp_path
-    for line in COMMANDS[1:]:
+    assert COMMANDS[1] == "armtempo demo"  # see test_demo
+    for line in COMMANDS[2:]:
         if line.startswith("cd "):
             folder /= line.removeprefix("cd ")
             continue
@@ -77,6 +90,7 @@ def test_an_own_arm_moves_within_ten_commands(installed: Path, tmp_path: Path) -
         assert any(line in output for output in outputs), line
 
 
+@TOGETHER
 def test_it_is_the_wheel_that_ran(installed: Path) -> None:
     code = "import armtempo; print(armtempo.__file__)"
     done = subprocess.run([str(installed / "python"), "-c", code], capture_output=True, text=True, check=True)
@@ -122,3 +136,37 @@ def test_its_commands_one_after_the_other(tmp_path: Path) -> None:
     postures = re.findall(r"^\[posture\.(\w+)\]", (folder / "arm.toml").read_text(), re.MULTILINE)
     assert postures == ["above_feeder", "at_feeder", "above_tray"]
     assert json.loads((folder / "feed.json").read_text())["format"].startswith("armtempo sequence")
+
+
+# the wheel: three packages at its top level and nothing else, with everything they need inside
+
+
+PACKAGES = {"armtempo": "host", "armtempo_shared": "shared", "armtempo_board": "board"}
+
+
+@pytest.fixture(scope="module")
+def names(wheel: Path) -> set[str]:
+    """The files in the wheel."""
+    return set(zipfile.ZipFile(wheel).namelist())
+
+
+@TOGETHER
+def test_its_top_level_is_the_three_packages(names: set[str]) -> None:
+    top = {Path(name).parts[0] for name in names}
+    assert {name for name in top if not name.endswith(".dist-info")} == set(PACKAGES)
+    assert len(top) == len(PACKAGES) + 1
+
+
+@TOGETHER
+def test_the_pages_that_messages_name_are_in_it(names: set[str]) -> None:
+    assert {f"armtempo/data/pages/{topic}.md" for topic in TOPICS} <= names
+
+
+@TOGETHER
+def test_every_tracked_file_of_the_packages_is_in_it(names: set[str]) -> None:
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True)
+    for package, folder in PACKAGES.items():
+        prefix = f"{folder}/{package}/"
+        wanted = {line.removeprefix(f"{folder}/") for line in listed.stdout.splitlines() if prefix in line}
+        assert wanted
+        assert wanted <= names

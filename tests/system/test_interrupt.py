@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -75,7 +75,7 @@ ENDS_WITHIN_S = 60.0
 
 @contextmanager
 def board_at_home(*faults: InjectedFault) -> Iterator[simulator.VirtualBoard]:
-    """A virtual board in real time whose arm stands where the shipped motion begins."""
+    """A virtual board in real time whose arm is at home."""
     arm = Arm.paper()
     with simulator.launch(simulator.LaunchOptions(arm=arm, virtual_time=False, faults=faults)) as process:
         with open_board(process.port) as board:
@@ -89,12 +89,15 @@ def samples_in(folder: Path) -> int:
     return sum(path.read_text().count("\n") for path in folder.glob("*-001/samples-01.csv"))
 
 
-def test_sigterm_ends_a_run_whose_board_has_fallen_silent(
-    plan_file: Callable[[str], Path], tmp_path: Path
-) -> None:
+def long_plan(folder: Path) -> Path:
+    """A motion of some seconds from home."""
+    return small_plan(folder / "feed.json", (170.0, -10.0, -50.0), "feed")
+
+
+def test_sigterm_ends_a_run_whose_board_has_fallen_silent(tmp_path: Path) -> None:
     with board_at_home(InjectedFault("silence", at_s=0.5, ms=1e9)) as process:
         command = commandline.start(
-            "run", plan_file("shipped"), "--port", process.port, "--out", tmp_path, folder=tmp_path
+            "run", long_plan(tmp_path), "--port", process.port, "--out", tmp_path, folder=tmp_path
         )
         commandline.wait_for(lambda: samples_in(tmp_path) > 3, "the first samples")
         command.terminate()
@@ -104,10 +107,10 @@ def test_sigterm_ends_a_run_whose_board_has_fallen_silent(
     assert reader.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "broken"
 
 
-def test_a_second_ctrl_c_ends_it_at_once(plan_file: Callable[[str], Path], tmp_path: Path) -> None:
+def test_a_second_ctrl_c_ends_it_at_once(tmp_path: Path) -> None:
     with board_at_home() as process:
         command = commandline.start(
-            "run", plan_file("shipped"), "--port", process.port, "--out", tmp_path, folder=tmp_path
+            "run", long_plan(tmp_path), "--port", process.port, "--out", tmp_path, folder=tmp_path
         )
         commandline.wait_for(lambda: samples_in(tmp_path) > 5, "the first samples")
         command.send_signal(signal.SIGINT)

@@ -222,21 +222,21 @@ def test_keys_move_the_arm_in_steps_and_while_held(tmp_path: Path) -> None:
         screen.press("z")
         screen.wait_for("tool along z, step 10 mm")
         screen.press("k")
-        screen.wait_for("'k' is no key here")
+        screen.wait_for("the key 'k' does nothing here")
         screen.press("1h")
         screen.wait_for("joint 1, held")
         screen.press("+")
         screen.wait_for("hold the key down")
         before = screen.shown
         limit_s = time.monotonic() + commandline.SLOW_S
-        while "moving; released, it rests within" not in screen.shown and time.monotonic() < limit_s:
+        while "moving; after release at rest within" not in screen.shown and time.monotonic() < limit_s:
             screen.press("+")
             screen.look(0.05)
-        assert "moving; released" in screen.shown, before
+        assert "moving; after release" in screen.shown, before
         screen.look(2.0)
         screen.press("q")
         assert screen.end() == 0, screen.shown
-        assert "the arm stands at" in screen.shown
+        assert "position:" in screen.shown
         joint_1, joint_2, _ = where(port)
         assert 0.0 < joint_1 < 190.0
         assert joint_2 == pytest.approx(-49.0, abs=0.02)
@@ -262,17 +262,17 @@ def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
         screen.press("p")
         screen.wait_for("point 1 taken: 0, -60, 39.99")
         screen.press("p")
-        screen.wait_for("not taken: the arm stands where")
+        screen.wait_for("not taken: the arm is at")
         screen.press("s+")
         screen.wait_for("| 10.01 -60.00")
         screen.press("pu")
-        screen.wait_for("point 2 forgotten")
+        screen.wait_for("point 2 removed")
         screen.press("p")
         screen.wait_for("point 2 taken")
         screen.press("q")
         assert screen.end() == 0, screen.shown
         assert "written: shelf.toml, 2 via points" in screen.shown
-        assert Terminal(*arguments, folder=tmp_path).end() == 2  # it is there already
+        assert Terminal(*arguments, folder=tmp_path).end() == 2  # it already exists
         hand = Terminal(*arguments, "--replace", "--by-hand", folder=tmp_path)
         hand.wait_for("hold the arm")
         hand.press("\n")
@@ -299,3 +299,39 @@ def test_a_joint_without_an_encoder_cannot_be_taught_by_hand(tmp_path: Path) -> 
         with pytest.raises(InputError, match="joint 1: no encoder"):
             board.by_hand()
         assert board.status().known == 0b111
+
+
+# a posture is taught, and gone to by name
+
+
+TAUGHT_DEG = (5.0, -61.0, 41.0)
+
+
+def test_a_posture_is_taught_and_gone_to_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(shipped.arm_path().read_text())
+    with launch(LaunchOptions(arm=armtempo.Arm.load(path))) as virtual:
+
+        def run(*arguments: str, code: int = 0) -> str:
+            result = CliRunner().invoke(main, [*arguments, "--arm", str(path), "--port", virtual.port])
+            assert result.exit_code == code, result.output
+            return result.output
+
+        assert "is unknown" in run("teach", "--posture", "rack", code=1)
+        run("home")
+        run("goto", ",".join(map(str, TAUGHT_DEG)))
+        assert "joint 1 5.01°, joint 2 -61°" in run("teach", "--posture", "rack")
+        assert "[posture.rack]" in path.read_text()
+        assert "did you mean 'rack'" in run("goto", "rak", code=2)
+        run("goto", "home")
+        assert "--replace" in run("teach", "--posture", "rack", code=2)
+        run("goto", "rack")
+        run("teach", "--posture", "rack", "--replace")
+        arm = armtempo.Arm.load(path)
+        with armtempo.connect(virtual.port, arm) as board:
+            board.configure(arm)
+            np.testing.assert_allclose(board.posture_deg(), TAUGHT_DEG, atol=0.02)
+            board.goto("home")
+            np.testing.assert_allclose(board.posture_deg(), arm.home_deg, atol=0.01)
+            with pytest.raises(armtempo.InputError, match="did you mean 'rack'"):
+                board.goto("rck")

@@ -187,12 +187,6 @@ def file(bench: Bench, name: str, text: str) -> None:
     (bench.flash / name).write_text(text)
 
 
-def half_deployed(bench: Bench) -> None:
-    (bench.flash / "main.py").unlink()
-    for path in list((bench.flash / "lib").rglob("*.*"))[::2]:
-        path.unlink()
-
-
 def full_flash(bench: Bench) -> None:
     shutil.rmtree(bench.flash / "lib")
     (bench.flash / "data.csv").write_bytes(bytes(512 * (190 - 40)))
@@ -217,11 +211,9 @@ def damaged(kind: str) -> Callable[[Bench], None]:
 
 STATES: dict[str, dict[str, Callable[[Bench], None]]] = {
     "The program does not start": {
-        "syntax error": lambda bench: module(bench, "program", "def turn(:\n"),
         "damaged file": damage_largest,
         "exception in main.py": lambda bench: file(bench, "main.py", "1 / 0\n"),
         "exception in boot.py": lambda bench: file(bench, "boot.py", "1 / 0\n"),
-        "half deployed": half_deployed,
     },
     "The board hangs": {
         "program": lambda bench: module(bench, "program", HANG),
@@ -297,7 +289,7 @@ def test_what_the_page_quotes_of_messages_is_said() -> None:
         "there is no port",
         "is in use",
         "no permission to open",
-        "set up for another arm",
+        "set up for a different arm",
         "connect an STM32F405",
     ):
         assert words in PAGE

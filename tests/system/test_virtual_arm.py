@@ -62,7 +62,7 @@ def test_cubic_starts_ring_more_than_quintic_ones() -> None:
 
 
 def test_homing_by_limit_switch(tmp_path: Path) -> None:
-    """The virtual arm's switch trips at its angle; after the homing run the board knows where it stands."""
+    """The virtual arm's switch trips at its angle; after the homing run the board knows where it is."""
     switches = LimitSwitches(low=1, low_deg=-8.0)
     arm = first_joint(boards.ARM, switches=switches, model=JointModel())
     start_deg = [6.0, -60.0, 40.0]

@@ -87,7 +87,7 @@ def test_a_motions_edges_are_those_behind_the_stop_of_the_clock_before_it() -> N
 
 
 def test_goes_with_its_launcher(tmp_path: Path) -> None:
-    """A launcher that is killed leaves no process behind."""
+    """A launcher that is killed leaves no process."""
     script = (
         "import time\nfrom armtempo.simulator import launch\n"
         "board = launch()\nprint(board.pid, flush=True)\ntime.sleep(60)"
@@ -154,7 +154,7 @@ CASES = Path(__file__).parent / "scripts" / "cases"
 SCRIPTS = tuple(CASES / f"virtual_{name}.py" for name in ("hardware", "time", "flash"))
 
 
-@scripted.each([case for script in SCRIPTS for case in scripted.cases(script)])
+@scripted.each(scripted.together(scripted.cases(*SCRIPTS)))
 def test_case(case: scripted.Case, tmp_path: Path) -> None:
     (tmp_path / "flash").mkdir()
     case.run(str(tmp_path), heap="")

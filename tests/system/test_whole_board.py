@@ -16,6 +16,7 @@ from armtempo.records import encode, encoded_motion
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters, scripted
+from tests.system import soak
 
 CASES = Path(__file__).parent / "scripts" / "cases"
 SCRIPTS = [CASES / f"{name}.py" for name in ("standalone", "faults", "prompt", "sequences")]
@@ -24,7 +25,7 @@ ARM = Arm.paper()
 HOME_DEG = np.array(ARM.home_deg)
 HOME_STEPS = [round(angle * joint.steps_per_deg) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)]
 AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
-FEWER = {"micropython": 6, "cpython": 10, "micropython-arm": 12}
+FEWER = {"micropython": 8, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
 QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 
@@ -114,3 +115,9 @@ def test_case_with_the_compact_program(
     case: scripted.Case, flashes: Path, compact: str, tmp_path: Path
 ) -> None:
     play(case, flashes, tmp_path, compact)
+
+
+def test_every_motion_of_a_soak_makes_the_steps_of_its_record(tmp_path: Path) -> None:
+    """A short one; ``python -m tests.benchmark.soak`` runs a long one."""
+    soak.make_flash(tmp_path / "flash", soak.AWAY[:2])
+    print(soak.run(QUICKEST, tmp_path / "flash", 10, seed=20268))

@@ -18,14 +18,14 @@ from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from click.testing import CliRunner, Result
 
 from tests import scripted
-from tests.host import wired_arms
+from tests.host import arm_files
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "wired_pins.py"
 ESTOP = "estop_fitted = true"
 TICKS_PER_US = 84
 
 
-@scripted.each(scripted.cases(SCRIPT))
+@scripted.each(scripted.together(scripted.cases(SCRIPT)))
 def test_case(case: scripted.Case, tmp_path: Path) -> None:
     case.run(str(tmp_path), heap="")
 
@@ -59,7 +59,7 @@ class Bench:
 
 @contextmanager
 def bench(folder: Path, *faults: InjectedFault) -> Iterator[Bench]:
-    path = wired_arms.write(folder, wired_arms.ALL)
+    path = arm_files.write(folder, arm_files.ALL)
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("estop_fitted = false", ESTOP), encoding="utf-8")
     log = folder / "edges"

@@ -30,7 +30,7 @@ def take_stored(board: "ArmState") -> None:
     board.arm_waits = False
     board.arm_problem = board.arm_value = 0
     try:
-        _take(board, _judged(board, _stored(board)))
+        _take(board, _checked(board, _stored(board)))
     except Refused as refused:
         if refused.code != codes.NOT_FOUND:
             board.arm_problem, board.arm_value = refused.code, refused.value
@@ -44,7 +44,7 @@ def take_new(board: "ArmState") -> None:
     """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
     board.arm_waits = False
     try:
-        record = _judged(board, _new(board))
+        record = _checked(board, _new(board))
     except Refused:
         _decide(board, False)
         raise
@@ -82,7 +82,7 @@ def _decide(board: "ArmState", is_fit: bool) -> None:
     heap.forget()
 
 
-def _judged(board: "ArmState", data: bytes) -> "Record":
+def _checked(board: "ArmState", data: bytes) -> "Record":
     """An arm record that can be taken, unpacked; else Refused."""
     from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _BOOT_BYTES = const(4)
-MOTION_CODE_BYTES = const(12_500)
+MOTION_CODE_BYTES = const(14_500)
 """The large pieces of the code that only a motion needs."""
 NEVER_MS = const((1 << 30) - 1)
 
@@ -47,7 +47,7 @@ class ArmState:
         self.rows: "dict[int, Any]" = {}  # and their commands
         self.sequence: "Any" = None  # the one under way
         self.program_crc = program_crc
-        self.board_id = _board_id()
+        self.board_id = board_id()
         self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
         self.joints = 0
         self.arm_crc = 0
@@ -147,5 +147,6 @@ class ArmState:
         return _BYTES_PER_JOINT * self.joints
 
 
-def _board_id() -> bytes:
+def board_id() -> bytes:
+    """The chip's number, and its firmware."""
     return b"".join([b"%02x" % byte for byte in machine.unique_id()]) + b" " + sys.version.encode()

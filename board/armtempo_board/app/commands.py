@@ -15,12 +15,13 @@ from armtempo_shared.messages import (
     PAYLOAD_AT,
     PERMILLE,
     PROTOCOL_VERSION,
+    RATES_MEASURED,
     RESUME,
     SLOWEST_PERMILLE,
 )
 from micropython import const
 
-from armtempo_board import features
+from armtempo_board import features, step_rates
 from armtempo_board.buffers import u32
 from armtempo_board.errors import Refused
 
@@ -176,15 +177,15 @@ class Commands:
             limits.MAX_ENCODERS,
             controller.state(),
             limits.TICK_HZ,
-            limits.MAX_STEP_RATE,
-            limits.MAX_STEP_RATE_SUM,
+            step_rates.one,
+            step_rates.together,
             controller.free_flash,
             controller.free_heap,
             controller.arm_crc,
             controller.program_crc,
             controller.boot,
             controller.engine_room(),
-            features.BITS,
+            features.BITS | (RATES_MEASURED if 0 < controller.joints <= step_rates.joints else 0),
             controller.arm_problem,
             controller.arm_value,
         )

@@ -179,21 +179,23 @@ class Controller(ArmState):
             return
         self.begin_motion(name, crc, rate, flags, unknown)
 
-    def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
-        self.tidy()
-        try:
-            from armtempo_board.app import sequence_start  # here, so that it can be forgotten
+    if features.SEQUENCES:
 
-            self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
-        except MemoryError:
-            raise Refused(codes.NO_SEQUENCE_ROOM)
+        def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
+            self.tidy()
+            try:
+                from armtempo_board.app import sequence_start  # here, so that it can be forgotten
 
-    def _is_sequence(self, name: str) -> bool:
-        self._make_room()
-        try:
-            return bool(self.store().is_sequence(name))
-        finally:
-            heap.release()
+                self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
+            except MemoryError:
+                raise Refused(codes.NO_SEQUENCE_ROOM)
+
+        def _is_sequence(self, name: str) -> bool:
+            self._make_room()
+            try:
+                return bool(self.store().is_sequence(name))
+            finally:
+                heap.release()
 
     def _opened(self, name: str, crc: "int | None") -> "MotionFile":
         try:

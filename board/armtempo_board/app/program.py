@@ -60,6 +60,10 @@ def _build(port: "pyb.USB_VCP", root: str) -> App:
     del program_crc
     built = App(port, root, crc, codes.WATCHDOG if has_reset() else 0)
     built.controller.forget_store()
+    if features.ALL:
+        from armtempo_board.storage import measured_rates  # here, so that it can be forgotten
+
+        measured_rates.read(root, built.controller.board_id, crc)
     heap.forget()
     return built
 

@@ -108,7 +108,7 @@ class Sequencer:
         self._rate = rate  # of the motions' own time, in thousandths
         self._row: "tuple[int, ...]" = (0, 0, 0, 0, 0)  # the one under way
         self._place = Place()  # behind it
-        self._judged = 0  # motions whose splines were checked in this run
+        self._checked = 0  # motions whose splines were checked in this run
         self.told = array("i", [sequence.RUNNING] + [0] * VALUE)
         self.stopping = False
         self._command = SequenceCommand(
@@ -154,31 +154,31 @@ class Sequencer:
         if self._place.next == self._record.rows:
             return self._end(sequence.FINISHED)
         try:
-            return self._do() if self._judged == self._record.motions else self._judge()
+            return self._do() if self._checked == self._record.motions else self._check()
         except Refused as refused:
             return self._end(sequence.REFUSED, refused.code)
         except OSError:
             return self._end(sequence.REFUSED, codes.FLASH_ERROR)
 
-    def _judge(self) -> None:
+    def _check(self) -> None:
         """Check the splines of a motion before any moves, once in a run: neither its record, whose checksum is compared
         each time, nor the arm can change meanwhile.
         """
         from armtempo_board.motion.start_check import check_splines  # here, so that it can be forgotten
 
         record = self._record
-        name, crc = record.motion(self._judged)
+        name, crc = record.motion(self._checked)
         try:
             engine = self._controller.engine
             check_splines(self._controller.load(name, crc), engine.drives, engine.limits)
         except Refused:
             for self.told[ROW] in range(record.rows):
                 row = record.row(self.told[ROW])
-                if row[_OP] == sequence.MOVE and row[_NUMBER] == self._judged:
+                if row[_OP] == sequence.MOVE and row[_NUMBER] == self._checked:
                     self.told[STEP] = row[_STEP_OF_ROW]
                     break
             raise
-        self._judged += 1
+        self._checked += 1
 
     def _do(self) -> None:
         """What the next row says."""
@@ -204,11 +204,11 @@ class Sequencer:
         """Begin a motion."""
         name, crc = self._record.motion(number)
         engine = self._controller.engine
-        engine.judged = True
+        engine.skip_check = True
         try:
             self._controller.begin_motion(name, crc, self._rate)
         finally:
-            engine.judged = False
+            engine.skip_check = False
 
     def _is_over(self) -> bool:
         """Whether the row under way is done; a motion is, as nothing moves."""

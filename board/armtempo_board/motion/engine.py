@@ -61,7 +61,7 @@ class Engine(EngineParts):
         self._watched_joint = self._background_task = 0
         self._homing = 0  # one bit per joint that moves in a homing motion
         self._in_service = False  # service() or refill() is at work, or has not come to its end
-        self.judged = False  # the next motion is one that was checked before, and nothing has changed since
+        self.skip_check = False  # the next motion was checked before, and nothing has changed since
 
     # before a motion
 
@@ -101,7 +101,8 @@ class Engine(EngineParts):
     def _checked(self, motion: "MotionHead") -> int:
         from armtempo_board.motion import start_check  # here, so that it can be forgotten
 
-        return start_check.check_start(motion, self.drives, None if self.judged else self.limits, self.known)
+        limits = None if self.skip_check else self.limits
+        return start_check.check_start(motion, self.drives, limits, self.known)
 
     def _override(self, rate: int, motion: "MotionHead") -> "Any":
         """The law of the motion's time, with the code that only a motion needs."""

@@ -9,7 +9,6 @@ import struct
 from armtempo_shared import codes
 from armtempo_shared.limits import (
     LONGEST_TICKS,
-    MAX_STEP_RATE,
     MOST_SPAN_STEPS,
     MOST_STEPS,
     STEP_FRACTION_BITS,
@@ -18,6 +17,7 @@ from armtempo_shared.limits import (
 )
 from micropython import const
 
+from armtempo_board import step_rates
 from armtempo_board.errors import Refused
 from armtempo_board.motion import rate_check
 from armtempo_board.stepgen import subdivision
@@ -119,7 +119,7 @@ class Judge:
         self._gap_ticks = gap_ticks
         self._low = row["min_steps"] + BIAS
         self._high = row["max_steps"] + BIAS
-        limit = min(row["max_rate"], MAX_STEP_RATE + MAX_STEP_RATE // 100)
+        limit = min(row["max_rate"], step_rates.one + step_rates.one // 100)
         self._mantissa, self._exponent = rate_check.scaled(limit)
 
     def verdict(self, measured: int) -> int:

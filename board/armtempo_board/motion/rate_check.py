@@ -4,9 +4,10 @@ from array import array
 
 import micropython
 from armtempo_shared import codes
-from armtempo_shared.limits import MAX_STEP_RATE_SUM, TICK_HZ
+from armtempo_shared.limits import TICK_HZ
 from micropython import const
 
+from armtempo_board import step_rates
 from armtempo_board.errors import Refused
 from armtempo_board.stepgen.bezier import BIAS, HIGH, LAST_HIGH, LOW_BITS
 from armtempo_board.stepgen.subdivision import (
@@ -106,7 +107,7 @@ def _rate(interval: "Subintervals", steps: int, ticks: int) -> int:
 
 def check_sum(motion: "MotionHead", joints: "list[dict[str, int]]", interval: "Subintervals") -> None:
     """Refused (too_fast, no joint, rate) where all joints together may step too fast in one of many spans of time."""
-    limit = MAX_STEP_RATE_SUM + MAX_STEP_RATE_SUM // 100
+    limit = step_rates.together + step_rates.together // 100
     if sum([row["max_rate"] for row in joints]) <= limit:
         return
     longest = max([_end_high(motion, joint) for joint in range(motion.joints)])

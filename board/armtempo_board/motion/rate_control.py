@@ -4,6 +4,7 @@ from armtempo_shared import codes
 from armtempo_shared.messages import RESUME
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.motion.clock import MotionClock
 from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS
@@ -58,18 +59,20 @@ class RateControl:
         """Whether its own time stands still behind the ramp that began last."""
         return bool(self.override.rate == 0)
 
-    def want(self, rate: int) -> None:
-        """Want another rate, in thousandths; 0: pause, RESUME: as before it."""
-        if self.braked:
-            raise Refused(codes.BUSY)
-        if not self._can_brake:
-            raise Refused(codes.FIXED_SPEED)
-        if rate == RESUME:
-            rate = self._before_pause
-        if self.override.is_too_long(self._clock.ticks(), rate):
-            raise Refused(codes.TOO_LONG)
-        self.wanted = rate
-        self._before_pause = rate or self._before_pause
+    if features.SPEED:
+
+        def want(self, rate: int) -> None:
+            """Want another rate, in thousandths; 0: pause, RESUME: as before it."""
+            if self.braked:
+                raise Refused(codes.BUSY)
+            if not self._can_brake:
+                raise Refused(codes.FIXED_SPEED)
+            if rate == RESUME:
+                rate = self._before_pause
+            if self.override.is_too_long(self._clock.ticks(), rate):
+                raise Refused(codes.TOO_LONG)
+            self.wanted = rate
+            self._before_pause = rate or self._before_pause
 
     def is_due(self) -> bool:
         """Whether the change that is wanted can begin; else it waits until the one before lies behind."""

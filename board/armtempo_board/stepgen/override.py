@@ -10,6 +10,7 @@ from array import array
 from armtempo_shared.limits import LONGEST_RUN_TICKS
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.stepgen import interval_steps, time_law
 from armtempo_board.stepgen.time_law import (
     AFTER,
@@ -118,11 +119,13 @@ class Override:
         """Real time at which the last ramp ends."""
         return self._real_ticks
 
-    def is_too_long(self, from_ticks: int, rate: int) -> bool:
-        """Whether at a rate, taken up at about a real time, the run could last longer than LONGEST_RUN_TICKS."""
-        left = max(self._duration_ticks - self._motion_ticks, 0)
-        latest = max(from_ticks, self._real_ticks) + 2 * time_law.LONGEST_RAMP_TICKS
-        return rate > 0 and latest + left * PERMILLE // rate > LONGEST_RUN_TICKS
+    if features.SPEED:
+
+        def is_too_long(self, from_ticks: int, rate: int) -> bool:
+            """Whether at a rate, taken up at about a real time, the run could last longer than LONGEST_RUN_TICKS."""
+            left = max(self._duration_ticks - self._motion_ticks, 0)
+            latest = max(from_ticks, self._real_ticks) + 2 * time_law.LONGEST_RAMP_TICKS
+            return rate > 0 and latest + left * PERMILLE // rate > LONGEST_RUN_TICKS
 
 
 class JointLaw:

@@ -20,7 +20,7 @@
         ├── PartError              a part of the self-test raised an exception on the board
         └── SilentError            the board does not answer in a part of the self-test
 
-Every error says what is wrong and where (``problem``) and what to do next (``hint``). Beside the tree stands
+Every error says what is wrong and where (``problem``) and what to do next (``hint``). Next to the tree is
 Stopped, a KeyboardInterrupt: a motion was brought to rest because a stop was asked for.
 """
 

@@ -36,7 +36,7 @@ Examples:
 
 _AGAIN_S = 0.01
 _MOST_WAITS = 300
-"""Longer than any import takes; whoever runs a command while importing is interrupted all the same."""
+"""Longer than any import takes; a command that is run while importing is interrupted all the same."""
 
 
 class LazyGroup(click.Group):
@@ -100,7 +100,7 @@ class LazyGroup(click.Group):
             results.show_error(error, as_json=as_json)
             ctx.exit(error.exit_code)
         except OSError as error:
-            if error.errno == errno.EPIPE:  # whoever read the output has gone: click ends quietly
+            if error.errno == errno.EPIPE:  # the reader of the output has gone: click ends quietly
                 raise
             results.show_error(_of_file(error), as_json=as_json)
             ctx.exit(1)

@@ -32,10 +32,10 @@ from armtempo.report import arm_picture, drawing
 def check(
     arm_path: Path | None, job_path: Path | None, picture: Path | None, force: bool, as_json: bool
 ) -> None:
-    """Hold an arm file, and a job if named, against common sense: what looks wrong, and what to do about it.
+    """Check an arm file, and a job if given: what looks wrong, and how to correct it.
 
-    Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 where there are
-    errors; warnings and notes leave it 0.
+    Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 if there are errors; 0
+    with warnings and notes only.
     """
     _check_picture(picture, force)
     path = chosen.arm_file(arm_path)
@@ -50,7 +50,7 @@ def check(
 
 
 def _check_picture(picture: Path | None, force: bool) -> None:
-    """Raise InputError where the picture cannot be written as asked."""
+    """Raise InputError if the picture cannot be written as asked."""
     if picture is None:
         return
     if picture.suffix not in (".png", ".svg"):
@@ -58,7 +58,7 @@ def _check_picture(picture: Path | None, force: bool) -> None:
             f"--picture {picture}: not a kind of picture", "give a name that ends in .png or .svg"
         )
     if picture.exists() and not force:
-        raise InputError(f"--picture {picture}: is there already", "choose another name, or add --force")
+        raise InputError(f"--picture {picture}: already exists", "choose another name, or add --force")
 
 
 def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:

@@ -50,15 +50,15 @@ def named_arm(path: Path | None, for_shape: bool = False) -> Arm | None:
 
 
 def arm_file(path: Path | None) -> Path:
-    """The file of the same, or the paper's arm's, which is said aloud."""
+    """The file of the same, or the paper's arm's, which is printed."""
     setting = ProjectSettings().get(ARM, path)
     if not setting:
-        tell(f"no arm is named; this is for the one that ships with armtempo, {shipped.PAPER!r}")
+        tell(f"no arm given; using the one that ships with armtempo, {shipped.PAPER!r}")
     return shipped.find(setting.value or shipped.PAPER).path
 
 
 def load_arm(path: Path | None) -> Arm:
-    """The same; InputError where none is named."""
+    """The same; InputError if none is named."""
     found = named_arm(path)
     if found is None:
         raise nothing_set(ARM, "which arm?")
@@ -66,16 +66,16 @@ def load_arm(path: Path | None) -> Arm:
 
 
 def arm_or_paper(path: Path | None, for_shape: bool = False) -> Arm:
-    """The same, for commands that move nothing: without one the paper's arm, which is said aloud."""
+    """The same, for commands that move nothing: without one the paper's arm, which is printed."""
     found = named_arm(path, for_shape)
     if found is None:
         found = Arm.paper()
-        tell(f"no arm is named; this is for the one that ships with armtempo, {found.name!r}")
+        tell(f"no arm given; using the one that ships with armtempo, {found.name!r}")
     return found
 
 
 def load_job(path: Path | None, arm: Arm) -> Job:
-    """The job of ``--job``, of the variable or of the project folder; InputError where none is named."""
+    """The job of ``--job``, of the variable or of the project folder; InputError if none is named."""
     setting = ProjectSettings().get(JOB, path)
     if not setting:
         raise nothing_set(JOB, "which job?")
@@ -91,7 +91,7 @@ def job_file(path: Path | None) -> Path | None:
 def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]:
     """What to plan: both as they are named, or, where neither is, the demo's.
 
-    InputError where only one of them is named: a job is never planned for an arm that nobody has named.
+    InputError if only one of them is named: a job is never planned for an arm that nobody has named.
     """
     settings = ProjectSettings()
     arm, job = settings.get(ARM, arm_path), settings.get(JOB, job_path)
@@ -100,14 +100,14 @@ def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]
             raise nothing_set(ARM, f"job {job.value} ({job.source}) is for which arm?")
         loaded = load_arm(arm_path)
         return loaded, load_job(job_path, loaded)
-    tell("no arm and no job are named; these are the feeding job and the arm that ship with armtempo")
+    tell("no arm and no job given; using the feeding job and the arm that ship with armtempo")
     return Arm.paper(), Job.paper()
 
 
 def arm_of_board(board: Board, named: Arm | None) -> Arm:
     """The arm that is named; else the one that ships with armtempo, if the board is set up for just that.
 
-    InputError where neither is.
+    InputError if neither is.
     """
     if named is not None:
         return named
@@ -129,7 +129,7 @@ def words(arm: Arm) -> str:
 def source_words(name: str, source: str) -> str:
     """An arm's name and file; the one that ships with armtempo needs no path."""
     ships = Path(source).is_relative_to(Path(__file__).parents[1]) if source else False
-    where = "as it ships with armtempo" if ships else source
+    where = "ships with armtempo" if ships else source
     return f"{name} ({where})" if where else name
 
 
@@ -149,7 +149,7 @@ def is_file(what: str) -> bool:
     beside = [str(path.with_name(one.name)) for one in path.parent.glob("*.json")]
     near = did_you_mean(what, beside)
     raise InputError(
-        f"{what}: there is no such file{near}",
+        f"{what}: no such file{near}",
         "check the path; 'armtempo plan' makes one, 'armtempo list' shows the board's",
     )
 
@@ -167,12 +167,12 @@ def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = Non
     from armtempo.records.encode import arm_record
 
     if name is not None:
-        raise InputError("--name: a sequence keeps the name in its file", "change it there and plan it again")
+        raise InputError("--name: the name of a sequence is in its file", "change it there and plan it again")
     found = SequencePlan.load(path)
     named = named_arm(arm_path)
     if named is not None and arm_record(named) != arm_record(found.arm):
         raise InputError(
-            f"{path} was planned for another arm than {named.name!r} ({named.source})",
+            f"{path} was planned for a different arm than {named.name!r} ({named.source})",
             "plan it again with this arm",
         )
     return found
@@ -182,7 +182,7 @@ def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = Non
 
 
 def port(given: str | None, others: bool = False) -> str:
-    """The port of ``--port``, of the variable or of the project folder, else the one that can be meant, said aloud.
+    """The port of ``--port``, of the variable or of the project folder, else the one that can be meant, printed.
 
     ``others``: one that another armtempo program has open will do too.
     """
@@ -226,7 +226,7 @@ def board(
 def shared_or_own(
     given: BoardOptions, arm: Arm | None = None, any_program: bool = False, sink: Sink | None = None
 ) -> SharedBoard | Board:
-    """The board through another program that has its port, which is said aloud, else over the port itself.
+    """The board through another program that has its port, which is printed, else over the port itself.
 
     ``given`` names a port. A program that opens it just now answers for it soon; one that ends gives it up.
     """
@@ -244,7 +244,7 @@ def shared_or_own(
 
 
 def board_state(given: BoardOptions) -> BoardState:
-    """What the board says, whoever has the port, which ``given`` names."""
+    """What the board says, whichever program has the port, which ``given`` names."""
     while True:
         with shared_or_own(given, any_program=True) as found:
             try:

@@ -58,13 +58,13 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "check": Entry(
             "check:check",
-            "Hold an arm file, and a job if named, against common sense: what looks wrong, and what to do about it.",
+            "Check an arm file, and a job if given: what looks wrong, and how to correct it.",
             "check",
             "check --arm my_arm.toml --job first.toml --picture arm.png",
         ),
         "import": Entry(
             "exchange:import_table",
-            "Make a job file from the CSV file TABLE: a line a via point, a column a driven joint.",
+            "Make a job file from the CSV file TABLE: one line per via point, one column per driven joint.",
             "import points.csv",
             "import motion.csv --tolerance-deg 0.05 -o back.toml",
         ),
@@ -76,7 +76,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "import-urdf": Entry(
             "exchange:import_urdf",
-            "Make an arm file of a URDF's chain of revolute joints: its Denavit-Hartenberg rows and ranges.",
+            "Make an arm file from a URDF's chain of revolute joints: Denavit-Hartenberg rows and ranges.",
             "import-urdf robot.urdf -o arm.toml --tip tool0",
         ),
     },
@@ -88,21 +88,21 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "demo --pick-and-place",
         ),
         "home": Entry(
-            "posture:home", "Declare where the arm stands.", "home", "home 0,-60,40", "home --switches"
+            "posture:home", "Declare the arm's position.", "home", "home 0,-60,40", "home --switches"
         ),
         "goto": Entry(
             "posture:goto", "Move straight to a posture.", "goto home", "goto 10,-50,30", "goto first.json"
         ),
         "jog": Entry(
             "jog:jog",
-            "Jog: move a joint or the tool a little, straight, never beyond a range.",
+            "Jog: move a joint or the tool by a step or while a key is held, within the ranges.",
             "jog",
             "jog --joint 2 --by -5",
             "jog --axis z --by 10 --speed 50",
         ),
         "teach": Entry(
             "teach:teach",
-            "Teach: keep where the arm stands.",
+            "Teach: store the arm's present position.",
             "teach points.toml",
             "teach --posture above_tray",
         ),
@@ -113,13 +113,15 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "run first.json --repeat 3 --speed 50",
             "run sequence_name",
         ),
-        "speed": Entry("speed:speed", "Let what moves go on at PERCENT of its planned speed.", "speed 50"),
+        "speed": Entry(
+            "speed:speed", "Change the speed of the running motion to PERCENT of the planned one.", "speed 50"
+        ),
         "pause": Entry(
             "speed:pause",
-            "Let what moves come to rest on its path; 'armtempo resume' goes on, 'armtempo stop' ends it.",
+            "Bring the running motion to rest on its path; 'armtempo resume' continues it, 'armtempo stop' ends it.",
             "pause",
         ),
-        "resume": Entry("speed:resume", "Go on along the path at the speed before the pause.", "resume"),
+        "resume": Entry("speed:resume", "Continue a paused motion at the speed before the pause.", "resume"),
         "output": Entry(
             "wired:output",
             "Set an output of the arm, or list them.",
@@ -128,23 +130,23 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "output lamp 0.5",
         ),
         "input": Entry("wired:read_inputs", "Read the inputs of the arm.", "input", "input part"),
-        "stop": Entry("stop:stop", "Brake or freeze, and say where the arm stands.", "stop", "stop --now"),
-        "clear": Entry("stop:clear", "Clear the pending fault, once its cause is gone.", "clear"),
+        "stop": Entry("stop:stop", "Brake or freeze, and print the arm's position.", "stop", "stop --now"),
+        "clear": Entry("stop:clear", "Clear the pending fault; its cause must be gone.", "clear"),
         "status": Entry(
             "state:status",
-            "Show the board, its state, and where the joints stand.",
+            "Show the board, its state and the joints' positions.",
             "status",
             "status --json",
         ),
         "watch": Entry(
             "watch:watch",
-            "Show samples, states and what happens, as another armtempo program that has the port hears it.",
+            "Show samples, states and events of another armtempo program that has the port.",
             "watch",
             "watch --json > samples.jsonl",
         ),
         "fetch": Entry(
             "run:fetch",
-            "Fetch the samples that the board keeps of its last run, such as one that its button started.",
+            "Fetch the samples that the board recorded of its last run, such as one started by its button.",
             "fetch",
             "fetch first.json",
         ),
@@ -156,7 +158,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "panel": Entry(
             "panel:panel",
-            "See the arm in a browser: move it, teach it, run it, watch it.",
+            "Open the panel in a browser: see, move, teach, run and watch the arm.",
             "panel",
             "panel --port sim --arm ar4",
         ),
@@ -165,11 +167,11 @@ GROUPS: dict[str, dict[str, Entry]] = {
         "ports": Entry("config:ports", "List the serial ports, likely boards first.", "ports"),
         "deploy": Entry(
             "deploy:deploy",
-            "Put the board program on a board, or bring it up to date.",
+            "Install or update the board program on a board.",
             "deploy --port /dev/ttyACM0",
             "deploy --mpy",
         ),
-        "undeploy": Entry("deploy:undeploy", "Take the board program off a board.", "undeploy"),
+        "undeploy": Entry("deploy:undeploy", "Remove the board program from a board.", "undeploy"),
         "firmware": Entry(
             "firmware:firmware",
             "Build a MicroPython firmware with the board program in it.",
@@ -177,7 +179,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "flash": Entry(
             "firmware:flash",
-            "Put MicroPython with the board program in it on a board; 'armtempo deploy' comes next.",
+            "Flash MicroPython with the board program built in; 'armtempo deploy' comes next.",
             "flash",
             "flash --image armtempo-firmware-STM32F4DISC.zip --port /dev/ttyACM0",
         ),
@@ -186,10 +188,11 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.",
             "selftest --port /dev/ttyACM0",
             "selftest --out first-power-on",
+            "selftest --with-motors --arm my_arm.toml",
         ),
         "configure": Entry(
             "deploy:configure",
-            "Set the board up for an arm, also in the place of another one.",
+            "Set the board up for an arm, or for another one than before.",
             "configure --arm my_arm.toml",
         ),
         "upload": Entry(
@@ -200,7 +203,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "list": Entry(
             "stored:list_motions",
-            "List the motions and sequences on the board, and where they begin and end.",
+            "List the motions and sequences on the board, and their first and last postures.",
             "list",
         ),
         "show": Entry("stored:show", "Show a stored motion, read back.", "show pick"),
@@ -215,12 +218,12 @@ GROUPS: dict[str, dict[str, Entry]] = {
         "monitor": Entry("watch:monitor", "Show decoded traffic.", "monitor", "monitor traffic.log"),
         "config": Entry(
             "config:config",
-            "Show what a command in this folder, with these options, takes for arm, port, job and run folder, and why.",
+            "Show which arm, port, job and run folder a command in this folder would use, and why.",
             "config",
         ),
         "doctor": Entry(
             "doctor:doctor",
-            "Examine Python, packages, ports, permissions, project, arm file and board, and say what to do.",
+            "Check Python, packages, ports, permissions, project, arm file and board; advise on each problem.",
             "doctor",
             "doctor --port /dev/ttyACM0",
         ),
@@ -231,12 +234,12 @@ GROUPS: dict[str, dict[str, Entry]] = {
     "Develop": {
         "paper": Entry(
             "paper:paper",
-            "Repeat the paper: every number beside the printed one, on one page.",
+            "Repeat the paper: every number next to the printed one, on one page.",
             "paper --quick",
         ),
         "completion": Entry(
             "help:completion",
-            "Print a script that lets SHELL complete commands and options.",
+            "Print a completion script for SHELL.",
             "completion bash >> ~/.bashrc",
         ),
     },

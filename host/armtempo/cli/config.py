@@ -23,9 +23,9 @@ from armtempo.project.settings import ProjectSettings, Setting
 def config(
     arm_path: Path | None, port: str | None, job_path: Path | None, out: Path | None, as_json: bool
 ) -> None:
-    """Show what a command in this folder, with these options, takes for arm, port, job and run folder, and why.
+    """Show which arm, port, job and run folder a command in this folder would use, and why.
 
-    An option wins over a variable (ARMTEMPO_ARM, ARMTEMPO_PORT, ARMTEMPO_JOB, ARMTEMPO_RUNS), and that over
+    An option overrides a variable (ARMTEMPO_ARM, ARMTEMPO_PORT, ARMTEMPO_JOB, ARMTEMPO_RUNS), which overrides
     armtempo.toml in this folder or the nearest one above it.
     """
     project = ProjectSettings()
@@ -72,7 +72,5 @@ def ports(as_json: bool) -> None:
         mark = "a MicroPython board" if port.board else ""
         click.echo(f"{port.device:<{width}}{port.description:<31} {mark}".rstrip())
     if not found:
-        click.echo(
-            "no serial ports here; connect a board by its USB socket; one without MicroPython: armtempo flash"
-        )
+        click.echo("no serial ports found; connect a board to USB; if it has no MicroPython: armtempo flash")
     click.echo(f"{SIM:<{width}}a virtual board, started for one command")

@@ -22,7 +22,7 @@ from armtempo.simulator import InjectedFault, LaunchOptions, launch
 _NEXT = """\
 report: {page}
         open it in a browser: {uri}
-next:   armtempo new my_arm            a folder for an own arm and job, asked for step by step
+next:   armtempo new my_arm            a folder for your own arm and job, step by step
         armtempo panel --port sim      the arm in a browser (needs armtempo[panel])
         armtempo demo --pick-and-place a gripper and a part sensor
         armtempo --help                all commands"""
@@ -46,7 +46,7 @@ next:   armtempo new my_arm            a folder for an own arm and job, asked fo
 def demo(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | None) -> None:
     """Plan, replay and report the paper's feeding motion.
 
-    Without --port a virtual board replays it, faster than in real time, whatever is plugged in.
+    Without --port a virtual board replays it, faster than real time, even if a board is plugged in.
     """
     if pick_and_place:
         if port != SIM:

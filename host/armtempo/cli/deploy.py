@@ -17,7 +17,7 @@ from armtempo.robot import engine_room
 
 
 @click.command("deploy")
-@click.option("--mpy", is_flag=True, help="Compiled by mpy-cross: smaller, and quicker to start.")
+@click.option("--mpy", is_flag=True, help="Compile with mpy-cross: smaller, and faster to start.")
 @click.option(
     "--package",
     type=click.Path(file_okay=False, path_type=Path),
@@ -28,11 +28,11 @@ from armtempo.robot import engine_room
 @options.port
 @options.as_json
 def deploy(mpy: bool, package: Path | None, arm_path: Path | None, port: str | None, as_json: bool) -> None:
-    """Put the board program on a board, or bring it up to date.
+    """Install or update the board program on a board.
 
-    mpremote copies what differs below /flash/lib; every file is read back. A boot.py or main.py that was
-    there before is kept aside. Interrupted, do it again. At the end it says which arms fit into the memory that
-    is left, and whether the arm that is named does.
+    mpremote copies the files below /flash/lib that differ; every file is read back. An existing boot.py or main.py is
+    backed up. If interrupted, run it again. At the end it prints which arms fit into the remaining memory, and whether
+    the given arm does.
     """
     if package is not None:
         packages.write(package)
@@ -59,9 +59,9 @@ def deploy(mpy: bool, package: Path | None, arm_path: Path | None, port: str | N
 @options.port
 @options.as_json
 def undeploy(port: str | None, as_json: bool) -> None:
-    """Take the board program off a board.
+    """Remove the board program from a board.
 
-    Stored motions stay; a boot.py or main.py from before comes back.
+    Stored motions are kept; the backed-up boot.py and main.py are restored.
     """
     name = chosen.port(port)
     deployment.undeploy(name, results.teller(as_json))
@@ -72,10 +72,10 @@ def undeploy(port: str | None, as_json: bool) -> None:
 @click.command("configure")
 @options.board(options.arm)
 def configure(given: BoardOptions) -> None:
-    """Set the board up for an arm, also in the place of another one.
+    """Set the board up for an arm, or for another one than before.
 
-    The position is unknown afterwards, unless only limits differ: ranges, speeds, following errors, the link
-    time-out. Motions that were stored for other figures of the arm are refused; upload them again.
+    The position is unknown afterwards, unless only limits differ: ranges, speeds, following errors, the link time-out.
+    Motions that were stored for another geometry or gearing are refused; upload them again.
     """
     arm = chosen.load_arm(given.arm_path)
     with chosen.board(given, arm) as board:
@@ -97,17 +97,17 @@ def configure(given: BoardOptions) -> None:
 
 
 def _unchanged(arm: Arm) -> str:
-    return f"the board is set up for {chosen.words(arm)} already; nothing is changed"
+    return f"the board is already set up for {chosen.words(arm)}; nothing is changed"
 
 
 def _configured(arm: Arm, values: dict[str, Any]) -> list[str]:
     lines = [f"the board is set up for {chosen.words(arm)}", values["memory"]]
     if motions := values["motions_to_upload_again"]:
         lines.append(
-            f"{motions} stored motions were made for the arm as it was; upload those that are still wanted"
+            f"{motions} stored motions were made for the old arm; upload again those that are needed"
         )
     if values["position_known"]:
-        lines.append("only limits differ from what the board had: it still knows where the arm stands")
+        lines.append("only limits differ from those that the board had: the position is still known")
     else:
-        lines.append("the position is unknown: bring the arm to its home posture, then 'armtempo home'")
+        lines.append("the position is unknown: move the arm to its home posture, then 'armtempo home'")
     return lines

@@ -23,10 +23,10 @@ from armtempo.robot.board_state import BoardState
 @options.port
 @options.as_json
 def doctor(arm_path: Path | None, port: str | None, as_json: bool) -> None:
-    """Examine Python, packages, ports, permissions, project, arm file and board, and say what to do.
+    """Check Python, packages, ports, permissions, project, arm file and board; advise on each problem.
 
-    Nothing is changed and nothing moves. Without a port it looks at the one board that is plugged in, if there is one.
-    Exit code 1 where something is wrong.
+    Nothing is changed and nothing moves. Without a port it checks the one board that is plugged in, if any.
+    Exit code 1 if something is wrong.
     """
     parts = {
         "machine": machine.examine_machine(),
@@ -60,14 +60,14 @@ def _arm(arm_path: Path | None) -> list[Finding]:
         setting = ProjectSettings().get(settings.ARM, arm_path)
         return arm_check.examine_arm(shipped.find(setting.value).path) if setting else []
     except ArmtempoError as refused:
-        return [error("arm file", str(refused), "name an arm file that is there")]
+        return [error("arm file", str(refused), "give an existing arm file")]
 
 
 def _board(port: str | None, arm_path: Path | None) -> list[Finding]:
     try:
         name = board_port.choose(port, others=True).value
     except ArmtempoError:  # none was named and none can be meant: nothing is wrong with that
-        return [note("board", "not looked at", "give --port PORT, or --port sim")]
+        return [note("board", "not checked", "give --port PORT, or --port sim")]
     try:
         return board_check.examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
     except ArmtempoError as refused:

@@ -30,7 +30,7 @@ from armtempo.new_arm import urdf_reader as reader
     "--tolerance-deg",
     type=float,
     metavar="DEG",
-    help="Leave out lines that the path keeps to within DEG without them. A table with a column time_s is a sampled "
+    help="Leave out lines that change the path by less than DEG. A table with a column time_s is a sampled "
     "motion, for which this is 0.1 unless given.",
 )
 @click.option(
@@ -38,9 +38,10 @@ from armtempo.new_arm import urdf_reader as reader
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Job file to write; without it the job's name with .toml. An existing file of other content is kept.",
+    help="Job file to write; without it the job's name with .toml. An existing file with other content is not "
+    "replaced.",
 )
-@options.force("an existing FILE of other content")
+@options.force("an existing FILE with other content")
 @options.as_json
 def import_table(
     table: Path,
@@ -52,9 +53,9 @@ def import_table(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Make a job file from the CSV file TABLE: a line a via point, a column a driven joint.
+    """Make a job file from the CSV file TABLE: one line per via point, one column per driven joint.
 
-    Columns are separated by commas, semicolons or tabs. What 'armtempo export' wrote comes back as a job of few via
+    Columns are separated by commas, semicolons or tabs. A file that 'armtempo export' wrote becomes a job of few via
     points along the same path.
     """
     arm = chosen.load_arm(arm_path)
@@ -103,9 +104,9 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="File to write; without it standard output. An existing FILE of other content is kept.",
+    help="File to write; without it standard output. An existing FILE with other content is not replaced.",
 )
-@options.force("an existing FILE of other content")
+@options.force("an existing FILE with other content")
 @options.altered
 @options.as_json
 def export(
@@ -146,24 +147,24 @@ def export(
     metavar="FILE",
     help="Arm file to write (TOML).",
 )
-@click.option("--base", metavar="LINK", help="Link that the arm stands on; without it the URDF's root.")
+@click.option("--base", metavar="LINK", help="Base link of the arm; default: the URDF's root.")
 @click.option(
     "--tip",
     metavar="LINK",
-    help="Link whose frame is the tool's; without it the one that fingers follow, or the end.",
+    help="Link whose frame is the tool's; default: the parent of the fingers, or the end.",
 )
-@click.option("--force", is_flag=True, help="Replace FILE if it is there.")
+@click.option("--force", is_flag=True, help="Replace FILE if it exists.")
 @options.as_json
 def import_urdf(urdf: Path, out: Path, base: str | None, tip: str | None, force: bool, as_json: bool) -> None:
-    """Make an arm file of a URDF's chain of revolute joints: its Denavit-Hartenberg rows and ranges.
+    """Make an arm file from a URDF's chain of revolute joints: Denavit-Hartenberg rows and ranges.
 
     URDF: the robot's description, a .urdf or .xacro file.
 
-    The rows are held against the URDF's own forward kinematics at 1000 random postures before anything is
-    written. Motors, which a URDF does not describe, are left as comments to fill in. Needs the extra 'urdf'.
+    The rows are checked against the URDF's own forward kinematics at 1000 random postures before anything is written.
+    Motors, which a URDF does not describe, are comments to fill in. Needs the extra 'urdf'.
     """
     if out.exists() and not force:
-        raise InputError(f"{out}: is there already", "choose another name, or --force to replace it")
+        raise InputError(f"{out}: already exists", "choose another name, or --force to replace it")
     if out.exists() and urdf.exists() and out.samefile(urdf):
         raise InputError(f"{out}: is the URDF itself", "choose another name")
     chain = reader.read(urdf, base, tip)

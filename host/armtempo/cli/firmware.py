@@ -33,7 +33,7 @@ from armtempo.project.settings import PORT, ProjectSettings
     "--out",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="Where the firmware goes, a new folder; without it firmware-NAME here.",
+    help="New folder for the firmware; default: firmware-NAME here.",
 )
 @click.option(
     "--program",
@@ -51,7 +51,7 @@ def firmware(
 ) -> None:
     """Build a MicroPython firmware with the board program in it.
 
-    Needs make, gcc and arm-none-eabi-gcc; what is missing is named with the command that brings it.
+    Needs make, gcc and arm-none-eabi-gcc; what is missing is named with the command that installs it.
     """
     if program is not None:
         frozen.write(program)
@@ -95,24 +95,25 @@ def _values(made: Image) -> dict[str, Any]:
     metavar="FILE",
     help="The zip file of a release, or a folder that 'armtempo firmware' made. Without it the only one here.",
 )
-@click.option("--port", metavar="PORT", help="Where the board answers now, if it runs MicroPython.")
+@click.option("--port", metavar="PORT", help="The board's present port, if it runs MicroPython.")
 @click.option(
     "--tool",
     type=click.Choice(["dfu-util", "st-flash"]),
-    help="What flashes: over USB, or through an ST-LINK; without it the one that is installed.",
+    help="How to flash: over USB, or through an ST-LINK; default: whichever is installed.",
 )
 @options.as_json
 def flash(given: Path | None, port: str | None, tool: str | None, as_json: bool) -> None:
-    """Put MicroPython with the board program in it on a board; 'armtempo deploy' comes next.
+    """Flash MicroPython with the board program built in; 'armtempo deploy' comes next.
 
-    A board that runs MicroPython is put in its bootloader first, which is refused while it moves; a board that
-    is there already, or has an ST-LINK, needs no port. What was written is read back and compared. Files in the
-    board's flash are kept.
+    A board that runs MicroPython is put into its bootloader first, which is refused while it moves; a board that is
+    in it already, or has an ST-LINK, needs no port. The flash is read back and compared. Files on the board are kept.
     """
     chosen = given or image.find(Path())
     found = ProjectSettings().get(PORT, port).value or None
     with ProgressBar("flashing") as progress:
         write.flash(chosen, found, tool, results.teller(as_json), progress)
     results.show(
-        as_json, {"image": str(chosen), "port": found}, ["flashed; the start files are next: armtempo deploy"]
+        as_json,
+        {"image": str(chosen), "port": found},
+        ["flashed; next: armtempo deploy, which writes the start files"],
     )

@@ -35,8 +35,8 @@ def fk(
     """Print the tool's pose and every frame for given joint angles.
 
     WHERE: angles in degrees ('0,-60,40', or as separate numbers), of all joints or of those that have a motor, the
-    others at home; a posture of the arm file; a via point such as P0; or a trajectory file for its start. Without it,
-    or for 'home', the arm's home. Hold the frames against the arm: a wrong row of its table shows at once.
+    others at their home angles; a posture of the arm file; a via point such as P0; or a trajectory file for its start.
+    Without it, or for 'home', the arm's home. Compare the frames with the real arm to find a wrong row.
     """
     if len(where) == 1 and posture.is_via(where[0]):
         arm, job = chosen.arm_and_job(arm_path, job_path)

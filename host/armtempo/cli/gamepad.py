@@ -1,4 +1,4 @@
-"""A gamepad beside the keys of the terminal: what is held repeats as a held key does, its buttons are keys.
+"""A gamepad in addition to the keys of the terminal: what is held repeats as a held key does, its buttons are keys.
 
 pygame reads it, in a thread of its own, which nothing else asks. A gamepad that is unplugged holds nothing.
 """
@@ -28,7 +28,7 @@ PUSHED = 0.5
 """A stick is held from this part of its way on."""
 HELP = """\
   gamepad: stick or cross  move    shoulder buttons  joint or axis    A  take a point (teach)    B  stop
-           X  steps    Y  steps, or moving while held    Back, Start  slower, faster    keys go on working"""
+           X  steps    Y  steps, or moving while held    Back, Start  slower, faster    keys still work"""
 _AXES = ((0, 1), (1, -1))  # numbers of the left stick's axes, and the sign of right and up
 _LOOK_S = 0.01
 _POLL_S = 0.02
@@ -102,9 +102,9 @@ class KeysAndGamepad:
 
 @contextmanager
 def beside(keys: Keys, joints: int) -> Iterator[Keys]:
-    """``keys`` with the first gamepad that is connected, for an arm of so many ``joints``.
+    """``keys`` with the first gamepad that is connected, for an arm of that many ``joints``.
 
-    Raises MissingPackageError without pygame, InputError where there is no gamepad.
+    Raises MissingPackageError without pygame, InputError if there is no gamepad.
     """
     pygame = _pygame()
     state = GamepadState(joints)
@@ -116,7 +116,7 @@ def beside(keys: Keys, joints: int) -> Iterator[Keys]:
         ready.wait(_START_S)
         if not found:
             raise InputError(
-                "no gamepad is connected", "connect one, or leave --gamepad out: keys do the same"
+                "no gamepad is connected", "connect one, or leave out --gamepad and use the keys"
             )
         yield KeysAndGamepad(keys, state)
     finally:

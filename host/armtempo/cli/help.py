@@ -58,7 +58,7 @@ SHELLS = ("bash", "zsh", "fish")
 @click.command("completion")
 @click.argument("shell", type=click.Choice(SHELLS))
 def completion(shell: str) -> None:
-    """Print a script that lets SHELL complete commands and options.
+    """Print a completion script for SHELL.
 
     \b
     bash: armtempo completion bash >> ~/.bashrc
@@ -66,5 +66,5 @@ def completion(shell: str) -> None:
     fish: armtempo completion fish > ~/.config/fish/completions/armtempo.fish
     """
     maker = get_completion_class(shell)
-    assert maker is not None  # click brings these three
+    assert maker is not None  # click defines these three
     click.echo(maker(main, {}, "armtempo", "_ARMTEMPO_COMPLETE").source())

@@ -1,4 +1,4 @@
-"""``armtempo ik``: all inverse solutions of a pose, and why some are not to be had."""
+"""``armtempo ik``: all inverse solutions of a pose, and why some are refused."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class _Given:
     type=float,
     nargs=3,
     metavar="X Y Z",
-    help="Tool position in mm; alone, or with what is asked of the orientation.",
+    help="Tool position in mm; alone, or with an orientation.",
 )
 @click.option(
     "--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw in deg: the whole orientation."
@@ -71,12 +71,12 @@ class _Given:
 @click.option(
     "--tolerance-mm",
     type=click.FloatRange(1e-6, 1000.0),
-    help="A tool this near to its position has reached it.  [default: 0.1]",
+    help="Distance at which the position counts as reached.  [default: 0.1]",
 )
 @click.option(
     "--tolerance-deg",
     type=click.FloatRange(1e-6, 180.0),
-    help="The same for what is asked of its orientation.  [default: 0.1]",
+    help="The same for the orientation.  [default: 0.1]",
 )
 @click.option(
     "--previous",
@@ -84,7 +84,7 @@ class _Given:
     help="Posture to stay near to, all joints in deg, in quotes; without it the arm's home. "
     "With --poses each pose follows the one before.",
 )
-@click.option("--numerical", is_flag=True, help="Search numerically, whatever the arm.")
+@click.option("--numerical", is_flag=True, help="Search numerically for any arm.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def ik(
     arm_path: Path | None,
@@ -97,9 +97,9 @@ def ik(
 ) -> None:
     """Print all solutions of the inverse kinematics for a pose, or for each pose of a file.
 
-    The solution marked * is the one nearest to the previous posture within the joint ranges. A pose that leaves
-    something open, and an arm outside the class of the closed form, get the solutions that a numerical search
-    finds with the joints that have a motor. Exit code 1 if a pose has no solution.
+    The solution marked * is the one nearest to the previous posture within the joint ranges. For a pose with free
+    components, and for an arm outside the class of the closed form, a numerical search over the joints that have a
+    motor finds the solutions. Exit code 1 if a pose has no solution.
     """
     wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
     solver = PoseSolver(chosen.arm_or_paper(arm_path, for_shape=True))
@@ -116,11 +116,9 @@ def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None)
 
 
 def _poses(given: _Given) -> list[Pose]:
-    """The poses of the options; InputError where they do not make exactly one of the three forms."""
+    """The poses of the options; InputError if they do not make exactly one of the three forms."""
     if sum(form is not None for form in (given.matrix, given.position, given.poses)) != 1:
-        raise InputError(
-            "not one pose is asked for, or too many", "give one of --matrix, --position and --poses"
-        )
+        raise InputError("no pose is given, or more than one", "give one of --matrix, --position and --poses")
     angles = {
         name: getattr(given, name) for name in ("roll", "pitch", "yaw") if getattr(given, name) is not None
     }
@@ -189,11 +187,11 @@ def _print_json(solver: PoseSolver, found: Iterable[Listing]) -> None:
 
 
 def _fail(without: list[int]) -> None:
-    """End with exit code 1 where poses are left without a solution."""
+    """End with exit code 1 if poses are left without a solution."""
     if without:
         which = ", ".join(map(str, without))
         raise PlanError(
             f"no solution for pose {which}; the reasons are listed with it",
-            "bring it nearer to the arm, ask for less of its orientation, or allow more by --tolerance-mm and "
+            "move it nearer to the arm, leave orientation components free, or give larger --tolerance-mm and "
             "--tolerance-deg",
         )

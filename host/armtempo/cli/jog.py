@@ -1,4 +1,4 @@
-"""``armtempo jog``: move a joint, or the tool along or about an axis, by keys or by so much."""
+"""``armtempo jog``: move a joint, or the tool along or about an axis, by keys or by a given amount."""
 
 from __future__ import annotations
 
@@ -44,24 +44,13 @@ def jog(
     gamepad: bool,
     given: BoardOptions,
 ) -> None:
-    """Jog: move a joint or the tool a little, straight, never beyond a range.
+    """Jog: move a joint or the tool by a step or while a key is held, within the ranges.
 
-    Without --joint, --axis and --about keys move the arm, in steps or while one is held down, and one line says where
-    it is. With one of them, and --by, it moves once. Axes are the base's, or the tool's as it stands. The arm must be
+    Without --joint, --axis and --about, keys move the arm, and one line shows the position. With one of them, and
+    --by, it moves once. Axes are those of the base, or those of the tool at its present orientation. The arm must be
     homed. Ctrl-C brakes.
     """
-    moves = [option for option in (joint, axis, about) if option is not None]
-    if len(moves) > 1 or (by is None) != (not moves):
-        raise InputError(
-            "one of --joint, --axis and --about goes with --by",
-            "give --joint 2 --by -5, say; or none, for the keys",
-        )
-    if moves and gamepad:
-        raise InputError("--gamepad goes with the keys of jog", "leave out --by, or --gamepad")
-    if not moves and given.as_json:
-        raise InputError("the keys of jog give no JSON", "give --joint, --axis or --about, and --by")
-    if not moves and not keys.is_terminal():
-        raise InputError("the keys of jog need a terminal", "give --joint, --axis or --about, and --by")
+    moves = _one_move(joint, axis, about, by, gamepad, given.as_json)
     arm = chosen.named_arm(given.arm_path)
     with chosen.board(given, arm) as board:
         prepare(board, chosen.arm_of_board(board, arm), given.replace_arm)
@@ -78,8 +67,27 @@ def jog(
             raise ArmtempoError(f"the jog ended early: {early}", "jog less far, or the other way")
 
 
+def _one_move(
+    joint: str | None, axis: str | None, about: str | None, by: float | None, gamepad: bool, as_json: bool
+) -> bool:
+    """Whether the options ask for one move rather than for the keys; InputError where they do not go together."""
+    moves = sum(option is not None for option in (joint, axis, about))
+    if moves > 1 or (by is None) != (not moves):
+        raise InputError(
+            "one of --joint, --axis and --about goes with --by",
+            "for example --joint 2 --by -5; or none of them, for the keys",
+        )
+    if moves and gamepad:
+        raise InputError("--gamepad goes with the keys of jog", "leave out --by, or --gamepad")
+    if not moves and as_json:
+        raise InputError("the keys of jog give no JSON", "give --joint, --axis or --about, and --by")
+    if not moves and not keys.is_terminal():
+        raise InputError("the keys of jog need a terminal", "give --joint, --axis or --about, and --by")
+    return moves == 1
+
+
 def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
-    """Set the board up; LinkError where the position is unknown. A virtual arm that has just come stands at home."""
+    """Set the board up; LinkError if the position is unknown. A virtual arm that has just come is at home."""
     board.configure(arm, replace=replace_arm)
     try:
         board.posture_deg()

@@ -59,7 +59,7 @@ class JogChoice:
 
     @property
     def tool_axis(self) -> str | None:
-        """As the library calls it; None where a joint moves."""
+        """As the library calls it; None if a joint moves."""
         return None if self.joint is not None else f"tool-{self.axis}" if self.in_tool else self.axis
 
     def press(self, key: str, joints: int) -> bool:
@@ -102,7 +102,7 @@ class JogScreen:
         self, board: Board, keys: Keys, more: dict[str, Callable[[], str]] | None = None, told: str = ""
     ) -> None:
         if board.arm is None:
-            raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
+            raise InputError("no arm is set", "set it with home(arm) or configure(arm)")
         self.choice = JogChoice()
         self._arm = board.arm
         self._board = board
@@ -113,7 +113,7 @@ class JogScreen:
         self._ended_by = ""
 
     def loop(self) -> None:
-        """Read keys until q, Ctrl-C or the end of the input. LinkError where the board cannot be reached."""
+        """Read keys until q, Ctrl-C or the end of the input. LinkError if the board cannot be reached."""
         self._show()
         while True:
             key = self._ended_by or self._keys.read(_IDLE_S)
@@ -139,7 +139,7 @@ class JogScreen:
                 self._board.clear()
                 self._said = "cleared"
             elif not self.choice.press(key, len(self._arm.driven)) and key != " ":
-                self._said = f"{key!r} is no key here"
+                self._said = f"the key {key!r} does nothing here"
         except (BoardError, InputError, PlanError) as error:
             self._said = _words(error)
         except LinkError as error:
@@ -189,7 +189,7 @@ class JogScreen:
         if not self._repeats(key, RELEASE_S):
             return
         with held:
-            self._said = f"moving; released, it rests within {held.rest_s + RELEASE_S:.1f} s"
+            self._said = f"moving; after release at rest within {held.rest_s + RELEASE_S:.1f} s"
             self._keys.flush()
             last_s = shown_s = time.monotonic()
             while held.hold(_POLL_S):

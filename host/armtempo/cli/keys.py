@@ -30,7 +30,7 @@ class Keys(Protocol):
     """Where keys come from."""
 
     def read(self, timeout_s: float) -> str:
-        """The next key, "" where none comes in time: a letter, or "up", "down", "left", "right", END, INTERRUPT."""
+        """The next key, "" if none comes in time: a letter, or "up", "down", "left", "right", END, INTERRUPT."""
 
     def flush(self) -> None:
         """Forget keys that were pressed and not read."""

@@ -1,4 +1,4 @@
-"""What a run shows while it goes on: a progress bar with angles and errors, and a window where one is wanted."""
+"""What a run shows while it runs: a progress bar with angles and errors, and a window where one is wanted."""
 
 from __future__ import annotations
 

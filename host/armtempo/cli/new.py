@@ -36,7 +36,7 @@ from armtempo.new_arm.questions import Answers
     "low_deg, high_deg, steps_per_rev, microsteps, gear_ratio, speed_deg_s, encoder_counts, parallel_linkage (1).",
 )
 @click.option("--modified", is_flag=True, help="The joints' rows are in the modified (Craig) convention.")
-@click.option("--resume", is_flag=True, help="Go on with the questions that were left by Ctrl-C.")
+@click.option("--resume", is_flag=True, help="Continue with the questions that Ctrl-C interrupted.")
 @click.option("--port", default=None, help="Port of the board; 'sim:board' is a virtual one.", metavar="PORT")
 @options.as_json
 def new(
@@ -51,9 +51,9 @@ def new(
 ) -> None:
     """Make a project folder: arm file, first job, settings, and a page with the next commands.
 
-    FOLDER: a folder that is not there yet, or is empty.
+    FOLDER: a new or an empty folder.
 
-    Asks for what no option says, if there is somebody at the terminal to ask: '?' explains, '<' goes back.
+    Asks for what no option gives, if run in a terminal: '?' explains, '<' goes back.
     """
     if sum(map(bool, (like, urdf, joints))) > 1:
         raise InputError("--like, --urdf and --joint exclude each other", "give one of them")
@@ -110,7 +110,7 @@ def hold(folder: Path, resume: bool) -> Answers:
     """Ask until all is answered. KeyboardInterrupt says how to go on, where answers were kept."""
     draft = draft_path(folder)
     answers = _kept(draft) if resume else {}
-    click.echo("'?' explains a question, '<' goes back to the one before; Ctrl-C keeps what was answered.")
+    click.echo("'?' explains a question, '<' goes back to the previous one; Ctrl-C keeps the answers.")
     try:
         while (question := questions.following(answers)) is not None:
             text = click.prompt(question.text, default=question.default).strip()
@@ -131,12 +131,14 @@ def hold(folder: Path, resume: bool) -> Answers:
     except (click.Abort, KeyboardInterrupt):
         if not draft.exists():
             raise
-        raise KeyboardInterrupt(f"the answers are kept; go on with: armtempo new {folder} --resume") from None
+        raise KeyboardInterrupt(
+            f"the answers are kept; continue with: armtempo new {folder} --resume"
+        ) from None
     return answers
 
 
 def _kept(draft: Path) -> Answers:
-    """The answers of a draft, as far as they can be taken; InputError where there are none."""
+    """The answers of a draft, as far as they can be taken; InputError if there are none."""
     try:
         found = json.loads(draft.read_text(encoding="utf-8"))
         given = {str(key): str(value) for key, value in found.items()}

@@ -29,7 +29,7 @@ log_traffic = click.option(
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
     help="Write every byte to and from the board to FILE ('armtempo monitor FILE' shows it). An existing FILE is "
-    "only replaced where it is such a log.",
+    "only replaced if it is such a log.",
 )
 
 
@@ -68,7 +68,7 @@ replace_arm = click.option(
     help="Set the board up for this arm if it is set up for another one; then its position is unknown.",
 )
 gamepad = click.option(
-    "--gamepad", is_flag=True, help="Take a gamepad beside the keys (needs the extra 'gamepad')."
+    "--gamepad", is_flag=True, help="Use a gamepad in addition to the keys (needs the extra 'gamepad')."
 )
 job = click.option(
     "--job",
@@ -86,7 +86,7 @@ out = click.option(
 altered = click.option(
     "--altered",
     is_flag=True,
-    help="Take the trajectory file although it was altered after it had been written.",
+    help="Accept the trajectory file although it was altered after it had been written.",
 )
 speed = click.option(
     "--speed",
@@ -95,7 +95,7 @@ speed = click.option(
     default=100.0,
     show_default=True,
     metavar="PERCENT",
-    help="Part of the planned speed; the path stays as it is.",
+    help="Percentage of the planned speed; the path is the same.",
 )
 as_json = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 

@@ -24,7 +24,7 @@ _LOOPBACK = "127.0.0.1"
     "--host",
     default=_LOOPBACK,
     show_default=True,
-    help="Address to listen on; another one than this needs the token that is printed.",
+    help="Address to listen on; any other than the default requires the printed token.",
 )
 @click.option(
     "--web-port",
@@ -38,10 +38,10 @@ _LOOPBACK = "127.0.0.1"
 def panel(
     arm_path: Path | None, job_path: Path | None, port: str | None, host: str, web_port: int, show: bool
 ) -> None:
-    """See the arm in a browser: move it, teach it, run it, watch it.
+    """Open the panel in a browser: see, move, teach, run and watch the arm.
 
-    Ctrl-C ends it and brakes what moves. A page that is closed while it holds a button stops the arm. One page
-    has control, others watch; stop works from each.
+    Ctrl-C ends it and brakes what moves. Closing a page while a button is held stops the arm. One page has control,
+    others watch; stop works from all.
     """
     try:
         from armtempo.panel.desk import Desk

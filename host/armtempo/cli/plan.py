@@ -17,7 +17,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import is_sequence
-from armtempo.planning import checks
+from armtempo.planning import by_torque, checks
 from armtempo.planning.free.corridor_curve import unit_of
 from armtempo.report import corridor_plot, drawing, text_summary
 from armtempo.robot import engine_room
@@ -41,8 +41,8 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced where "
-    "it is an earlier plan of the same job for the same arm, by their names.",
+    help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced if it "
+    "is an earlier plan of the same job for the same arm, by name.",
 )
 @options.force("any other FILE too")
 @click.option(
@@ -62,16 +62,17 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     "--refine",
     callback=_refine,
     metavar="N|auto",
-    help="Instead of the job's segments between via points: 1 to 64, or as many as pay.",
+    help="Instead of the job's segments between via points: 1 to 64, or as many as shorten the motion.",
 )
-@click.option(
-    "--polish/--no-polish", default=None, help="Finish the search with a gradient solver, or do not."
-)
+@click.option("--polish/--no-polish", default=None, help="Whether a gradient solver finishes the search.")
 @click.option("--optimiser", metavar="NAME", help="Instead of the job's search algorithm.")
 @click.option("--population", type=click.IntRange(4), help="Instead of the job's population.")
 @click.option("--iterations", type=click.IntRange(1), help="Instead of the job's iterations.")
 @click.option("--starts", type=click.IntRange(1), help="Instead of the job's starts of the gradient solver.")
 @click.option("--seed", type=click.IntRange(0), help="Instead of the job's seed.")
+@click.option(
+    "--use-torque", is_flag=True, help="Plan by the motors' torque instead of the acceleration limits."
+)
 @click.option("--split", is_flag=True, help="Cut a motion that is too long for the board at its stops.")
 @click.option(
     "--corridor-curve", is_flag=True, help="Instead of a plan: the motion time in ever wider corridors."
@@ -85,29 +86,36 @@ def plan(
     force: bool,
     split: bool,
     corridor_curve: bool,
+    use_torque: bool,
     as_json: bool,
     **changes: Any,
 ) -> None:
     """Plan a job and write its trajectory file, or plan a sequence.
 
     FILE: a sequence file, or a job file, as with --job.
-    Where neither an arm nor a job is named, this plans the demo's job for the arm that ships with armtempo.
+    If neither an arm nor a job is given, this plans the demo's job for the arm that ships with armtempo.
     """
     if file is not None and job_path is not None:
-        raise InputError("FILE and --job are both given", "name one of them")
+        raise InputError("FILE and --job are both given", "give one of them")
     if file is not None and is_sequence(file):
-        sequences.refuse_job_options({"split": split, "corridor_curve": corridor_curve, **changes})
+        flags = {"split": split, "corridor_curve": corridor_curve, "use_torque": use_torque}
+        sequences.refuse_job_options({**flags, **changes})
         sequences.plan(file, arm_path, output, force, as_json)
         return
     job_path = file or job_path
     arm, job = chosen.arm_and_job(arm_path, job_path)
     job = _changed(job, changes)
+    if use_torque and (split or corridor_curve):
+        raise InputError(
+            "--use-torque goes with neither --split nor --corridor-curve",
+            "lower acceleration_deg_s2 in the arm file instead",
+        )
     target = output or Path(f"{job.name}.json")
     check_not_input(target, (job.source, arm.source))
     if corridor_curve:
         _write_curve(arm, job, target, force, as_json)
         return
-    plans = _plans(arm, job, split)
+    plans = _plans(arm, job, split, use_torque)
     parts = [target] if len(plans) == 1 else [_part(target, number) for number in range(1, len(plans) + 1)]
     made = dict(zip(parts, plans, strict=True))
     _save(made, force)
@@ -123,10 +131,13 @@ def _changed(job: Job, changes: dict[str, Any]) -> Job:
     return replace(job, **given)
 
 
-def _plans(arm: Arm, job: Job, split: bool) -> list[Plan]:
+def _plans(arm: Arm, job: Job, split: bool, use_torque: bool) -> list[Plan]:
     """The plan of the job, or those of its parts; each one that the board can hold."""
     with ProgressBar("planning") as progress:
-        plans = pipeline.split(arm, job, progress) if split else [pipeline.plan(arm, job, progress)]
+        if use_torque:
+            plans = [by_torque.plan(arm, job, progress)]
+        else:
+            plans = pipeline.split(arm, job, progress) if split else [pipeline.plan(arm, job, progress)]
     for plan in plans:
         checks.check_held(plan.trajectory, arm)
     return plans

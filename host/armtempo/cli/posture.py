@@ -27,16 +27,16 @@ from armtempo.robot.stop_request import Stopped
 
 @click.command("goto", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
 @click.argument("where", nargs=-1, required=True, shell_complete=options.files)
-@click.option("--line", is_flag=True, help="The tool goes in a straight line and turns evenly.")
+@click.option("--line", is_flag=True, help="The tool moves in a straight line and turns evenly.")
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
 def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: BoardOptions) -> None:
     """Move straight to a posture.
 
-    WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such as P0,
-    or a trajectory file or a planned sequence for its start. All joints move together, within their limits; with
-    --line so that the tool goes in a straight line. The arm must be homed. Ctrl-C brakes, and so does 'armtempo
-    stop' in another terminal.
+    WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such as P0, or
+    a trajectory file or a planned sequence for its start. All joints move together, within their limits; with --line
+    the tool moves in a straight line. The arm must be homed. Ctrl-C brakes, as does 'armtempo stop' in another
+    terminal.
     """
     if len(where) > 1:
         raise InputError(
@@ -59,11 +59,11 @@ def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: Board
 
 @click.command("home", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
 @click.argument("where", default=HOME, shell_complete=options.files)
-@click.option("--switches", is_flag=True, help="Move to the limit switches instead of taking WHERE on trust.")
+@click.option("--switches", is_flag=True, help="Find the position by moving to the limit switches.")
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
 def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions) -> None:
-    """Declare where the arm stands.
+    """Declare the arm's position.
 
     WHERE: angles such as '0,-60,40', a posture of the arm file by its name, a via point of the job such as P0, or a
     trajectory file for its start. Without it: the home posture of the arm file. Nothing moves; afterwards motions may
@@ -73,7 +73,7 @@ def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions)
     if switches and where != HOME:
         raise InputError(
             "WHERE and --switches exclude each other",
-            "give WHERE where the arm stands, or --switches to drive to the limit switches",
+            "give the present posture as WHERE, or --switches to move to the limit switches",
         )
     wanted = NamedPosture.of(where, given.arm_path, given.altered)
     with chosen.board(given, wanted.arm) as board:
@@ -105,7 +105,7 @@ class NamedPosture:
 
     @classmethod
     def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
-        """The posture that ``text`` names; InputError where its trajectory file or the arm cannot be read."""
+        """The posture that ``text`` names; InputError if its trajectory file or the arm cannot be read."""
         if text.endswith(".json") and is_sequence_plan(Path(text)):
             sequence = chosen.load_sequence_plan(Path(text), arm_path)
             return cls(text, sequence.arm, None, sequence)
@@ -113,14 +113,14 @@ class NamedPosture:
             plan = chosen.load_plan(Path(text), arm_path, altered)
             return cls(text, plan.arm, plan)
         if not is_named(text):
-            _numbers(text)  # what is no posture is said before a port is opened
+            _numbers(text)  # what is not a posture is said before a port is opened
         arm = chosen.named_arm(arm_path)
         if arm is not None and is_named(text) and not is_via(text):
             arm.posture(text)  # the same
         return cls(text, arm, None)
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
-        """Angles in degrees (J,); InputError where the text is no posture, or does not fit the arm."""
+        """Angles in degrees (J,); InputError if the text is not a posture, or does not fit the arm."""
         if self.sequence is not None:
             return point_to_point.posture(self.sequence.start_deg or arm.home_deg, arm)
         if self.plan is not None:
@@ -139,7 +139,7 @@ def _numbers(text: str) -> list[float]:
         return [float(cell) for cell in text.split(",")]
     except ValueError:
         raise InputError(
-            f"{text!r} is no posture",
+            f"{text!r} is not a posture",
             "give angles in degrees ('0,-60,40'), 'home' or another posture of the arm file, a via point of the job "
             "('P0') or a trajectory file",
         ) from None
@@ -148,7 +148,7 @@ def _numbers(text: str) -> list[float]:
 def say_where_it_is(board: Board, as_json: bool = False) -> None:
     """Print where the arm is, as the commands that place it do in the end; as JSON what ``status`` prints."""
     found = board.state()
-    lines = ["the arm stands at", *(f"  {line}" for line in state.joint_lines(found))]
+    lines = ["position:", *(f"  {line}" for line in state.joint_lines(found))]
     results.show(as_json, found.to_json(), lines)
 
 
@@ -161,7 +161,7 @@ def words(angles_deg: Array, arm: Arm) -> str:
 
 
 def via_deg(text: str, arm: Arm, job: Job) -> Array:
-    """The angles of a via point of a job, degrees (J,); InputError where the job has no such point."""
+    """The angles of a via point of a job, degrees (J,); InputError if the job has no such point."""
     points_deg, _ = planner.via_angles(arm, job)
     index = int(text[1:])
     if index >= len(points_deg):

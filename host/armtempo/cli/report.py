@@ -24,16 +24,16 @@ from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="Page to write when comparing; default: comparison.html beside the first run. An existing file is only "
-    "replaced where it is such a page.",
+    help="Page to write when comparing; default: comparison.html next to the first run. An existing file is only "
+    "replaced if it is such a page.",
 )
 @options.force("any other file too")
 @options.as_json
 def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool) -> None:
     """Write report.html and its figures into a run folder, of a motion or a sequence.
 
-    RUNS: run folders. With two or more, each gets its page, and one more page compares them. One that cannot be
-    read is named there.
+    RUNS: run folders. With two or more, each gets its page, and one more page compares them, naming those that cannot
+    be read.
     """
     if len(runs) == 1:
         if out is not None:

@@ -21,9 +21,11 @@ from armtempo.robot.run import Run
 @click.command("run")
 @click.argument("what", shell_complete=options.files)
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
-@click.option("--live", is_flag=True, help="Open a window that follows the run (matplotlib and a display).")
+@click.option(
+    "--live", is_flag=True, help="Open a window that plots the run (needs matplotlib and a display)."
+)
 @options.speed
-@options.force("another motion that the board keeps under this one's name")
+@options.force("another motion of this name on the board")
 @options.out
 @options.board(options.arm_of_file, options.replace_arm, options.altered)
 def run(
@@ -32,10 +34,10 @@ def run(
     """Replay a motion and record it, or run a sequence.
 
     WHAT: a trajectory file or the name of a motion on the board, or a planned sequence or the name of one on the
-    board, whose step and cycle are shown. The samples go into a new run folder.
-    The arm must be homed ('armtempo home') and stand where the motion begins ('armtempo goto'); a virtual
-    board sees to that itself. Between repetitions the arm returns along the same path. Ctrl-C brakes, and so
-    does 'armtempo stop' in another terminal; 'armtempo speed', 'pause' and 'resume' work there too.
+    board, whose step and cycle are shown. The samples go into a new run folder. The arm must be homed ('armtempo
+    home') and be at the start of the motion ('armtempo goto'); a virtual board is put there first. Between repetitions
+    the arm returns along the same path. Ctrl-C brakes, as does 'armtempo stop' in another terminal; 'armtempo speed',
+    'pause' and 'resume' work there too.
     """
     if chosen.is_file(what) and is_sequence_plan(Path(what)):
         only_for_motions(repeat, live)
@@ -62,12 +64,10 @@ def run(
 
 
 def only_for_motions(repeat: int, live: bool) -> None:
-    """InputError for what a sequence has not: repetitions of its own, a plot."""
+    """InputError for what a sequence does not have: repetitions of its own, a plot."""
     for name, given in (("--repeat", repeat != 1), ("--live", live)):
         if given:
-            raise InputError(
-                f"{name}: a sequence has no such thing", "leave it out; repeat is a step of the sequence"
-            )
+            raise InputError(f"{name}: not for a sequence", "leave it out; repeat is a step of the sequence")
 
 
 def _is_sequence(board: Board, name: str) -> bool:
@@ -83,7 +83,7 @@ def run_and_tell(
     live: bool = False,
     as_json: bool = False,
 ) -> Run:
-    """Run a motion, or the stored one of that name, and print what happens and what became of each joint.
+    """Run a motion, or the stored one of that name, and print what happens and the outcome for each joint.
 
     ``as_json``: the result as JSON, what happens on the other stream.
     """
@@ -99,10 +99,10 @@ def run_and_tell(
 @options.out
 @options.board(options.arm_of_file, options.altered)
 def fetch(what: str | None, out: Path | None, given: BoardOptions) -> None:
-    """Fetch the samples that the board keeps of its last run, such as one that its button started.
+    """Fetch the samples that the board recorded of its last run, such as one started by its button.
 
     WHAT: what was run: a trajectory file, or the name of a motion on the board; without it the motion that
-    the button starts. A run under way is followed to its end. The samples go into a new run folder, once.
+    the button starts. If it is still running, this waits for its end. The samples go into a new run folder, once.
     """
     plan = (
         chosen.load_plan(Path(what), given.arm_path, given.altered) if what and chosen.is_file(what) else None

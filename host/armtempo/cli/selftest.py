@@ -7,9 +7,11 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
+from armtempo.robot.motor_test import ARM_FILE
 from armtempo.selftest import page
 from armtempo.selftest.result import Measurement, SelfTest
 
@@ -23,18 +25,25 @@ from armtempo.selftest.result import Measurement, SelfTest
     help="Write selftest.json and a page with figures, selftest.html, to FOLDER.",
 )
 @options.force("the files of an earlier self-test in FOLDER")
-@options.board()
-def selftest(given: BoardOptions, out: Path | None, force: bool) -> None:
+@click.option(
+    "--with-motors",
+    is_flag=True,
+    help="Instead, after a question: move each joint up to a degree there and back; press switches and E-stop.",
+)
+@options.board(options.arm_of_board)
+def selftest(given: BoardOptions, out: Path | None, force: bool, with_motors: bool) -> None:
     """Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.
 
-    Nothing needs to be connected, and nothing moves: the drivers must be off, and stay so. The board is reset at the
-    end, so the arm's position is unknown then. Exit code 1 where anything is wrong.
+    Nothing needs to be connected, and nothing moves: the drivers must be off, and are kept off. The board is reset at
+    the end, so the arm's position is unknown then. With --with-motors it asks, then moves each joint of the homed arm
+    and compares directions and encoders with the arm file. Exit code 1 if anything is wrong.
     """
     if out is not None:
         page.check_free(out, force)
+    if given.arm_path is not None and not with_motors:
+        raise InputError("--arm goes with --with-motors", "leave it out: the board has its arm's record")
     given = replace(given, port=chosen.port(given.port))
-    with chosen.board(given) as board, ProgressBar("self-test") as progress:
-        found = board.selftest(progress)
+    found = _with_motors(given) if with_motors else _alone(given)
     if out is not None:
         page.write(found, out)
     results.show(given.as_json, found.to_json(), _lines(found))
@@ -42,11 +51,28 @@ def selftest(given: BoardOptions, out: Path | None, force: bool) -> None:
         raise SystemExit(1)
 
 
+def _alone(given: BoardOptions) -> SelfTest:
+    with chosen.board(given) as board, ProgressBar("self-test") as progress:
+        return board.selftest(progress)
+
+
+def _with_motors(given: BoardOptions) -> SelfTest:
+    arm = chosen.named_arm(given.arm_path)
+    with chosen.board(given, arm) as board:
+        return board.motor_test(
+            chosen.arm_of_board(board, arm),
+            ask=lambda question: click.confirm(question, err=True),
+            tell=lambda what: click.echo(what, err=True),
+        )
+
+
 def _lines(found: SelfTest) -> list[str]:
     kind = "virtual board: its figures are simulated" if found.simulated else "board"
     lines = [f"self-test of {kind} {found.board_id}"]
     for line in found.lines:
         lines.extend(_words(line))
+    if to_correct := found.data.get(ARM_FILE):
+        lines += ["to correct in the arm file:", *(f"  {line}" for line in to_correct)]
     wrong = len(found.failed)
     lines.append(f"{wrong} of {len(found.lines)} lines are wrong" if wrong else "nothing is wrong")
     return lines

@@ -1,4 +1,4 @@
-"""Sequences on the terminal: what a planned one takes, and where one that runs stands."""
+"""Sequences on the terminal: what a planned one takes, and how far one that runs is."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as
 
 
 def refuse_job_options(options: dict[str, Any]) -> None:
-    """InputError where an option changes the job, and there is none."""
+    """InputError if an option changes the job, and there is none."""
     given = sorted(name for name, value in options.items() if value not in (None, False))
     if given:
         raise InputError(
-            f"--{given[0].replace('_', '-')}: a sequence has no such setting",
+            f"--{given[0].replace('_', '-')}: not for a sequence",
             "give it in the job files that the sequence runs",
         )
 
@@ -73,7 +73,7 @@ def _share(share: Share) -> dict[str, Any]:
 
 
 def _duration_s(planned: SequencePlan, row: SequenceRow) -> float | None:
-    """What a row takes; None where it takes no time of its own."""
+    """What a row takes; None if it takes no time of its own."""
     if row.op == MOVE:
         return float(planned.legs[row.number].duration_s)
     return row.amount / 1000 if row.op == WAIT else None
@@ -116,7 +116,7 @@ class Shown:
         self.last: SequenceState | None = None
 
     def __call__(self, state: SequenceState) -> None:
-        """Show where the sequence stands."""
+        """Show how far the sequence is."""
         self.last = state
         doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
@@ -134,9 +134,9 @@ class Shown:
 def run_and_tell(
     board: Board, sequence: SequencePlan | str, replace: bool, out: Path | None, as_json: bool = False
 ) -> SequenceState:
-    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it stands and how it ended.
+    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it is and how it ended.
 
-    ``as_json``: the end as JSON. Exit code 1 where an input did not come.
+    ``as_json``: the end as JSON. Exit code 1 if an input did not come.
     """
     say = results.teller(as_json)
     shown = Shown(sequence if not isinstance(sequence, str) else None, say)
@@ -157,7 +157,8 @@ def run_and_tell(
     shown.close()
     if end.ending == "timed_out":
         raise ArmtempoError(
-            f"an input did not come in time {where(end)}", "see why, 'armtempo goto' its start, run it again"
+            f"an input did not change in time {where(end)}",
+            "see why, 'armtempo goto' its start, run it again",
         )
     result = _as_json(end, board, recorded.path if recorded else None)
     results.show(as_json, result, [f"{end.ending} after {cycles(end)}{counted(board.counters)}"])

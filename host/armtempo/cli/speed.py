@@ -19,7 +19,7 @@ from armtempo.robot.shared_board import SharedBoard
 @click.argument("percent", type=click.FloatRange(1, 100))
 @options.board()
 def speed(percent: float, given: BoardOptions) -> None:
-    """Let what moves go on at PERCENT of its planned speed.
+    """Change the speed of the running motion to PERCENT of the planned one.
 
     PERCENT: 1 to 100.
 
@@ -51,7 +51,7 @@ def _change(given: BoardOptions, asked: _Asked) -> None:
 
 
 def _ask(given: BoardOptions, asked: _Asked) -> str | None:
-    """Ask for it; through which program, None where over the port itself."""
+    """Ask for it; through which program, None if over the port itself."""
     with chosen.shared_or_own(given) as board:
         if asked.what == "speed" and not isinstance(board, SharedBoard) and not board.status().moving:
             raise LinkError("nothing moves", "'armtempo run --speed' begins at a lower speed")
@@ -69,7 +69,7 @@ def _ask(given: BoardOptions, asked: _Asked) -> str | None:
 @click.command("pause")
 @options.board()
 def pause(given: BoardOptions) -> None:
-    """Let what moves come to rest on its path; 'armtempo resume' goes on, 'armtempo stop' ends it.
+    """Bring the running motion to rest on its path; 'armtempo resume' continues it, 'armtempo stop' ends it.
 
     The drivers hold meanwhile. A run, its pauses counted, lasts at most 1 h 49 min.
     """
@@ -79,5 +79,5 @@ def pause(given: BoardOptions) -> None:
 @click.command("resume")
 @options.board()
 def resume(given: BoardOptions) -> None:
-    """Go on along the path at the speed before the pause."""
+    """Continue a paused motion at the speed before the pause."""
     _change(given, _Asked("resume", lambda board: board.resume(), "going on"))

@@ -18,7 +18,7 @@ from armtempo.robot.board_state import BoardState, JointState, SequenceStand, To
 @click.command("status")
 @options.board(options.arm_of_board)
 def status(given: BoardOptions) -> None:
-    """Show the board, its state, and where the joints stand.
+    """Show the board, its state and the joints' positions.
 
     Also while another armtempo program has the port.
     """
@@ -40,7 +40,7 @@ def _named(found: BoardState, arm_path: Path | None) -> BoardState:
         results.tell(f"armtempo: {error}")
     if named is not None and found.arm_crc and not found.arm and not found.named(named).arm:
         results.tell(
-            f"the board is set up for another arm than {chosen.words(named)}; see 'armtempo configure'"
+            f"the board is set up for a different arm than {chosen.words(named)}; see 'armtempo configure'"
         )
     return found.named(named).named(Arm.paper())
 
@@ -48,17 +48,21 @@ def _named(found: BoardState, arm_path: Path | None) -> BoardState:
 def lines(state: BoardState) -> list[str]:
     """Who the board is, what it is doing, where the joints are."""
     virtual = f", {chosen.virtual_words(state.port)}" if state.virtual else ""
-    current = "" if state.program_current else "; another than the one installed here: 'armtempo deploy'"
+    current = "" if state.program_current else "; differs from the one installed here: 'armtempo deploy'"
     return [
         f"board     {state.board_id}{virtual}",
         f"port      {state.port}",
         f"program   {state.program_crc:08x}, protocol {state.protocol}{current}",
         f"arm       {_arm(state)}",
         f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
-        f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together",
+        f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together, {_measured(state)}",
         f"engine    {state.room}",
         *motion_lines(state),
     ]
+
+
+def _measured(state: BoardState) -> str:
+    return "measured" if state.rates_measured else "estimated; run 'armtempo selftest'"
 
 
 def motion_lines(state: BoardState) -> list[str]:
@@ -74,7 +78,7 @@ def motion_lines(state: BoardState) -> list[str]:
 
 
 def _sequence(stand: SequenceStand) -> str:
-    """Which it is, where it stands, what it has counted."""
+    """Which it is, where it is, what it has counted."""
     cycles = f"{stand.cycle} whole cycle{'s' * (stand.cycle != 1)}"
     return f"{stand.name}: {stand.ending}, step {stand.step}, {cycles}{counted(stand.counters)}"
 
@@ -116,7 +120,7 @@ def tool_words(tool: ToolPlace) -> str:
 
 def _link(state: BoardState) -> str:
     if not state.frames_bad and not state.samples_lost:
-        return "sound: no message arrived damaged, no sample was lost"
+        return "OK: no damaged messages, no lost samples"
     return (
         f"messages damaged {state.frames_bad} times, {state.samples_lost} samples lost: check cable and plugs"
     )
@@ -126,11 +130,11 @@ def _arm(state: BoardState) -> str:
     if state.arm_problem:
         return state.arm_problem
     if not state.arm_crc:
-        return "none yet; 'armtempo configure' sets the board up for one"
+        return "none; set the board up for one with 'armtempo configure'"
     record = f"{len(state.joints)} joints, record {state.arm_crc:08x}"
     if state.arm:
         return f"{chosen.source_words(state.arm, state.arm_source)}: {record}"
-    return f"{record}; name its file with --arm to see degrees"
+    return f"{record}; give its file with --arm to see degrees"
 
 
 def _cells(joint: JointState) -> tuple[str, str, str, str]:

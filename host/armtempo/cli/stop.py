@@ -26,9 +26,9 @@ _LOOK_S = 0.1
 @click.option("--now", is_flag=True, help="Freeze the step outputs instead of braking along the path.")
 @options.board()
 def stop(now: bool, given: BoardOptions) -> None:
-    """Brake or freeze, and say where the arm stands.
+    """Brake or freeze, and print the arm's position.
 
-    Where another armtempo program has the port, it is told to stop and ends what it does.
+    If another armtempo program has the port, it is told to stop and ends its command.
     """
     given = chosen.any_port(given)
     answer = quick_stop.take_answer(given.port or "", now)
@@ -64,7 +64,7 @@ def _tell(given: BoardOptions, answer: StopAnswer, now: bool) -> None:
 
 
 def _rest(shared: SharedBoard) -> BoardState | None:
-    """Where the arm comes to rest; None where the other program gives up the port before."""
+    """Where the arm comes to rest; None if the other program gives up the port before."""
     try:
         found = shared.state()
         if found.moving and found.rest_s:
@@ -104,7 +104,7 @@ def _with_degrees(found: BoardState) -> BoardState:
 @click.command("clear")
 @options.board()
 def clear(given: BoardOptions) -> None:
-    """Clear the pending fault, once its cause is gone."""
+    """Clear the pending fault; its cause must be gone."""
     with chosen.board(given) as board:
         before = board.status()
         board.clear()

@@ -26,7 +26,7 @@ from armtempo.robot.board_state import record_crc
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--name", metavar="NAME", help="Name on the board; without it the job's name.")
 @click.option("--default", "as_default", is_flag=True, help="Let the board's button start it.")
-@options.force("another motion that the board keeps under this name")
+@options.force("another motion of this name on the board")
 @options.board(options.arm_of_file, options.replace_arm, options.altered)
 def upload(file: Path, name: str | None, as_default: bool, force: bool, given: BoardOptions) -> None:
     """Store a trajectory file, or a planned sequence with its motions, on the board.
@@ -57,9 +57,9 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
 @click.command("list")
 @options.board(options.arm_of_board)
 def list_motions(given: BoardOptions) -> None:
-    """List the motions and sequences on the board, and where they begin and end.
+    """List the motions and sequences on the board, and their first and last postures.
 
-    The one marked * is what the board's button starts.
+    The one marked * is the default that the board's button starts.
     """
     with chosen.board(given) as board:
         found = board.list()
@@ -92,7 +92,7 @@ def _arm_of(board: Board, arm_path: Path | None) -> Arm | None:
     named = chosen.named_arm(arm_path)
     if named is not None and record_crc(named) != board.info.arm_crc:
         results.tell(
-            f"the board is set up for another arm than {chosen.words(named)}; see 'armtempo configure'"
+            f"the board is set up for a different arm than {chosen.words(named)}; see 'armtempo configure'"
         )
         named = None
     try:

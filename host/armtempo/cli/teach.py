@@ -1,4 +1,4 @@
-"""``armtempo teach``: where the arm stands becomes a posture of its file, or the via points of a job."""
+"""``armtempo teach``: where the arm is becomes a posture of its file, or the via points of a job."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def teach(
     port: str | None,
     log_traffic: Path | None,
 ) -> None:
-    """Teach: keep where the arm stands.
+    """Teach: store the arm's present position.
 
-    JOB.toml: a job file that collects via points and plans at once: by the keys of 'armtempo jog' and p for a point,
-    or --by-hand. --posture NAME writes one posture into the arm file, whose comments and layout stay, and moves
-    nothing; then 'armtempo goto NAME' brings the arm there, and a job may pass it: [[via]] posture = "NAME".
+    JOB.toml: a new job file for the via points: move by the keys of 'armtempo jog' and press p for a point, or move
+    --by-hand. --posture NAME writes one posture into the arm file, whose comments and layout are kept; nothing moves.
+    Then 'armtempo goto NAME' moves the arm there, and a job may use it: [[via]] posture = "NAME".
     """
     if (job_file is None) == (name is None) or (name is not None and by_hand):
         raise InputError(
@@ -123,11 +123,11 @@ def _guide(board: Board, pressed: Keys, points: TaughtPoints) -> None:
         "hold the arm: it sinks when the motors' current goes off. Enter: off; any other key: leave it on"
     )
     if pressed.read(600.0) not in ("\r", "\n"):
-        raise InputError("the motors kept their current", "run it again with somebody who holds the arm")
+        raise InputError("the motors kept their current", "run it again while somebody holds the arm")
     points.where = guided.angles_deg
     with guided:
         click.echo(
-            "the current is off. p or the board's button takes a point, u forgets the last, q gives the current back "
+            "the current is off. p or the board's button takes a point, u removes the last, q gives the current back "
             "and ends"
         )
         by_hand(pressed, points, guided.button_pressed)
@@ -151,21 +151,21 @@ class TaughtPoints:
         return {TAKE: self.take, UNDO: self.undo}
 
     def take(self) -> str:
-        """Take where the arm stands; says what was done."""
+        """Take where the arm is; says what was done."""
         point = posture_text.digits(self._arm, self.where().tolist())
         if problem := self._arm.angles_problem(point):
             return f"not taken: {problem}"
         if self.points_deg and point == self.points_deg[-1]:
-            return "not taken: the arm stands where it stood at the last point"
+            return "not taken: the arm is at the last point"
         self.points_deg.append(point)
         return f"point {len(self.points_deg)} taken: {_row(point)}"
 
     def undo(self) -> str:
         """Forget the last point."""
         if not self.points_deg:
-            return "there is no point to forget"
+            return "there is no point to remove"
         self.points_deg.pop()
-        return f"point {len(self.points_deg) + 1} forgotten"
+        return f"point {len(self.points_deg) + 1} removed"
 
     def save(self, file: Path) -> None:
         """Write the job; InputError for fewer than two points."""
@@ -182,9 +182,9 @@ class TaughtPoints:
 
 
 def check_free(file: Path, replace_old: bool) -> None:
-    """InputError where the job file is there already, before anything moves."""
+    """InputError if the job file already exists, before anything moves."""
     if file.exists() and not replace_old:
-        raise InputError(f"{file} exists, so it is kept", "choose another name, or replace it with --replace")
+        raise InputError(f"{file} already exists", "choose another name, or replace it with --replace")
     if not file.parent.is_dir():
         raise InputError(f"{file.parent}: there is no such folder", "make it, or choose another place")
 

@@ -18,7 +18,7 @@ _LOOK_S = 0.5
 @click.option(
     "--flash",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder that is the board's flash; made if missing. Default: one that goes with the board.",
+    help="Folder used as the board's flash; created if missing. Default: a temporary one.",
 )
 @click.option("--real-time", is_flag=True, help="Run motions in real time instead of as fast as possible.")
 @click.option(
@@ -26,30 +26,30 @@ _LOOK_S = 0.5
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write every pin edge with its time to this file.",
 )
-@click.option(
-    "--interpreter", help="MicroPython or Python to run it. Default: micropython where there is one."
-)
+@click.option("--interpreter", help="MicroPython or Python to run it. Default: micropython if found.")
 @click.option(
     "--deployed",
     is_flag=True,
-    help="Run what is in the flash ('armtempo deploy' puts it there), not the installed program.",
+    help="Run the program in the flash (installed by 'armtempo deploy'), not the one of this installation.",
 )
 @click.option(
     "--hold-button",
     type=click.FloatRange(0.0, 60.0),
     default=0.0,
     metavar="SECONDS",
-    help="Hold the user button for so long from power-up on: 0.9 starts in safe mode.",
+    help="Hold the user button this long from power-up: 0.9 starts in safe mode.",
 )
 @click.option(
     "--sd-card",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help="Folder that is an SD card in the board.",
+    help="Folder used as an SD card in the board.",
 )
 @options.arm
-@click.option("--ideal", is_flag=True, help="Ideal motors, as without an arm.")
-@click.option("--seed", default=0, show_default=True, help="Tells one board from another, and its scatter.")
+@click.option("--ideal", is_flag=True, help="Ideal motors, as without an arm file.")
+@click.option(
+    "--seed", default=0, show_default=True, help="Seed of the board's id and of its random deviations."
+)
 def virtual_board(
     flash: Path | None,
     real_time: bool,
@@ -64,8 +64,8 @@ def virtual_board(
 ) -> None:
     """Start a virtual board, print its port, and run it until Ctrl-C.
 
-    The port can be opened like a serial device, by armtempo (--port) and by any other program. Its motors are as
-    the arm file describes them; without one they are ideal, for whatever arm the board is set up for.
+    The port can be opened like a serial device, by armtempo (--port) and by any other program. Its motors are those of
+    the arm file; without one they are ideal, for any arm that the board is set up for.
     """
     wanted = LaunchOptions(
         flash,
@@ -84,6 +84,6 @@ def virtual_board(
             time.sleep(_LOOK_S)
         tail = board.log().strip().splitlines()[-1:]
         raise LinkError(
-            f"the virtual board ended: {' '.join(tail) or 'it says nothing'}",
-            "start it again; with the same --flash its files are kept",
+            f"the virtual board ended: {' '.join(tail) or 'without a message'}",
+            "start it again; the same --flash keeps its files",
         )

@@ -22,15 +22,15 @@ _STATE_S = 0.5
 @click.command("watch")
 @options.board()
 def watch(given: BoardOptions) -> None:
-    """Show samples, states and what happens, as another armtempo program that has the port hears it.
+    """Show samples, states and events of another armtempo program that has the port.
 
-    Where no program has it, the board is asked for its state. Ctrl-C ends it; a motion under way goes on.
+    If no program has it, the board is asked for its state. Ctrl-C ends it; a running motion continues.
     """
     given = chosen.any_port(given)
     with chosen.shared_or_own(given, any_program=True) as board:
         if isinstance(board, SharedBoard):
             _show_messages(board.watch("sample", "status", "event"), given.as_json)
-            results.tell(f"{board.program} has given up {given.port}")
+            results.tell(f"{board.program} has closed {given.port}")
         else:
             _show_messages(_states(board), given.as_json)
 
@@ -81,9 +81,9 @@ Say = Callable[[float, str, list[str]], None]
 def monitor(file: Path | None, given: BoardOptions) -> None:
     """Show decoded traffic.
 
-    FILE: what '--log-traffic FILE' recorded; without it, what another armtempo program that has the port says
-    and hears, else the board is asked once a second. Ctrl-C ends it; a motion under way goes on.
-    With --json each line is a document.
+    FILE: what '--log-traffic FILE' recorded; without it, the traffic of another armtempo program that has the port,
+    else the board is asked once a second. Ctrl-C ends it; a running motion continues. With --json each line is a
+    document.
     """
     say = _print_json if given.as_json else _print
     if file is not None:
@@ -94,7 +94,7 @@ def monitor(file: Path | None, given: BoardOptions) -> None:
         if isinstance(board, SharedBoard):
             for message in board.watch("traffic"):
                 say(message["time_s"], message["direction"], message["words"])
-            results.tell(f"{board.program} has given up {given.port}")
+            results.tell(f"{board.program} has closed {given.port}")
             return
         while True:
             board.status()

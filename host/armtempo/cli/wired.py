@@ -28,7 +28,7 @@ def output(name: str | None, value: str | None, given: BoardOptions) -> None:
     """Set an output of the arm, or list them.
 
     NAME: an [output.NAME] of the arm file. VALUE: a state of it such as open, or a number: 0 or 1, a duty of 0 to 1,
-    degrees of a servo. Without VALUE: what it is set to; without NAME: all of them. Also while a motion runs, and while
+    degrees of a servo. Without VALUE: prints its value; without NAME: all of them. Also while a motion runs, and while
     another armtempo program has the port.
     """
     if name is not None and name.startswith("-"):
@@ -136,7 +136,7 @@ class Wired:
 
 @contextmanager
 def _board(given: BoardOptions) -> Iterator[Wired]:
-    """Raises LinkError where the board is set up for another arm than the one that is named."""
+    """Raises LinkError if the board is set up for a different arm than the one that is named."""
     given = chosen.any_port(given)
     named = chosen.named_arm(given.arm_path)
     with chosen.shared_or_own(given, named) as found:
@@ -152,6 +152,7 @@ def _same_arm(arm_crc: int, named: Arm | None) -> Arm:
     arm = named or Arm.paper()
     if record_crc(arm) != arm_crc:
         raise LinkError(
-            f"the board is set up for another arm than {chosen.words(arm)}", "name that arm's file with --arm"
+            f"the board is set up for a different arm than {chosen.words(arm)}",
+            "give that arm's file with --arm",
         )
     return arm

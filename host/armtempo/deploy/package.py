@@ -18,7 +18,7 @@ STM32F4 = 6 | 3 << 8 | 7 << 10
 def write(folder: Path) -> None:
     """Write compiled files, start files and package.json into a new or empty folder.
 
-    Raises InputError where it holds something already or cannot be written.
+    Raises InputError if it holds something already or cannot be written.
     """
     files = {
         **program_files.library(STM32F4),

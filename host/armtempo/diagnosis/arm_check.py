@@ -14,19 +14,19 @@ from armtempo.model.posture import HOME
 
 
 def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, list[Finding]]:
-    """The arm of the file, None where it cannot be read, and all findings on it and on the job.
+    """The arm of the file, None if it cannot be read, and all findings on it and on the job.
 
     What the readers refuse is a finding too.
     """
     try:
         arm = Arm.read(arm_file)
     except InputError as refused:
-        return None, [error("arm file", str(refused), "correct that; the rest of the file was not looked at")]
+        return None, [error("arm file", str(refused), "correct that; the rest of the file was not checked")]
     found = check_arm(arm)
     if job_file is None:
         return arm, found
     if any(finding.level is Level.ERROR for finding in found):
-        return arm, [*found, note("job", "not looked at", "correct the arm first")]
+        return arm, [*found, note("job", "not checked", "correct the arm first")]
     from armtempo.diagnosis import job  # here, because it imports the whole planner
 
     return arm, _sorted([*found, *job.findings(arm, job_file)])

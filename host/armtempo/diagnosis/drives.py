@@ -8,6 +8,7 @@ from armtempo.basics.errors import ArmtempoError
 from armtempo.diagnosis.finding import Finding, error, warning
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Driver
+from armtempo.planning.checks import ESTIMATED
 from armtempo.records import encode
 
 _MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}
@@ -38,7 +39,8 @@ def findings(arm: Arm) -> list[Finding]:
         found.append(
             warning(
                 "all joints",
-                f"all at their speed limits together need {rates:.0f} steps/s, the board makes {MAX_STEP_RATE_SUM}",
+                f"all at their speed limits together need {rates:.0f} steps/s, the board makes {MAX_STEP_RATE_SUM} "
+                f"{ESTIMATED}",
                 "use fewer microsteps or lower speed limits; else a plan that needs more is refused",
             )
         )
@@ -64,7 +66,7 @@ def _motor(joint: DrivenJoint) -> list[Finding]:
         found.append(
             warning(
                 joint.name,
-                f"steps_per_rev = {joint.motor.steps_per_rev} is no multiple of 4, as a stepper's full steps are",
+                f"steps_per_rev = {joint.motor.steps_per_rev} is not a multiple of 4, as a stepper's full steps are",
                 "give the motor's full steps a turn: 200 for 1.8 deg, 400 for 0.9 deg; microsteps have their own key",
             )
         )
@@ -72,7 +74,7 @@ def _motor(joint: DrivenJoint) -> list[Finding]:
         found.append(
             warning(
                 joint.name,
-                f"microsteps = {joint.motor.microsteps} is no setting that stepper drivers have",
+                f"microsteps = {joint.motor.microsteps} is not a setting of stepper drivers",
                 "look up the driver's switches: mostly 1, 2, 4, 8, 16, 32 and on",
             )
         )
@@ -85,7 +87,7 @@ def _rates(joint: DrivenJoint, driver: Driver) -> list[Finding]:
     rpm = motor_rpm(joint)
     found = []
     if rate > MAX_STEP_RATE:
-        text = f"{at_limit} it needs {rate:.0f} steps/s, the board makes at most {MAX_STEP_RATE}"
+        text = f"{at_limit} it needs {rate:.0f} steps/s, the board makes at most {MAX_STEP_RATE} {ESTIMATED}"
         found.append(
             error(joint.name, text, "lower speed_deg_s or use fewer microsteps; check the gear ratio")
         )
@@ -97,7 +99,7 @@ def _rates(joint: DrivenJoint, driver: Driver) -> list[Finding]:
     if rate < _SLOW_STEPS_S:
         text = f"{at_limit} the motor makes only {rate:.2g} steps/s"
         found.append(
-            warning(joint.name, text, "check speed_deg_s, microsteps and gear_ratio for a slip of the unit")
+            warning(joint.name, text, "check speed_deg_s, microsteps and gear_ratio for a wrong unit")
         )
     if rpm > _FAST_RPM:
         text = f"{at_limit} the motor turns at {rpm:.0f} rpm; few steppers have torque left above {_FAST_RPM:.0f}"

@@ -37,7 +37,7 @@ def findings(arm: Arm) -> list[Finding]:
 
 
 def ends(arm: Arm) -> Iterator[End]:
-    """The arm with each driven joint at each end of its range, the others at home."""
+    """The arm with each driven joint at each end of its range, the others at their home angles."""
     for index, joint in zip(arm.driven_indices, arm.driven, strict=True):
         for angle_deg in joint.range_deg:
             angles = np.array(arm.all_home_deg)
@@ -72,17 +72,13 @@ def _ends(arm: Arm) -> list[Finding]:
         if _gap_mm(end.points_mm, near) < near:
             crossing.append(where)
     found = []
-    next_step = (
-        "keep it in mind: armtempo does not look for collisions; narrow range_deg where it is never wanted"
-    )
+    next_step = "give [room] and radius_mm, so that motions are checked for it, or narrow range_deg"
     if below:
         found.append(
             note("ranges", f"from home, the arm goes below its base plane with {', '.join(below)}", next_step)
         )
     if crossing:
-        found.append(
-            note("ranges", f"from home, links meet each other with {', '.join(crossing)}", next_step)
-        )
+        found.append(note("ranges", f"from home, links collide with {', '.join(crossing)}", next_step))
     return found
 
 
@@ -92,14 +88,14 @@ def _wide(arm: Arm) -> list[Finding]:
         low, high = joint.range_deg
         if high - low > _FULL_TURN_DEG:
             text = f"its range of {high - low:g} deg is more than a turn"
-            found.append(note(joint.name, text, "make sure that the cables go along"))
+            found.append(note(joint.name, text, "make sure that the cables allow it"))
     return found
 
 
 def _gap_mm(points: Array, shortest: float) -> float:
     """Smallest distance between two lines of the outline that are not neighbours; infinite if there are none.
 
-    Lines shorter than ``shortest`` are left out: what stands before and behind them is near in any posture.
+    Lines shorter than ``shortest`` are left out: what is before and after them is near in any posture.
     """
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     links = [(points[i], points[i + 1]) for i in np.flatnonzero(lengths > max(shortest, _BELOW_MM))]

@@ -26,7 +26,7 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
         checks.check_job(arm, job)
         via_deg, notes = planner.via_angles(arm, job)
     except ArmtempoError as refused:
-        text = "correct that; the rest of the job was not looked at"
+        text = "correct that; the rest of the job was not checked"
         return [*suspected, error("job", str(refused), text)]
     told = [note("job", text, "change the pose, or accept it") for text in notes]
     return [*suspected, *told, *_steps(arm, via_deg), *_room(arm, via_deg)]
@@ -59,8 +59,6 @@ def _steps(arm: Arm, via_deg: Array) -> list[Finding]:
         if 0.0 < way_deg * joint.steps_per_deg < 1.0:
             text = f"{joint.name} is to move by {way_deg:.2g} deg, less than a step"
             found.append(
-                warning(
-                    "job", text, "check the unit: angles are degrees; it will stand still or make one step"
-                )
+                warning("job", text, "check the unit: angles are degrees; it will not move, or make one step")
             )
     return found

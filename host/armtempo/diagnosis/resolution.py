@@ -68,7 +68,7 @@ def _of(resolution: Resolution) -> list[Finding]:
                 joint.name,
                 f"its smallest step, {resolution.step_deg:.3g} deg, moves the tool by up to "
                 f"{resolution.step_mm:.2g} mm (more than {COARSE_MM:g})",
-                "use more microsteps or a larger gear ratio, or accept it: the tool will move in jerks of that",
+                "use more microsteps or a larger gear ratio, or accept it: the tool will move in steps of that size",
             )
         )
     return found

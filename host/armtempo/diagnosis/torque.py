@@ -1,31 +1,35 @@
-"""Torque that the model of the virtual arm asks of each motor, against what the motor has."""
+"""Torque that the model in the arm file asks of each motor at its limits, against what it has; odd masses."""
 
 from __future__ import annotations
 
 import math
 
-from armtempo.diagnosis.finding import Finding, error, note, warning
-from armtempo.model.arm import Arm
-from armtempo.model.parts import DrivenJoint
+import numpy as np
 
-_ENOUGH = 1.5
-"""Motors are seldom as strong as their data sheet: less than half as much again is told."""
+from armtempo.diagnosis.finding import Finding, error, note, warning
+from armtempo.kinematics.dynamics import inertia_matrix
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint, Dynamics, Joint
+from armtempo.planning.torque import ENOUGH, held_nm
+
+_TRIANGLE = 1e-6
+"""A largest moment of inertia may exceed the sum of the two others by this part of it: by rounding."""
+_HEAVY_KG = 50.0
+"""Heavier than any link that steppers carry."""
 
 
 def margin(joint: DrivenJoint) -> float | None:
     """Torque of a joint's motor over what gravity and its acceleration limit ask at its speed limit.
 
-    None where the arm file says nothing of the torque; infinite where nothing is asked. Torque falls with speed
-    as in the virtual arm: to 0.71 of the holding torque at the corner speed.
+    By ``joint.model``; None if the arm file says nothing of the torque; infinite if nothing is asked.
     """
     model, motor, limits = joint.model, joint.motor, joint.limits
-    if not model.holding_torque_nm:
+    held = float(held_nm(joint, math.radians(limits.speed_deg_s) * motor.gear_ratio))
+    if math.isnan(held):
         return None
-    speed = math.radians(limits.speed_deg_s) * motor.gear_ratio
-    fallen = math.hypot(1.0, speed / model.corner_speed_rad_s) if model.corner_speed_rad_s else 1.0
     inertia = model.rotor_inertia_kg_m2 + model.inertia_kg_m2 / motor.gear_ratio**2
     asked = inertia * math.radians(limits.acceleration_deg_s2) * motor.gear_ratio + gravity_nm(joint)
-    return model.holding_torque_nm / fallen / asked if asked else math.inf
+    return held / asked if asked else math.inf
 
 
 def gravity_nm(joint: DrivenJoint) -> float:
@@ -37,23 +41,44 @@ def gravity_nm(joint: DrivenJoint) -> float:
 
 
 def findings(arm: Arm) -> list[Finding]:
-    """Joints whose motor is too weak, or nearly so; and those of which nothing is known."""
+    """Joints whose motor is too weak, or nearly so; those of which nothing is known; dynamics that look wrong."""
     found = [finding for joint in arm.driven for finding in _of(joint)]
-    unknown = [joint.name for joint in arm.driven if not joint.model.holding_torque_nm]
+    unknown = [joint.name for joint in arm.driven if np.isnan(held_nm(joint, 0.0))]
     if unknown:
-        text = f"not checked for {', '.join(unknown)}: no holding_torque_nm"
         next_step = (
-            "give holding_torque_nm, inertia_kg_m2 and gravity_torque_nm in [joint.model] to have it checked"
+            "give curve_rpm_nm in [joint.motor], and masses in [joint.dynamics], to have plans checked"
         )
-        found.append(note("torque", text, next_step))
+        found.append(
+            note("torque", f"not checked for {', '.join(unknown)}: no torque of the motor", next_step)
+        )
+    for joint in arm.joints:
+        if joint.dynamics is not None:
+            found += _body(joint, joint.dynamics)
+    return found
+
+
+def _body(joint: Joint, body: Dynamics) -> list[Finding]:
+    """What looks wrong about the masses of a row."""
+    least, middle, most = np.linalg.eigvalsh(inertia_matrix(body.inertia_kg_m2))
+    found = []
+    if least < -_TRIANGLE * most or most > (least + middle) * (1.0 + _TRIANGLE):
+        text = f"no body has the inertia {list(body.inertia_kg_m2)}"
+        found.append(
+            error(joint.name, text, "give xx, yy, zz, xy, xz, yz about the centre of mass, in kg m^2")
+        )
+    elif body.mass_kg and most == 0.0:
+        text = "its inertia_kg_m2 is not given: its mass counts as a point"
+        found.append(note(joint.name, text, "give it where the link is large for the way it moves"))
+    if body.mass_kg > _HEAVY_KG:
+        found.append(warning(joint.name, f"a mass of {body.mass_kg:g} kg", "give mass_kg in kilograms"))
     return found
 
 
 def _of(joint: DrivenJoint) -> list[Finding]:
     found = margin(joint)
-    if found is None or found >= _ENOUGH:
+    if found is None or found >= ENOUGH:
         return []
-    holding = joint.model.holding_torque_nm
+    holding = float(held_nm(joint, 0.0))
     if gravity_nm(joint) >= holding:
         text = (
             f"gravity asks {gravity_nm(joint):.2g} Nm of its motor, which holds {holding:g}: the joint falls"
@@ -65,4 +90,4 @@ def _of(joint: DrivenJoint) -> list[Finding]:
     next_step = "lower acceleration_deg_s2 or speed_deg_s, or correct [joint.model]"
     if found < 1.0:
         return [error(joint.name, f"{text}: it loses steps", next_step)]
-    return [warning(joint.name, f"{text}; {_ENOUGH:g} is prudent", next_step)]
+    return [warning(joint.name, f"{text}; {ENOUGH:g} is prudent", next_step)]

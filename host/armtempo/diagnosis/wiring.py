@@ -24,9 +24,7 @@ def findings(arm: Arm) -> list[Finding]:
         text = "channel 6 takes the pin of the board's button, which starts nothing then"
         found.append(note("wiring", text, "use channels 1 to 5 if the button is to start motions"))
     if not arm.safety.estop_fitted:
-        found.append(
-            note("safety", "no E-stop is fitted", "wire one and set estop_fitted = true: it is worth it")
-        )
+        found.append(note("safety", "no E-stop is fitted", "wire one and set estop_fitted = true"))
     return found
 
 
@@ -47,7 +45,7 @@ def _levels(arm: Arm) -> list[Finding]:
     return [
         error(
             "switches",
-            f"input {number} is to trip at low and at high level",
+            f"input {number} is set to trip both at low and at high level",
             "give its joints the same 'active'",
         )
         for number, active in levels.items()
@@ -95,5 +93,5 @@ def _has_switch(joint: Joint) -> bool:
 
 
 def _unused(joint: Joint) -> Finding:
-    text = "has switches but no motor: they are not looked at"
+    text = "has switches but no motor: they are not checked"
     return warning(joint.name, text, "give it a motor, or leave its [switches] out")

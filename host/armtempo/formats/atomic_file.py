@@ -14,7 +14,7 @@ def replace_text(path: Path, text: str, newline: str | None = None) -> None:
     """Write a file aside and put it in place of the old one, so that it is never half there.
 
     ``newline``: as of ``open``; "" leaves the ends of lines as they are. A link stays one; a pipe or a device, such as
-    /dev/stdout, is written to. Raises InputError where it cannot be written; what was there before stays.
+    /dev/stdout, is written to. Raises InputError if it cannot be written; what was there before stays.
     """
     try:
         if path.exists() and not path.is_file():
@@ -31,7 +31,7 @@ def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
         with suppress(OSError):
             if file and target.exists() and os.path.samefile(target, file):
                 raise InputError(
-                    f"{target} is what this is made from and is not written over", "choose another name"
+                    f"{target} is an input of this command and is not overwritten", "choose another name"
                 )
 
 
@@ -44,7 +44,7 @@ def check_replaceable(target: Path, text: str, force: bool, rule: str = "") -> N
         return
     kept = f" ({rule})" if rule else ""
     raise InputError(
-        f"{target} exists and has other content, so it is kept{kept}",
+        f"{target} exists with other content and is not replaced{kept}",
         "choose another name, or replace it with --force",
     )
 

@@ -16,7 +16,7 @@ _SEPARATORS = (";", "\t", ",")
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The cells of a table; ``header`` is None where the first line is all numbers."""
+    """The cells of a table; ``header`` is None if the first line is all numbers."""
 
     path: Path | str
     """Its file, or what it is, in words."""
@@ -44,7 +44,7 @@ class NumberTable:
 
 
 def read(path: Path) -> NumberTable:
-    """The table in a text file, as ``of_text``. InputError where it cannot be read."""
+    """The table in a text file, as ``of_text``. InputError if it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -55,7 +55,7 @@ def read(path: Path) -> NumberTable:
 
 
 def of_text(text: str, path: Path | str) -> NumberTable:
-    """The table in a text that comes from ``path``; empty lines are left out. InputError where it is none."""
+    """The table in a text that comes from ``path``; empty lines are left out. InputError if it is not a table."""
     separator = _separator(text)
     try:
         lines = list(enumerate(csv.reader(text.splitlines(), delimiter=separator), 1))

@@ -9,7 +9,7 @@ _LIKELY, _SURE = 0.6, 0.8
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """A question for the nearest known word, to stand behind an error; "" where none is near."""
+    """A question for the nearest known word, to stand after an error; "" if none is near."""
     near = _nearest(word, known, _LIKELY)
     return f"; did you mean {near!r}?" if near else ""
 

@@ -21,12 +21,12 @@ _REQUIRED: Any = object()
 def read(path: Path | str) -> Table:
     """The top table of a TOML file.
 
-    Raises InputError where the file is missing, unreadable or not TOML.
+    Raises InputError if the file is missing, unreadable or not TOML.
     """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file", "check the path") from None
+        raise InputError(f"{path}: no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}: cannot be read: {why(error)}",
@@ -36,13 +36,13 @@ def read(path: Path | str) -> Table:
 
 
 def parse(text: str, file: str) -> Table:
-    """The top table of TOML text; ``file`` names it in messages. Raises InputError where it is not TOML."""
+    """The top table of TOML text; ``file`` names it in messages. Raises InputError if it is not TOML."""
     try:
         return Table(tomllib.loads(text), file)
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
         raise InputError(
             f"{file}: not valid TOML: {error}",
-            "correct that place; strings stand in quotes, tables in [brackets]",
+            "correct that place; strings are written in quotes, tables in [brackets]",
         ) from None
 
 
@@ -56,7 +56,7 @@ class Table:
         self._asked: list[str] = []
 
     def fail(self, key: str, allowed: str) -> InputError:
-        """The error for a key: say what is there and what is allowed."""
+        """The error for a key: say what it has and what is allowed."""
         name = f"{self.place}{key}"
         if key not in self._values:
             return InputError(
@@ -75,7 +75,7 @@ class Table:
         return key in self._values
 
     def peek(self, key: str) -> Any:
-        """The value as it stands there, unchecked, or None; for one that may be of several kinds."""
+        """The value as given, unchecked, or None; for one that may be of several kinds."""
         return self._values.get(key)
 
     def is_text(self, key: str) -> bool:
@@ -160,7 +160,7 @@ class Table:
         return value
 
     def table(self, key: str) -> Table | None:
-        """A table inside this one, or None where it is not given."""
+        """A table inside this one, or None if it is not given."""
         value = self._get(key, None, "a table")
         if value is None:
             return None

@@ -15,7 +15,7 @@ BORDER = 1e-9
 
 
 class Branch(NamedTuple):
-    """How the arm stands; "" where it stands between the two."""
+    """How the arm stands; "" if it stands between the two."""
 
     base: str
     """"front": the arm reaches forwards over its shoulder; "rear": backwards."""

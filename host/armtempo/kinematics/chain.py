@@ -21,7 +21,7 @@ def all_angles_deg(arm: Arm, driven_deg: Array) -> Array:
 
 
 def spread_deg(arm: Arm, angles_deg: ArrayLike, what: str = "") -> Array:
-    """Angles of all joints (..., joints) from theirs or from those of the driven ones (..., J), the others at home.
+    """Angles of all joints (..., joints) from theirs or from those of the driven ones (..., J); others are at home.
 
     Raises InputError, which begins with ``what``, for another number of angles.
     """

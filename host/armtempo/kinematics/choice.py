@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +15,7 @@ from armtempo.kinematics.folding import folded
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse_of_pose, wrist_centre
 from armtempo.kinematics.ranges import Ranges
-from armtempo.kinematics.regions import classify
+from armtempo.kinematics.regions import Regions, classify
 from armtempo.kinematics.rejection import Rejection, WristCentre, reasons
 from armtempo.kinematics.shape import Shape
 
@@ -36,19 +37,37 @@ class Candidate:
     """Root of the sum of squares of the joints' ways from the previous posture."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Choice:
     """All solutions of a pose and the one chosen."""
 
     candidates: tuple[Candidate, ...]
-    chosen: Candidate | None
-    """None: no solution can be used."""
-    region: str
-    """Of Fig. 3, as in ``Regions.names``."""
-    postures: int
-    """Arm postures in that region, 0 to 4."""
-    on_axis: bool
-    """Wrist centre on axis 1: joint 1 is kept as in the previous posture."""
+    wrist: WristCentre
+
+    @cached_property
+    def chosen(self) -> Candidate | None:
+        """The nearest that can be used; None: none can."""
+        usable = [candidate for candidate in self.candidates if not candidate.rejections]
+        return min(usable, key=lambda candidate: candidate.distance_rad, default=None)
+
+    @cached_property
+    def _region(self) -> Regions:
+        return classify(self.wrist.shape, self.wrist.position)
+
+    @property
+    def region(self) -> str:
+        """Of Fig. 3, as in ``Regions.names``."""
+        return self._region.names[0]
+
+    @property
+    def postures(self) -> int:
+        """Arm postures in that region, 0 to 4."""
+        return int(self._region.postures[0])
+
+    @property
+    def on_axis(self) -> bool:
+        """Wrist centre on axis 1: joint 1 is kept as in the previous posture."""
+        return bool(self._region.axis[0])
 
 
 def choose(
@@ -70,12 +89,4 @@ def choose(
         why = reasons(wrist, solutions, i, ranges, placed)
         distance = math.dist(placed, previous)
         candidates.append(Candidate(i + 1, branch, np.array(placed), why, solutions.singular[i], distance))
-    usable = [candidate for candidate in candidates if not candidate.rejections]
-    region = classify(shape, wrist.position)
-    return Choice(
-        tuple(candidates),
-        min(usable, key=lambda candidate: candidate.distance_rad, default=None),
-        region.names[0],
-        int(region.postures[0]),
-        bool(region.axis[0]),
-    )
+    return Choice(tuple(candidates), wrist)

@@ -137,7 +137,7 @@ def _hold(problem: PoseProblem, angles: list[float], matrix: Matrix, gradient: l
 
 
 def _solve(matrix: Matrix, gradient: list[float], damping: float) -> list[float] | None:
-    """The step down, by Cholesky's factors of the damped lower triangle ``matrix``; None where that is not definite."""
+    """The step down, by Cholesky's factors of the damped lower triangle ``matrix``; None if that is not definite."""
     damp = damping * max(row[-1] for row in matrix)
     factors: Matrix = []
     forth: list[float] = []

@@ -15,7 +15,7 @@ from armtempo.kinematics.shape import Shape
 
 
 class ArmPart(NamedTuple):
-    """Joints 1 to 3 as Denavit-Hartenberg angles, theta3 not wrapped; NaN where out of reach.
+    """Joints 1 to 3 as Denavit-Hartenberg angles, theta3 not wrapped; NaN if out of reach.
 
     Axes of the arrays: base (front, rear), elbow (up, down), pose.
     """

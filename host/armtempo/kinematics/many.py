@@ -27,7 +27,7 @@ class ManySolutions:
     """Joint angles that bring the tool to each of N poses."""
 
     angles_deg: Array
-    """(N, 8, joints): whole turns added to lie in the ranges, nearest to the posture to stay near to; NaN where out of
+    """(N, 8, joints): whole turns added to lie in the ranges, nearest to the posture to stay near to; NaN if out of
     reach."""
     usable: NDArray[np.bool_]
     """(N, 8): within reach and all ranges, and not equal to an earlier one."""
@@ -40,7 +40,7 @@ def inverse_many(arm: Arm | Path | str, poses: ArrayLike, near_deg: ArrayLike | 
     """The eight solutions of each of many poses, some hundred thousand a second; see ``inverse`` for why not.
 
     ``poses``: (N, 4, 4) or (N, 3, 4), lengths in mm; ``near_deg``, (joints,) or (J,): the posture to stay near to;
-    None: home. Raises InputError for what is no pose, and for an arm without a closed form.
+    None: home. Raises InputError for what is not a pose, and for an arm without a closed form.
     """
     arm = Arm.shape(arm)
     geometry, ranges = Geometry.of(arm), Ranges.of(arm)

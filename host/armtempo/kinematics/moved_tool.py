@@ -22,7 +22,7 @@ def moved_tool_deg(arm: Arm, angles_deg: Array, position_mm: Sequence[float]) ->
     """The postures of the driven joints, (J,) each, with the tool at ``position_mm``, nearest to ``angles_deg`` first.
 
     An arm that drives six joints keeps the orientation of the tool, another one only reaches the place. Raises
-    PlanError, with the reason, if there is no such posture.
+    PlanError, with the reason, if no such posture.
     """
     solver = PoseSolver(arm)
     before = np.radians(all_angles_deg(arm, np.asarray(angles_deg, dtype=float)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import spread_deg
-from armtempo.kinematics.choice import Candidate
+from armtempo.kinematics.choice import Candidate, choose
 from armtempo.kinematics.constraint import Miss
 from armtempo.kinematics.forward import forward as forward_rad
 from armtempo.kinematics.geometry import Geometry
@@ -20,7 +21,10 @@ from armtempo.kinematics.numerical import NumericalSolution
 from armtempo.kinematics.solver import Answer, PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.pose import checked as checked_pose
-from armtempo.model.tool_pose import Pose
+from armtempo.model.tool_pose import WHOLE, Pose
+
+_FAR_DEG, _FAR = 5.0, 50.0
+"""No tolerance brings a joint back that is outside its range by more than that, or by this many times the tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +32,7 @@ class Solution:
     """Joint angles that bring the tool to a pose."""
 
     angles_deg: Array
-    """(joints,): of all joints of the arm; NaN where the pose is out of reach of this branch."""
+    """(joints,): of all joints of the arm; NaN if the pose is out of reach of this branch."""
     branch: str
     """Which of the arm's configurations it is; empty for one that was found numerically."""
     rejections: tuple[str, ...]
@@ -51,7 +55,7 @@ def forward(arm: Arm | Path | str, angles_deg: ArrayLike) -> Array:
     """The tool's pose, Eq. (1): (..., 4, 4), lengths in mm, in the frame of the base.
 
     ``arm``: or its file or name. ``angles_deg``: of all joints, (..., joints), or of the driven ones, (..., J), with
-    the others at home. Raises InputError for another number of angles.
+    the others at their home angles. Raises InputError for another number of angles.
     """
     arm = Arm.shape(arm)
     return forward_rad(Geometry.of(arm), np.radians(spread_deg(arm, angles_deg)))
@@ -68,15 +72,33 @@ def inverse(
     closed form's class has eight solutions, some perhaps rejected. Any other arm or pose gets what a numerical
     search finds with the joints that have a motor, perhaps nothing: of a pose that asks for fewer numbers than joints
     move the one that the search comes to first, else all, but at most 16 where one turns into the next, as at a
-    singular pose. Raises InputError for a matrix that is no pose.
+    singular pose. Raises InputError for a matrix that is not a pose.
     """
-    arm = Arm.shape(arm)
-    near = PoseSolver(arm).home_rad if near_deg is None else _posture(arm, near_deg)
+    solver = PoseSolver(Arm.shape(arm))
+    near = solver.home_rad if near_deg is None else tuple(_posture(solver.arm, near_deg).tolist())
     target = pose.exact() if isinstance(pose, Pose) else Pose.of_matrix(checked_pose(pose))
-    solutions = _solutions(PoseSolver(arm).solve(target, tuple(near)))
+    solutions = _exact(solver, target, near) or _solutions(solver.solve(target, near))
     return tuple(
-        sorted(solutions, key=lambda one: (not one.usable, np.nan_to_num(one.distance_deg, nan=np.inf)))
+        sorted(solutions, key=lambda one: (not one.usable, math.isnan(one.distance_deg), one.distance_deg))
     )
+
+
+def _exact(solver: PoseSolver, target: Pose, near: tuple[float, ...]) -> list[Solution]:
+    """The eight of the closed form; empty if it does not serve, or a posture within the tolerance may be usable."""
+    if target.fixed != WHOLE or solver.refusals:
+        return []
+    choice = choose(solver.geometry, target.matrix, solver.ranges, near)
+    turn = math.radians(target.tolerance_deg)
+    slack_mm, slack_deg = (
+        target.tolerance_mm + turn * solver.geometry.reach,
+        max(_FAR_DEG, _FAR * target.tolerance_deg),
+    )
+    for each in choice.candidates:
+        slack = [slack_mm if reason.kind == "unreachable" else slack_deg for reason in each.rejections]
+        small = all(abs(reason.amount) < most for reason, most in zip(each.rejections, slack, strict=True))
+        if each.rejections and small and not choice.chosen:
+            return []
+    return [_solution(each, str(each.branch), Miss(0.0, 0.0)) for each in choice.candidates]
 
 
 def _posture(arm: Arm, near_deg: ArrayLike) -> Array:
@@ -88,11 +110,10 @@ def _posture(arm: Arm, near_deg: ArrayLike) -> Array:
 
 
 def _solutions(answer: Answer) -> list[Solution]:
-    """The eight of the closed form where they settle the matter, else those of the search."""
-    choice, search = answer.choice, answer.search
-    if choice and (choice.chosen or not answer.success):
-        return [_solution(each, str(each.branch), Miss(0.0, 0.0)) for each in choice.candidates]
-    return [_solution(each, "", each.miss) for each in search.solutions] if search else []
+    """Those of the search where it found one that can be used, else the eight of the closed form."""
+    if answer.choice and not answer.success:
+        return [_solution(each, str(each.branch), Miss(0.0, 0.0)) for each in answer.choice.candidates]
+    return [_solution(each, "", each.miss) for each in answer.search.solutions] if answer.search else []
 
 
 def _solution(found: Candidate | NumericalSolution, branch: str, miss: Miss) -> Solution:

@@ -47,7 +47,7 @@ def parse(text: str, what: str, counts: tuple[int, ...] = tuple(FORMS)) -> Pose:
     words = text.replace(",", " ").split()
     if len(words) not in counts:
         allowed = ", ".join(f"{count} ({FORMS[count]})" for count in counts)
-        raise InputError(f"{what}: {len(words)} numbers are no pose", f"give {allowed}")
+        raise InputError(f"{what}: {len(words)} numbers are not a pose", f"give {allowed}")
     if len(words) in (3, 6):
         position = numbers(" ".join(words[:3]), what)
         fixed = {name: word for name, word in zip(WHOLE, words[3:], strict=False) if word != FREE}
@@ -70,6 +70,6 @@ def numbers(text: str, what: str) -> list[float]:
         if not abs(found[-1]) <= LARGEST:
             raise InputError(
                 f"{what}: {word!r} is not a finite number of at most {LARGEST:g}",
-                "mend it, mm and degrees are meant",
+                "correct it; units are mm and degrees",
             )
     return found

@@ -55,7 +55,7 @@ class Regions:
     """(N,): how many postures of joints 1 to 3 there are, 0 to 4. On axis 1 itself: per angle of joint 1 and
     the one opposite to it."""
     axis: Mask
-    """(N,): on axis 1, where joint 1 may take any angle."""
+    """(N,): on axis 1, if joint 1 may take any angle."""
 
 
 def classify(shape: Shape, wrist: ArrayLike) -> Regions:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from armtempo.basics.arrays import Array
 from armtempo.kinematics.ranges import Ranges
@@ -37,7 +38,7 @@ class Rejection:
     """For "duplicate": the solution it equals, 1 to 8."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WristCentre:
     """The wrist centre that a pose asks for, as the regions of Fig. 3 see it."""
 
@@ -47,13 +48,17 @@ class WristCentre:
     unit: str
     """Of the lengths, for the texts."""
 
+    @cached_property
+    def _from_shoulder(self) -> list[float]:
+        """Distance from the shoulder's axis, with the base turned either way."""
+        return [float(each[0]) for each in radii(self.shape, *self.position[:, None]).shoulder]
+
     def unreachable(self, index: int, outcome: int) -> Rejection:
         """Say which inequality of Eq. (3) it violates for solution ``index``."""
         shape, unit = self.shape, self.unit
-        x, y, z = self.position[:, None]
         if outcome == IN_OFFSET:
-            return _in_offset(shape, math.hypot(x[0], y[0]), unit)
-        r = float(radii(shape, x, y, z).shoulder[index // 4, 0])
+            return _in_offset(shape, math.hypot(*self.position[:2]), unit)
+        r = self._from_shoulder[index // 4]
         if outcome == TOO_NEAR:
             text = (
                 f"out of reach by {shape.nearest - r:.6g} {unit}: wrist centre {r:.6g} {unit} from the shoulder "
@@ -61,7 +66,7 @@ class WristCentre:
             )
             return Rejection("unreachable", text, shape.nearest - r, inequality=4)
         assert outcome == TOO_FAR
-        line = _outer_line(shape, float(z[0]))
+        line = _outer_line(shape, float(self.position[2]))
         text = (
             f"out of reach by {r - shape.farthest:.6g} {unit}: wrist centre {r:.6g} {unit} from the shoulder "
             f"axis, at most L2 + L34 = {shape.farthest:.6g} {unit} allowed (Eq. (3), line {line})"

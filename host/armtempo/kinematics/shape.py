@@ -40,7 +40,7 @@ class Shape:
     shoulder: float
     """a1, of the shoulder axis from the base axis."""
     offset: float
-    """Of the arm's plane from the base axis: d2 and d3 together; exactly 0 where they cancel out."""
+    """Of the arm's plane from the base axis: d2 and d3 together; exactly 0 if they cancel out."""
     upper: float
     """L2 of Eq. (4)."""
     fore: float
@@ -51,7 +51,7 @@ class Shape:
     """Half a turn where a2 is negative, else 0."""
     sign1: float
     sign2: float
-    """+1 where alpha2 is 0, -1 where it is half a turn."""
+    """+1 if alpha2 is 0, -1 if it is half a turn."""
     sign3: float
     sign4: float
     sign5: float
@@ -88,7 +88,7 @@ class Shape:
 
     @cached_property
     def turn2_sign(self) -> float:
-        """-1 where a2 is negative, else 1."""
+        """-1 if a2 is negative, else 1."""
         return -1.0 if self.turn2 else 1.0
 
     @cached_property

@@ -27,7 +27,7 @@ class Solutions:
     """
 
     angles_rad: Array
-    """(N, 8, joints): joint angles in [-pi, pi]; NaN where out of reach."""
+    """(N, 8, joints): joint angles in [-pi, pi]; NaN if out of reach."""
     outcome: NDArray[np.uint8]
     """(N, 8): OK, TOO_FAR, TOO_NEAR, IN_OFFSET or DUPLICATE."""
     singular: NDArray[np.uint8]

@@ -8,7 +8,7 @@ from typing import Any
 
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
-from armtempo_shared.messages import FEATURES
+from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
 from armtempo.basics.virtual_id import is_virtual
@@ -36,13 +36,18 @@ class Hello:
     features: int
     """Bits of what the program can do beyond one motion at a time, by ``messages.FEATURES``."""
     arm_problem: int
-    """Code of what is wrong with the stored arm record; 0 where it is in force or there is none."""
+    """Code of what is wrong with the stored arm record; 0 if it is in force or there is none."""
     arm_value: int
     board_id: str
 
     def can(self, feature: str) -> bool:
         """Whether the program can do one of ``messages.FEATURES``; in the firmware it can do all."""
         return bool(self.features >> FEATURES.index(feature) & 1)
+
+    @property
+    def rates_measured(self) -> bool:
+        """Whether ``max_rate`` and ``max_rate_sum`` were measured by its self-test; else they are estimated."""
+        return bool(self.features & RATES_MEASURED)
 
     @property
     def virtual(self) -> bool:
@@ -109,7 +114,7 @@ class Levels:
 
 @dataclass(frozen=True)
 class StoredMotion:
-    """One stored motion; ``crc``, ``duration_ticks`` and ``joints`` are 0 where it is damaged."""
+    """One stored motion; ``crc``, ``duration_ticks`` and ``joints`` are 0 if it is damaged."""
 
     name: str
     size: int
@@ -129,7 +134,7 @@ class StoredMotion:
 
 @dataclass(frozen=True)
 class SequenceState:
-    """Where a sequence stands, or where the last one ended."""
+    """How far a sequence is, or where the last one ended."""
 
     ending: str
     """One of ``armtempo_shared.sequence.ENDINGS``."""
@@ -210,7 +215,7 @@ def state_name(number: int) -> str:
 
 
 def ending_name(number: int) -> str:
-    """How a sequence stands; a number the host does not know is shown as such."""
+    """The state of a sequence; a number the host does not know is shown as such."""
     return ENDINGS[number] if number < len(ENDINGS) else f"ending {number}"
 
 
@@ -223,14 +228,14 @@ def positions(tail: bytes) -> Positions:
 
 
 def levels(inputs: int, tail: bytes) -> Levels:
-    """The answer to ``inputs``; WireError where the tail does not fit."""
+    """The answer to ``inputs``; WireError if the tail does not fit."""
     if len(tail) % 2:
         raise wire.WireError("length")
     return Levels(inputs, struct.unpack(f"<{len(tail) // 2}H", tail))
 
 
 def event(number: int, payload: bytes) -> Event:
-    """An event from its message id and payload; WireError where it is none."""
+    """An event from its message id and payload; WireError if it is none."""
     entry = wire.EVENT_BY_ID.get(number)
     if entry is None:
         raise wire.WireError("not an event")

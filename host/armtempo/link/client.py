@@ -63,7 +63,7 @@ def harmless_number() -> int:
 class Client:
     """The host's end of the protocol, one method a command.
 
-    Every method raises BoardError where the board refuses, LinkError where the connection is lost.
+    Every method raises BoardError if the board refuses, LinkError if the connection is lost.
     """
 
     def __init__(self, session: Session, session_number: int | None = None) -> None:
@@ -79,7 +79,7 @@ class Client:
     def info(self) -> board_messages.Hello:
         """The board's answer to ``hello``; LinkError before it."""
         if self._info is None:
-            raise LinkError("the board has not been greeted yet", "call hello() first")
+            raise LinkError("no hello has been exchanged yet", "call hello() first")
         return self._info
 
     def hello(self) -> board_messages.Hello:
@@ -113,8 +113,8 @@ class Client:
                 "plug the right board in, or run the command again for this one",
             )
         raise OtherBoardError(
-            f"the board on {where} has started anew: positions are unknown",
-            "bring the arm to its home posture and run 'armtempo home'",
+            f"the board on {where} has restarted: positions are unknown",
+            "move the arm to its home posture and run 'armtempo home'",
         )
 
     def status(self) -> board_messages.Status:
@@ -203,11 +203,11 @@ class Client:
         self.session.command("rename", (len(old.encode()),), old + new, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def set_default(self, name: str) -> None:
-        """Choose what the board's button starts; "" for nothing."""
+        """Choose the default that the board's button starts; "" for nothing."""
         self.session.command("set_default", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def sequence(self) -> board_messages.SequenceState:
-        """Where the sequence stands, or where the last one since the board's start ended."""
+        """How far the sequence is, or where the last one since the board's start ended."""
         if not self.info.can("sequences"):
             return board_messages.SequenceState("none", 0, 0, 0, 0, "")
         try:

@@ -61,8 +61,8 @@ def open_board(
 
     ``log_traffic``: file for the traffic log; ``sink`` takes the traffic as well; ``arm``: what a virtual
     board's motors move; ``any_program``: also talk to a board whose program is not the one installed here;
-    ``tell`` is called with the outcome for a program that had the port. Raises InputError where there is no such port,
-    PortInUseError where another program has it (see ``patiently``), LinkError where it is silent or runs something
+    ``tell`` is called with the outcome for a program that had the port. Raises InputError if there is no such port,
+    PortInUseError if another program has it (see ``patiently``), LinkError if it is silent or runs something
     else. A program that has the port and hangs loses it.
     """
     hanging = _check_owner(port, tell)
@@ -91,7 +91,7 @@ def open_board(
 
 
 def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
-    """The claim of a program that has the port and hangs; PortInUseError where it lives and continues."""
+    """The claim of a program that has the port and hangs; PortInUseError if it lives and continues."""
     name = names.same_for_all(port)
     claim = claims.find(name, port) if name else None
     if claim is None:
@@ -100,7 +100,7 @@ def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
     if state is Ownership.ALIVE:
         raise PortInUseError(
             f"port {port} is in use by {claim.who}",
-            "wait for its end, or end it with 'armtempo stop'; 'armtempo status' and 'watch' look on meanwhile",
+            "wait for its end, or stop it with 'armtempo stop'; 'armtempo status' and 'watch' work meanwhile",
         )
     if state is Ownership.DEAD:
         tell(f"{claim.who} has ended without giving up {port}; what it had started may still move")
@@ -129,7 +129,7 @@ def _check_program(board: Client) -> None:
                 f"the board on {board.session.transport.name} runs version {board.info.program_crc:08x} of the board "
                 f"program, installed here is {own_crc():08x}"
             ),
-            "bring it up to date: 'armtempo flash' if the program is in its firmware, else 'armtempo deploy'",
+            "update it: 'armtempo flash' if the program is in its firmware, else 'armtempo deploy'",
         )
 
 

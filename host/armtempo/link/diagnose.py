@@ -38,23 +38,23 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
             )
         return NoProgramError(
             f"{where} runs MicroPython but not the armtempo program",
-            "'armtempo flash' puts it into the firmware; 'armtempo deploy' then starts it",
+            "'armtempo flash' installs the firmware with it; then run 'armtempo deploy'",
         )
     if any(sign in heard for sign in _FRAME_SIGNS):
         return DisturbedError(
-            f"{where} is mostly unreadable: pieces of armtempo's messages arrive, too few of them whole",
+            f"{where} is mostly unreadable: only parts of armtempo's messages arrive",
             "check cable and plugs",
         )
     if heard:
         return LinkError(
-            f"something else than armtempo answers on {transport.name} (it says {_excerpt(heard)})",
+            f"something other than armtempo answers on {transport.name} (it says {_excerpt(heard)})",
             "choose another port: 'armtempo ports' lists them",
         )
     return LinkError(
         f"{where} does not answer within 2 s",
         (
-            "check the cable, that the board is powered, and that this is its port ('armtempo ports'); a board "
-            "that hangs starts afresh with its reset button"
+            "check the cable, that the board is powered, and that this is its port ('armtempo ports'); reset a "
+            "board that hangs by its button"
         ),
     )
 

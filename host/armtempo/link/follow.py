@@ -86,7 +86,7 @@ class Follower:
     def end(self) -> RunEnd:
         """How the run ended; LinkError before it has."""
         if self._end is None:
-            raise LinkError("the run has not ended yet", "take the samples to their end first")
+            raise LinkError("the run has not ended yet", "read all samples first")
         return self._end
 
     def samples(self, between: Callable[[], None] = lambda: None) -> Iterator[Sample]:
@@ -177,7 +177,7 @@ class Follower:
                 )
         elif self._stuck(status.ticks):
             raise LinkError(
-                "the board says that it moves, but its motion clock stands still",
+                "the board says that it moves, but its motion clock does not advance",
                 "press its reset button, then 'armtempo home'",
             )
 

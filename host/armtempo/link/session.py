@@ -60,13 +60,13 @@ class Session:
         """Opens the port that this session is on, which was closed."""
         self.reopen: Callable[[], Transport] | None = None
         self.greet: Callable[[], None] = lambda: None
-        """Raises OtherBoardError where another one answers, or the same one started anew."""
+        """Raises OtherBoardError if another one answers, or the same one started anew."""
         self.tell: Callable[[str], object] = lambda text: None
         """Called with messages for the user while other calls wait."""
         self.stopping: Callable[[], bool] = lambda: False
         """Whether a stop was asked for: then a broken port is tried again for STOPPING_RECONNECT_S only."""
         self.check: Callable[[], None] = lambda: None
-        """Called before the port is used; raises PortError where it is no longer this program's."""
+        """Called before the port is used; raises PortError if it is no longer this program's."""
         self.listeners: list[Callable[[board_messages.Event], None]] = []
         """Each is called with every event when it arrives, in the thread that reads the port."""
         self.turns = Turns()
@@ -95,8 +95,8 @@ class Session:
     ) -> Answer:
         """(fields, tail) of the board's answer.
 
-        Raises BoardError where the board refuses, NoAnswerError after ``silence_timeout_s`` without a byte or
-        ``answer_timeout_s`` without an answer, LinkError where the port breaks.
+        Raises BoardError if the board refuses, NoAnswerError after ``silence_timeout_s`` without a byte or
+        ``answer_timeout_s`` without an answer, LinkError if the port breaks.
         """
         with self.turns:
             return self._command(
@@ -209,7 +209,7 @@ class Session:
     def reconnect(self, reason: LinkError) -> None:
         """Close the port and open it again until the board answers, for up to RECONNECT_S.
 
-        Raises ``reason`` where that fails, OtherBoardError where another board answers.
+        Raises ``reason`` where that fails, OtherBoardError if another board answers.
         """
         if self.reopen is None:
             raise reason
@@ -230,12 +230,12 @@ class Session:
         if not self.stopping():
             return reason
         return LinkError(
-            f"{reason.problem}; it could not be told to stop: what was moving may move on",
+            f"{reason.problem}; no stop could be sent: a motion may still be running",
             "see 'armtempo status' once it is back",
         )
 
     def _found_again(self, reopen: Callable[[], Transport]) -> bool:
-        """Open the port and greet the board; False where that fails."""
+        """Open the port and greet the board; False if that fails."""
         self._parser = wire.Parser()
         self.reopen = None  # the caller repeats what fails meanwhile
         try:

@@ -1,4 +1,4 @@
-"""The traffic log: every byte to and from the board, decoded beside it.
+"""The traffic log: every byte to and from the board, with its meaning.
 
 A log is a text file, one line a chunk of bytes, tab-separated::
 
@@ -119,7 +119,7 @@ class LoggedTransport:
 
 
 class LogFile:
-    """A sink that writes a log; used as a context. InputError where the file cannot be opened.
+    """A sink that writes a log; used as a context. InputError if the file cannot be opened.
 
     Each line is flushed, so that a killed program leaves a readable log. Where the disk fills up the log ends
     and the traffic continues; InputError says so when the context is left without another error.
@@ -159,12 +159,12 @@ class LogFile:
         if self._failed is not None and value is None:
             raise InputError(
                 f"{self._path}: the traffic log is cut short: {self._failed.strerror}",
-                "make room on the disk, or leave --log-traffic out",
+                "free disk space, or leave --log-traffic out",
             )
 
 
 def read_log(path: Path) -> Iterator[Chunk]:
-    """The chunks of a recorded log; InputError where it is none. A cut last line is left out."""
+    """The chunks of a recorded log; InputError if it is none. A cut last line is left out."""
     try:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeError) as error:

@@ -14,7 +14,7 @@ from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseEr
 
 BAUD_RATE = 115_200
 """Has no effect over USB; a UART between host and board would use it."""
-_ADVICE = "'armtempo ports' lists what is there"
+_ADVICE = "'armtempo ports' lists the ports"
 
 
 class Transport(Protocol):
@@ -38,8 +38,8 @@ class Transport(Protocol):
 class SerialTransport:
     """A transport over pyserial: a device name, or a URL such as ``socket://host:port``.
 
-    Raises InputError where there is no such port, PortInUseError where another program has it, PortError where it
-    cannot be opened for another reason, LinkError where it breaks.
+    Raises InputError if there is no such port, PortInUseError if another program has it, PortError if it
+    cannot be opened for another reason, LinkError if it breaks.
     """
 
     def __init__(self, port: str, exclusive: bool = True) -> None:
@@ -93,7 +93,7 @@ def _broken(port: str, error: Exception) -> LinkError:
     reason = "its cable was unplugged, or the board was reset" if unplugged else str(error)
     return LinkError(
         f"the connection to {port} broke: {reason}",
-        "plug it in again and close other programs on this port; then 'armtempo status' says where the arm stands",
+        "plug it in again and close other programs on this port; then 'armtempo status' shows the arm's position",
     )
 
 

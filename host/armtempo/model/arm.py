@@ -60,6 +60,12 @@ class Arm:
                 f"arm {self.name!r}: board {self.board!r} is not known",
                 f"give one of {', '.join(boards.BOARDS)}",
             )
+        light = [joint.name for joint in self.joints if joint.motor is not None and joint.dynamics is None]
+        if light and any(joint.dynamics for joint in self.joints):
+            raise InputError(
+                f"{self.source or f'arm {self.name!r}'}: no dynamics of {', '.join(light)}, but of other joints",
+                "give each joint with a motor its dynamics, mass_kg = 0 for one without a mass; or none of them",
+            )
 
     @classmethod
     def of(cls, arm: Arm | Path | str) -> Arm:
@@ -133,7 +139,7 @@ class Arm:
 
     @cached_property
     def driven(self) -> tuple[DrivenJoint, ...]:
-        """The joints with a motor, in order. InputError where one of them has no limits."""
+        """The joints with a motor, in order. InputError if one of them has no limits."""
         return tuple(
             _driven(self.name, joint, joint.motor) for joint in self.joints if joint.motor is not None
         )
@@ -144,11 +150,11 @@ class Arm:
         return tuple(index for index, joint in enumerate(self.joints) if joint.motor is not None)
 
     def output(self, name: str) -> int:
-        """The number of an output, from 0; InputError where the arm has none of this name."""
+        """The number of an output, from 0; InputError if the arm has none of this name."""
         return self._number("output", name, [output.name for output in self.outputs])
 
     def input(self, name: str) -> int:
-        """The number of an input, from 0; InputError where the arm has none of this name."""
+        """The number of an input, from 0; InputError if the arm has none of this name."""
         return self._number("input", name, [entry.name for entry in self.inputs])
 
     def _number(self, what: str, name: str, names: list[str]) -> int:
@@ -176,7 +182,7 @@ class Arm:
             names = [named.HOME, *(posture.name for posture in self.postures)]
             raise InputError(
                 f"arm {self.name!r} has no posture {name!r}{did_you_mean(name, names)}",
-                f"known: {', '.join(names)}; 'armtempo teach --posture {name}' adds where the arm stands",
+                f"known: {', '.join(names)}; 'armtempo teach --posture {name}' stores the arm's present position",
             )
         return found[0]
 
@@ -220,7 +226,7 @@ def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:
 
 
 def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
-    """The posture ``name`` of the table [posture]; InputError where it is none that the arm can take."""
+    """The posture ``name`` of the table [posture]; InputError if it is none that the arm can take."""
     where = f"{tables.file}: posture.{name}"
     table = tables.table(name)
     if problem := named.name_problem(name):

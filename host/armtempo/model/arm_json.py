@@ -20,13 +20,13 @@ _AGAIN = "restore it from a copy, or run again"
 
 
 def save(arm: Arm, path: Path) -> None:
-    """Write the arm, whole or not at all; InputError where the file cannot be written."""
+    """Write the arm, whole or not at all; InputError if the file cannot be written."""
     content = {"format": FORMAT, "version": VERSION, "arm": json_codec.encode(arm)}
     replace_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def load(path: Path) -> Arm:
-    """The arm of such a file; InputError where it is none, damaged, or cannot be driven."""
+    """The arm of such a file; InputError if it is none, damaged, or cannot be driven."""
     try:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:

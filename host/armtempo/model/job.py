@@ -76,7 +76,7 @@ class Job:
     """``"shared"``: one time axis for all joints; ``"per-joint"`` (the paper): one for each."""
     refine: int | str = AUTO
     """Segments of the time axis per segment of the path (of a free path: pieces of both from via point to via
-    point); ``"auto"``: as many as pay and fit the board's record."""
+    point); ``"auto"``: as many as shorten the motion and fit the board's record."""
     optimiser: str = "acs"
     population: int = 10
     iterations: int = 500
@@ -103,7 +103,7 @@ class Job:
     def _check(self) -> None:
         """InputError for settings that no planner knows or the board cannot keep."""
         if not is_name(self.name):
-            raise InputError(f"job {self.name!r}: the board keeps no such name", f"give {NAME_RULE}")
+            raise InputError(f"job {self.name!r}: not a valid name on the board", f"give {NAME_RULE}")
         for key, allowed in (
             ("timing", TIMINGS),
             ("path", PATHS),

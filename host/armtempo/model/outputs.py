@@ -81,7 +81,7 @@ class Output:
         return low + (high - low) * raw / FULL_OUTPUT
 
     def state(self, raw: int) -> str:
-        """The name of the state that the board has as ``raw``; "" where it is none."""
+        """The name of the state that the board has as ``raw``; "" if it is none."""
         return next((name for name, value in self.states if self.raw(value) == raw), "")
 
     def words(self, raw: int) -> str:

@@ -2,38 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import pairwise
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec
+from armtempo.formats.part import check, key
 
-Range = tuple[float, float]
-MOTOR: dict[str, Range] = {
-    "channel": (1, MAX_JOINTS),
-    "steps_per_rev": (4, 10_000),
-    "microsteps": (1, 256),
-    "gear_ratio": (0.1, 10_000.0),
-}
-ENCODER: dict[str, Range] = {
-    "channel": (1, MAX_ENCODERS),
-    "counts_per_rev": (4, 10_000_000),
-    "following_error_deg": (0.0, 360.0),
-}
-"""Least and largest value of each figure."""
+LEVELS = ("low", "high")
+_LEAST_LIMIT = 0.001
+_MOST_US = 500.0
+Curve = tuple[tuple[float, float], ...]
+CURVE = "pairs of rpm and Nm, at least two: speeds increasing from 0, no torque below 0"
 
 
-def _check(part: Motor | Encoder, ranges: Mapping[str, Range]) -> None:
-    """InputError for a figure that no drive has."""
-    for key, (least, most) in ranges.items():
-        if not least <= (value := getattr(part, key)) <= most:
-            raise InputError(f"{type(part).__name__}: {key} is {value:g}", f"give {least:g} to {most:g}")
-    if part.direction not in (1, -1):
-        raise InputError(f"{type(part).__name__}: direction is {part.direction}", "give 1 or -1")
+def is_curve(curve: Curve) -> bool:
+    """Whether pairs are a motor's torque over its speed, or none at all."""
+    speeds, torques = [pair[0] for pair in curve], [pair[1] for pair in curve]
+    increasing = all(after > before for before, after in pairwise(speeds))
+    return len(curve) == 0 or (len(curve) > 1 and speeds[0] == 0.0 and increasing and min(torques) >= 0.0)
 
 
 @checked_fields
@@ -41,9 +32,9 @@ def _check(part: Motor | Encoder, ranges: Mapping[str, Range]) -> None:
 class Limits:
     """Largest magnitudes of one joint's motion (Table 5)."""
 
-    speed_deg_s: float
-    acceleration_deg_s2: float
-    jerk_deg_s3: float
+    speed_deg_s: float = field(metadata=key("largest speed", _LEAST_LIMIT, 1e5))
+    acceleration_deg_s2: float = field(metadata=key("largest acceleration", _LEAST_LIMIT, 1e7))
+    jerk_deg_s3: float = field(metadata=key("largest jerk", _LEAST_LIMIT, 1e9))
 
     @property
     def values(self) -> tuple[float, float, float]:
@@ -56,19 +47,19 @@ class Limits:
 class Motor:
     """Stepper, driver and gear of one joint (Table 7)."""
 
-    channel: int
-    """STEP/DIR channel on the board, 1 to 6."""
-    steps_per_rev: int
-    """Full steps of the motor shaft."""
-    microsteps: int
-    gear_ratio: float
-    """Motor revolutions per joint revolution."""
-    direction: int = 1
-    """1, or -1 where the DIR signal is inverted."""
+    channel: int = field(metadata=key("STEP/DIR channel of the board, each used once", 1, MAX_JOINTS))
+    steps_per_rev: int = field(metadata=key("full steps of the motor shaft", 4, 10_000))
+    microsteps: int = field(metadata=key("subdivision of the driver", 1, 256))
+    gear_ratio: float = field(metadata=key("motor turns for one turn of the joint", 0.1, 10_000.0))
+    direction: int = field(default=1, metadata=key("-1 inverts DIR", choices=(1, -1)))
+    curve_rpm_nm: Curve = field(default=(), metadata=json_codec.ADDED)
+    """Speed of its shaft and torque that it holds there; empty: not known."""
 
     def __post_init__(self) -> None:
         """InputError for figures that no motor has."""
-        _check(self, MOTOR)
+        check(self)
+        if not is_curve(self.curve_rpm_nm):
+            raise InputError(f"Motor: curve_rpm_nm is {self.curve_rpm_nm}", f"give {CURVE}")
 
     @property
     def steps_per_deg(self) -> float:
@@ -81,21 +72,20 @@ class Motor:
 class Encoder:
     """Incremental encoder of one joint."""
 
-    channel: int
-    """Encoder channel on the board, 1 to 4."""
-    counts_per_rev: int
-    """Counts, all edges, per revolution of the shaft it sits on."""
-    on: str = "joint"
-    """``"joint"`` or ``"motor"``."""
-    direction: int = 1
-    following_error_deg: float = 0.0
-    """Largest deviation from the command, in degrees of the joint; 0: not watched."""
+    channel: int = field(metadata=key("encoder channel of the board, each used once", 1, MAX_ENCODERS))
+    counts_per_rev: int = field(
+        metadata=key("counts, all edges, for a turn of the shaft it is mounted on", 4, 10_000_000)
+    )
+    on: str = field(default="joint", metadata=key("the shaft it is mounted on", choices=("joint", "motor")))
+    direction: int = field(default=1, metadata=key("-1 counts the other way", choices=(1, -1)))
+    following_error_deg: float = field(
+        default=0.0,
+        metadata=key("largest deviation from the command, of the joint; 0: not watched", 0.0, 360.0),
+    )
 
     def __post_init__(self) -> None:
         """InputError for figures that no encoder has."""
-        _check(self, ENCODER)
-        if self.on not in ("joint", "motor"):
-            raise InputError(f"Encoder: on is {self.on!r}", "give 'joint' or 'motor'")
+        check(self)
 
 
 @checked_fields
@@ -118,25 +108,55 @@ class LimitSwitches:
 @checked_fields
 @dataclass(frozen=True)
 class JointModel:
-    """What the virtual arm simulates of one joint beyond its drive."""
+    """What the virtual arm simulates of one joint beyond its drive.
 
-    holding_torque_nm: float = 0.0
-    """Of the motor, at its shaft; 0: an ideal motor, which never lags."""
-    rotor_inertia_kg_m2: float = 0.0
-    inertia_kg_m2: float = 0.0
-    """Of what the joint moves, at the joint."""
-    damping_nm_s: float = 0.0
-    """Viscous, of the motor shaft against its turning field."""
-    corner_speed_rad_s: float = 0.0
-    """Of the motor shaft; there the torque has fallen to 0.71 of the holding torque. 0: it does not fall."""
-    gravity_torque_nm: float = 0.0
-    """At the joint, at angle 0; falls with the angle's cosine."""
-    backlash_deg: float = 0.0
-    """Of the joint against its motor."""
-    encoder_phase_counts: float = 0.0
-    """Fraction of a count by which the encoder is beyond its last edge at power-up, 0 to 1."""
-    scatter_deg: float = 0.0
-    """Standard deviation between repetitions."""
+    The bounds are those that no small arm comes near: what is beyond them is a slip of the unit or of the point.
+    """
+
+    holding_torque_nm: float = field(
+        default=0.0, metadata=key("of the motor, at its shaft; 0: an ideal motor, which never lags", 0.0, 1e3)
+    )
+    rotor_inertia_kg_m2: float = field(default=0.0, metadata=key("of the motor", 0.0, 1.0))
+    inertia_kg_m2: float = field(default=0.0, metadata=key("of what the joint moves, at the joint", 0.0, 1e4))
+    damping_nm_s: float = field(
+        default=0.0, metadata=key("viscous, of the motor shaft against its turning field", 0.0, 1e3)
+    )
+    corner_speed_rad_s: float = field(
+        default=0.0,
+        metadata=key("motor speed at which the torque has fallen to 0.71; 0: it does not fall", 0.0, 1e5),
+    )
+    gravity_torque_nm: float = field(
+        default=0.0, metadata=key("at the joint, at angle 0; falls with the cosine of its angle", -1e4, 1e4)
+    )
+    backlash_deg: float = field(default=0.0, metadata=key("of the joint against its motor", 0.0, 90.0))
+    encoder_phase_counts: float = field(
+        default=0.0, metadata=key("how far the encoder is beyond its last count at power-up", 0.0, 1.0)
+    )
+    scatter_deg: float = field(
+        default=0.0,
+        metadata=key(
+            "standard deviation of the joint's offset from one motion to the next, drawn from the seed",
+            0.0,
+            90.0,
+        ),
+    )
+
+
+@checked_fields
+@dataclass(frozen=True)
+class Dynamics:
+    """What a row of the table carries, and the friction of its joint."""
+
+    mass_kg: float
+    """Of the link with all that is fixed to it: motors, the tool and what it holds."""
+    centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Its centre of mass in the frame after the row."""
+    inertia_kg_m2: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """About the centre of mass along the axes of that frame: xx, yy, zz, xy, xz, yz."""
+    friction_nm: float = field(
+        default=0.0, metadata=key("at the joint, against its motion whatever the speed (Coulomb)", 0.0, 1e4)
+    )
+    viscous_nm_s: float = field(default=0.0, metadata=key("at the joint, for a rad/s", 0.0, 1e4))
 
 
 @checked_fields
@@ -161,6 +181,7 @@ class Joint:
     is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
     radius_mm: float = field(default=0.0, metadata=json_codec.ADDED)
     """Of the link about its d and its a; what it holds included."""
+    dynamics: Dynamics | None = field(default=None, metadata=json_codec.ADDED)
 
 
 @dataclass(frozen=True)
@@ -203,11 +224,11 @@ class DrivenJoint:
 class Driver:
     """Timing and polarity of the signals that the stepper drivers need."""
 
-    pulse_us: float = 2.0
-    low_us: float = 2.0
-    dir_setup_us: float = 5.0
-    dir_hold_us: float = 5.0
-    enable_active: str = "low"
+    pulse_us: float = field(default=2.0, metadata=key("least time that STEP is high", 0.1, _MOST_US))
+    low_us: float = field(default=2.0, metadata=key("least time that STEP is low", 0.1, _MOST_US))
+    dir_setup_us: float = field(default=5.0, metadata=key("DIR is stable before a step", 0.1, _MOST_US))
+    dir_hold_us: float = field(default=5.0, metadata=key("DIR is stable after a step", 0.1, _MOST_US))
+    enable_active: str = field(default="low", metadata=key("level of ENABLE with current", choices=LEVELS))
 
 
 @checked_fields
@@ -215,9 +236,15 @@ class Driver:
 class Safety:
     """E-stop input, and what the board does when it trips or the host disappears."""
 
-    estop_fitted: bool = False
-    estop_active: str = "low"
-    estop_releases_enable: bool = False
-    on_link_loss: str = "finish"
-    """``"finish"`` the motion or ``"stop"``."""
-    link_timeout_ms: int = 1000
+    estop_fitted: bool = field(default=False, metadata=key("an E-stop is wired to its input"))
+    estop_active: str = field(default="low", metadata=key("level that trips it", choices=LEVELS))
+    estop_releases_enable: bool = field(
+        default=False, metadata=key("it also switches the motors' current off")
+    )
+    on_link_loss: str = field(
+        default="finish",
+        metadata=key("what becomes of a motion when the host disappears", choices=("finish", "stop")),
+    )
+    link_timeout_ms: int = field(
+        default=1000, metadata=key("time without a message that counts as that", 200, 60_000)
+    )

@@ -1,24 +1,27 @@
-"""The parts of an arm in its file: the tables of joints, drivers and safety, with the range of each key."""
+"""The parts of an arm in its file: the tables of joints, drivers and safety; ranges are with the fields (parts.py)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import Any
 
+from armtempo.basics.arguments import fits
 from armtempo.basics.errors import InputError
+from armtempo.formats import part
 from armtempo.formats.toml_table import Table
 from armtempo.model import outputs_file
 from armtempo.model.parts import (
-    ENCODER,
-    MOTOR,
+    CURVE,
+    Curve,
     Driver,
+    Dynamics,
     Encoder,
     Joint,
     JointModel,
     Limits,
     LimitSwitches,
     Motor,
-    Range,
     Safety,
+    is_curve,
 )
 
 MAX_ANGLE_DEG = 36_000.0
@@ -27,49 +30,18 @@ MAX_ANGLE_DEG = 36_000.0
 MAX_LENGTH_MM = 1e6
 """Longest link that an arm file may describe."""
 
-_LIMITS = {"speed_deg_s": 1e5, "acceleration_deg_s2": 1e7, "jerk_deg_s3": 1e9}
-_LEAST_LIMIT = 0.001
 _LOCKED_DEG = 0.001
-_MODEL = {
-    "holding_torque_nm": (0.0, 1e3),
-    "rotor_inertia_kg_m2": (0.0, 1.0),
-    "inertia_kg_m2": (0.0, 1e4),
-    "damping_nm_s": (0.0, 1e3),
-    "corner_speed_rad_s": (0.0, 1e5),
-    "gravity_torque_nm": (-1e4, 1e4),
-    "backlash_deg": (0.0, 90.0),
-    "encoder_phase_counts": (0.0, 1.0),
-    "scatter_deg": (0.0, 90.0),
-}
-"""Bounds that no small arm comes near: what is beyond them is a slip of the unit or of the point."""
+_MOST_KG = 1e3
 
 
 def driver(table: Table | None) -> Driver:
     """[driver]; errors of this and the other functions: InputError, naming file, key and value."""
-    if table is None:
-        return Driver()
-    times = {
-        key: table.number(key, getattr(Driver, key), least=0.1, most=500.0)
-        for key in ("pulse_us", "low_us", "dir_setup_us", "dir_hold_us")
-    }
-    active = table.choice("enable_active", ("low", "high"), Driver.enable_active)
-    table.done()
-    return Driver(**times, enable_active=active)
+    return part.read(Driver, table) if table else Driver()
 
 
 def safety(table: Table | None) -> Safety:
     """[safety]."""
-    if table is None:
-        return Safety()
-    found = Safety(
-        estop_fitted=table.boolean("estop_fitted", Safety.estop_fitted),
-        estop_active=table.choice("estop_active", ("low", "high"), Safety.estop_active),
-        estop_releases_enable=table.boolean("estop_releases_enable", Safety.estop_releases_enable),
-        on_link_loss=table.choice("on_link_loss", ("finish", "stop"), Safety.on_link_loss),
-        link_timeout_ms=table.integer("link_timeout_ms", Safety.link_timeout_ms, least=200, most=60_000),
-    )
-    table.done()
-    return found
+    return part.read(Safety, table) if table else Safety()
 
 
 def joint(table: Table, number: int) -> Joint:
@@ -110,9 +82,21 @@ def joint(table: Table, number: int) -> Joint:
         model=_model(table.table("model")),
         parallel_linkage=linkage,
         radius_mm=table.number("radius_mm", 0.0, least=0.0, most=MAX_LENGTH_MM),
+        dynamics=_dynamics(table.table("dynamics")),
     )
     table.done()
     return found
+
+
+def _dynamics(table: Table | None) -> Dynamics | None:
+    if table is None:
+        return None
+    mass = table.number("mass_kg", least=0.0, most=_MOST_KG)
+    x, y, z = table.numbers("centre_mm", 3, *[] if mass else [(0.0,) * 3])
+    xx, yy, zz, xy, xz, yz = table.numbers("inertia_kg_m2", 6, (0.0,) * 6)
+    return part.read(
+        Dynamics, table, mass_kg=mass, centre_mm=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz)
+    )
 
 
 def _home(table: Table, low: float, high: float) -> float:
@@ -132,51 +116,21 @@ def _locked(table: Table) -> tuple[float, float]:
 
 
 def _limits(table: Table | None) -> Limits | None:
-    if table is None:
-        return None
-    limits = Limits(
-        **{key: table.number(key, least=_LEAST_LIMIT, most=most) for key, most in _LIMITS.items()}
-    )
-    table.done()
-    return limits
-
-
-def _whole(table: Table, key: str, ranges: Mapping[str, Range]) -> int:
-    least, most = ranges[key]
-    return table.integer(key, least=int(least), most=int(most))
-
-
-def _number(table: Table, key: str, ranges: Mapping[str, Range], *default: float) -> float:
-    least, most = ranges[key]
-    return table.number(key, *default, least=least, most=most)
+    return part.read(Limits, table) if table else None
 
 
 def _motor(table: Table | None) -> Motor | None:
     if table is None:
         return None
-    motor = Motor(
-        channel=_whole(table, "channel", MOTOR),
-        steps_per_rev=_whole(table, "steps_per_rev", MOTOR),
-        microsteps=_whole(table, "microsteps", MOTOR),
-        gear_ratio=_number(table, "gear_ratio", MOTOR),
-        direction=table.choice("direction", (1, -1), 1),
-    )
-    table.done()
-    return motor
+    table.known("curve_rpm_nm")
+    curve: Any = table.array("curve_rpm_nm", CURVE) if table.has("curve_rpm_nm") else ()
+    if not fits(curve, Curve) or not is_curve(curve):
+        raise table.fail("curve_rpm_nm", CURVE)
+    return part.read(Motor, table, curve_rpm_nm=tuple((float(rpm), float(nm)) for rpm, nm in curve))
 
 
 def _encoder(table: Table | None) -> Encoder | None:
-    if table is None:
-        return None
-    encoder = Encoder(
-        channel=_whole(table, "channel", ENCODER),
-        counts_per_rev=_whole(table, "counts_per_rev", ENCODER),
-        on=table.choice("on", ("joint", "motor"), "joint"),
-        direction=table.choice("direction", (1, -1), 1),
-        following_error_deg=_number(table, "following_error_deg", ENCODER, 0.0),
-    )
-    table.done()
-    return encoder
+    return part.read(Encoder, table) if table else None
 
 
 def _switches(table: Table | None) -> LimitSwitches:
@@ -217,8 +171,4 @@ def _angle(table: Table, key: str) -> float | None:
 
 
 def _model(table: Table | None) -> JointModel:
-    if table is None:
-        return JointModel()
-    values = {key: table.number(key, 0.0, least=least, most=most) for key, (least, most) in _MODEL.items()}
-    table.done()
-    return JointModel(**values)
+    return part.read(JointModel, table) if table else JointModel()

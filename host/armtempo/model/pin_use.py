@@ -60,7 +60,7 @@ class Period:
 
 
 def problems(arm: PinUser) -> list[PinProblem]:
-    """What stands in the way of outputs, inputs and home switches, and of the board; empty where nothing does."""
+    """What stands in the way of outputs, inputs and home switches, and of the board; empty if nothing does."""
     if not (arm.outputs or arm.inputs or _home_switches(arm)) and arm.board == DEFAULT:
         return []
     board = BOARDS[arm.board]

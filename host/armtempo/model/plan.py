@@ -31,7 +31,7 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 FORMAT = "armtempo trajectory"
 VERSION = 2
 _RUN = "run.json"
-"""A run folder has this beside its trajectory file."""
+"""A run folder has this next to its trajectory file."""
 RULE = "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name"
 LOG = logging.getLogger("armtempo")
 
@@ -165,7 +165,7 @@ def _check_unaltered(content: dict[str, Any], path: Path | str, altered: bool) -
             raise InputError(
                 f"{path} was altered after it had been written: its checksum does not fit", _cure(path)
             )
-        LOG.warning(f"{path} was altered after it had been written, and is taken all the same")
+        LOG.warning(f"{path} was altered after it had been written; accepted with --altered")
 
 
 def _cure(path: Path | str) -> str:
@@ -234,7 +234,7 @@ def _check(plan: Plan, path: Path | str) -> None:
             f"{path}: plan.job.refine {plan.job.refine!r} should be a number or {AUTO!r}", "plan it again"
         )
     if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
-        raise InputError(f"{path}: searches name a joint that there is not", "plan it again")
+        raise InputError(f"{path}: searches name a joint that does not exist", "plan it again")
 
 
 def _check_spline(spline: JointSpline, stretches: int, where: str) -> None:

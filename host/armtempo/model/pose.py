@@ -37,7 +37,7 @@ class Quaternion(NamedTuple):
 
 
 def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
-    """Return a (4, 4) pose, its rotation part made exact; InputError, naming ``what``, if it is no pose.
+    """Return a (4, 4) pose, its rotation part made exact; InputError, naming ``what``, if it is not a pose.
 
     Rounding to three digits is put right by the nearest rotation (of singular value decomposition).
     """
@@ -46,7 +46,7 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
         pose = np.vstack((pose, (0.0, 0.0, 0.0, 1.0)))
     if pose.shape != (4, 4):
         raise InputError(
-            f"{what}: a matrix of shape {pose.shape} is no pose",
+            f"{what}: a matrix of shape {pose.shape} is not a pose",
             "give 4 rows of 4 numbers, or the first 3 of them",
         )
     if not np.all(np.abs(pose) <= LARGEST):
@@ -65,11 +65,11 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
 
 
 def checked_all(matrices: ArrayLike) -> Array:
-    """The same for N poses, (N, 4, 4) or (N, 3, 4): (N, 4, 4). The InputError names the first that is no pose."""
+    """The same for N poses, (N, 4, 4) or (N, 3, 4): (N, 4, 4). The InputError names the first that is not a pose."""
     given = np.array(matrices, dtype=np.float64)
     if given.ndim != 3 or given.shape[1:] not in ((3, 4), (4, 4)):
         raise InputError(
-            f"poses of shape {given.shape} are no list of poses", "give N times 4 rows of 4 numbers"
+            f"poses of shape {given.shape} are not a list of poses", "give N times 4 rows of 4 numbers"
         )
     poses = np.tile(np.eye(4), (len(given), 1, 1))
     poses[:, : given.shape[1]] = given
@@ -128,7 +128,7 @@ def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str 
 
 
 def to_rpy_deg(matrix: ArrayLike) -> RollPitchYaw:
-    """Roll, pitch and yaw of a pose (4, 4) or rotation (3, 3); roll is 0 where the x axis stands upright."""
+    """Roll, pitch and yaw of a pose (4, 4) or rotation (3, 3); roll is 0 if the x axis stands upright."""
     r = np.asarray(matrix, dtype=np.float64)
     level = math.hypot(r[0, 0], r[1, 0])
     pitch = math.atan2(-r[2, 0], level)

@@ -20,13 +20,13 @@ _MARK = "\ufeff"
 def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool) -> None:
     """Write ``[posture.NAME]`` into the file of ``arm``, whole or not at all, with its comments and layout kept.
 
-    InputError where the name is none, the arm cannot stand so, the file has this posture and ``replace`` is false,
+    InputError if the name is none, the arm cannot stand so, the file has this posture and ``replace`` is false,
     or it cannot be read, written, or changed in this one place.
     """
     if problem := named.name_problem(name):
         raise InputError(f"posture {name!r}: {problem}", "choose another name")
     if problem := arm.angles_problem(angles_deg):
-        raise InputError(f"posture {name!r}: {problem}", "bring the arm into its ranges")
+        raise InputError(f"posture {name!r}: {problem}", "move the arm into its ranges")
     try:
         with path.open(encoding="utf-8", newline="") as file:
             text = file.read()
@@ -35,7 +35,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
     known = _parsed(text, path).get("posture", {})
     if name in known and not replace:
         raise InputError(
-            f"{path} has a posture {name!r}, so it is kept",
+            f"{path} already has a posture {name!r}",
             "choose another name, or replace it with --replace",
         )
     replace_text(path, with_posture(text, name, angles_deg, path), newline="")
@@ -53,7 +53,7 @@ def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
 
 
 def with_posture(text: str, name: str, angles_deg: list[float], path: Path) -> str:
-    """The text of an arm file with the posture in it; InputError where that would change anything else."""
+    """The text of an arm file with the posture in it; InputError if that would change anything else."""
     end = "\r\n" if "\r\n" in text else "\n"
     values = f"[{', '.join(f'{angle:.12g}' for angle in angles_deg)}]"
     before = _parsed(text, path)
@@ -82,7 +82,7 @@ def _changed(text: str, name: str, values: str, end: str) -> str:
 
 
 def _place(lines: list[str], name: str) -> tuple[int, int] | None:
-    """Where the table stands: the line of its header, and the line behind it; None if there is none."""
+    """Where the table is: the line of its header, and the line after it; None if there is none."""
     header = re.compile(rf"\s*\[\s*posture\s*\.\s*[\"']?{re.escape(name)}[\"']?\s*\]\s*(#.*)?")
     heads = [number for number, line in enumerate(lines) if header.fullmatch(line.rstrip("\r\n"))]
     for head in heads[:1]:
@@ -102,7 +102,7 @@ def _is_whole(lines: list[str]) -> bool:
 
 
 def _replaced(table: list[str], values: str, end: str) -> list[str]:
-    """The lines of a table with other values; comments before, behind and beside them stay."""
+    """The lines of a table with other values; comments before, after and next to them stay."""
     text = "".join(table)
     keys = tomllib.loads(text.replace("\r\n", "\n"))
     if [*keys] == ["angles_deg"]:

@@ -27,7 +27,7 @@ class KeepOut:
             low < high for low, high in zip(self.low_mm, self.high_mm, strict=True)
         ):
             raise InputError(
-                f"keep-out box {self.name!r}: low_mm and high_mm are no corners of a box",
+                f"keep-out box {self.name!r}: low_mm and high_mm are not corners of a box",
                 "give x, y, z of both, each of low_mm below that of high_mm",
             )
 
@@ -35,7 +35,7 @@ class KeepOut:
 @checked_fields
 @dataclass(frozen=True)
 class ArmRoom:
-    """Boxes to keep out of, and walls: the least and largest x, y and z, FAR_MM away where there is none."""
+    """Boxes to keep out of, and walls: the least and largest x, y and z, FAR_MM away if there is none."""
 
     keep_out: tuple[KeepOut, ...] = ()
     low_mm: tuple[float, ...] = (-FAR_MM,) * 3
@@ -56,7 +56,7 @@ class ArmRoom:
 
 
 def read(table: Table | None) -> ArmRoom | None:
-    """The room of an arm file's table; None where there is none. InputError for what is not allowed."""
+    """The room of an arm file's table; None if there is none. InputError for what is not allowed."""
     if table is None:
         return None
     low, high = [-FAR_MM] * 3, [FAR_MM] * 3

@@ -42,7 +42,7 @@ _KINDS = ("goto", "run", "output", "wait_s", "wait_input", "count", "repeat", "e
 
 
 def is_sequence(path: Path | str) -> bool:
-    """Whether a TOML file describes a sequence: it has steps. Raises InputError where it is not TOML."""
+    """Whether a TOML file describes a sequence: it has steps. Raises InputError if it is not TOML."""
     return Path(path).suffix == ".toml" and toml_table.read(path).has("step")
 
 
@@ -63,7 +63,7 @@ class Sequence:
         object.__setattr__(self, "steps", tuple(self.steps))
         if not is_name(self.name, LONGEST_NAME):
             raise InputError(
-                f"sequence {self.name!r}: the board keeps no such name",
+                f"sequence {self.name!r}: not a valid name on the board",
                 f"give at most {LONGEST_NAME} of the characters a-z A-Z 0-9 - _",
             )
 
@@ -110,7 +110,7 @@ def _postures(top: Table, arm: Arm) -> dict[str, ArmPosture]:
         return found
     for name in own.names():
         if name in found:
-            raise InputError(f"{top.file}: posture.{name} is there already", "choose another name")
+            raise InputError(f"{top.file}: posture.{name} already exists", "choose another name")
         found[name] = read_posture(own, name, arm)
     return found
 
@@ -198,7 +198,7 @@ class _Reader:
         if name not in self.postures:
             near = did_you_mean(name, self.postures)
             raise InputError(
-                f"{_place(table)}{key} = {name!r}: there is no such posture{near}",
+                f"{_place(table)}{key} = {name!r}: no such posture{near}",
                 f"known here: {', '.join(sorted(self.postures))}; more with [posture.NAME] angles_deg = [...]",
             )
         return self.postures[name]
@@ -259,7 +259,7 @@ class _Reader:
         top = toml_table.read(path)
         if not top.has("step"):
             raise InputError(
-                f"{_place(table)}call: {path.name} is no sequence: it has no [[step]]", "use run for a job"
+                f"{_place(table)}call: {path.name} is not a sequence: it has no [[step]]", "use run for a job"
             )
         postures = {**self.postures, **_postures(top, self.arm)}
         called = _Reader(self.arm, path, postures, chain, step, self.motions)

@@ -91,7 +91,7 @@ class SequencePlan:
 
     @property
     def start_deg(self) -> tuple[float, ...] | None:
-        """Where it begins, degrees (J,); None where nothing moves."""
+        """Where it begins, degrees (J,); None if nothing moves."""
         for row in self.rows:
             if row.op == MOVE:
                 return tuple(float(angle) for angle in self.legs[row.number](0.0))
@@ -104,7 +104,7 @@ class SequencePlan:
 
     @property
     def total(self) -> Share | None:
-        """The whole sequence without waiting for inputs; None where it has no end."""
+        """The whole sequence without waiting for inputs; None if it has no end."""
         return self._times()[0]
 
     def _times(self) -> tuple[Share | None, tuple[Cycle, ...]]:
@@ -131,7 +131,7 @@ class SequencePlan:
     def save(self, path: Path | str, force: bool = False) -> None:
         """Write the sequence's plan, whole or not at all.
 
-        ``force``: also over a file that is no earlier plan of a sequence of this name. Raises InputError where such a
+        ``force``: also over a file that is no earlier plan of a sequence of this name. Raises InputError if such a
         file is there, or the file cannot be written.
         """
         content = json_codec.encode(self)
@@ -143,7 +143,7 @@ class SequencePlan:
 
     @classmethod
     def load(cls, path: Path | str) -> SequencePlan:
-        """The plan of a file that ``save`` wrote; InputError where it is none, is damaged, altered or does not fit."""
+        """The plan of a file that ``save`` wrote; InputError if it is none, is damaged, altered or does not fit."""
         content = _read(path)
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise InputError(
@@ -163,7 +163,7 @@ class SequencePlan:
         arm_json.check(plan.arm, f"{path}: arm", _AGAIN)
         there = {MOVE: len(plan.legs), COUNT: len(plan.counters)}
         if any(not 0 <= row.number < there.get(row.op, row.number + 1) for row in plan.rows):
-            raise InputError(f"{path}: a row names a motion or counter that there is not", _AGAIN)
+            raise InputError(f"{path}: a row names a motion or counter that does not exist", _AGAIN)
         return plan
 
 
@@ -178,11 +178,11 @@ def rows_of(plan: SequencePlan) -> list[tuple[int, ...]]:
 
 
 def check_size(rows: int, legs: int, counters: int, where: str) -> None:
-    """Raise InputError where the board takes no sequence as large."""
+    """Raise InputError if the board takes no sequence as large."""
     if counters > record.MAX_COUNTERS:
         raise InputError(
             f"{where}: {counters} counters; the board keeps {record.MAX_COUNTERS} for a sequence",
-            "count less",
+            "use fewer counters",
         )
     if rows > record.MAX_ROWS or legs > record.MAX_MOTIONS:
         raise InputError(

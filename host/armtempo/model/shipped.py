@@ -40,7 +40,7 @@ def files() -> dict[str, Path]:
 def find(given: Path | str) -> ArmFile:
     """The arm file that a user means by a path or a name; a file of that name wins over an arm that ships.
 
-    Raises InputError where there is neither, naming the arms that ship.
+    Raises InputError if there is neither, naming the arms that ship.
     """
     path, shipped = Path(given), files()
     named = str(given) in shipped
@@ -49,6 +49,6 @@ def find(given: Path | str) -> ArmFile:
     if named:
         return ArmFile(shipped[str(given)], True)
     raise InputError(
-        f"{given}: there is no such file, and no arm of that name ships with armtempo",
+        f"{given}: no such file, and no arm of that name ships with armtempo",
         f"check the path, or give one of those that do: {', '.join(shipped)}",
     )

@@ -112,7 +112,9 @@ class Count(Placed):
     def __post_init__(self) -> None:
         """InputError for a name that the board cannot keep."""
         if not is_name(self.counter):
-            raise InputError(f"counter {self.counter!r}: the board keeps no such name", "use a-z A-Z 0-9 - _")
+            raise InputError(
+                f"counter {self.counter!r}: not a valid name on the board", "use a-z A-Z 0-9 - _"
+            )
 
 
 @checked_fields

@@ -88,7 +88,7 @@ class Pose:
         return " and ".join(("position", *self.fixed)) if self.fixed else "position only"
 
     def exact(self, what: str = "the pose") -> Pose:
-        """The same with what rounding did to its rotation put right; InputError, naming ``what``, if it is no pose."""
+        """The same with its rotation part made exact; InputError, naming ``what``, if it is not a pose."""
         return replace(self, matrix=_rows(pose.checked(self.matrix, what)))
 
     @classmethod
@@ -105,7 +105,8 @@ class Pose:
         fixed = tuple(name for name in WHOLE if name in angles_deg)
         if fixed not in CONSTRAINTS:
             raise InputError(
-                f"{what}: roll and yaw without pitch leave too much open", "give pitch too, or leave one out"
+                f"{what}: roll and yaw without pitch do not define an orientation",
+                "give pitch too, or leave one out",
             )
         rpy = [angles_deg.get(name, 0.0) for name in WHOLE]
         return cls.of_matrix(pose.from_rpy(position, rpy, what), fixed)

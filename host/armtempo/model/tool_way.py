@@ -64,7 +64,7 @@ class ToolWay:
 
 
 def read(table: Table, via: int) -> ToolWay | None:
-    """What the table of a via point asks of the way to it, None where nothing; InputError for what is not allowed."""
+    """What the table of a via point asks of the way to it, None if nothing; InputError for what is not allowed."""
     if not any(table.has(key) for key in KEYS):
         table.known(*KEYS)
         return None
@@ -94,7 +94,7 @@ def _tolerance(table: Table, key: str, allowed: tuple[float, float], default: fl
 
 
 def limit(table: Table, key: str) -> float | None:
-    """A limit of the tool, None where it is not given."""
+    """A limit of the tool, None if it is not given."""
     return table.number(key, least=LEAST, most=MOST) if table.has(key) else None
 
 

@@ -27,7 +27,7 @@ class ImportedPath:
     via_deg: Array
     lines: int
     thinned_to_deg: float | None = None
-    """The tolerance they keep to where there were more; None where every line is a via point."""
+    """The tolerance they keep to where there were more; None if every line is a via point."""
 
 
 def via_points(
@@ -44,7 +44,7 @@ def via_points(
     points = np.array(table.numbers(columns)).reshape(-1, len(columns))
     if len(points) < 2:
         raise InputError(
-            f"{table.path}: {len(points)} via points are no motion", "give at least 2 lines of angles"
+            f"{table.path}: {len(points)} via points are not a motion", "give at least 2 lines of angles"
         )
     angles = np.degrees(points) if radians else points
     times = _times(table)

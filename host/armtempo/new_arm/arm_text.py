@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import fields
 
+import numpy as np
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
+from armtempo.basics.arrays import Array
+from armtempo.kinematics import all_frames
+from armtempo.model.parts import Dynamics
 from armtempo.new_arm.urdf_fitting import Fit
 from armtempo.new_arm.urdf_reader import Chain, TurningJoint
-from armtempo.new_arm.urdf_rows import DhRow
+from armtempo.new_arm.urdf_rows import DhRow, geometry
 
 _STILL_DEG = 0.001
 """Half the range of a row that never moves: an arm file wants a range, and this one is none."""
@@ -47,17 +52,42 @@ def arm_text(chain: Chain, fit: Fit, source: str) -> str:
         position_mm=fit.position_mm,
         rotation_deg=fit.rotation_deg,
     )
-    return "\n".join([head, *(_joint(row, chain, first=number == 0) for number, row in enumerate(fit.rows))])
+    frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))
+    rows = [
+        _joint(row, chain, frame, number == 0)
+        for number, (row, frame) in enumerate(zip(fit.rows, frames[1:], strict=True))
+    ]
+    return "\n".join([head, *rows])
 
 
-def _joint(row: DhRow, chain: Chain, first: bool) -> str:
+def _joint(row: DhRow, chain: Chain, frame: Array, first: bool) -> str:
+    """Its table; ``frame``: after the row, all joints at 0."""
     if row.joint is None:
         name = "base" if first else "tool"
         return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves")
     joint = chain.joints[row.joint]
     note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
     name = _one_line(joint.name) or f"joint {row.joint + 1}"
-    return _row_text(name, row, _inside(joint.range_deg), note) + _placeholders(row.joint + 1, joint)
+    text = _row_text(name, row, _inside(joint.range_deg), note)
+    if any(each.body for each in chain.joints):
+        text += _dynamics(joint.body.in_frame(frame) if joint.body else Dynamics(0.0))
+    return text + _placeholders(row.joint + 1, joint)
+
+
+def _dynamics(body: Dynamics) -> str:
+    keys = (
+        field.name
+        for field in fields(body)
+        if field.name in ("mass_kg", "centre_mm") or np.any(getattr(body, field.name))
+    )
+    return f"dynamics = {{ {', '.join(f'{key} = {_digits(getattr(body, key))}' for key in keys)} }}\n"
+
+
+def _digits(value: float | tuple[float, ...]) -> str:
+    """A number, or a list of them, with as many digits as count."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_digits, value))}]"
+    return repr(float(f"{value:.7g}") + 0.0)
 
 
 def _row_text(name: str, row: DhRow, range_deg: tuple[float, float], note: str) -> str:

@@ -69,7 +69,7 @@ _PAGE = """\
 def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     """Make ``folder`` with the files of a project; gives their paths.
 
-    Raises InputError where the folder is there and not empty, or cannot be written; nothing is left then.
+    Raises InputError if the folder is there and not empty, or cannot be written; nothing is left then.
     """
     check_free(folder)
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
@@ -85,13 +85,13 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
 
 
 def check_free(folder: Path) -> None:
-    """InputError where the folder is there and not empty."""
+    """InputError if the folder is there and not empty."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: is there already and not empty", "choose another name")
+        raise InputError(f"{folder}: already exists and is not empty", "choose another name")
 
 
 def _put(folder: Path, files: dict[str, str]) -> None:
-    """Written beside the folder, then put in its place in one step."""
+    """Written next to the folder, then put in its place in one step."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
     try:

@@ -54,7 +54,7 @@ INTEGERS = ("steps_per_rev", "microsteps", "encoder_counts", "parallel_linkage")
 def parse(text: str, number: int) -> JointEntry:
     """The joint in ``key=value,key=value``, the keys being ``name`` and NUMBERS.
 
-    Raises InputError, naming the key, for one that is unknown or given twice, or for a value that is no number.
+    Raises InputError, naming the key, for one that is unknown or given twice, or for a value that is not a number.
     """
     values: dict[str, str] = {}
     for part in filter(None, (part.strip() for part in text.split(","))):
@@ -77,7 +77,7 @@ def _number(number: int, key: str, value: str) -> float | int:
         return float(value)
     except ValueError:
         raise InputError(
-            f"joint {number}: {key} = {value!r} is no number", "write it as 12 or -3.5"
+            f"joint {number}: {key} = {value!r} is not a number", "write it as 12 or -3.5"
         ) from None
 
 

@@ -50,7 +50,7 @@ class Question:
 
 
 def following(answers: Mapping[str, str]) -> Question | None:
-    """The question that comes after these answers; None where all is answered."""
+    """The question that comes after these answers; None if all is answered."""
     for question in _all(answers):
         if question.key not in answers:
             return question
@@ -119,94 +119,102 @@ def _own(answers: Mapping[str, str]) -> list[Question]:
 
 
 def _joint(number: int, answers: Mapping[str, str]) -> list[Question]:
-    joint = f"joint {number} of {answers['count']}"
-    before = answers["convention"] == MODIFIED
-    names = [answers[f"{other}.name"] for other in range(1, number)]
-    link = "the axis before to this one" if before else "this axis to the next one"
-    length, angle = _number(-MAX_LENGTH_MM, MAX_LENGTH_MM, "120.5"), _number(-360, 360, "-90")
+    joint = _Joint(number, answers)
+    return [*joint.row(), *joint.linkage(), *joint.travel(), *joint.drive(), *joint.encoder(), *joint.speed()]
 
-    def ask(key: str, text: str, explanation: str, read: Reader, default: str = "") -> Question:
-        shown = default or str(getattr(JointEntry(f"joint {number}"), key))
-        return Question(f"{number}.{key}", f"{joint}: {text}", shown, explanation, read)
 
-    found = [
-        ask("name", "name", "Any words; reports and messages use them.", _new_name(names)),
-        ask("d_mm", "d, mm", "Along this joint's axis, from one common normal to the next.", length),
-        ask("a_mm", "a, mm", f"Length of the common normal from {link}.", length),
-        ask(
-            "alpha_deg",
-            "alpha, degrees",
-            f"Turn about the common normal from {link}.",
-            _number(-180, 180, "-90"),
-        ),
-        ask(
-            "theta_offset_deg",
-            "theta where the joint stands at 0, degrees",
-            "Added to the joint's angle.",
-            angle,
-        ),
-    ]
-    if number > 1:
+class _Joint:
+    """The questions about one joint, in their order."""
+
+    def __init__(self, number: int, answers: Mapping[str, str]) -> None:
+        self._number = number
+        self._answers = answers
+        self._name = f"joint {number} of {answers['count']}"
+
+    def row(self) -> list[Question]:
+        names = [self._answers[f"{other}.name"] for other in range(1, self._number)]
+        modified = self._answers["convention"] == MODIFIED
+        link = "the axis before to this one" if modified else "this axis to the next one"
+        length = _number(-MAX_LENGTH_MM, MAX_LENGTH_MM, "120.5")
+        offset = "theta where the joint stands at 0, degrees"
+        return [
+            self._ask("name", "name", "Any words; reports and messages use them.", _new_name(names)),
+            self._ask(
+                "d_mm", "d, mm", "Along this joint's axis, from one common normal to the next.", length
+            ),
+            self._ask("a_mm", "a, mm", f"Length of the common normal from {link}.", length),
+            self._ask(
+                *("alpha_deg", "alpha, degrees", f"Turn about the common normal from {link}."),
+                _number(-180, 180, "-90"),
+            ),
+            self._ask("theta_offset_deg", offset, "Added to the joint's angle.", _number(-360, 360, "-90")),
+        ]
+
+    def linkage(self) -> list[Question]:
+        if self._number == 1:
+            return []
         text = "does a parallelogram turn it, with the motor one link further down (yes, no)"
         explanation = (
             "A parallel linkage, as of palletisers and the EEZYbotARM: the joint's angle is then counted from the link "
             "before the previous one, and stays when the previous joint turns."
         )
-        found.append(ask("parallel_linkage", text, explanation, _one_of([*_YES, *_NO]), "no"))
-    turns = _number(-MAX_ANGLE_DEG, MAX_ANGLE_DEG, "-90")
-    low = answers.get(f"{number}.low_deg", "-90")
-    found += [
-        ask("low_deg", "lowest angle, degrees", "Where the joint may turn to at most, its lower end.", turns),
-        ask(
-            *("high_deg", "highest angle, degrees", "The upper end of its range."),
-            _above(float(low)),
-            str(max(90.0, float(low) + 90.0)),
-        ),
-        ask(
-            "steps_per_rev",
-            "full steps for a turn of the motor",
-            "200 for 1.8 degrees a step.",
-            _whole(4, 10_000),
-        ),
-        ask(
-            "microsteps",
-            "microsteps of the driver",
-            "As its switches or the firmware set them.",
-            _whole(1, 256),
-        ),
-        ask(
-            *(
-                "gear_ratio",
-                "motor turns for a turn of the joint",
-                "Of gear and belt together; 1 without any.",
+        return [self._ask("parallel_linkage", text, explanation, _one_of([*_YES, *_NO]), "no")]
+
+    def travel(self) -> list[Question]:
+        low = float(self._answers.get(f"{self._number}.low_deg", "-90"))
+        return [
+            self._ask(
+                *("low_deg", "lowest angle, degrees", "The lower end of the joint's range."),
+                _number(-MAX_ANGLE_DEG, MAX_ANGLE_DEG, "-90"),
             ),
-            _number(0.1, 10_000, "4.5"),
-        ),
-    ]
-    if number <= MAX_ENCODERS:
+            self._ask(
+                *("high_deg", "highest angle, degrees", "The upper end of its range."),
+                _above(low),
+                str(max(90.0, low + 90.0)),
+            ),
+        ]
+
+    def drive(self) -> list[Question]:
+        steps, gear = "full steps for a turn of the motor", "motor turns for a turn of the joint"
+        return [
+            self._ask("steps_per_rev", steps, "200 for 1.8 degrees a step.", _whole(4, 10_000)),
+            self._ask(
+                *("microsteps", "microsteps of the driver", "As its switches or the firmware set them."),
+                _whole(1, 256),
+            ),
+            self._ask(
+                *("gear_ratio", gear, "Of gear and belt together; 1 without any."),
+                _number(0.1, 10_000, "4.5"),
+            ),
+        ]
+
+    def encoder(self) -> list[Question]:
+        if self._number > MAX_ENCODERS:
+            return []
         text = "encoder counts for a turn of the joint, all edges (0: none)"
-        found.append(ask("encoder_counts", text, "Four times the lines of its disc.", _counts))
-    return [*found, *_speed(number, answers, joint)]
+        return [self._ask("encoder_counts", text, "Four times the lines of its disc.", _counts)]
 
+    def speed(self) -> list[Question]:
+        """How fast; asked once steps and gear are known."""
+        keys = [f"{self._number}.{key}" for key in ("steps_per_rev", "microsteps", "gear_ratio")]
+        if not all(key in self._answers for key in keys):
+            return []
+        steps, micro, gear = (self._answers[key] for key in keys)
+        entry = JointEntry("", steps_per_rev=int(steps), microsteps=int(micro), gear_ratio=float(gear))
+        most = entry.most_speed_deg_s(int(self._answers["count"]))
+        return [
+            self._ask(
+                "speed_deg_s",
+                f"speed limit, degrees/s ({entry.steps_per_deg:.5g} steps/deg; {most:.4g} is easy for the motor)",
+                "Acceleration and jerk begin at 1 and 4 times of it; change all three in the file.",
+                _number(0.001, MAX_STEP_RATE / entry.steps_per_deg, "30"),
+                f"{min(60.0, float(f'{0.9 * most:.2g}')):g}",
+            )
+        ]
 
-def _speed(number: int, answers: Mapping[str, str], joint: str) -> list[Question]:
-    """How fast; asked once steps and gear are known."""
-    keys = ("steps_per_rev", "microsteps", "gear_ratio")
-    if not all(f"{number}.{key}" in answers for key in keys):
-        return []
-    steps, micro, gear = (answers[f"{number}.{key}"] for key in keys)
-    entry = JointEntry("", steps_per_rev=int(steps), microsteps=int(micro), gear_ratio=float(gear))
-    most = entry.most_speed_deg_s(int(answers["count"]))
-    fastest = MAX_STEP_RATE / entry.steps_per_deg
-    return [
-        Question(
-            f"{number}.speed_deg_s",
-            f"{joint}: speed limit, degrees/s ({entry.steps_per_deg:.5g} steps/deg; {most:.4g} is easy for the motor)",
-            f"{min(60.0, float(f'{0.9 * most:.2g}')):g}",
-            "Acceleration and jerk begin at 1 and 4 times of it; change all three in the file.",
-            _number(0.001, fastest, "30"),
-        )
-    ]
+    def _ask(self, key: str, text: str, explanation: str, read: Reader, default: str = "") -> Question:
+        shown = default or str(getattr(JointEntry(f"joint {self._number}"), key))
+        return Question(f"{self._number}.{key}", f"{self._name}: {text}", shown, explanation, read)
 
 
 _YES, _NO = ("yes", "y"), ("no", "n")
@@ -241,7 +249,7 @@ def _number(least: float, most: float, example: str) -> Reader:
         try:
             value = float(text)
         except ValueError:
-            raise WrongAnswerError(f"{text!r} is no number; write it as {example}") from None
+            raise WrongAnswerError(f"{text!r} is not a number; write it as {example}") from None
         if not least <= value <= most:
             raise WrongAnswerError(f"it must be from {least:g} to {most:g}, such as {example}")
         return value

@@ -42,7 +42,7 @@ def fit(chain: Chain) -> Fit:
 
     URDF files give angles in rad with few digits (1.5708), which makes axes that were meant to be parallel meet
     kilometres away. So near ones are taken for parallel first, and the comparison says whether that was right.
-    Raises PlanError where no table comes that near.
+    Raises PlanError if no table comes that near.
     """
     angles = _postures(chain)
     wanted = chain.poses(angles)
@@ -59,7 +59,7 @@ def fit(chain: Chain) -> Fit:
     assert best is not None  # there is at least one way to round
     raise PlanError(
         f"no Denavit-Hartenberg table of {chain.robot!r} keeps to its URDF: the best one is off by "
-        f"{best.position_mm:.3g} mm and {best.rotation_deg:.3g} deg at worst, which should not be; nothing was "
+        f"{best.position_mm:.3g} mm and {best.rotation_deg:.3g} deg at worst, which is an error; nothing was "
         "written",
         "choose another chain, or write the rows by hand",
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,7 +15,8 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.formats.atomic_file import why
 from armtempo.model.parts_file import MAX_ANGLE_DEG
-from armtempo.new_arm import urdf_tip
+from armtempo.new_arm import urdf_bodies, urdf_tip
+from armtempo.new_arm.urdf_bodies import Body
 
 MM = 1000.0
 """Millimetres in the URDF's unit, the metre."""
@@ -33,7 +35,7 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class TurningJoint:
-    """One revolute joint where it stands while all joints are at 0, in the base link's frame."""
+    """One revolute joint where it is while all joints are at 0, in the base link's frame."""
 
     name: str
     point_mm: Array
@@ -43,6 +45,8 @@ class TurningJoint:
     range_deg: tuple[float, float]
     speed_deg_s: float | None
     continuous: bool
+    body: Body | None
+    """What it moves as far as the next joint; None if nothing of it has a mass."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ class Chain:
 def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     """The chain from link ``base`` (None: the root) to link ``tip`` (None: see ``urdf_tip.choose``).
 
-    Raises MissingPackageError without yourdfpy, InputError where the file is no URDF, the chain is not one, or
+    Raises MissingPackageError without yourdfpy, InputError if the file is no URDF, the chain is not one, or
     a joint in it is of a kind that an arm file cannot describe: with every reason.
     """
     urdf = _reader()
@@ -99,7 +103,7 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
         )
     first, last = joints[0].parent, joints[-1].child
     model.update_cfg({joint.name: 0.0 for joint in moving})
-    turning = tuple(_turning(model, first, joint) for joint in moving)
+    turning = tuple(map(partial(_turning, model, first), moving, [*moving[1:], None]))
     return Chain(model.robot.name, first, last, turning, _transform(model, last, first), model)
 
 
@@ -116,13 +120,13 @@ def _check_text(path: Path) -> None:
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file", "check the path") from None
+        raise InputError(f"{path}: no such file", "check the path") from None
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read: {why(error)}", "make it readable, or give a copy"
         ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise InputError(f"{path}: not valid XML: {error}", "mend the file there") from None
+        raise InputError(f"{path}: not valid XML: {error}", "correct the file there") from None
     if root.tag != "robot":
         raise InputError(f"{path}: its outermost element is <{root.tag}>, not <robot>", "give a URDF file")
     if root.get("name") is None:
@@ -177,7 +181,7 @@ def _refuse_wheels(path: Path, moving: list[Any]) -> None:
     endless = [joint.name for joint in moving if joint.type == "continuous"]
     if endless and (len(endless) == len(moving) or len(moving) <= _WHEEL_JOINTS):
         raise InputError(
-            f"{path}: {', '.join(map(repr, endless))} turn without end, as wheels do: this chain is no arm",
+            f"{path}: {', '.join(map(repr, endless))} turn without end, as wheels do: this chain is not an arm",
             "choose another chain with --base and --tip; a joint of an arm gets limits (type='revolute') in the URDF",
         )
 
@@ -205,14 +209,15 @@ def _range_reason(limit: Any) -> str:
     return ""
 
 
-def _turning(model: Any, base: str, joint: Any) -> TurningJoint:
+def _turning(model: Any, base: str, joint: Any, after: Any) -> TurningJoint:
     frame = _transform(model, joint.child, base)
     axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis, dtype=np.float64)
     limit, continuous = joint.limit, joint.type == "continuous"
     low_high = CONTINUOUS_DEG if continuous else (math.degrees(limit.lower), math.degrees(limit.upper))
     speed = math.degrees(limit.velocity) if limit is not None and limit.velocity else None
     direction = frame[:3, :3] @ (axis / np.linalg.norm(axis))
-    return TurningJoint(joint.name, frame[:3, 3], direction, low_high, speed, continuous)
+    body = urdf_bodies.of_joint(model, base, joint, after)
+    return TurningJoint(joint.name, frame[:3, 3], direction, low_high, speed, continuous, body)
 
 
 def _transform(model: Any, link: str, base: str) -> Array:

@@ -48,8 +48,8 @@ class _Frame:
 def derive(axes: Sequence[AxisLine], tool: Array, near: Near) -> list[DhRow]:
     """Rows from the base frame over all axes to the frame ``tool`` (4, 4), all joints at 0.
 
-    The base's z axis is taken for an axis before the first one, the tool's z axis for one behind the last: a
-    constant row stands before joint 1 where its axis is not the base's, and one behind the last joint where
+    The base's z axis is taken for an axis before the first one, the tool's z axis for one after the last: a
+    constant row stands before joint 1 if its axis is not the base's, and one after the last joint where
     the tool is turned or shifted along its own z axis and no row before it can take that up.
     """
     frame = _Frame(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
@@ -81,7 +81,7 @@ def rounded(rows: Sequence[DhRow], decimals: int) -> list[DhRow]:
 
 
 def _to_line(frame: _Frame, line: AxisLine, joint: int | None, near: Near) -> tuple[DhRow, _Frame]:
-    """The row whose next z axis lies on ``line``, and the frame behind it."""
+    """The row whose next z axis lies on ``line``, and the frame after it."""
     across = np.cross(frame.z, line.direction)
     if np.linalg.norm(across) <= near.angle_rad:
         return _to_parallel(frame, line, joint, near)

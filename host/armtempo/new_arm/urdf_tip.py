@@ -25,7 +25,7 @@ class _Candidate(NamedTuple):
 def choose(path: Path, joints: Sequence[Any], first: str, reason: Callable[[Any], str]) -> str:
     """The link that fingers follow, or the only end below ``first``.
 
-    ``reason``: why an arm file cannot describe a joint, "" if it can. Raises InputError where the tool is not clear,
+    ``reason``: why an arm file cannot describe a joint, "" if it can. Raises InputError if the tool is not clear,
     naming each link that it may be with the joints that turn on the way, best first.
     """
     below = [*_below(joints, first)]

@@ -12,7 +12,7 @@ Bits = NDArray[np.bool_]
 """A population: individuals × variables × bits, the first bit of a variable counting most."""
 
 BITS = Number(16, 2, 52, "bits that code a variable")
-"""Bits that code a variable; a double has 52 behind its point."""
+"""Bits that code a variable; a double has 52 after its point."""
 
 
 def random_bits(rng: np.random.Generator, population: int, variables: int, bits: int) -> Bits:

@@ -67,7 +67,7 @@ class BandedKkt:
         self._flat = (2 * self._width + row - column) + (3 * self._width + 1) * column
 
     def factor(self, entries: Array) -> Factor:
-        """The matrix with these entries of H (H,), factorised. Raises numpy's LinAlgError where it is singular."""
+        """The matrix with these entries of H (H,), factorised. Raises numpy's LinAlgError if it is singular."""
         from scipy.linalg import lapack  # here, because loading it takes longer than most commands
 
         width, count = self._width, len(self._position)

@@ -1,4 +1,4 @@
-"""A printed value beside ours, with a verdict."""
+"""A printed value next to ours, with a verdict."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ SAME, BETTER, DIFFERS = "same", "better", "differs"
 
 @dataclass(frozen=True)
 class Claim:
-    """One value of the paper beside the one found here."""
+    """One value of the paper next to the one found here."""
 
     where: str
     """Table, figure or section."""

@@ -129,7 +129,7 @@ def rows(found: Iterable[tuple[Case, Array]]) -> list[Row]:
 
 
 def claims(found: Sequence[Row]) -> list[Claim]:
-    """Our median beside the printed value, with the range over the seeds."""
+    """Our median next to the printed value, with the range over the seeds."""
     return [_claim(row) for row in found]
 
 

@@ -135,7 +135,7 @@ class _Ramps:
         self._duration_s = trajectory.duration_s
         self._allowed = allowed
         time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
-        # speeds, accelerations and jerks over their limits' units; rest behind the end
+        # speeds, accelerations and jerks over their limits' units; rest after the end
         self._motion = np.stack([trajectory(time, order) for order in (1, 2, 3)], axis=1)  # (T, 3, J)
         self.worst_of_motion = float(np.max(np.abs(self._motion[:, 1:]) / allowed.T[1:]))
 

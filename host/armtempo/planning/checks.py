@@ -30,6 +30,8 @@ from armtempo.splines import bspline, extremes
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
+ESTIMATED = "(estimated; 'armtempo selftest' measures your board)"
+
 TOLERANCE = 1e-9
 """Allowance for rounding: largest excess over a limit, relative, and over a range, in degrees."""
 
@@ -66,7 +68,7 @@ def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
     if rate > MAX_STEP_RATE:
         raise InputError(
             f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
-            f"steps/s, the board does {MAX_STEP_RATE} at most",
+            f"steps/s, the board does {MAX_STEP_RATE} at most {ESTIMATED}",
             "check the unit, lower the limit, or use fewer microsteps",
         )
 
@@ -170,7 +172,7 @@ def _check_path(job: Job) -> None:
 
 
 def is_wide(via: tuple[float, ...] | Pose) -> bool:
-    """Whether a free path may pass beside it: a pose with more tolerance than counts as reached anyway.
+    """Whether a free path may pass next to it: a pose with more tolerance than counts as reached anyway.
 
     Only where nothing or all is asked of the orientation; other poses are passed where the inverse puts them.
     """
@@ -230,7 +232,7 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
 
 
 def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
-    """Raises PlanError where the path, also between the via points, leaves a joint's range."""
+    """Raises PlanError if the path, also between the via points, leaves a joint's range."""
     low, high = extremes.range_of(np.moveaxis(bspline.polynomials(angle_points_deg, degree), 2, 0))
     for joint, lowest, highest in zip(arm.driven, low, high, strict=True):
         least, most = joint.range_deg
@@ -244,19 +246,20 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
 
 
 def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
-    """The check that every plan passes: PlanError where a limit or the board's step rate is exceeded."""
+    """The check that every plan passes: PlanError if a limit or the board's step rate is exceeded."""
     rates = 0.0
     for joint, extreme in zip(arm.driven, reached, strict=True):
         if not np.all(extreme.values <= np.array(joint.limits.values) * (1 + TOLERANCE)):
             raise PlanError(
                 f"{joint.name}: no plan was found that keeps its limits {joint.limits.values}, the best one "
                 f"reaches {extreme.values}",
-                "angles and limits are too far apart in size to compute with",
+                "angles and limits are too different in magnitude to compute with",
             )
         rates += extreme.speed_deg_s * joint.steps_per_deg
     if rates > MAX_STEP_RATE_SUM:
         raise PlanError(
-            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at most",
+            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at most "
+            f"{ESTIMATED}",
             "lower the speed limits or use fewer microsteps",
         )
 
@@ -267,12 +270,12 @@ def check_time(trajectory: Trajectory) -> None:
         if not np.all(np.diff(spline.time_points_s) > 0.0):
             raise PlanError(
                 f"trajectory {trajectory.name!r}: no time axis was found that increases everywhere",
-                "via points, limits and dwells are too far apart in size to compute with; bring them closer",
+                "via points, limits and dwells are too different in magnitude to compute with",
             )
 
 
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
-    """Raises PlanError where a control point exceeds the integers of the board's evaluator."""
+    """Raises PlanError if a control point exceeds the integers of the board's evaluator."""
     for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
         where = f"trajectory {trajectory.name!r}, {joint.name}"
         _check_times(where, joint_spline)

@@ -36,7 +36,7 @@ class DualKkt:
         self._rows = (_SHARED + 1) * self._block
 
     def _both(self, apart: int) -> tuple[Index, Index, Index]:
-        """Variables that a cell and that ``apart`` behind share: their numbers there, and their places in both.
+        """Variables that a cell and that ``apart`` after share: their numbers there, and their places in both.
 
         They have the same places in all cells but perhaps the last.
         """
@@ -44,7 +44,7 @@ class DualKkt:
         return self._columns[:-apart, first], first, second
 
     def factor(self, entries: Array) -> DualFactor:
-        """The matrix with B (2, 2, N G) and D, one after the other. Raises numpy's LinAlgError where it is singular."""
+        """The matrix with B (2, 2, N G) and D, one after the other. Raises numpy's LinAlgError if it is singular."""
         from scipy.linalg import lapack  # here, because loading it takes longer than most commands
 
         size = len(entries) - self._size

@@ -18,7 +18,7 @@ _ROUNDING = 1e-9
 
 
 def value(cells: Cells, multipliers: Multipliers) -> float:
-    """No motion along the path takes less, in the cells' unit of time; 0 where the multipliers prove nothing.
+    """No motion along the path takes less, in the cells' unit of time; 0 if the multipliers prove nothing.
 
     The minimum over x is concave and rises with w and c. On a piece both are at least their chords less what the
     Bernstein coefficients may lie below them, and the integral over a chord is at least that by its ends.
@@ -94,7 +94,7 @@ def _least(w: Array, c: Array) -> Array:
 
 
 def _highest_x(cells: Cells) -> Array:
-    """The most that x can be on each cell, (N,), infinite where no simple reason bounds it.
+    """The most that x can be on each cell, (N,), infinite if no simple reason bounds it.
 
     A joint's speed limit; where a joint turns in the cell, its acceleration limit: v^2 <= 2 A |dq| from there; at an
     end at rest, its jerk limit: v <= J / 2 (6 dq / J)^(2/3) from there.
@@ -114,7 +114,7 @@ def _highest_x(cells: Cells) -> Array:
 
 
 class _Extent(NamedTuple):
-    """Bounds on a magnitude on each cell, (N, J); the lower one 0 where the sign is not sure."""
+    """Bounds on a magnitude on each cell, (N, J); the lower one 0 if the sign is not sure."""
 
     least: Array
     most: Array

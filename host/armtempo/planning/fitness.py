@@ -20,7 +20,7 @@ checked without a grid."""
 _PENALTY = 30.0
 """Seconds that the penalty of Eq. (21) charges where a limit is exceeded by as much again."""
 _TINY = 1e-300
-"""Avoids 0 / 0 where a joint does not move."""
+"""Avoids 0 / 0 if a joint does not move."""
 
 
 class Fitness:
@@ -64,16 +64,7 @@ class Fitness:
         A parabola through three points whose top lies beyond the outer ones is cut down to less than those.
         """
         ratios = self.ratios(intervals_s)
-        left, middle, right = ratios[:, :-2], ratios[:, 1:-1], ratios[:, 2:]
-        slope = np.abs(left - right)
-        bend = 2.0 * middle
-        bend -= left
-        bend -= right
-        tops = np.maximum(bend, 0.5 * slope, out=bend)
-        tops += _TINY
-        np.divide(np.square(slope, out=slope), 8.0 * tops, out=tops)
-        tops += middle
-        return np.asarray(np.maximum(tops.max(axis=1), np.maximum(ratios[:, 0], ratios[:, -1])))
+        return np.asarray(np.maximum(_tops(ratios).max(axis=1), np.maximum(ratios[:, 0], ratios[:, -1])))
 
     def penalised(self, intervals_s: Array) -> Array:
         """Eq. (21): sum of X and weighted excess of each segment's extremes, (N,) for X (N, m).
@@ -89,18 +80,26 @@ class Fitness:
 
     def stretch(self, intervals_s: Array) -> Array:
         """The factor on X that brings it just within the limits, on the grid: (N,)."""
-        return stretch_of(self._highest(self.ratios(intervals_s)))
+        ratios = self.ratios(intervals_s)
+        everywhere = (1, 2, 3)
+        return stretch_of(np.maximum(_tops(ratios).max(axis=everywhere), ratios.max(axis=everywhere)))
 
-    def _highest(self, ratios: Array) -> Array:
-        """The largest of ``peaks``, (3, N): parabolas rise above their middle by a quarter of the largest at most."""
-        flat = ratios.reshape(3, len(ratios[0]), -1, ratios.shape[-1])
-        highest = flat.max(axis=(1, 2))
-        kind, point, place, candidate = np.nonzero(flat[:, 1:-1] > 0.75 * highest[:, None, None])
-        left, middle, right = (flat[kind, point + shift, place, candidate] for shift in (0, 1, 2))
-        slope = np.abs(left - right)
-        bend = np.maximum(2.0 * middle - left - right, 0.5 * slope) + _TINY
-        np.maximum.at(highest, (kind, candidate), middle + slope**2 / (8.0 * bend))
-        return np.asarray(highest)
+
+def _tops(ratios: Array) -> Array:
+    """Tops of parabolas through each three points that follow each other, (3, G - 2, J, m, N); see ``peaks``."""
+    left, middle, right = ratios[:, :-2], ratios[:, 1:-1], ratios[:, 2:]
+    slope = np.abs(left - right)
+    bend = middle + middle
+    bend -= left
+    bend -= right
+    half = 0.5 * slope
+    np.maximum(bend, half, out=bend)
+    bend += _TINY
+    tops = np.multiply(half, half, out=half)
+    tops *= 0.5
+    tops /= bend
+    tops += middle
+    return tops
 
 
 def stretch_of(ratios: Array) -> Array:

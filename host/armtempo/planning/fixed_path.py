@@ -43,7 +43,7 @@ class Optimum:
     """Of the time control points, (m + degree - 1,)."""
     total_s: float
     bound_s: float
-    """No axis nearby with as many variables takes less; 0 where that was not found out."""
+    """No axis nearby with as many variables takes less; 0 if that was not found out."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,7 +56,7 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
 
 
 def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> float:
-    """By duality, on more cells where few prove nothing; 0 where that does not help."""
+    """By duality, on more cells where few prove nothing; 0 if that does not help."""
     stage("proving the floor")
     segments = len(angle_points_deg) - degree
     parts = min(max(_WORK // (segments * len(limits) ** 2), _LEAST_CELLS), _MOST_CELLS)

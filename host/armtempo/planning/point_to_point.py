@@ -24,7 +24,7 @@ _MARGIN = 1.001
 def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, speed: float = 1.0) -> Trajectory:
     """The quintic from rest at ``start_deg`` (J,) to rest at ``end_deg`` (J,), all joints arriving together.
 
-    As fast as the limits of the slowest joint allow, times ``speed``. Raises InputError where a posture has another
+    As fast as the limits of the slowest joint allow, times ``speed``. Raises InputError if a posture has another
     number of joints than the arm drives or leaves a joint's range.
     """
     start, end = posture(start_deg, arm), posture(end_deg, arm)
@@ -45,12 +45,12 @@ def backwards(trajectory: Trajectory, name: str) -> Trajectory:
 
 
 def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
-    """The angles as an array (J,); InputError where their number or a range does not fit the arm."""
+    """The angles as an array (J,); InputError if their number or a range does not fit the arm."""
     try:
         found = np.asarray(angles_deg, dtype=float)
     except (TypeError, ValueError):
         raise InputError(
-            f"{angles_deg!r:.40} is no posture", "give an angle in degrees for each joint with a motor"
+            f"{angles_deg!r:.40} is not a posture", "give an angle in degrees for each joint with a motor"
         ) from None
     if found.shape != (len(arm.driven),):
         raise InputError(

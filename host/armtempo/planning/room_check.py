@@ -79,7 +79,7 @@ class Bodies:
 
     @cached_property
     def reach_mm(self) -> Array:
-        """How far a segment is from the axis of a row at most, (2 joints, joints); 0 where that does not move it."""
+        """How far a segment is from the axis of a row at most, (2 joints, joints); 0 if that does not move it."""
         lengths = np.array([(abs(joint.d_mm), abs(joint.a_mm)) for joint in self.arm.joints]).ravel()
         found = np.zeros((len(lengths), len(self.arm.joints)))
         for segment in range(len(lengths)):
@@ -138,7 +138,7 @@ class Bodies:
         """How fast each of the distances can shrink at speeds of the driven joints, (J,): (M,)."""
         rows = self.turned @ np.radians(speeds_deg_s)
         found = [float(self.reach_mm[segment] @ rows) for segment in self.moves for _ in self.obstacles]
-        for one, other in self.pairs:  # seen from the first, only the rows behind it move the other
+        for one, other in self.pairs:  # seen from the first, only the rows after it move the other
             after = np.arange(len(rows)) >= one // 2 + one % 2
             found.append(float(self.reach_mm[other, after] @ rows[after]))
         return np.array(found)
@@ -162,7 +162,7 @@ def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
 
 
 def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch | None:
-    """What touches in a motion, None where it is proven that nothing does.
+    """What touches in a motion, None if it is proven that nothing does.
 
     ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep: so an
     arm can be moved out.
@@ -209,7 +209,7 @@ def touch_of(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None
 
 
 def check(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, through: bool = False) -> None:
-    """Raises PlanError where a motion leaves the room, naming what touches what, and when.
+    """Raises PlanError if a motion leaves the room, naming what touches what, and when.
 
     ``speeds_deg_s``: as for ``first_touch``, where they are known; ``through``: the message names via points too.
     """

@@ -33,8 +33,8 @@ _SAME_STEPS = 1 / 128
 def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
     """All motions of a sequence, equal ones once, and the rows that the board goes through.
 
-    Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or nothing is
-    left to do; PlanError where a motion cannot be planned.
+    Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or the
+    sequence has no effect; PlanError if a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)
     source = sequence.source or f"sequence {sequence.name!r}"
@@ -42,7 +42,7 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     start = compiler.posture(sequence.start, f"{source}: start: ") if sequence.start else _End(None, "")
     rows, _ = compiler.rows(sequence.steps, start.angles_deg, start.name)
     if not rows:
-        raise InputError(f"{source}: nothing is left to do", "add a step that moves, sets or waits")
+        raise InputError(f"{source}: the sequence has no effect", "add a step that moves, sets or waits")
     check_size(len(rows), len(compiler.legs), len(compiler.counters), source)
     legs = [replace(leg, name=f"{sequence.name}-{number}") for number, leg in enumerate(compiler.legs, 1)]
     return SequencePlan(
@@ -60,7 +60,7 @@ class _Place:
 
 @dataclass(frozen=True)
 class _End:
-    """The same of where rows lead; None where nothing has moved yet."""
+    """The same of where rows lead; None if nothing has moved yet."""
 
     angles_deg: Angles | None
     name: str
@@ -131,7 +131,7 @@ class _Compiler:
         target = None if isinstance(pose, Pose) else self._target(step)
         if here.angles_deg is None:
             raise InputError(
-                f"{step.where}goto: a line begins somewhere, and where the arm stands is not known",
+                f"{step.where}goto: a line needs a known start, and the arm's position is not known here",
                 "give the sequence a start, or put a goto without line before it",
             )
         if target and target.angles_deg == here.angles_deg:
@@ -193,7 +193,7 @@ class _Compiler:
         return _Place(_angles(trajectory(0.0)), f"the start of {motion.name}")
 
     def posture(self, posture: ArmPosture, where: str) -> _Place:
-        """Where the arm stands then; PlanError where it cannot."""
+        """Where the arm is then; PlanError if it cannot."""
         try:
             return _Place(_angles(via_points.posture_deg(self.arm, posture)), posture.name)
         except ArmtempoError as error:
@@ -208,7 +208,7 @@ class _Compiler:
         if isinstance(source, Plan):
             if source.arm != self.arm:
                 raise InputError(
-                    f"{where}run: it was planned for another arm than {self.arm.name!r}", "plan it again"
+                    f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
                 )
             return source.trajectory
         found = planner.plan(self.arm, source, self.progress).trajectory

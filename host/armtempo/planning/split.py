@@ -22,7 +22,7 @@ _ROOM = 0.98
 def at_all_stops(job: Job, via_deg: Array) -> list[Job]:
     """A job for each stretch between stops; ``via_deg``: (n + 1, J), the angles at the via points.
 
-    Raises PlanError where there is no stop.
+    Raises PlanError if there is no stop.
     """
     return _parts(job, via_deg, [stop.via for stop in _stops(job)])
 
@@ -30,7 +30,7 @@ def at_all_stops(job: Job, via_deg: Array) -> list[Job]:
 def at_few_stops(job: Job, via_deg: Array, whole: Trajectory) -> list[Job]:
     """As few jobs as keep within what the board counts, by the times at which ``whole`` passes the stops.
 
-    Raises PlanError where there is no stop, or one stretch by itself is too long.
+    Raises PlanError if there is no stop, or one stretch by itself is too long.
     """
     times = whole.joints[0].via_times_s
     cuts: list[int] = []

@@ -18,7 +18,7 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 
 
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
-    """The motion through via angles (n + 1, J); PlanError where the spline leaves a joint's range."""
+    """The motion through via angles (n + 1, J); PlanError if the spline leaves a joint's range."""
     limits = checks.limits_of(arm)
     points = bspline.fit(via_deg, job.degree)
     checks.check_ranges(arm, points, job.degree)

@@ -56,7 +56,7 @@ class MotionVariables:
 
     @property
     def places(self) -> Array:
-        """Where each variable stands along the motion: (size,)."""
+        """Where each variable is along the motion: (size,)."""
         angles = np.tile(np.arange(self.angles, dtype=float), self.joints)
         return np.concatenate([angles, np.arange(self.differences) + 0.5])
 

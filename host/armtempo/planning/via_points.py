@@ -86,7 +86,7 @@ class _Setup:
         return cls(arm, solver, Ranges(low, high), np.array(solver.home_rad), driven, not solver.refusals)
 
     def moved(self, angles: Array) -> Array:
-        """The posture with the driven joints at ``angles`` and the others at home."""
+        """The posture with the driven joints at ``angles`` and the others at their home angles."""
         return np.where(self.driven, angles, self.home)
 
     def miss(self, target: Pose, angles: Array) -> Miss:
@@ -98,7 +98,7 @@ class _Setup:
 def resolve(arm: Arm, job: Job) -> Resolved:
     """Turn every pose of ``job`` into angles, in order, each nearest to the one before.
 
-    Raises InputError for a via point that is no pose or has the wrong number of angles, PlanError with all
+    Raises InputError for a via point that is not a pose or has the wrong number of angles, PlanError with all
     reasons for a pose that no solution reaches.
     """
     setup = _Setup.of(arm)
@@ -143,7 +143,7 @@ def _led(arm: Arm, job: Job, number: int, before_deg: Array, setup: _Setup) -> A
 def posture_deg(arm: Arm, posture: ArmPosture) -> Array:
     """The driven joints' angles of a named posture, degrees (J,); of the solutions of a pose the one nearest to home.
 
-    They are the ones that ``resolve`` takes. Raises PlanError where the arm cannot stand so.
+    They are the ones that ``resolve`` takes. Raises PlanError if the arm cannot stand so.
     """
     if not isinstance(posture.where, Pose):
         return np.array(posture.where, dtype=float)
@@ -243,7 +243,7 @@ def _needs(setup: _Setup, needed: Array) -> str:
 
 
 def _branch(setup: _Setup, posture: Array, before: Branch | None) -> Branch:
-    """The branch at a via point; where the arm stands between two, it still counts as on the one before."""
+    """The branch at a via point; where the arm is between two, it still counts as on the one before."""
     here = branch_of(setup.solver.geometry, posture)
     return here.after(before) if before else here
 

@@ -54,7 +54,7 @@ def remember_hanging(number: str) -> None:
 class Caller:
     """A connection to the program that has a port; used as a context, or ended by ``close``.
 
-    Raises NoAnswerError where that program hangs, LinkError where it is gone.
+    Raises NoAnswerError if that program hangs, LinkError if it is gone.
     """
 
     def __init__(self, claim: PortClaim) -> None:
@@ -128,7 +128,7 @@ class Caller:
             self._socket.sendall(line)
         except TimeoutError:
             raise NoAnswerError(
-                f"{self.claim.who} has {self.claim.port} and takes no requests", _END
+                f"{self.claim.who} has {self.claim.port} and accepts no requests", _END
             ) from None
         except OSError as error:
             raise self._gone() from error
@@ -148,7 +148,7 @@ class Caller:
 
     def _gone(self) -> LinkError:
         return PortGivenUpError(
-            f"{self.claim.who} has given up {self.claim.port}", "try again: the port is free"
+            f"{self.claim.who} has closed {self.claim.port}", "try again: the port is free"
         )
 
 
@@ -164,7 +164,7 @@ def _connect(claim: PortClaim) -> socket.socket:
         found.connect(address)
     except (TimeoutError, BlockingIOError):
         found.close()
-        raise NoAnswerError(f"{claim.who} has {claim.port} and takes no connection", _END) from None
+        raise NoAnswerError(f"{claim.who} has {claim.port} and accepts no connection", _END) from None
     except OSError as error:
         found.close()
         raise LinkError(f"{claim.who} had {claim.port} and is gone", "try again: the port is free") from error

@@ -40,7 +40,7 @@ class PortClaim(NamedTuple):
     address: str
     """Path of a socket, or a port of localhost."""
     token: str
-    """What a caller must know; "" where the socket's permissions are enough."""
+    """What a caller must know; "" if the socket's permissions are enough."""
     version: int = VERSION
 
     @property
@@ -49,7 +49,7 @@ class PortClaim(NamedTuple):
         return f"'{self.program}' (process {self.pid})"
 
     def write(self) -> None:
-        """Put the claim in place of an earlier one. OSError where that fails."""
+        """Put the claim in place of an earlier one. OSError if that fails."""
         folder()
         for path in self._files():
             before = _read(path)
@@ -64,7 +64,7 @@ class PortClaim(NamedTuple):
         os.replace(aside, path)
 
     def _marker(self, path: Path) -> Path:
-        """Where it stands who has taken the port over from this program, also when that has given it up again."""
+        """Who has taken the port over from this program, also when that has given it up again."""
         return path.with_name(f"{self.number}.taken")
 
     def taken_by(self) -> PortClaim | None:
@@ -95,7 +95,7 @@ class PortClaim(NamedTuple):
 
 
 def new(name: str, port: str, device: str) -> PortClaim:
-    """This program's claim, not yet written. OSError where there is no private folder for it."""
+    """This program's claim, not yet written. OSError if there is no private folder for it."""
     import secrets
 
     number = secrets.token_hex(8)
@@ -121,7 +121,7 @@ def claims() -> Iterator[PortClaim]:
 
 
 def folder() -> Path:
-    """Where claims and sockets are, made where it is missing. OSError where it is not this user's alone."""
+    """Where claims and sockets are, made where it is missing. OSError if it is not this user's alone."""
     place = Path(next(claim_file.folders()))
     place.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not claim_file.is_private(str(place)):
@@ -139,7 +139,7 @@ def program() -> str:
 
 
 def _read(path: Path) -> PortClaim | None:
-    """The claim in a file; None where it is gone, damaged or of another version."""
+    """The claim in a file; None if it is gone, damaged or of another version."""
     try:
         name, port, device, program, pid, number, address, token, version = claim_file.read(str(path))
         return PortClaim(name, port, device, program, int(pid), number, address, token, int(version))

@@ -24,7 +24,7 @@ class LineReader:
     def read(self) -> Message | None:
         """The next message; None at the end of the connection.
 
-        Raises LinkError for what is no message, TimeoutError as the socket's time-out says, OSError where the
+        Raises LinkError for what is no message, TimeoutError as the socket's time-out says, OSError if the
         connection breaks.
         """
         while b"\n" not in self._data:

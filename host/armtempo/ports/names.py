@@ -22,14 +22,14 @@ def is_sim(port: str) -> bool:
 def sim_flash(port: str) -> Path | None:
     """The folder that is the virtual board's flash; None: a new one that goes with the board.
 
-    Raises InputError where the folder is not named.
+    Raises InputError if the folder is not named.
     """
     if port == SIM:
         return None
     if port == SIM + ":":
         raise InputError(
-            f"port '{port}' names no folder",
-            "write sim:FOLDER to keep the flash there, or sim to keep it nowhere",
+            f"port '{port}' has no folder",
+            "write sim:FOLDER to keep the flash there, or sim for a temporary one",
         )
     from pathlib import Path  # here, because a stop does not wait for it
 

@@ -74,7 +74,7 @@ def is_id(value: object) -> bool:
 
 
 def check(request: Message, fields: Fields) -> None:
-    """Raise LinkError where the fields of a request are not as the table says."""
+    """Raise LinkError if the fields of a request are not as the table says."""
     name = request["request"]
     for field, wanted in fields.items():
         if field not in request:

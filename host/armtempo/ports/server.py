@@ -36,7 +36,7 @@ _QUEUE = 1000
 class Server:
     """Listens as the owner of a port, from the making on until ``close``.
 
-    ``handlers``: by the name of a request, which gets only what ``requests`` allows. OSError where nobody can be
+    ``handlers``: by the name of a request, which gets only what ``requests`` allows. OSError if nobody can be
     listened to.
     """
 
@@ -68,7 +68,7 @@ class Server:
                 connection.send(line)
 
     def check(self) -> None:
-        """Raise PortError where another program has taken the port over, because this one did not answer."""
+        """Raise PortError if another program has taken the port over, because this one did not answer."""
         now_s = time.monotonic()
         if self._taken_by is None and now_s - self._checked_s >= _CHECK_S:
             self._checked_s = now_s
@@ -182,7 +182,7 @@ class _Connection:
             return _failed(LinkError("a request without an id", "give a whole number or a short text as id"))
         name = request.get("request")
         if not self._known and name != "hello":
-            return _failed(LinkError("nobody has said hello yet", "say hello with the token first"))
+            return _failed(LinkError("no hello yet", "say hello with the token first"))
         handler = self._handlers.get(name) if isinstance(name, str) else None
         if handler is None:
             return _failed(

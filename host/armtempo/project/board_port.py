@@ -19,7 +19,7 @@ def choose(given: str | None = None, others: bool = False) -> Setting:
     """The port to use, and why it: ``given``, the variable, the project folder, else the one likely board.
 
     ``others``: a port that another program of armtempo has open will do too, if it is the only one; for commands
-    that go through that program. Raises InputError where there is no such port, or more than one.
+    that go through that program. Raises InputError if there is no such port, or more than one.
     """
     found = ProjectSettings().get(PORT, given)
     if found:
@@ -43,6 +43,6 @@ def _unclear(candidates: list[str]) -> InputError:
     seen = (
         f"{len(candidates)} could be meant: {', '.join(candidates)}"
         if candidates
-        else "none is plugged in ('armtempo ports' lists what is there)"
+        else "none is plugged in ('armtempo ports' lists the ports)"
     )
     return nothing_set(PORT, f"which board? {seen}. '--port {SIM}' is a virtual one; for a real one")

@@ -54,7 +54,7 @@ def send(arguments: Sequence[str]) -> None:
 
 
 def take_answer(port: str, now: bool) -> StopAnswer | None:
-    """What ``send`` was answered for this port; None where it has not asked."""
+    """What ``send`` was answered for this port; None if it has not asked."""
     return _answers.pop((names.same_for_all(port), now), None)
 
 

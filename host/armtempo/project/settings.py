@@ -21,9 +21,9 @@ class Setting:
 
     name: str
     value: str
-    """"" where nothing is set."""
+    """"" if nothing is set."""
     source: str
-    """Where it comes from, in words; "" where nothing is set."""
+    """Where it comes from, in words; "" if nothing is set."""
 
     @property
     def path(self) -> Path:

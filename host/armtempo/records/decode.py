@@ -25,7 +25,7 @@ class StepScale(Protocol):
 def trajectory(data: bytes, joints: Sequence[StepScale], name: str, arm: str = "the arm") -> Trajectory:
     """The motion that a record holds, to the rounding of its integers; ``joints`` are the driven ones.
 
-    Raises InputError where the record is damaged or has another number of joints; ``name`` and ``arm`` are
+    Raises InputError if the record is damaged or has another number of joints; ``name`` and ``arm`` are
     what the message calls motion and arm.
     """
     try:

@@ -29,7 +29,7 @@ _TICKS_PER_US = limits.TICK_HZ / 1e6
 def arm_record(arm: Arm) -> bytes:
     """The arm record (layout: ``armtempo_shared.armrecord``).
 
-    Raises InputError where a figure does not fit the board.
+    Raises InputError if a figure does not fit the board.
     """
     joints = [_joint(joint) for joint in arm.driven]
     return armrecord.pack(_head(arm), joints, output_rows.outputs(arm), output_rows.inputs(arm))
@@ -44,7 +44,7 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
     """The motion record (layout: ``armtempo_shared.motion``), tied to the arm by the checksum of its record.
 
     ``brakes``: how long it takes to come to rest and to change its speed; None: it can do neither.
-    Raises InputError where trajectory and arm do not fit each other or the record's number range, PlanError
+    Raises InputError if trajectory and arm do not fit each other or the record's number range, PlanError
     where the board could not hold the numbers.
     """
     if len(trajectory.joints) != len(arm.driven):
@@ -132,7 +132,7 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
     per_step = joint.counts_per_step
     if max(abs(per_step.numerator), per_step.denominator) >= 2**31:
         raise InputError(
-            f"{joint.name}: the ratio of encoder counts to steps is too odd for the board",
+            f"{joint.name}: the board cannot represent the ratio of encoder counts to steps",
             "check gear_ratio, microsteps and counts_per_rev in the arm file",
         )
     following = encoder.following_error_deg * joint.counts_per_deg if encoder else 0.0
@@ -169,7 +169,7 @@ def _switch(where: int | str | None) -> int:
 def _max_rate(joint: DrivenJoint) -> int:
     """The joint's speed limit in steps/s with a little room for rounding.
 
-    Raises InputError where the board cannot step that fast.
+    Raises InputError if the board cannot step that fast.
     """
     rate = joint.limits.speed_deg_s * joint.steps_per_deg
     if rate > limits.MAX_STEP_RATE:

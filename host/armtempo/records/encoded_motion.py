@@ -52,7 +52,7 @@ class EncodedMotion:
 def of_trajectory(trajectory: Trajectory, arm: Arm) -> EncodedMotion:
     """A trajectory of ``arm`` with the times in which it can brake to rest and change its speed.
 
-    Raises InputError or PlanError where the board could not replay it.
+    Raises InputError or PlanError if the board could not replay it.
     """
     brakes = brake_time.of_motion(trajectory, [joint.limits for joint in arm.driven])
     return EncodedMotion(trajectory.name, arm, trajectory, encode.motion_record(trajectory, arm, brakes))
@@ -65,7 +65,7 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
     """
     if name is not None and not re.fullmatch(f"[A-Za-z0-9_-]{{1,{MAX_NAME}}}", name):
         raise InputError(
-            f"{name!r} is no name for the board",
+            f"{name!r} is not a valid name on the board",
             f"take 1 to {MAX_NAME} characters of a-z A-Z 0-9 - _",
         )
     board_name = name or re.sub(r"[^A-Za-z0-9_-]", "-", plan.job.name)[:MAX_NAME]
@@ -74,6 +74,6 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
 
 
 def of_record(name: str, data: bytes, arm: Arm) -> EncodedMotion:
-    """The motion that a record from the board holds; InputError where it is damaged or does not fit the arm."""
+    """The motion that a record from the board holds; InputError if it is damaged or does not fit the arm."""
     trajectory = decode.trajectory(data, arm.driven, name, f"arm {arm.name!r}")
     return EncodedMotion(name, arm, trajectory, data)

@@ -34,7 +34,7 @@ class EncodedSequence:
 
 
 def of_plan(plan: SequencePlan) -> EncodedSequence:
-    """The records of a sequence; InputError or PlanError where the board could not run it."""
+    """The records of a sequence; InputError or PlanError if the board could not run it."""
     motions = tuple(encoded_motion.of_trajectory(leg, plan.arm) for leg in plan.legs)
     keys = [(motion.name, motion.key.crc) for motion in motions]
     data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys, plan.counters)

@@ -28,7 +28,7 @@ def arm_picture(arm: Arm) -> Figure:
     """One field for the home posture from the side and from above, one for each driven joint.
 
     A joint is seen along its axis, from the side where x, or else y, grows to the right. Raises
-    MissingPackageError where matplotlib is not installed.
+    MissingPackageError if matplotlib is not installed.
     """
     count = 2 + len(arm.driven)
     columns = min(_MOST_COLUMNS, (count + 1) // 2 if count > 3 else count)
@@ -132,4 +132,6 @@ def _explain(figure: Figure, arm: Arm) -> None:
         Line2D([], [], color=HOME, linestyle="", marker="o", markerfacecolor="none", label="its axis")
     )
     figure.legend(handles=lines, loc="outside lower center", ncols=5, frameon=False)
-    figure.suptitle(f"{arm.name}: each joint seen along its axis, the others at home; lengths in mm")
+    figure.suptitle(
+        f"{arm.name}: each joint seen along its axis, the others at their home angles; lengths in mm"
+    )

@@ -33,13 +33,13 @@ _COLUMNS = {
 def write(folders: Sequence[Path], path: Path) -> Path:
     """Compare run folders on one page at ``path``; a folder that cannot be read is named there.
 
-    Raises RunFolderError where fewer than two can be read.
+    Raises RunFolderError if fewer than two can be read.
     """
     readable, complaints = _read(folders)
     if len(readable) < 2:
         raise RunFolderError(
-            "fewer than two runs can be compared: " + "; ".join(complaints),
-            "name two runs or more that can be read",
+            "a comparison needs two readable runs: " + "; ".join(complaints),
+            "give two or more runs that can be read",
         )
     replace_text(path, render(readable, complaints))
     return path

@@ -39,7 +39,7 @@ class Evaluation:
 
     @property
     def limits(self) -> list[Limits]:
-        """Their limits; empty where the arm is not known."""
+        """Their limits; empty if the arm is not known."""
         return [joint.limits for joint in self.arm.driven] if self.arm else []
 
     @property
@@ -49,7 +49,7 @@ class Evaluation:
 
     @property
     def limit_checks(self) -> list[list[peaks.LimitCheck]]:
-        """``[joint]``: speed and acceleration beside the limits; empty where the arm is not known."""
+        """``[joint]``: speed and acceleration next to the limits; empty if the arm is not known."""
         if not self.limits:
             return []
         counts = [joint.counts_per_deg for joint in self.run.joints]
@@ -65,19 +65,19 @@ class Evaluation:
 def evaluate(folder: Path) -> Evaluation:
     """Read and analyse a run folder; what is incomplete is listed in ``complaints``.
 
-    Raises RunFolderError where it is not known what was to move, or there is not one sample.
+    Raises RunFolderError if it is not known what was to move, or there is not one sample.
     """
     run = reader.load(folder)
     plan = replayed.plan_of(run)
     trajectory = plan.trajectory if plan else replayed.trajectory_of(run)
     if len(run.joints) != len(trajectory.joints):
         raise RunFolderError(
-            f"{folder}: run.json tells of {len(run.joints)} joints, trajectory.json of {len(trajectory.joints)}",
-            "put the trajectory.json of this run there, or run again",
+            f"{folder}: run.json lists {len(run.joints)} joints, trajectory.json has {len(trajectory.joints)}",
+            "put the trajectory.json has this run there, or run again",
         )
     usable = [repetition for repetition in run.repetitions if len(repetition.time_s)]
     if not usable:
-        raise RunFolderError(f"{folder}: holds no sample", "run it again")
+        raise RunFolderError(f"{folder}: contains no samples", "run it again")
     found = complaints(run)
     arm = plan.arm if plan else _arm(run, found)
     return Evaluation(run, trajectory, arm, plan, analysis.curves(usable, trajectory), tuple(found))

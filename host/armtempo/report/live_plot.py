@@ -18,7 +18,7 @@ _WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 class LivePlot:
     """A window with one plot for each joint.
 
-    Raises MissingPackageError without matplotlib, ArmtempoError where there is no display to open a window on.
+    Raises MissingPackageError without matplotlib, ArmtempoError if there is no display to open a window on.
     """
 
     def __init__(self, trajectory: Trajectory, names: Sequence[str]) -> None:

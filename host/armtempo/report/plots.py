@@ -13,6 +13,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import MissingPackageError
 from armtempo.model.parts import Limits
+from armtempo.planning.torque import MotorTorques
 from armtempo.report.drawing import PAGE_COLOUR
 from armtempo.runs import stretched
 from armtempo.runs.analysis import Curves
@@ -31,7 +32,7 @@ _POINTS = 600
 def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Any]:
     """A figure and its axes, an array (rows, columns).
 
-    Raises MissingPackageError where matplotlib is not installed.
+    Raises MissingPackageError if matplotlib is not installed.
     """
     try:
         from matplotlib.figure import Figure
@@ -94,6 +95,24 @@ def errors(found: Curves, names: Sequence[str]) -> Figure:
             axis.plot(found.times_s, run - found.theory[0, :, joint], color=colour, alpha=0.3, linewidth=0.8)
         axis.plot(found.times_s, found.mean[0, :, joint] - found.theory[0, :, joint], color=colour)
     _label(axes, names, ("error (°)",))
+    return figure
+
+
+def torque(found: MotorTorques, enough: float) -> Figure:
+    """Torque that each motor holds of what it needs, over time; dashed where it loses steps and where it is prudent."""
+    figure, ((axis,),) = new_figure(1, 1, 6.8, 2.8)
+    for joint, name in enumerate(found.joints):
+        colour = COLOURS[joint % len(COLOURS)]
+        axis.plot(found.times_s, found.margin[:, joint], color=colour, label=_shown(name))
+    for value in (1.0, enough):
+        axis.axhline(value, color=LIMIT_COLOUR, linestyle="--", linewidth=0.8)
+    axis.set_yscale("log")
+    axis.set_ylim(0.5, 20.0)
+    axis.set_yticks([0.5, 1, 1.5, 2, 5, 10, 20], ["0.5", "1", "1.5", "2", "5", "10", "20"])
+    axis.minorticks_off()
+    axis.set(xlabel="time (s)", ylabel="torque held of needed")
+    axis.legend(frameon=False, ncols=len(found.joints))
+    theme(axis)
     return figure
 
 

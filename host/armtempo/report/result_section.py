@@ -1,4 +1,4 @@
-"""What a report says of the result: the verdict, measured against planned, steps, peaks beside limits."""
+"""What a report says of the result: the verdict, measured against planned, steps, peaks next to limits."""
 
 from __future__ import annotations
 

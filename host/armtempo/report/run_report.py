@@ -10,15 +10,23 @@ import numpy as np
 
 from armtempo.formats.atomic_file import replace_text
 from armtempo.kinematics import chain
+from armtempo.model.arm import Arm
+from armtempo.planning import torque
 from armtempo.report import arm_figure, drawing, html_page, plan_section, plots, result_section
 from armtempo.report.evaluation import Evaluation, evaluate
 from armtempo.runs.run_folder import COMPLETE
+from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE = "report.html"
-_HEADINGS = {"motion": "The plan", "convergence": "The search", "postures": "The arm along its path"}
+_HEADINGS = {
+    "motion": "The plan",
+    "torque": "Torque",
+    "convergence": "The search",
+    "postures": "The arm along its path",
+}
 _POSTURES = 7
 _PATH_POINTS = 300
 
@@ -26,7 +34,7 @@ _PATH_POINTS = 300
 def write(folder: Path) -> Path:
     """Write report.html and its figures (PNG and SVG) into the run folder; returns the page's path.
 
-    Raises RunFolderError where it is not known what was to move, or there is not one sample.
+    Raises RunFolderError if it is not known what was to move, or there is not one sample.
     """
     found = evaluate(folder)
     drawn = figures(found)
@@ -59,13 +67,24 @@ def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
             plots.convergence(histories),
             "Best fitness after each iteration of the search.",
         )
-    if found.arm and len(found.arm.joints) > 1:
+    return drawn if found.arm is None else drawn | _of_arm(found.arm, trajectory)
+
+
+def _of_arm(arm: Arm, trajectory: Trajectory) -> dict[str, tuple[Figure, str]]:
+    """What the motion asks of the motors, and where it leads the arm."""
+    drawn = {}
+    torques = torque.of_motion(arm, trajectory)
+    if torques and (least := torques.least):
+        drawn["torque"] = (
+            plots.torque(torques, torque.ENOUGH),
+            f"Torque that each motor holds of what the plan needs. {least.joint} has the least to spare: "
+            f"{least.words}. Below 1 steps are lost, from {torque.ENOUGH:g} on it is prudent (dashed).",
+        )
+    if len(arm.joints) > 1:
         times = np.linspace(0.0, trajectory.duration_s, _PATH_POINTS)
         stops = trajectory(np.linspace(0.0, trajectory.duration_s, _POSTURES))
         drawn["postures"] = (
-            arm_figure.postures(
-                chain.chains_mm(found.arm, stops), chain.tool_path_mm(found.arm, trajectory, times)
-            ),
+            arm_figure.postures(chain.chains_mm(arm, stops), chain.tool_path_mm(arm, trajectory, times)),
             f"The arm at {_POSTURES} equally spaced times, from its start to its end, and the path of its tool.",
         )
     return drawn

@@ -30,7 +30,7 @@ _LEGS = {
 
 
 def write(folder: Path) -> Path:
-    """Write report.html into the folder of a recorded sequence; gives the page. RunFolderError where it is none."""
+    """Write report.html into the folder of a recorded sequence; gives the page. RunFolderError if it is none."""
     found = SequenceRun.load(folder)
     path = folder / PAGE
     replace_text(path, render(found))
@@ -38,7 +38,7 @@ def write(folder: Path) -> Path:
 
 
 def verdict_of(folder: Path) -> Verdict:
-    """The verdict on a recorded sequence in its folder; RunFolderError where it is none."""
+    """The verdict on a recorded sequence in its folder; RunFolderError if it is none."""
     found = SequenceRun.load(folder)
     return verdict(found, results(found))
 
@@ -149,7 +149,7 @@ def _course(found: SequenceRun) -> Iterator[tuple[str, str]]:
 
 
 def _cycle_s(found: SequenceRun) -> float | None:
-    """From the first row that was heard of in a cycle to that of the next; None where there are less than three."""
+    """From the first row that was heard of in a cycle to that of the next; None if there are less than three."""
     begins: dict[int, float] = {}
     for row in found.rows:
         begins.setdefault(row.cycle, row.time_s)

@@ -12,7 +12,7 @@ from armtempo.diagnosis.resolution import findings as coarse_steps
 from armtempo.formats.text_table import aligned
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
-from armtempo.planning import checks, path_deviation
+from armtempo.planning import checks, path_deviation, torque
 from armtempo.runs.replayed import JointResult
 
 _HEAD = (
@@ -30,7 +30,7 @@ _FLOORS = {
 
 
 def lines(plan: Plan) -> list[str]:
-    """A plan: motion times beside their lower bounds, extremes beside their limits; one string a line.
+    """A plan: motion times next to their lower bounds, extremes next to their limits; one string a line.
 
     Then what the user should know: notes on the poses, joints whose steps are coarse.
     """
@@ -46,6 +46,10 @@ def lines(plan: Plan) -> list[str]:
     if job.refine == AUTO:
         text.append(f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes")
     text.extend(f"note: {note}" for note in plan.notes)
+    if least := torque.least_margin(plan.arm, plan.trajectory):
+        level = "warning" if least.margin < torque.ENOUGH else "torque"
+        prudent = f"; {torque.ENOUGH:g} is prudent" if least.margin < torque.ENOUGH else ""
+        text.append(f"{level}: {least.joint} has the least to spare: {least.words}{prudent}")
     text.extend(
         f"{each.level.value}: {each.where}: {each.what}; {each.next_step}" for each in coarse_steps(plan.arm)
     )
@@ -145,6 +149,7 @@ def values(plan: Plan) -> dict[str, Any]:
         "record_bytes": record_bytes(plan),
         "joints": [_joint_values(plan, joint) for joint in range(len(plan.extremes))],
         "notes": list(plan.notes),
+        "torque": least._asdict() if (least := torque.least_margin(plan.arm, plan.trajectory)) else None,
     }
 
 

@@ -19,8 +19,8 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
     """Make sure the board has this arm's record; where it is new, positions are unknown.
 
     ``replace``: also in the place of another record; where that differs in limits alone, the board keeps the
-    positions. Raises LinkError where the board has another record and ``replace`` is false, InputError where
-    the arm does not fit the board, which keeps the one it has, BoardError where it is moving.
+    positions. Raises LinkError if the board has another record and ``replace`` is false, InputError where
+    the arm does not fit the board, which keeps the one it has, BoardError if it is moving.
     """
     data = encode.arm_record(arm)
     if client.info.arm_crc == wire.record_crc(data):
@@ -36,24 +36,24 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
 
 def _other_arm(arm: Arm, old: bytes, new: bytes) -> LinkError:
     return LinkError(
-        f"the board is set up for another arm than {arm.name!r} ({arm.source}): "
+        f"the board is set up for a different arm than {arm.name!r} ({arm.source}): "
         f"{arm_difference.describe(old, new)}",
-        f"name that arm's file with --arm; or, if this is the arm on the board "
+        f"give that arm's file with --arm; or, if this is the arm on the board "
         f"now, 'armtempo configure' or --replace-arm sets the board up for it, {arm_difference.consequence(old, new)}",
     )
 
 
 def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:
-    """Declare that the arm stands at ``angles_deg`` (J,), or at the arm file's home posture.
+    """Declare the arm's position: ``angles_deg`` (J,), or the arm file's home posture.
 
-    Raises InputError for a posture that does not fit the arm, BoardError where the board is moving.
+    Raises InputError for a posture that does not fit the arm, BoardError if the board is moving.
     """
     posture = point_to_point.posture(arm.home_deg if angles_deg is None else angles_deg, arm)
     client.home([round(steps) for steps in posture * _steps_per_deg(arm)])
 
 
 def home_unknown(client: Client, arm: Arm) -> None:
-    """Declare that every joint whose position is unknown stands at home."""
+    """Declare that every joint whose position is unknown is at home."""
     status = client.status()
     steps = [
         None if status.joint_known(index) else round(joint.home_deg * joint.steps_per_deg)
@@ -64,19 +64,19 @@ def home_unknown(client: Client, arm: Arm) -> None:
 
 
 def posture_deg(client: Client, arm: Arm) -> Array:
-    """Where the joints are by the steps commanded, degrees (J,); LinkError where that is unknown."""
+    """Where the joints are by the steps commanded, degrees (J,); LinkError if that is unknown."""
     status = client.status()
     unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
     if unknown:
         raise LinkError(
             f"the position of {', '.join(unknown)} is unknown",
-            "bring the arm to its home posture and run 'armtempo home'",
+            "move the arm to its home posture and run 'armtempo home'",
         )
     return np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
 
 
 def is_at(client: Client, arm: Arm, target_deg: Array) -> bool:
-    """Whether every joint is within half a step of ``target_deg`` (J,); LinkError where that is unknown."""
+    """Whether every joint is within half a step of ``target_deg`` (J,); LinkError if that is unknown."""
     return bool(np.all(np.abs(posture_deg(client, arm) - target_deg) * _steps_per_deg(arm) <= 0.5))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -40,6 +40,7 @@ from armtempo.robot import (
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.jog import HeldJog
+from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardInput, BoardOutput
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
@@ -58,7 +59,7 @@ class Board:
     """A board and the arm that it moves; ``connect`` gives one.
 
     Nothing moves before the arm's position is known (``home``), and a motion only starts from where it begins
-    (``goto``). Every method raises BoardError where the board refuses or a fault ends a motion, LinkError
+    (``goto``). Every method raises BoardError if the board refuses or a fault ends a motion, LinkError
     where it cannot be reached. What moves stops at Ctrl-C, and with Stopped at a ``StopRequest``.
     """
 
@@ -71,7 +72,7 @@ class Board:
         self.stops: list[StopRequest] = []
         """The stop requests of what this object has under way."""
         self.last_jog_ends = ""
-        """Why the last jog ended before it was to, in words; "" where it did not."""
+        """Why the last jog ended before it was to, in words; "" if it did not."""
         self._stack = stack or ExitStack()
         self._start = StartPosition(client, port)
         self._last_folder: Path | None = None
@@ -116,8 +117,8 @@ class Board:
         """Make sure that the board has this arm's record; ``arm``: or its file, or the name of one that ships.
 
         ``replace``: put it in the place of another one. All positions are unknown then, unless the two differ
-        in limits alone; stored motions of the other record are refused. Raises LinkError where the board has
-        another record and ``replace`` is false, InputError where a figure of the arm does not fit the board.
+        in limits alone; stored motions of the other record are refused. Raises LinkError if the board has
+        another record and ``replace`` is false, InputError if a figure of the arm does not fit the board.
         """
         arm = Arm.of(arm)
         arm_state.configure(self.client, arm, replace)
@@ -137,7 +138,7 @@ class Board:
 
         ``motion``: a plan or its file. ``name``: on the board, else made of the job's name. ``default``: let the
         board's button start it. ``replace``: also in the place of another motion of this name, which the button then
-        starts no longer. Raises LinkError where there is such a motion, or the board is set up for another arm.
+        starts no longer. Raises LinkError if there is such a motion, or the board is set up for another arm.
         """
         if isinstance(motion, Path | str):
             motion = Plan.load(motion)
@@ -170,7 +171,7 @@ class Board:
     def read(self, name: str, arm: Arm | Path | str | None = None) -> EncodedMotion:
         """A stored motion of ``arm``, else of the arm that the board is set up for, read back.
 
-        InputError where the record is damaged or does not fit the arm.
+        InputError if the record is damaged or does not fit the arm.
         """
         data = self.client.fetch(self._stored_name(name))
         if data.startswith(MAGIC[:KIND_BYTES]):
@@ -181,8 +182,8 @@ class Board:
         """The name, where it can be one: InputError with what is meant else."""
         if not is_name(name):
             raise InputError(
-                f"{name!r} is no name for a motion on the board",
-                f"give the name of one that it keeps: {NAME_RULE}; armtempo.Plan.load reads a file",
+                f"{name!r} is not a valid name of a motion on the board",
+                f"give the name of a stored one: {NAME_RULE}; armtempo.Plan.load reads a file",
             )
         return name
 
@@ -203,7 +204,7 @@ class Board:
     def home(self, arm: Arm | Path | str, where: Where | None = None) -> None:
         """Declare that ``arm`` is at ``where``, or at its home posture; nothing moves.
 
-        Raises InputError for a posture that does not fit the arm, LinkError where the board is set up for another.
+        Raises InputError for a posture that does not fit the arm, LinkError if the board is set up for another.
         """
         arm = Arm.of(arm)
         self.configure(arm)
@@ -212,7 +213,7 @@ class Board:
     def home_to_switches(self, arm: Arm | Path | str, stop: StopRequest | None = None) -> None:
         """Home the joints that have a switch of known angle: to it, off it, slowly to it again, to their home angle.
 
-        Raises InputError where no joint has one, LinkError where a switch does not trip.
+        Raises InputError if no joint has one, LinkError if a switch does not trip.
         """
         arm = Arm.of(arm)
         self.configure(arm)
@@ -221,13 +222,13 @@ class Board:
             homing.home_to_switches(self.client, arm, wanted)
 
     def posture_deg(self) -> Array:
-        """Where the joints are by the steps commanded, degrees (J,); LinkError where that is unknown."""
+        """Where the joints are by the steps commanded, degrees (J,); LinkError if that is unknown."""
         return arm_state.posture_deg(self.client, self._known_arm())
 
     # outputs and inputs
 
     def output(self, name: str) -> BoardOutput:
-        """An output of the arm by its name; InputError where the arm has none of this name or is not known."""
+        """An output of the arm by its name; InputError if the arm has none of this name or is not known."""
         return BoardOutput(self.client, self._configured_arm(), name)
 
     def input(self, name: str) -> BoardInput:
@@ -247,8 +248,8 @@ class Board:
         """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
 
         ``where``: also the file of a plan, for where it begins. ``speed``: part of the quickest, 0.01 to 1.
-        ``line``: the tool goes in a straight line. Raises LinkError where the position is unknown, InputError for a
-        posture that does not fit the arm, PlanError where the arm cannot follow the line.
+        ``line``: the tool goes in a straight line. Raises LinkError if the position is unknown, InputError for a
+        posture that does not fit the arm, PlanError if the arm cannot follow the line.
         """
         permille(speed)  # InputError for one that is none
         arm = self._known_arm()
@@ -271,8 +272,8 @@ class Board:
         ``joint``: number, from 1, or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y", "tool-z", along
         which the tool moves by ``by_mm``, or about which it turns by ``by_deg``; ``speed``: part of the speed limits,
         0.01 to 1. The jog ends at the end of a range, or where the tool cannot go on along the line, at the latest.
-        Gives the posture in degrees, (J,); ``last_jog_ends`` says why it ended early. Raises LinkError where the
-        position is unknown, InputError where nothing can move that way.
+        Gives the posture in degrees, (J,); ``last_jog_ends`` says why it ended early. Raises LinkError if the
+        position is unknown, InputError if nothing can move that way.
         """
         arm = self._known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
@@ -305,7 +306,7 @@ class Board:
         """The arm without its motors' current, to be moved by hand while its encoders are followed, in a ``with``
         statement: its ``angles_deg()``. Hold the arm before: it sinks.
 
-        Raises InputError for a driven joint without an encoder, LinkError where the position is unknown.
+        Raises InputError for a driven joint without an encoder, LinkError if the position is unknown.
         """
         return HandGuided(self.client, self._known_arm())
 
@@ -328,7 +329,7 @@ class Board:
         recorded until then is ``last_run``.
         """
         if repeat < 1:
-            raise InputError(f"a run of {repeat} repetitions is none", "give repeat 1 or more")
+            raise InputError(f"repeat = {repeat} is not allowed", "give 1 or more")
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._stoppable(stop) as wanted:
@@ -352,7 +353,7 @@ class Board:
 
         Its rows and samples are recorded in a new run folder below ``out``; None: nowhere. The arm must be homed and
         be where the sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there.
-        ``watcher`` gets how it stands. What an input that does not come does is the sequence's affair: an end as
+        ``watcher`` gets its state. What an input that does not come does is the sequence's affair: an end as
         ``timed_out``, or BoardError. With Stopped, its end is what ``client.sequence()`` says.
         """
         with self._stoppable(stop) as wanted:
@@ -390,7 +391,7 @@ class Board:
             sequence.arm,
             None if sequence.start_deg is None else np.array(sequence.start_deg),
             f"sequence {sequence.name!r}",
-            "bring it there with 'armtempo goto' and the sequence's file",
+            "move it there with 'armtempo goto' and the sequence's file",
             stop,
         )
         return key
@@ -409,7 +410,7 @@ class Board:
         """The samples that the board keeps of its last run, in a new run folder below ``out``.
 
         ``motion`` is what was run; None: the motion that the button starts. Such a run needs no host; one under
-        way is followed to its end. Raises LinkError where the board keeps no samples.
+        way is followed to its end. Raises LinkError if the board keeps no samples.
         """
         encoded = self._encoded(self._default() if motion is None else motion)
         folder = recording.fetch(self.client, encoded, Path(out), self.port)
@@ -437,25 +438,40 @@ class Board:
 
         The path is unchanged; while it moves, the speed goes over smoothly in the motion's brake time: from a
         ``Watcher``, from another thread than the one that waits in ``run``, or for what the button started.
-        Raises InputError for another fraction, BoardError where the board refuses.
+        Raises InputError for another fraction, BoardError if the board refuses.
         """
         change_speed(self.client, permille(fraction))
 
     def pause(self) -> None:
-        """Let what moves come to rest on its path, to go on with ``resume``; BoardError where nothing moves."""
+        """Let what moves come to rest on its path, to go on with ``resume``; BoardError if nothing moves."""
         change_speed(self.client, 0)
 
     def resume(self) -> None:
-        """Go on along the path at the speed before the pause; BoardError where nothing moves."""
+        """Go on along the path at the speed before the pause; BoardError if nothing moves."""
         change_speed(self.client, RESUME)
 
     def selftest(self, progress: Progress | None = None) -> SelfTest:
         """The board measures itself with its drivers off; ``progress`` tells how far it is.
 
-        The board is reset at the end, so its positions are unknown. Raises LinkError where the drivers are on,
+        The board is reset at the end, so its positions are unknown. Raises LinkError if the drivers are on,
         something moves, or the program is not a part of the board's firmware; nothing was done then.
         """
         return selftest.run(self.client, progress)
+
+    def motor_test(
+        self, arm: Arm | Path | str, ask: Callable[[str], bool], tell: Callable[[str], object] = print
+    ) -> SelfTest:
+        """Try directions, encoders, switches and E-stop: each joint moves up to a degree there and back, slowly.
+
+        ``ask`` puts a question to the person at the arm, first one that names what will move, and gives True for
+        yes; ``tell`` says what to press. Lines to correct in the arm file are in the result's ``data["arm_file"]``.
+        Raises ArmtempoError without a yes, LinkError where a position is unknown; nothing moved then.
+        """
+        arm = Arm.of(arm)
+        self.configure(arm)
+        self._start.home_virtual_arm(arm)
+        with self._stoppable(None) as stop:
+            return MotorTest(self.client, arm, stop, ask, tell).run()
 
     def clear(self) -> None:
         """Clear a fault; BoardError while its cause is still there."""
@@ -473,7 +489,7 @@ class Board:
 
     def _known_arm(self) -> Arm:
         if self.arm is None:
-            raise InputError("no arm is known to move", "say which with home(arm) or configure(arm)")
+            raise InputError("no arm is set", "set it with home(arm) or configure(arm)")
         return self.arm
 
     def _configured_arm(self) -> Arm:
@@ -496,12 +512,12 @@ class Board:
             if entry.default:
                 return entry.name
         raise InputError(
-            "no motion was named, and no stored motion is set as the one that the board's button starts",
-            "say which motion's samples these are: armtempo fetch NAME; 'armtempo list' shows the names",
+            "no motion given, and no default motion is set for the board's button",
+            "give the motion's name: armtempo fetch NAME; 'armtempo list' shows the names",
         )
 
     def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
         """Store the motion; bring a virtual arm to its start, and refuse where a real one is elsewhere."""
         stored_motion.store(self.client, motion.name, motion.data)
-        advice = "bring it there with 'armtempo goto'"
+        advice = "move it there with 'armtempo goto'"
         self._start.take(motion.arm, motion.start_deg, repr(motion.name), advice, stop)

@@ -37,7 +37,7 @@ def _program(state: BoardState) -> Finding:
     text = f"{state.program_crc:08x}, protocol {state.protocol}"
     if state.program_current:
         return good("program", f"{text}, as installed here")
-    return error("program", f"{text}, another than the one installed here", "armtempo deploy")
+    return error("program", f"{text}, which differs from the one installed here", "armtempo deploy")
 
 
 def _room(state: BoardState) -> Finding:

@@ -29,7 +29,7 @@ class JointState:
     steps: int
     """Steps commanded."""
     angle_deg: float | None
-    """The same in degrees; None where the arm is not known."""
+    """The same in degrees; None if the arm is not known."""
     counts: int
     """Of the encoder, 0 without one."""
     encoder_deg: float | None
@@ -38,7 +38,7 @@ class JointState:
 
 @dataclass(frozen=True)
 class SequenceStand:
-    """Where a sequence stands, or where the last one since the board's start ended."""
+    """How far a sequence is, or where the last one since the board's start ended."""
 
     name: str
     ending: str
@@ -72,9 +72,9 @@ class BoardState:
     """Whether its program is the one installed here."""
     protocol: int
     arm_crc: int
-    """Checksum of its arm record; 0 where it has none."""
+    """Checksum of its arm record; 0 if it has none."""
     arm: str
-    """Name of the arm whose record that is; "" where it is not known."""
+    """Name of the arm whose record that is; "" if it is not known."""
     arm_source: str
     """File of that arm."""
     free_flash: int
@@ -83,10 +83,12 @@ class BoardState:
     """Steps/s of one joint."""
     max_rate_sum: int
     """Steps/s of all joints together."""
+    rates_measured: bool
+    """Whether its self-test measured them; else they are estimated."""
     room: str
     """What engines its memory has room for, in words."""
     arm_problem: str
-    """Why a stored arm record is not used; "" where it is, or there is none."""
+    """Why a stored arm record is not used; "" if it is, or there is none."""
     state: str
     """One of ``armtempo_shared.messages.STATES``."""
     moving: bool
@@ -102,9 +104,9 @@ class BoardState:
     samples_lost: int
     joints: tuple[JointState, ...]
     sequence: SequenceStand | None
-    """None where none was started since the board's start."""
+    """None if none was started since the board's start."""
     tool: ToolPlace | None = None
-    """None where the arm or a position is not known."""
+    """None if the arm or a position is not known."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -112,7 +114,7 @@ class BoardState:
 
     @classmethod
     def of_json(cls, values: Mapping[str, Any]) -> BoardState:
-        """What ``to_json`` gave; LinkError where another version of armtempo gave it."""
+        """What ``to_json`` gave; LinkError if another version of armtempo gave it."""
         try:
             joints = tuple(JointState(**joint) for joint in values["joints"])
             stand = SequenceStand(**values["sequence"]) if values["sequence"] else None
@@ -172,6 +174,7 @@ def read(client: Client, port: str) -> BoardState:
         free_heap=info.free_heap,
         max_rate=info.max_rate,
         max_rate_sum=info.max_rate_sum,
+        rates_measured=info.rates_measured,
         room=engine_room.Room.of_board(info).words(),
         arm_problem=_arm_problem(info),
         state=status.state,

@@ -24,14 +24,14 @@ class HandGuided:
     """An arm without its motors' current, as a context; in the end it has it again, and its position by the encoders.
 
     The caller holds the arm: it sinks under its weight. Raises InputError for a driven joint without an
-    encoder, LinkError where the position is unknown before.
+    encoder, LinkError if the position is unknown before.
     """
 
     def __init__(self, client: Client, arm: Arm) -> None:
         blind = [joint.name for joint in arm.driven if joint.encoder is None]
         if blind:
             raise InputError(
-                f"{', '.join(blind)}: no encoder, so nobody would know where the arm was moved by hand",
+                f"{', '.join(blind)}: no encoder, so moves by hand cannot be measured",
                 "teach with the keys instead: armtempo teach without --by-hand",
             )
         arm_state.posture_deg(client, arm)
@@ -59,7 +59,7 @@ class HandGuided:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give the current back and declare where the arm is; LinkError where a joint is beyond its range."""
+        """Give the current back and declare where the arm is; LinkError if a joint is beyond its range."""
         self._client.drivers(True)
         time.sleep(SETTLES_S)
         scale = np.array([joint.steps_per_deg for joint in self._arm.driven])
@@ -70,5 +70,5 @@ class HandGuided:
             if value is None:
                 raise LinkError(
                     f"the arm was left beyond a range ({error.problem}), so its position is unknown",
-                    "bring it within its ranges by hand and run 'armtempo home'",
+                    "move it within its ranges by hand and run 'armtempo home'",
                 ) from error

@@ -39,8 +39,8 @@ def connect(
     the logger "armtempo" does. Until the board is closed other programs on this machine can look in and stop it
     (``attach``). A port in use is tried again for a few seconds: many programs only ask something.
 
-    Raises InputError where there is no such port, or none is named and not exactly one board is there;
-    PortInUseError where another program keeps it, LinkError where it is silent or runs something else.
+    Raises InputError if there is no such port, or none is named and not exactly one board is there;
+    PortInUseError if another program keeps it, LinkError if it is silent or runs something else.
     """
     moved = None if arm is None else Arm.of(arm)
     chosen = board_port.choose(port)
@@ -62,7 +62,7 @@ def connect_now(
     any_program: bool = False,
     tell: Callable[[str], object] = LOG.warning,
 ) -> Board:
-    """``connect`` to the port that is named, without waiting; PortInUseError where another program has it."""
+    """``connect`` to the port that is named, without waiting; PortInUseError if another program has it."""
     stack = ExitStack()
     taps = _Taps(sink)
     log = Path(log_traffic) if log_traffic else None

@@ -43,7 +43,7 @@ class Room:
         return [f"{joints} x {rate} steps/s" for joints, rate in found if rate]
 
     def _highest_rate(self, joints: int) -> int:
-        """The highest step rate, in whole 1000 steps/s, at which that many joints fit; 0 where none do."""
+        """The highest step rate, in whole 1000 steps/s, at which that many joints fit; 0 if none do."""
         for rate in range(limits.MAX_STEP_RATE_SUM // joints // 1000, 0, -1):
             if self.holds([1000 * rate] * joints):
                 return 1000 * rate

@@ -42,8 +42,8 @@ def go_to(
 ) -> None:
     """Move straight to a posture (J,); nothing happens if it is there.
 
-    Raises LinkError where the position is unknown, BoardError where the board refuses or a fault ends the move,
-    PlanError where the arm would leave its room, or the tool cannot go there in a line.
+    Raises LinkError if the position is unknown, BoardError if the board refuses or a fault ends the move,
+    PlanError if the arm would leave its room, or the tool cannot go there in a line.
     """
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
@@ -74,7 +74,7 @@ def go_back(client: Client, motion: EncodedMotion, stop: StopRequest) -> None:
 def move_once(
     client: Client, motion: EncodedMotion, stop: StopRequest, progress: Progress | None = None
 ) -> None:
-    """Store a motion, run it and remove it; BoardError where a fault ends it."""
+    """Store a motion, run it and remove it; BoardError if a fault ends it."""
     key = store(client, motion.name, motion.data)
     try:
         raise_fault(replay(client, key, stop, shown(progress)))

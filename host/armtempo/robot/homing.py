@@ -50,8 +50,8 @@ class _Switch:
 def home_to_switches(client: Client, arm: Arm, stop: StopRequest) -> None:
     """Home every joint that has a switch of known angle, then bring it to its home posture; the others stay.
 
-    In the order of ``arm.homing``. Raises InputError where no joint has one, LinkError where a switch does not trip,
-    BoardError where the board refuses or a fault ends it, Stopped after a stop request.
+    In the order of ``arm.homing``. Raises InputError if no joint has one, LinkError if a switch does not trip,
+    BoardError if the board refuses or a fault ends it, Stopped after a stop request.
     """
     groups = _groups(arm)
     if not groups:

@@ -43,14 +43,14 @@ def rest_s(motion: JogMotion, told: bool = False) -> float:
 
 
 def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog_motion.SPEED) -> JogMotion:
-    """The jog from where the arm stands; LinkError where that is unknown, else errors as of ``jog_motion.plan``."""
+    """The jog from where the arm is; LinkError if that is unknown, else errors as of ``jog_motion.plan``."""
     return jog_motion.plan(NAME, arm, arm_state.posture_deg(client, arm).tolist(), move, speed)
 
 
 def step(client: Client, arm: Arm, move: JogMove, speed: float, stop: StopRequest) -> JogMotion:
     """Move by so much, or to the end of the range, and wait for it.
 
-    BoardError where the board refuses or a fault ends it; the rest as ``plan``.
+    BoardError if the board refuses or a fault ends it; the rest as ``plan``.
     """
     motion = plan(client, arm, move, speed)
     goto.move_once(client, _encoded(motion, arm), stop)
@@ -83,7 +83,7 @@ class HeldJog:
         self._reopen: Callable[[], Transport] | None = None
 
     def __enter__(self) -> Self:
-        """Upload and start it; BoardError where the board refuses."""
+        """Upload and start it; BoardError if the board refuses."""
         client = self._client
         client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
@@ -118,7 +118,7 @@ class HeldJog:
     def hold(self, seconds: float = 0.05) -> bool:
         """Hold it for so long, looking at what the board says; False once it has ended.
 
-        Raises LinkError where the board cannot be reached any more: it brakes by itself then.
+        Raises LinkError if the board cannot be reached any more: it brakes by itself then.
         """
         session = self._client.session
         until_s = session.clock() + seconds
@@ -152,7 +152,7 @@ class HeldJog:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Brake, and wait for rest; BoardError where a fault ended it."""
+        """Brake, and wait for rest; BoardError if a fault ended it."""
         try:
             self._rest()
         except LinkError:

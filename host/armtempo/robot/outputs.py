@@ -24,7 +24,7 @@ class Way(Protocol):
 
 
 class BoardOutput:
-    """One output; ``Board.output`` gives it. Every method raises BoardError where the board refuses."""
+    """One output; ``Board.output`` gives it. Every method raises BoardError if the board refuses."""
 
     def __init__(self, way: Way, arm: Arm, name: str) -> None:
         self._way = way
@@ -51,7 +51,7 @@ class BoardOutput:
 
     @property
     def state(self) -> str:
-        """The state that it is in, by its name; "" where its value is none of them."""
+        """The state that it is in, by its name; "" if its value is none of them."""
         return self.output.state(self.raw)
 
 
@@ -69,7 +69,7 @@ class BoardInput:
         return self._way.levels().active(self._number)
 
     def wait(self, active: bool = True, timeout_s: float | None = None) -> None:
-        """Return when it is active, or not; LinkError where that does not come within ``timeout_s``."""
+        """Return when it is active, or not; LinkError if that does not come within ``timeout_s``."""
         limit_s = None if timeout_s is None else time.monotonic() + timeout_s
         while self.read() != active:
             if limit_s is not None and time.monotonic() > limit_s:

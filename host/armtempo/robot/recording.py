@@ -127,7 +127,7 @@ def _recorded(
 def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> RunFolder:
     """The samples that the board keeps of its last run, one of ``motion``, in a new run folder.
 
-    A run under way is followed to its end. Raises LinkError where the board keeps no samples.
+    A run under way is followed to its end. Raises LinkError if the board keeps no samples.
     """
     status = client.status()
     if not status.run or not (status.moving or status.samples_kept):

@@ -27,7 +27,7 @@ class Run:
 
     @classmethod
     def load(cls, path: Path | str) -> Run:
-        """The run in a folder, whole or cut short; RunFolderError where it is none or contradicts itself."""
+        """The run in a folder, whole or cut short; RunFolderError if it is none or contradicts itself."""
         return cls(reader.load(Path(path)))
 
     def __repr__(self) -> str:
@@ -76,14 +76,14 @@ class Run:
 
     @cached_property
     def plan(self) -> Plan | None:
-        """The plan that was run; None where it is not known, as with a motion that only the board had."""
+        """The plan that was run; None if it is not known, as with a motion that only the board had."""
         return replayed.plan_of(self._content)
 
     @cached_property
     def trajectory(self) -> Trajectory:
         """The motion that was run: as planned, or as the board's record has it.
 
-        Raises RunFolderError where neither can be read.
+        Raises RunFolderError if neither can be read.
         """
         return self.plan.trajectory if self.plan is not None else replayed.trajectory_of(self._content)
 
@@ -119,13 +119,13 @@ class Run:
 
     @property
     def results(self) -> tuple[JointResult, ...]:
-        """How each joint ended the last repetition; empty where it is not known how that ended."""
+        """How each joint ended the last repetition; empty if it is not known how that ended."""
         return results(self._content, self.trajectory)
 
     def report(self) -> Path:
         """Write report.html and its figures into the run folder; gives the page.
 
-        Raises RunFolderError where it is not known what was to move or there is no sample, MissingPackageError without
+        Raises RunFolderError if it is not known what was to move or there is no sample, MissingPackageError without
         matplotlib.
         """
         return run_report.write(self.path)

@@ -64,7 +64,7 @@ def of_plan(plan: SequencePlan) -> SequenceContent:
 
 
 def fetched(client: Client, name: str, arm: Arm) -> SequenceContent:
-    """Of one that the board keeps; InputError where its record is damaged or of another version."""
+    """Of one that the board keeps; InputError if its record is damaged or of another version."""
     try:
         record = SequenceData(client.fetch(name))
     except SequenceError as error:

@@ -21,9 +21,9 @@ from armtempo.robot.sequence_recording import Recorder
 from armtempo.robot.stop_request import StopRequest
 
 LOOK_S = 0.1
-"""How often the board is asked where it stands."""
+"""How often the board is asked where it is."""
 SequenceWatcher = Callable[[SequenceState], object]
-"""Gets how the sequence stands, each time it stands otherwise."""
+"""Gets the state of the sequence, each time it changes."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def store(
 ) -> MotionKey:
     """Store a sequence: its motions first, itself last, so that it is whole or is not there.
 
-    Motions of an earlier sequence of this name that nobody needs any more are removed. Raises LinkError where the
+    Motions of an earlier sequence of this name that nobody needs any more are removed. Raises LinkError if the
     board keeps something else under one of the names, unless ``replace``.
     """
     client.need("sequences", f"sequence {encoded.plan.name!r}")
@@ -55,7 +55,7 @@ def store(
             entry = kept.get(one.name)
             if entry and entry.crc not in (0, one.crc, legs.get(one.name)):
                 raise LinkError(
-                    f"the board keeps something else as {one.name!r} (checksum {entry.crc:08x})",
+                    f"the board has something else as {one.name!r} (checksum {entry.crc:08x})",
                     "replace it with --force, or give the sequence another name",
                 )
     whole, done = sum(len(one.data) for one in records), 0
@@ -90,8 +90,8 @@ def run(
     """Start a stored sequence and follow it to its end; a stop request makes the board brake and end it.
 
     ``recorder`` gets the board's events and the end. A board that cannot be reached continues by itself; the host tries
-    to reconnect for RECONNECT_S. Raises BoardError where the board refuses to start or a fault ends the sequence,
-    LinkError where it cannot be reached any more.
+    to reconnect for RECONNECT_S. Raises BoardError if the board refuses to start or a fault ends the sequence,
+    LinkError if it cannot be reached any more.
     """
     client.session.stopping = lambda: stop.wanted
     stop.wake = client.session.wake
@@ -125,8 +125,8 @@ def _follow(
             if state.name != name or state.ending == "none":
                 last = f"; it was last heard of {where(before)}" if before and before.name == name else ""
                 raise OtherBoardError(
-                    f"the board has started anew during the sequence: positions are unknown{last}",
-                    "bring the arm to its home posture and run 'armtempo home'",
+                    f"the board has restarted during the sequence: positions are unknown{last}",
+                    "move the arm to its home posture and run 'armtempo home'",
                 )
             before = state
             _take_events(client, recorder)

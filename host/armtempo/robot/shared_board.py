@@ -28,8 +28,8 @@ _LOOK_S = 0.05
 class SharedBoard:
     """The board on a port that another program has; ``attach`` gives one. Used as a context, or closed.
 
-    Every method raises NoAnswerError where that program does not answer, LinkError where it has given up the
-    port, BoardError where the board refuses.
+    Every method raises NoAnswerError if that program does not answer, LinkError if it has given up the
+    port, BoardError if the board refuses.
     """
 
     def __init__(self, caller: Caller) -> None:
@@ -55,11 +55,11 @@ class SharedBoard:
         self._caller.ask("speed", ANSWER_S, rate=permille(fraction))
 
     def pause(self) -> None:
-        """Let what moves come to rest on its path, to go on with ``resume``; BoardError where nothing moves."""
+        """Let what moves come to rest on its path, to go on with ``resume``; BoardError if nothing moves."""
         self._caller.ask("speed", ANSWER_S, rate=0)
 
     def resume(self) -> None:
-        """Go on along the path at the speed before the pause; BoardError where nothing moves."""
+        """Go on along the path at the speed before the pause; BoardError if nothing moves."""
         self._caller.ask("speed", ANSWER_S, rate=RESUME)
 
     def set_output(self, number: int, value: int) -> None:
@@ -105,7 +105,7 @@ class SharedBoard:
 
 
 def find(port: str) -> SharedBoard | None:
-    """The board on a port that another program has and answers for; None where there is no such program."""
+    """The board on a port that another program has and answers for; None if there is no such program."""
     name = names.same_for_all(port)
     found = claim.find(name, port) if name else None
     if found is None:
@@ -119,7 +119,7 @@ def find(port: str) -> SharedBoard | None:
 def attach(port: str | None = None) -> SharedBoard:
     """The board on a port that another program has, to look in or stop it.
 
-    ``port``: as for ``connect``; where none is named, also the only one that is open. Raises LinkError where no
+    ``port``: as for ``connect``; where none is named, also the only one that is open. Raises LinkError if no
     program has it, or the one that has it hangs.
     """
     from armtempo.project import board_port

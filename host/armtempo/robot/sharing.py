@@ -54,7 +54,7 @@ class Sharing:
         self._closed = Flag()
 
     def open(self, port: str) -> None:
-        """Listen; OSError where that cannot be. A virtual board that only this program can reach is not shared."""
+        """Listen; OSError if that cannot be. A virtual board that only this program can reach is not shared."""
         name = names.same_for_all(port)
         if not name:
             return

@@ -25,7 +25,7 @@ def permille(fraction: float) -> int:
 def change_speed(client: Client, rate: int) -> None:
     """Let what moves go on at ``rate`` (0: pause, RESUME: as before it), and what this program starts later too.
 
-    Raises BoardError where nothing moves, and where the board refuses.
+    Raises BoardError if nothing moves, and where the board refuses.
     """
     client.speed(rate)
     if rate not in (0, RESUME):

@@ -23,7 +23,7 @@ class StartPosition:
     """Whether this arm has been moved or homed through this object, so that nothing is assumed of its position."""
 
     def home_virtual_arm(self, arm: Arm) -> None:
-        """A virtual arm that has not moved yet stands at home: nobody needs to look."""
+        """A virtual arm that has not moved yet is at home: nobody needs to look."""
         if is_sim(self.port) and not self.moved:
             arm_state.home_unknown(self.client, arm)
         self.moved = True
@@ -38,4 +38,4 @@ class StartPosition:
             if start_deg is not None:
                 goto.go_to(self.client, arm, start_deg, stop)
         elif start_deg is not None and not arm_state.is_at(self.client, arm, start_deg):
-            raise LinkError(f"the arm does not stand where {name} begins", advice)
+            raise LinkError(f"the arm is not at the start of {name}", advice)

@@ -37,7 +37,7 @@ def store(
 ) -> MotionKey:
     """Upload a motion record under ``name``, unless the board has just this one already.
 
-    Raises LinkError where the board keeps another motion under this name, unless ``replace``, or the name or what
+    Raises LinkError if the board keeps another motion under this name, unless ``replace``, or the name or what
     stands there is worth nothing: temporary or damaged.
     """
     key = MotionKey(name, wire.record_crc(data))
@@ -52,7 +52,7 @@ def store(
     ):
         button = ", which its button starts" if found.default else ""
         raise LinkError(
-            f"the board keeps another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
+            f"the board has another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
             "replace it with --force, or store this one under another name with 'armtempo upload --name'",
         )
     client.upload(name, data, progress)
@@ -68,7 +68,7 @@ def replay(
 ) -> RunEnd:
     """Start a stored motion and follow it to its end; a stop request makes the board brake.
 
-    Whatever fails here stops the board. Raises BoardError where the board refuses to start, LinkError where it
+    Whatever fails here stops the board. Raises BoardError if the board refuses to start, LinkError if it
     cannot be reached any more, Stopped where the stop was asked for before the start.
     """
     client.session.stopping = lambda: stop.wanted
@@ -81,7 +81,7 @@ def replay(
         return _follow(client, follower, Brake(client, stop), lambda sample: sink(sample, motion_s))
     except OtherBoardError as error:
         raise LinkError(
-            f"{error.problem}; what came after the last sample cannot be known",
+            f"{error.problem}; what followed the last sample is not known",
             f"{error.hint}",
         ) from error
 
@@ -111,8 +111,8 @@ def _stop_after(client: Client, error: BaseException) -> None:
     if isinstance(error, BoardError) and error.code == wire.ERROR_CODES["no_session"]:
         raise LinkError(
             (
-                "the board started anew during the motion: where the arm stands and what came after the last "
-                "sample cannot be known"
+                "the board restarted during the motion: the arm's position, and what followed the last sample, are "
+                "not known"
             ),
             "find the cause, then 'armtempo home'",
         ) from error
@@ -154,7 +154,7 @@ def _does_not_stop() -> None:
 
 
 def send_stop(client: Client, now: bool = False) -> bool:
-    """Tell the board to brake along the path, or to freeze; False where nothing moves, and nothing happens."""
+    """Tell the board to brake along the path, or to freeze; False if nothing moves, and nothing happens."""
     try:
         client.stop(now)
         return True
@@ -175,7 +175,7 @@ def request_stop(client: Client, stops: Iterable[StopRequest], now: bool, by: st
         if not mine:
             raise NoAnswerError(
                 "the board does not answer the program that has its port",
-                "it is told to stop as soon as it does; if that takes too long, switch off the motors' power",
+                "a stop is sent as soon as it does; if that takes too long, switch off the motors' power",
             )
         return send_stop(client, now)
 

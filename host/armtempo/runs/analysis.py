@@ -28,7 +28,7 @@ EDGE_S = 1.0
 class Curves:
     """Angle, speed and acceleration on the common time grid.
 
-    ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN where samples are missing; ``mean``,
+    ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN if samples are missing; ``mean``,
     ``sem`` (standard error of the mean; NaN with one repetition), ``theory``, and ``shown``, what the same
     differentiation shows of theory's angles, each (3, K, J). Deviations are taken from ``shown``, so that
     they show the arm's errors and not those of the differentiation. ``measured`` (J,): whether the joint has an
@@ -58,7 +58,7 @@ def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Cur
     """Mean, scatter and theory of the repetitions of one trajectory.
 
     Those that ran at another speed than the one that went furthest are left out; theory is the plan at that speed.
-    Raises ValueError where there is no sample at all.
+    Raises ValueError if there is no sample at all.
     """
     count = max((_grid_size(repetition) for repetition in repetitions), default=0)
     if count == 0:
@@ -139,7 +139,7 @@ def _grid_size(repetition: RepetitionData) -> int:
 
 
 def _on_grid(repetition: RepetitionData, count: int, measured: NDArray[np.bool_]) -> Array:
-    """Angles (count, J), measured or else as commanded; NaN where a sample is missing."""
+    """Angles (count, J), measured or else as commanded; NaN if a sample is missing."""
     index = _indices(repetition)
     angles = np.where(measured, repetition.angle_deg, repetition.commanded_deg)
     grid = np.full((count, angles.shape[1]), np.nan)

@@ -28,7 +28,7 @@ def weights(order: int, at: int, window: int = WINDOW, degree: int = DEGREE) -> 
 def derivative(values: Array, step_s: float, order: int, window: int = WINDOW) -> Array:
     """Derivative of the given order (0: the fit itself) of values (M, ...) sampled every ``step_s``; same shape.
 
-    With fewer than ``window`` samples, it shrinks to what is there; NaN where even DEGREE does not fit.
+    With fewer than ``window`` samples, it shrinks to what exists; NaN if even DEGREE does not fit.
     """
     count = len(values)
     window = min(window, count)

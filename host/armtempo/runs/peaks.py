@@ -25,7 +25,7 @@ _PEAK_STEP_S = 0.01
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """A measured peak beside its limit; ``sigma`` is the peak's standard uncertainty.
+    """A measured peak next to its limit; ``sigma`` is the peak's standard uncertainty.
 
     NaN for a joint without an encoder.
     """
@@ -50,7 +50,7 @@ class LimitCheck:
 def limit_checks(
     found: Curves, trajectory: Trajectory, limits: Sequence[Limits], resolutions_deg: Sequence[float]
 ) -> list[list[LimitCheck]]:
-    """``[joint]``: speed and acceleration peaks of the mean curve beside the limits.
+    """``[joint]``: speed and acceleration peaks of the mean curve next to the limits.
 
     The peak of a noisy derivative is too high. So theory, which is known exactly, gives the fast part, and only
     the deviation from it, which is slow, is differentiated, over PEAK_WINDOW samples: their sum has its peak where
@@ -88,7 +88,7 @@ def _scatter(residual: Array) -> Array:
 
 
 def _interpolated(values: Array, times_s: Array) -> Array:
-    """Values (K,) of the sample grid at other times (T,); NaN beside a gap, where a one-sided window is noisier."""
+    """Values (K,) of the sample grid at other times (T,); NaN next to a gap, where a one-sided window is noisier."""
     missing = np.isnan(values)
     if missing.all():
         return np.full(len(times_s), np.nan)
@@ -99,6 +99,6 @@ def _interpolated(values: Array, times_s: Array) -> Array:
 
 
 def _peak(values: Array) -> float:
-    """Largest magnitude of the measured values; NaN where there are none."""
+    """Largest magnitude of the measured values; NaN if there are none."""
     known = np.abs(values[~np.isnan(values)])
     return float(known.max()) if known.size else np.nan

@@ -66,7 +66,7 @@ class RunData:
 
 
 def load(path: Path) -> RunData:
-    """A run folder, whole or cut short; RunFolderError where it is none or contradicts itself.
+    """A run folder, whole or cut short; RunFolderError if it is none or contradicts itself.
 
     A repetition whose file is missing or damaged is there without samples and says why in ``problem``.
     """
@@ -141,7 +141,7 @@ def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Repetiti
 def parsed(
     path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]
 ) -> RepetitionData:
-    """The samples in the rows of a file; ValueError where a value is missing, no number, or impossible."""
+    """The samples in the rows of a file; ValueError if a value is missing, no number, or impossible."""
     table = {name: [row[name] or "" for row in rows] for name in (rows[0] if rows else ())}
 
     def column(name: str, largest: float) -> Array:
@@ -149,7 +149,7 @@ def parsed(
             raise ValueError(f"column {name} is missing")
         values = np.array(table.get(name, []), dtype=float)
         if not np.all(np.abs(values) <= largest):
-            raise ValueError(f"column {name} holds what no run can give")
+            raise ValueError(f"column {name} has values that no run can have")
         return values
 
     def joint_columns(name: str) -> Array:

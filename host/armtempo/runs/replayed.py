@@ -16,21 +16,21 @@ from armtempo.splines.trajectory import Trajectory
 
 
 def plan_of(run: RunData) -> Plan | None:
-    """The plan; None where only the board had the motion. InputError where its file is damaged."""
+    """The plan; None if only the board had the motion. InputError if its file is damaged."""
     return Plan.load(run.trajectory_path) if run.trajectory_path else None
 
 
 def trajectory_of(run: RunData) -> Trajectory:
     """The motion as the board's record has it, to the rounding of its integers.
 
-    Raises RunFolderError where that is not there or not whole.
+    Raises RunFolderError if that is not there or not whole.
     """
     path = run.path / MOTION
     try:
         return decode.trajectory(path.read_bytes(), run.joints, str(run.meta["name"]))
     except OSError as error:
         raise RunFolderError(
-            f"{run.path}: neither a plan nor {MOTION} can be read ({why(error)}), so what was to move is not known",
+            f"{run.path}: neither a plan nor {MOTION} can be read ({why(error)}), so the planned motion is not known",
             "restore one of them from a copy, or run again",
         ) from error
     except InputError as error:
@@ -38,7 +38,7 @@ def trajectory_of(run: RunData) -> Trajectory:
 
 
 def arm_of(run: RunData) -> Arm | None:
-    """The arm of a motion without a plan; None where the folder does not say. InputError where it is damaged."""
+    """The arm of a motion without a plan; None if the folder does not say. InputError if it is damaged."""
     path = run.path / ARM
     return arm_json.load(path) if path.is_file() else None
 
@@ -57,7 +57,7 @@ class JointResult:
 
 
 def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
-    """The joints of the last repetition; empty where run.json does not say how that ended."""
+    """The joints of the last repetition; empty if run.json does not say how that ended."""
     last = run.entries[-1] if run.entries else None
     steps, counts = (last.commanded_steps, last.counts) if last else ((), ())
     start_deg, end_deg = trajectory(0.0), trajectory(trajectory.duration_s)

@@ -139,7 +139,7 @@ class RunFolder:
         write_meta(self.path, meta)
 
     def write_motion(self, data: bytes) -> None:
-        """Keep the record that the board replays; RunFolderError where it cannot be written."""
+        """Keep the record that the board replays; RunFolderError if it cannot be written."""
         with writing(self.path / MOTION):
             (self.path / MOTION).write_bytes(data)
 
@@ -164,7 +164,7 @@ class SampleFile:
         self._line(list(columns(folder.joints)))
 
     def append(self, sample: Sample) -> None:
-        """Add one sample; RunFolderError where it cannot be written."""
+        """Add one sample; RunFolderError if it cannot be written."""
         self._line(row(sample, self._folder.joints))
         self.repetition.samples += 1
 
@@ -188,7 +188,7 @@ class SampleFile:
 
 
 def new_folder(parent: Path, name: str) -> Path:
-    """A fresh folder ``parent/name-001`` (or the next free number); InputError where none can be made."""
+    """A fresh folder ``parent/name-001`` (or the next free number); InputError if none can be made."""
     try:
         for number in range(1, 10_000):
             path = parent / f"{name}-{number:03d}"
@@ -215,18 +215,18 @@ def unless(error: BaseException | None) -> Iterator[None]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """RunFolderError where what is done cannot write ``path``."""
+    """RunFolderError if what is done cannot write ``path``."""
     try:
         yield
     except OSError as error:
         raise RunFolderError(
             f"{path}: cannot be written: {error.strerror}; what came before is kept",
-            "make room, then run again",
+            "free disk space, then run again",
         ) from None
 
 
 def written_head(name: str, started: str) -> dict[str, Any]:
-    """What run.json says of any run, behind its format: by which version, of what, when."""
+    """What run.json says of any run, after its format: by which version, of what, when."""
     return {"armtempo": installed_version(), "name": name, "started": started, "written": now()}
 
 

@@ -91,13 +91,13 @@ class SequenceFolder:
         return lines
 
     def add_row(self, row: RowBegun, time_s: float) -> None:
-        """A row has begun; RunFolderError where that cannot be written."""
+        """A row has begun; RunFolderError if that cannot be written."""
         words = self.words[row.row] if row.row < len(self.words) else ""
         numbers = (row.run, row.row, row.step, row.cycle, row.value)
         self._rows.add([str(row.passed), f"{time_s:.3f}", *map(str, numbers), words])
 
     def add_sample(self, sample: Sample, row: int | None) -> None:
-        """A sample has come; RunFolderError where it cannot be written."""
+        """A sample has come; RunFolderError if it cannot be written."""
         cells = ["" if row is None else str(row), *run_folder.row(sample, self.joints)]
         self._samples.add([str(sample.run), *cells])
 

@@ -60,11 +60,11 @@ class SequenceRun:
     run: NDArray[np.int64]
     """(N,): the board's number of the motion's run that each sample belongs to."""
     row: NDArray[np.int64]
-    """(N,): the row that each sample belongs to; -1 where it was not heard of."""
+    """(N,): the row that each sample belongs to; -1 if it was not heard of."""
 
     @classmethod
     def load(cls, path: Path | str) -> SequenceRun:
-        """The folder of a recorded sequence; RunFolderError where it is none or contradicts itself."""
+        """The folder of a recorded sequence; RunFolderError if it is none or contradicts itself."""
         folder = Path(path)
         meta = _meta(folder / META)
         try:
@@ -76,7 +76,7 @@ class SequenceRun:
             row = np.array([int(line["row"] or _UNKNOWN) for line in lines], dtype=np.int64)
             motions = [int(entry["motion"]) for entry in meta["rows"]]
             if row.size and row.max() >= len(motions):
-                raise ValueError("a sample of a row that there is not")
+                raise ValueError("a sample of a row that does not exist")
         except OSError as error:
             raise RunFolderError(f"{folder}: cannot be read: {error.strerror}", _RESTORE) from error
         except (KeyError, TypeError, ValueError) as error:
@@ -104,12 +104,12 @@ class SequenceRun:
         return self.rows[-1].passed - len(self.rows) if self.rows else 0
 
     def motion_of(self, row: int) -> int:
-        """The number of the motion of a row, from 1; 0 where it moves nothing."""
+        """The number of the motion of a row, from 1; 0 if it moves nothing."""
         return int(self.meta["rows"][row]["motion"])
 
     @cached_property
     def legs(self) -> tuple[Trajectory, ...]:
-        """Its motions, as the board's records have them; RunFolderError where one cannot be read."""
+        """Its motions, as the board's records have them; RunFolderError if one cannot be read."""
         count = max((int(entry["motion"]) for entry in self.meta["rows"]), default=0)
         found = []
         for number in range(1, count + 1):

@@ -21,7 +21,7 @@ def is_stretched(repetition: RepetitionData) -> bool:
 
 
 def path_times(repetition: RepetitionData, times_s: Array) -> Array:
-    """The motion's own time (K,) at real times (K,); between samples and behind the last by straight lines."""
+    """The motion's own time (K,) at real times (K,); between samples and after the last by straight lines."""
     if len(repetition.time_s) < 2 or not is_stretched(repetition):
         return times_s
     inside = np.interp(times_s, repetition.time_s, repetition.path_s)
@@ -47,7 +47,7 @@ def note(repetition: RepetitionData) -> str:
     if not is_stretched(repetition):
         return ""
     passed_s = np.diff(repetition.time_s)
-    whole = passed_s > _SHORT_S  # the last sample may come right behind another
+    whole = passed_s > _SHORT_S  # the last sample may come right after another
     rates = 100 * np.diff(repetition.path_s)[whole] / passed_s[whole]
     low, high = round(float(rates.min()), 1), round(float(rates.max()), 1)
     speed = f"at {high:g} %" if high - low < 1.0 else f"between {low:g} and {high:g} %"

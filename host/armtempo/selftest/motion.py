@@ -18,7 +18,7 @@ _DEGREE = 5
 _MOST_STEPS = 200
 _FEWER = 15
 """Steps by which each joint makes fewer than the one before it, so that they step at different times."""
-_SHORTEST_S = 0.12
+_SHORTEST_S = 0.06
 _PEAK = 1.875
 """Peak speed of 10 u³ - 15 u⁴ + 6 u⁵ over u in 0..1."""
 _OF_RATE = 0.5

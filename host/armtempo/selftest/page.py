@@ -25,7 +25,7 @@ def check_free(folder: Path, force: bool) -> None:
     there = [name for name in (JSON, HTML) if (folder / name).exists()]
     if there and not force:
         raise InputError(
-            f"{folder / there[0]} is there already", "choose another folder, or replace it with --force"
+            f"{folder / there[0]} already exists", "choose another folder, or replace it with --force"
         )
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -25,7 +25,7 @@ _BULK = b"#"
 _BLOCKS, _BLOCK = 32, 512
 """What is sent to measure the rates: 16 KB each way. To the board it is a comment, which takes no heap."""
 CONTINUE = "import armtempo_board\narmtempo_board.start()"
-"""The board program goes on as it was before it was left; only before a soft reset."""
+"""The board program continues as it was before it was left; only before a soft reset."""
 RESET = "import machine\nmachine.reset()"
 """As the reset button: the program starts anew, and nothing is left of what was done at the prompt."""
 
@@ -51,7 +51,7 @@ class Measured:
 
 
 class Prompt:
-    """The raw prompt behind a port; raises LinkError, which names the part, where it does not answer."""
+    """The raw prompt behind a port; raises LinkError, which names the part, if it does not answer."""
 
     def __init__(self, port: Any) -> None:
         self._port = port

@@ -1,53 +1,98 @@
-"""The highest step rates at which the board keeps up, against what it states."""
+"""The highest step rates at which the board keeps up, and what it states of itself from then on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
+from armtempo_shared import wire
 from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
+from armtempo.diagnosis.finding import Level
+from armtempo.link.board_messages import Hello
 from armtempo.selftest.result import Measurement, judged
 
 PART = "rates"
 JOINTS = (1, 2, 3, 6)
 DURATION_S = 0.4
+SIMULATED_DURATION_S = 0.1
+KEPT = 0.8
+"""Part of the rate that was found which the board states; it never states more than one that was not measured."""
 _ABOVE = 1.01
-"""The rate that is allowed is this much above the one that is wanted, so that rounding does not exceed it."""
+"""The joint's limit is this much above the rate that is wanted, so that rounding does not exceed it."""
 _ROUNDS = 5
 
 
 def limit(rate: int) -> int:
     """The joint's limit in the arm record for a motion that reaches ``rate``."""
-    return min(round(rate * _ABOVE), MAX_STEP_RATE)
+    return round(rate * _ABOVE)
+
+
+def frames() -> list[str]:
+    """hello, then two commands as they come while an arm moves, in hex."""
+    said = (("hello", (wire.PROTOCOL_VERSION, 1)), ("status", ()), ("samples", (0, 0)))
+    return [
+        wire.frame(sequence, wire.COMMAND[name][1], wire.encode(wire.COMMAND[name], values)).hex()
+        for sequence, (name, values) in enumerate(said)
+    ]
 
 
 def stated(count: int) -> int:
-    """What the board allows each of ``count`` joints, less the rounding."""
-    return int(min(MAX_STEP_RATE, MAX_STEP_RATE_SUM // count) / _ABOVE**2)
+    """What a board that was not measured allows each of ``count`` joints."""
+    return min(MAX_STEP_RATE, MAX_STEP_RATE_SUM // count)
 
 
 def highest(keeps_up: Callable[[int], bool | None], count: int) -> int | None:
-    """By bisection below what is stated, to about 3 % of it; None where it could not be tried."""
-    good, bad = 0, stated(count)
+    """By bisection up to what is stated with the margin, to about 3 % of it; None where one could not be tried."""
+    good, bad = 0, round(stated(count) / KEPT)
     answer = keeps_up(bad)
-    if answer or answer is None:
-        return bad if answer else None
+    if answer:
+        return bad
     for _ in range(_ROUNDS):
+        if answer is None:
+            return None
         middle = (good + bad) // 2
-        good, bad = (middle, bad) if keeps_up(middle) else (good, middle)
-    return good
+        answer = keeps_up(middle)
+        good, bad = (middle, bad) if answer else (good, middle)
+    return None if answer is None else good
+
+
+def to_state(found: Mapping[int, int | None]) -> tuple[int, int] | None:
+    """Steps/s of one joint and of all together, from the rates found by number of joints; None where one is missing."""
+    rates = {count: KEPT * rate for count, rate in found.items() if rate is not None}
+    if len(rates) != len(found) or 1 not in rates:
+        return None
+    together = min(count * rate for count, rate in rates.items())
+    return min(round(rates[1]), MAX_STEP_RATE), min(round(together), MAX_STEP_RATE_SUM)
 
 
 def judge(rate: int | None, count: int) -> Iterator[Measurement]:
-    """The line about the rate that was found for so many joints."""
+    """The line about the rate that was found for that many joints; a slower board is none that is wrong."""
     if rate is None:
         return
-    joints = "1 joint" if count == 1 else f"{count} joints, each"
+    expected = stated(count)
+    is_enough = round(KEPT * rate) >= expected
+    yield Measurement(
+        PART,
+        f"highest step rate without an underrun, {'1 joint' if count == 1 else f'{count} joints, each'}",
+        f"{rate} steps/s",
+        f"{round(expected / KEPT)}: what is stated, {expected}, and a quarter",
+        Level.GOOD if is_enough else Level.ERROR if rate < expected else Level.NOTE,
+        "" if is_enough else "lower max_speed or microsteps until 'armtempo run' is not refused as too fast",
+    )
+
+
+def judge_stated(found: Mapping[str, Any] | None, info: Hello) -> Iterator[Measurement]:
+    """What the board states when it has started again, against what was found to be stated."""
+    if found is None or found["states"] is None:
+        return
+    one, together = found["states"]
     yield judged(
         PART,
-        f"highest step rate without an underrun, {joints}",
-        f"{rate} steps/s",
-        f"{stated(count)}, as the board states",
-        rate >= stated(count),
-        f"keep max_speed and microsteps such that {joints} stays below {round(0.8 * rate)} steps/s",
+        "what the board states from now on",
+        f"{info.max_rate} steps/s one joint, {info.max_rate_sum} all together, "
+        f"{'measured' if info.rates_measured else 'estimated'}",
+        f"{one}, {together}, measured",
+        (info.max_rate, info.max_rate_sum, info.rates_measured) == (one, together, True),
+        "correct what is wrong above, then run the self-test again",
     )

@@ -51,6 +51,10 @@ class SelfTest:
         """The lines that are wrong."""
         return [line for line in self.lines if line.verdict is Level.ERROR]
 
+    def failed_in(self, *parts: str) -> bool:
+        """Whether a line of one of these parts is wrong."""
+        return any(line.part in parts for line in self.failed)
+
     def to_json(self) -> dict[str, Any]:
         """What ``selftest.json`` and ``--json`` have."""
         lines = [{**asdict(line), "verdict": line.verdict.word} for line in self.lines]

@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from armtempo_shared import codes
+from armtempo_shared.meanings import ERRORS
 
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress, stage, watched
+from armtempo.diagnosis.finding import Level
 from armtempo.link import Client
-from armtempo.selftest import board_part, link_part, motion, pulse_part, rate_part
+from armtempo.selftest import board_part, drivers_part, link_part, motion, pulse_part, rate_part
+from armtempo.selftest.drivers_part import DRIVERS
 from armtempo.selftest.prompt import RESET, Measured, PartError, Prompt, SilentError, at_prompt
-from armtempo.selftest.result import Measurement, SelfTest, judged, left_out
+from armtempo.selftest.result import Measurement, SelfTest, judged
 
-DRIVERS = "drivers"
+_FEATURE = "sequences"
+"""Of the program in the firmware, with the modules that the parts import; as files it is without both."""
 UNIQUE_ID_DIGITS = 24
-_ARM_RECORD = "/flash/armtempo/arm.ata"
+_ROOT = "/flash/armtempo"
+_ARM_RECORD = f"{_ROOT}/arm.ata"
 _BACK_S = 60.0
 _SIMULATED_TURN_US = 1000
 """What a turn of the loop takes on a virtual board, about as on the chip."""
-_SEED, _STOPS, _WAITS_US = 5, 50, (22_000, 120_000)
-_SIMULATED_STOPS = 5
+_SEED, _STOPS, _WAITS_US = 5, 50, (22_000, 75_000)
+_SIMULATED_STOPS = 3
 """E-stops at random moments of the motion, which begins 20 ms after its start."""
 _LOOK_S = 0.3
 
@@ -43,6 +49,7 @@ def run(client: Client, progress: Progress | None = None) -> SelfTest:
         found.data[link_part.PART] = link_part.trips(client)
         _leave(client, lambda prompt: _at_prompt(prompt, found, work))
         found.add([_same_room(info.engine_room, client.info.engine_room)])
+        found.add(rate_part.judge_stated(found.data.get(rate_part.PART), client.info))
         work(1, 1)
     return found
 
@@ -59,13 +66,17 @@ def _same_room(before: int, after: int) -> Measurement:
 
 
 def _check_rest(client: Client) -> None:
+    client.need(_FEATURE, "the self-test")
     status = client.status()
     if status.moving:
         raise LinkError("the board is moving", "wait for the end of the motion, or 'armtempo stop'")
-    if status.fault:
-        raise LinkError(
-            f"the board has fault {status.fault} pending", "remove its cause, then 'armtempo clear'"
-        )
+    if status.fault not in (
+        0,
+        codes.ESTOP,
+        codes.WATCHDOG,
+    ):  # an E-stop that is not wired; a self-test that hung
+        name, _, _ = ERRORS.get(status.fault, (str(status.fault), "", ""))
+        raise LinkError(f"the board has fault {name} pending", "remove its cause, then 'armtempo clear'")
 
 
 def _leave(client: Client, work: Callable[[Prompt], None]) -> None:
@@ -83,22 +94,12 @@ def _leave(client: Client, work: Callable[[Prompt], None]) -> None:
 
 
 def _check_drivers(prompt: Prompt) -> None:
-    """LinkError, and the program goes on as it was, unless ENABLE is inactive or the board has no arm.
+    """LinkError, and the program continues as it was, unless ENABLE is inactive or the board has no arm.
 
     From here on the end of the prompt is a reset, which switches drivers off that are on.
     """
     prompt.enter(soft_reset=False)
-    try:
-        found = _drivers(prompt)
-        on = found["active"] is not None and found["output"] and found["level"] == found["active"]
-    except PartError as error:
-        if "ImportError" not in error.problem:
-            raise
-        raise LinkError(
-            "the board program on this board is files, which the self-test cannot use",
-            "put MicroPython with the program in it on the board: 'armtempo flash'",
-        ) from None
-    if on:
+    if drivers_part.is_on(_drivers(prompt)):
         raise LinkError(
             "the drivers are on (ENABLE, PE12, is active)",
             "support the arm, then press the board's reset button, which switches them off, and run the self-test "
@@ -116,7 +117,7 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     try:
         prompt.enter(soft_reset=True)
         drivers = found.data[DRIVERS] = _drivers(prompt)
-        found.add(_driver_lines(drivers))
+        found.add(drivers_part.judge(drivers))
         work(0.1, 1)
         if measured := _part(prompt, found, board_part.BOARD, "identity"):
             found.add(board_part.judge(measured.values, found.board_id))
@@ -127,11 +128,11 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         stage(link_part.PART)
         found.data[link_part.PART] |= prompt.rates()
         found.add(link_part.judge(found.data[link_part.PART], found.simulated))
-        if is_off(drivers):
+        if drivers_part.is_off(drivers) and _is_still(prompt, found):
             _move(prompt, found, work)
-            if not found.data.get(pulse_part.PULSES, {}).get(
-                "fault"
-            ):  # else no motion would tell of its rate
+            if not any(
+                line.part == pulse_part.PULSES for line in found.failed
+            ):  # else no rate tells anything
                 _rates(prompt, found, work)
     except SilentError as error:
         found.add([_failed(error.part, error)])
@@ -151,6 +152,24 @@ def _part(prompt: Prompt, found: SelfTest, part: str, *files: str, **arguments: 
 
 def _failed(part: str, error: LinkError) -> Measurement:
     return judged(part, "the whole part", error.problem, "an answer", False, error.hint)
+
+
+def _is_still(prompt: Prompt, found: SelfTest) -> bool:
+    """Whether no encoder turns with the first steps: where ENABLE is wired or named wrong, nothing else is made."""
+    arguments = _arguments(motion.make(found.data[DRIVERS]["joints"], True), found)
+    measured = _part(prompt, found, "encoders", "engine", "encoders", **arguments)
+    if measured is None:
+        return False
+    lines = list(drivers_part.judge_encoders(measured.values))
+    found.add([*lines, _still_off(measured, found)])
+    return lines[0].verdict is Level.GOOD
+
+
+def _still_off(measured: Measured, found: SelfTest) -> Measurement:
+    """After a part that made steps."""
+    return drivers_part.off_line(
+        "ENABLE after that", found.data[DRIVERS]["active"], measured.values["enable"]
+    )
 
 
 def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
@@ -175,23 +194,29 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
 
 
 def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
-    """The highest step rate of the arm's first 1, 2, … joints; on a virtual board of all of them, once."""
+    """The highest step rate of the arm's first 1, 2, … joints; on a virtual board of one and of all of them."""
     most = len(found.data[DRIVERS]["joints"])
-    counts = [most] if found.simulated else [count for count in rate_part.JOINTS if count <= most]
-    highest = found.data[rate_part.PART] = {}
-    for number, count in enumerate(counts):
+    counts = [count for count in rate_part.JOINTS if count <= most]
+    highest: dict[int, int | None] = {}
+    for number, count in enumerate(counts[:1] + counts[-1:] if found.simulated else counts):
         work(0.7 + 0.25 * number / len(counts), 1)
-        rate = rate_part.highest(lambda rate: _keeps_up(prompt, found, [rate] * count), count)  # noqa: B023
-        highest[str(count)] = rate
-        found.add(rate_part.judge(rate, count))
+        highest[count] = rate_part.highest(lambda rate: _keeps_up(prompt, found, [rate] * count), count)  # noqa: B023
+        found.add(rate_part.judge(highest[count], count))
+    states = rate_part.to_state(highest)
+    found.data[rate_part.PART] = {"highest": highest, "states": states}
+    if states and not found.failed_in(DRIVERS, pulse_part.PULSES, pulse_part.SAFETY, rate_part.PART):
+        arguments = {"root": _ROOT, "program_crc": found.program_crc, "rates": (*states, most)}
+        _part(prompt, found, "keep", "keep", **arguments)
 
 
 def _keeps_up(prompt: Prompt, found: SelfTest, rates: Sequence[int]) -> bool | None:
     """Whether so many joints make these rates; None where it could not be tried."""
+    duration_s = rate_part.SIMULATED_DURATION_S if found.simulated else rate_part.DURATION_S
     arguments = {
         "record": _ARM_RECORD,
-        "motion": motion.at_rates(rates, rate_part.DURATION_S).hex(),
+        "motion": motion.at_rates(rates, duration_s).hex(),
         "rates": [rate_part.limit(rate) for rate in rates],
+        "frames": rate_part.frames(),
         "idle_us": _SIMULATED_TURN_US if found.simulated else 0,
     }
     measured = _part(prompt, found, rate_part.PART, "engine", "rates", **arguments)
@@ -207,46 +232,8 @@ def _arguments(moved: motion.TestMotion, found: SelfTest) -> dict[str, Any]:
     }
 
 
-def _driver_lines(found: dict[str, Any]) -> Iterator[Measurement]:
-    if found["active"] is None:
-        yield left_out(
-            DRIVERS,
-            "no arm is configured, so the level that switches drivers off is unknown; no pulses were made",
-            "run 'armtempo configure' with your arm file, then the self-test again",
-        )
-        return
-    yield _off_line("ENABLE (PE12)", found["active"], (found["output"], found["driven"], found["level"]))
-
-
-def _still_off(measured: Measured, found: SelfTest) -> Measurement:
-    """After a part that made steps."""
-    return _off_line("ENABLE after that", found.data[DRIVERS]["active"], measured.values["enable"])
-
-
-def _off_line(what: str, active: int, state: Sequence[int]) -> Measurement:
-    level = "high" if state[2] else "low"
-    return judged(
-        DRIVERS,
-        what,
-        f"{level}, {'driven' if state[0] else 'not driven'}",
-        f"{'low' if active else 'high'}, driven",
-        _off(active, state),
-        "take power from the drivers, look for a short at PE12; no pulses were made",
-    )
-
-
-def is_off(found: dict[str, Any]) -> bool:
-    """Whether ENABLE is driven to its inactive level, and is at it."""
-    active = found["active"]
-    return active is not None and _off(active, (found["output"], found["driven"], found["level"]))
-
-
-def _off(active: int, state: Sequence[int]) -> bool:
-    return bool(state[0] and state[1] == state[2] == 1 - active)
-
-
 def _back(client: Client) -> None:
-    """Greet the program, which starts again after the reset; LinkError where it does not answer in time."""
+    """Greet the program, which starts again after the reset; LinkError if it does not answer in time."""
     limit_s = time.monotonic() + _BACK_S
     while True:
         time.sleep(_LOOK_S)

@@ -17,7 +17,7 @@ from armtempo.records import encode
 def describe(arm: Arm, start_deg: Sequence[float] | None = None) -> dict[str, Any]:
     """The arm record's fields and, per joint, where it is at power-up and its drive's model.
 
-    ``start_deg`` (J,): None means the home posture. Raises InputError where a model makes no sense.
+    ``start_deg`` (J,): None means the home posture. Raises InputError if a model makes no sense.
     """
     head, rows, _ = armrecord.unpack(encode.arm_record(arm))
     angles = start_deg if start_deg is not None else [joint.home_deg for joint in arm.driven]

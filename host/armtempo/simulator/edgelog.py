@@ -36,7 +36,7 @@ Edges = tuple[NDArray[np.int64], NDArray[np.int8]]
 
 
 class Pulses(NamedTuple):
-    """What pulses a timer makes at a pin from a tick on; all 0 where it makes none."""
+    """What pulses a timer makes at a pin from a tick on; all 0 if it makes none."""
 
     tick: int
     high_ticks: int
@@ -58,7 +58,7 @@ class PowerCycle:
     def motion(self, number: int = -1) -> dict[str, Edges]:
         """Per pin its edges in the ``number``-th motion, in ticks of the motion clock.
 
-        A motion lasts until the next is started. Raises RunFolderError where there was none.
+        A motion lasts until the next is started. Raises RunFolderError if there was none.
         """
         if not -len(self.starts) <= number < len(self.starts):
             raise RunFolderError(
@@ -78,7 +78,7 @@ class PowerCycle:
         return cut
 
     def _before(self, zero: int) -> int:
-        """Tick from which on edges belong to the motion of this time 0: the clock was stopped behind the one before."""
+        """Tick from which on edges belong to the motion of this time 0: the clock was stopped after the one before."""
         stopped = bisect.bisect_left(self.ends, zero)
         return max([zero - _LEAD_TICKS, *self.ends[max(stopped - 1, 0) : stopped]])
 
@@ -87,11 +87,11 @@ _LEAD_TICKS = 8_400_000
 
 
 def read(path: Path) -> list[PowerCycle]:
-    """All power cycles of a log, oldest first. Raises RunFolderError where the file is none."""
+    """All power cycles of a log, oldest first. Raises RunFolderError if the file is none."""
     data = path.read_bytes()
     if data[:4] != b"ATE1":
         raise RunFolderError(
-            f"{path} is no edge log of a virtual board",
+            f"{path} is not an edge log of a virtual board",
             "give a file that --edge-log of a virtual board wrote",
         )
     cycles: list[_Collector] = []

@@ -71,7 +71,7 @@ class LaunchOptions:
     """How long the user button is held from power-up on: safe mode from 0.6 to 1.2, a fresh file system from
     1.2 to 1.8."""
     sd_card: Path | str | None = None
-    """Folder that is an SD card in the board."""
+    """Folder used as an SD card in the board."""
     damage: str = ""
     """Simulated damage of the flash: ``"no file system"``, ``"unreadable"``, or none."""
     machine: str = DEFAULT_MACHINE

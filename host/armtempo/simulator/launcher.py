@@ -76,14 +76,14 @@ class VirtualBoard:
         return self.log_path.read_text(errors="replace")
 
     def wait_until_up(self) -> None:
-        """Wait until the board program has started; LinkError where the process ends instead."""
+        """Wait until the board program has started; LinkError if the process ends instead."""
         limit = time.monotonic() + _START_S
         while not (self._folder.path / "up").exists():
             if not self.running() or time.monotonic() > limit:
                 tail = self.log().strip().splitlines()[-1:] or ["it says nothing"]
                 raise LinkError(
                     f"the virtual board did not start: {tail[0]}",
-                    "start it again; where that fails too, report it with this line",
+                    "start it again; if that fails too, report it with this line",
                 )
             time.sleep(0.005)
 
@@ -116,7 +116,7 @@ class VirtualBoard:
 
 
 def _pseudo_terminal() -> tuple[int, int]:
-    """Both ends; LinkError where the system has none to give, as in a container without /dev/pts."""
+    """Both ends; LinkError if the system has none to give, as in a container without /dev/pts."""
     import pty
 
     try:
@@ -136,7 +136,7 @@ def _set_raw(terminal: int) -> None:
 def launch(options: LaunchOptions | None = None) -> VirtualBoard:
     """Start a virtual board; use it as a context manager.
 
-    Raises InputError where the flash's folder cannot be made, LinkError where the board does not start.
+    Raises InputError if the flash's folder cannot be made, LinkError if the board does not start.
     """
     wanted = options or LaunchOptions()
     if os.name != "posix":

@@ -28,7 +28,7 @@ def basis(degree: int) -> Array:
     Raises InputError for a degree other than 3 or 5.
     """
     if degree not in BASIS:
-        raise InputError(f"splines of degree {degree} are not known", "choose 3 (cubic) or 5 (quintic)")
+        raise InputError(f"a spline of degree {degree} is not supported", "choose 3 (cubic) or 5 (quintic)")
     matrix = np.array(BASIS[degree], dtype=float) / FACTORIAL[degree]
     matrix.setflags(write=False)
     return matrix
@@ -37,14 +37,12 @@ def basis(degree: int) -> Array:
 def fit(points_deg: ArrayLike, degree: int, rests: Sequence[int] = ()) -> Array:
     """Control points of the spline through ``points_deg`` that starts and ends at rest.
 
-    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J). A banded solve of
-    Eq. (13) or (14); the cubic rests in speed, the quintic also in acceleration. A quintic stands still at the points
-    ``rests`` too, where it may go on in any direction, and only comes near to the two points before and after each;
-    they are at least DEGREE apart and from the ends. Raises
-    InputError for fewer than two points or values that are not finite.
+    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J): Eq. (13) or (14), solved as a full
+    matrix, as scipy's banded solver takes longer to load than most commands. The cubic rests in speed, the quintic
+    also in acceleration. A quintic stands still at the points ``rests`` too, where it may go on in any direction, and
+    only comes near to the two points before and after each; they are at least ``degree`` apart and from the ends.
+    Raises InputError for fewer than two points or values that are not finite.
     """
-    from scipy.linalg import solve_banded  # here, because loading it takes longer than most commands
-
     points = np.asarray(points_deg, dtype=float)
     row = basis(degree)[0, :-1]
     if len(points) < 2 or not np.all(np.isfinite(points)):
@@ -57,26 +55,21 @@ def fit(points_deg: ArrayLike, degree: int, rests: Sequence[int] = ()) -> Array:
     right[edge : edge + len(points)] = points
     for rest in rests:
         right[rest : rest + degree] = points[rest]
-    return np.asarray(solve_banded((degree - 1, degree - 1), _bands(len(right), row, degree, rests), right))
+    return np.asarray(np.linalg.solve(_matrix(len(right), row, degree, rests), right))
 
 
-def _bands(size: int, row: Array, degree: int, rests: Sequence[int]) -> Array:
-    """The matrix of Eq. (13) or (14) in LAPACK band storage, (2 degree - 1, size)."""
-    edge, width = (degree - 1) // 2, degree - 1
-    bands = np.zeros((2 * width + 1, size))
-
-    def put(at: int, first: int, values: ArrayLike) -> None:
-        columns = first + np.arange(degree)
-        bands[width + at - columns, columns] = values
-
+def _matrix(size: int, row: Array, degree: int, rests: Sequence[int]) -> Array:
+    """The matrix of Eq. (13) or (14), (size, size)."""
+    edge = (degree - 1) // 2
+    matrix = np.zeros((size, size))
     for at, rest in enumerate(_REST_ROWS[degree]):
-        put(at, 0, rest)
-        put(size - 1 - at, size - degree, rest)
+        matrix[at, :degree] = rest
+        matrix[size - 1 - at, size - degree :] = rest
     for at in range(edge, size - edge):
-        put(at, at - edge, row)
-    for control in (control for rest in rests for control in range(rest, rest + degree)):
-        put(control, control - edge, np.eye(degree)[edge])
-    return bands
+        matrix[at, at - edge : at - edge + degree] = row
+    for first in rests:
+        matrix[first : first + degree] = np.eye(degree, size, first)
+    return matrix
 
 
 def polynomials(control_points: Array, degree: int) -> Array:

@@ -7,7 +7,7 @@ halving the pieces that could still hold the maximum closes the gap quadraticall
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,6 @@ from armtempo.splines.trajectory import JointSpline
 GAP = 1e-11
 """How far, relative, the bound returned may lie above the true maximum."""
 
-_GOLDEN = (5**0.5 - 1) / 2
 _DEPTH = 48
 """Halvings after which a piece is narrower than the doubles that describe it."""
 
@@ -117,18 +116,3 @@ def range_of(polynomials: Array) -> tuple[Array, Array]:
     above = largest_quotients((plain - low[:, None, None]).reshape(-1, count), bottom, group, joints)
     below = largest_quotients((high[:, None, None] - plain).reshape(-1, count), bottom, group, joints)
     return high - below / (1 + GAP), low + above / (1 + GAP)
-
-
-def golden_section(function: Callable[[Array], Array], low: Sequence[float], high: Sequence[float]) -> Array:
-    """Largest |function| inside each of the intervals, as the paper finds it (section 3.1): (N,).
-
-    Takes the function to have one extreme in each interval; where it has more, one of them is missed. So
-    no check relies on it. ``function`` takes and returns (N,).
-    """
-    left, right = np.array(low, dtype=float), np.array(high, dtype=float)
-    for _ in range(80):
-        width = _GOLDEN * (right - left)
-        first, second = right - width, left + width
-        rising = np.abs(function(first)) < np.abs(function(second))
-        left, right = np.where(rising, first, left), np.where(rising, right, second)
-    return np.abs(function(0.5 * (left + right)))

@@ -32,7 +32,7 @@ class Spline:
         object.__setattr__(self, "control_points", np.asarray(self.control_points, dtype=float))
         if self.degree not in DEGREES or self.control_points.ndim not in (1, 2) or self.segments < 1:
             raise InputError(
-                f"control points of shape {self.control_points.shape} make no spline of degree {self.degree}",
+                f"control points of shape {self.control_points.shape} do not make a spline of degree {self.degree}",
                 "give more of them than the degree, which is 3 or 5; Spline.through takes points to pass",
             )
 
@@ -63,7 +63,7 @@ class Spline:
         """
         if not 0 <= order <= self.degree:
             raise InputError(
-                f"a derivative of order {order} is none",
+                f"there is no derivative of order {order}",
                 f"give 0 for the value, 1 for the slope, up to {self.degree}",
             )
         at = np.asarray(u, dtype=float)

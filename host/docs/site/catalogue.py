@@ -76,7 +76,7 @@ def names_of_arguments(command: click.Command) -> list[str]:
 
 
 def described(command: click.Command, name: str) -> str:
-    """What the help says of an argument: ``NAME: a sentence.``; "" where it says nothing."""
+    """What the help says of an argument: ``NAME: a sentence.``; "" if it says nothing."""
     text = " ".join((command.help or "").split())
     found = re.search(rf"(?:^|\s){re.escape(name)}: (.+?\.)(?=\s[A-Z]|$)", text)
     return found[1] if found else ""

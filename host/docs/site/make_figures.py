@@ -46,7 +46,7 @@ def solutions() -> Figure:
 
 
 def motion() -> Figure:
-    """The feeding motion with one time axis for all joints, beside its limits."""
+    """The feeding motion with one time axis for all joints, next to its limits."""
     from dataclasses import replace
 
     job = replace(armtempo.Job.paper(), timing="shared", refine="auto", polish=True)

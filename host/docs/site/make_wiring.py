@@ -66,7 +66,7 @@ def _driver(number: int, step: str, direction: str) -> list[str]:
 
 
 def _enable(pin: str, y: int, drivers: int) -> list[str]:
-    """One pin to all drivers: a line beside them, with a branch to each."""
+    """One pin to all drivers: a line next to them, with a branch to each."""
     x, width = BOARD
     bus = DRIVER_X + BOX + 12
     found = [

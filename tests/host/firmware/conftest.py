@@ -13,7 +13,7 @@ from tests.host.firmware.fakes import BOARD_MAKE, GCC, HEADER, MAKE
 
 @pytest.fixture
 def tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
-    """Makes a folder with programs, by name, the only one beside the system's to be looked into."""
+    """Makes a folder with programs, by name, the only one in addition to the system's to be looked into."""
     folder = tmp_path / "bin"
     folder.mkdir()
 

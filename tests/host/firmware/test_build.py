@@ -85,7 +85,7 @@ def test_a_build_makes_a_whole_folder(micropython: Path, tools: Callable[..., Pa
     cross, port = (tmp_path / "make.log").read_text().splitlines()
     assert "mpy-cross" in cross
     assert "FROZEN_MANIFEST=" in port
-    with pytest.raises(InputError, match="there already"):
+    with pytest.raises(InputError, match="already exists"):
         build.build(micropython, "STM32F4DISC", out, no_progress)
 
 

@@ -19,13 +19,13 @@ def test_the_command_says_how_to_get_a_checkout(tools: Callable[..., Path], tmp_
     assert f"git clone --depth 1 --branch {checkout.RELEASE}" in said
     code, said = outcome("firmware", "--board", "STM32F4DISC", "--micropython", tmp_path)
     assert code == 2
-    assert "is no checkout of MicroPython\nhint: get one: git clone" in said
+    assert "is not a MicroPython checkout\nhint: get one: git clone" in said
 
 
 @pytest.mark.parametrize(
     ("board", "change", "words"),
     [
-        ("NONE", {}, "knows no board NONE\nhint: give one that suits: PYBV11, STM32F4DISC"),
+        ("NONE", {}, "has no board NONE\nhint: give one that suits: PYBV11, STM32F4DISC"),
         ("OTHER", {}, "has no STM32F405 or F407\nhint: give one that suits: PYBV11, STM32F4DISC"),
         ("STM32F4DISC", {"lib/tinyusb/a": None}, "lacks submodules (lib/tinyusb)\nhint: get them: make -C"),
         ("STM32F4DISC", {"lib/micropython-lib/a": None}, "lacks submodules (lib/micropython-lib)"),
@@ -34,7 +34,11 @@ def test_the_command_says_how_to_get_a_checkout(tools: Callable[..., Path], tmp_
             {f"{STM32F4DISC}/mpconfigboard.mk": f"{BOARD_MAKE}MICROPY_PY_LWIP = 1\n"},
             "lacks submodules (lib/lwip)",
         ),
-        ("STM32F4DISC", {"py/mpconfig.h": "#define MICROPY_VERSION_MAJOR 1\n"}, "is no checkout"),
+        (
+            "STM32F4DISC",
+            {"py/mpconfig.h": "#define MICROPY_VERSION_MAJOR 1\n"},
+            "is not a MicroPython checkout",
+        ),
     ],
 )
 def test_a_checkout_that_does_not_suit(

@@ -1,4 +1,4 @@
-"""`armtempo flash`: how a firmware gets onto a board, and what is said where it does not."""
+"""`armtempo flash`: how a firmware gets onto a board, and what is said if it does not."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_what_is_read_back_must_be_what_was_written(
     monkeypatch.setenv("DFU_DAMAGES", "1")
     code, said = outcome("flash", "--image", built)
     assert code == 1
-    assert "read back at 0x08020000 is not what was written" in said
+    assert "the data read back at 0x08020000 differ from what was written" in said
 
 
 def test_the_only_firmware_here_is_taken(
@@ -67,15 +67,15 @@ def test_the_only_firmware_here_is_taken(
     assert outcome("flash")[0] == 0
     shutil.make_archive("armtempo-firmware-STM32F4DISC", "zip", tmp_path, built.name)
     code, said = outcome("flash")
-    assert (code, "2 firmwares are here" in said) == (2, True)
+    assert (code, "2 firmwares found here" in said) == (2, True)
     shutil.rmtree(built)
     assert outcome("flash")[0] == 0  # of the zip file
     Path("armtempo-firmware-STM32F4DISC.zip").write_bytes(b"PK cut")
     code, said = outcome("flash")
-    assert (code, "is no whole zip file" in said) == (2, True)
+    assert (code, "is not a complete zip file" in said) == (2, True)
     Path("armtempo-firmware-STM32F4DISC.zip").unlink()
     code, said = outcome("flash")
-    assert (code, "no firmware is named" in said) == (2, True)
+    assert (code, "no firmware given" in said) == (2, True)
 
 
 def test_flashing_by_st_link(built: Path, tools: Callable[..., Path], tmp_path: Path) -> None:
@@ -277,9 +277,9 @@ def test_a_folder_that_is_no_firmware_is_refused(
 ) -> None:
     tools(st_flash=STLINK, st_info=ST_INFO)
     for damage, words in (
-        (lambda: (built / "firmware1.bin").unlink(), "is not whole: firmware1.bin"),
+        (lambda: (built / "firmware1.bin").unlink(), "is incomplete: firmware1.bin"),
         (lambda: (built / image.ABOUT).write_text(json.dumps({"pieces": []})), "cannot be read"),
-        (lambda: (built / image.ABOUT).unlink(), "holds no firmware"),
+        (lambda: (built / image.ABOUT).unlink(), "contains no firmware"),
     ):
         damage()
         code, said = outcome("flash", "--image", built)

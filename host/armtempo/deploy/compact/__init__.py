@@ -3,9 +3,8 @@
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
 packages within packages go (``flatten``), constants are put in where they are used (``constants``), the modules that
 are always needed become one (``merge``), as do others that come and go together (``join``), the program's own names
-become short (``shorten``), what is called only while nothing moves is imported for the call (``set_up``), and the one
-module becomes two, of which the second fills what the import of the first leaves (``halve``). The behaviour of the
-program does not change.
+become short (``shorten``), and what is called only while nothing moves is imported for the call (``set_up``). The
+behaviour of the program does not change.
 """
 
 from __future__ import annotations
@@ -18,14 +17,10 @@ from types import MappingProxyType
 from armtempo.deploy.compact.constants import fold
 from armtempo.deploy.compact.flatten import flatten
 from armtempo.deploy.compact.frames import Function, Functions, functions, label
-from armtempo.deploy.compact.halve import halve
 from armtempo.deploy.compact.join import join
 from armtempo.deploy.compact.merge import CORE, merge, used_whole
 from armtempo.deploy.compact.set_up import move, set_up_methods
 from armtempo.deploy.compact.shorten import short_names, shorten
-
-FIRST = "first"
-"""The first half of ``core``."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +42,7 @@ def compact(
     """A program of fewer modules and shorter names that does the same.
 
     ``sources``: text by dotted module name, packages by their own. ``main``: what it needs at once becomes the
-    module ``core`` of its package, with ``first``. ``entries``: modules that are imported from outside, ``main`` among
+    module ``core`` of its package. ``entries``: modules that are imported from outside, ``main`` among
     them. ``keep``: names that must stay, as they are used from outside or made at run time. ``together``: modules that
     become part of another one (``join``). ``at_rest``: methods, by module, class and name, that are called only
     while nothing moves, under the name of the module that is to hold them (``set_up``). Raises ValueError where a
@@ -73,8 +68,6 @@ def compact(
     for target, methods in apart.items():
         for name, of in zip(move(merged, core, target, methods), labels[target], strict=True):
             known[target, name] = [Function(of, name, frozenset(), named=True)]
-    halve(merged, core, FIRST)
-    known |= {(FIRST, name): functions for (module, name), functions in known.items() if module == CORE}
     texts = {module: ast.unparse(ast.fix_missing_locations(tree)) for module, tree in merged.items()}
     return Compact(texts, known)
 

@@ -148,7 +148,7 @@ class _Pruner(Scoped):
         self._used = used
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST | None:
-        """``from ... import`` brings in names only."""
+        """``from ... import`` imports names only."""
         node.names = [alias for alias in node.names if (alias.asname or alias.name) in self._used]
         return node if node.names else None
 

@@ -25,7 +25,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
     """Build the firmware of a board, by its name in MicroPython or a folder that defines it, into a new folder ``out``.
 
     What the compiler makes stays in the checkout, in ``ports/stm32/build-BOARD-armtempo``, so the next build is short.
-    Raises InputError where checkout, submodules or board do not suit or ``out`` holds something, ToolError where a
+    Raises InputError if checkout, submodules or board do not suit or ``out`` holds something, ToolError if a
     compiler is missing or the build fails; ``out`` is then as it was.
     """
     found = checkout.look(micropython)
@@ -33,7 +33,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
     checkout.check_submodules(found, definition)
     toolchain.check(with_mpy_cross=not toolchain.has_mpy_cross(found.folder))
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"{out} is there already", "name a new folder with --out")
+        raise InputError(f"{out} already exists", "name a new folder with --out")
     built = _make(found, definition, progress)
     made = image.Image(
         definition.name,
@@ -92,13 +92,13 @@ def _run(command: list[str], step: Callable[[str], None]) -> None:
     if said := toolchain.run(command, step):
         raise ToolError(
             f"MicroPython's build failed:\n  {said}",
-            f"see the whole of it with {' '.join(command)}; with another version of MicroPython or of the compiler "
+            f"for the whole output run {' '.join(command)}; with another version of MicroPython or of the compiler "
             f"than {checkout.RELEASE} and gcc 12 to 14, try those",
         )
 
 
 def _check_room(built: Path, made: image.Image, definition: BoardDefinition) -> None:
-    """ToolError where the firmware is larger than the chip's flash, which MicroPython's linker takes for 1 MB."""
+    """ToolError if the firmware is larger than the chip's flash, which MicroPython's linker takes for 1 MB."""
     last = made.pieces[-1]
     end = last.address + (built / last.file).stat().st_size
     if end > definition.flash_end:

@@ -17,7 +17,7 @@ BOARDS = ("STM32F4DISC", "OLIMEX_H407", "VCC_GND_F407ZG")
 """Boards that releases bring a firmware for; any other of the port with an STM32F405 or F407 can be built."""
 _CHIPS = ("STM32F405xx", "STM32F407xx")
 _FLASH_KB = {"E": 512, "G": 1024}
-"""By the letter behind the number of pins in the chip's name (data sheet, ordering information)."""
+"""By the letter after the number of pins in the chip's name (data sheet, ordering information)."""
 _FLASH_START = 0x08000000
 _PARTS = ("MAJOR", "MINOR", "MICRO")
 _LIBRARY = "lib/micropython-lib"
@@ -70,7 +70,7 @@ def look(folder: Path) -> Checkout:
         numbers = [re.findall(rf"define MICROPY_VERSION_{part} (\d+)", text)[0] for part in _PARTS]
     except (OSError, IndexError):
         raise InputError(
-            f"{folder} is no checkout of MicroPython", f"get one: {how_to_get(folder)}"
+            f"{folder} is not a MicroPython checkout", f"get one: {how_to_get(folder)}"
         ) from None
     found = Checkout(folder.resolve(), (int(numbers[0]), int(numbers[1]), int(numbers[2])))
     if found.version[:2] < LEAST_RELEASE:
@@ -104,7 +104,7 @@ def board(checkout: Checkout, name: str) -> BoardDefinition:
         header = (folder / "mpconfigboard.h").read_text(encoding="utf-8", errors="replace")
     except OSError:
         raise InputError(
-            f"MicroPython {checkout.release} knows no board {name}",
+            f"MicroPython {checkout.release} has no board {name}",
             f"give one that suits: {', '.join(suitable(checkout))}",
         ) from None
     if _setting(make, "CMSIS_MCU") not in _CHIPS:
@@ -138,7 +138,7 @@ def suitable(checkout: Checkout) -> list[str]:
 
 
 def check_submodules(checkout: Checkout, definition: BoardDefinition) -> None:
-    """InputError where a submodule that the port or the board needs is not there."""
+    """InputError if a submodule that the port or the board needs is not there."""
     make = (checkout.port / "Makefile").read_text(encoding="utf-8", errors="replace")
     needed = {*re.findall(r"lib/\S+", " ".join(re.findall(r"GIT_SUBMODULES \+=(.*)", make))), _LIBRARY}
     board_make = (definition.folder / "mpconfigboard.mk").read_text(encoding="utf-8", errors="replace")

@@ -30,7 +30,7 @@ def program_crc(board, shared):
 def write(folder: Path, board_manifest: str = USUAL_MANIFEST) -> None:
     """Write the program's sources and a manifest for MicroPython's FROZEN_MANIFEST into a new or empty folder.
 
-    ``board_manifest``: what else is frozen. Raises InputError where the folder holds something already or
+    ``board_manifest``: what else is frozen. Raises InputError if the folder holds something already or
     cannot be written.
     """
     package.fill(folder, files(board_manifest))

@@ -51,10 +51,10 @@ def find(here: Path) -> Path:
     get = "download armtempo-firmware-BOARD.zip of a release, or build one with 'armtempo firmware'"
     if not found:
         raise InputError(
-            "no firmware is named, and none is here", f"{get}; then: armtempo flash --image FILE"
+            "no firmware given, and none found here", f"{get}; then: armtempo flash --image FILE"
         )
     raise InputError(
-        f"{len(found)} firmwares are here: {', '.join(map(str, sorted(found)))}", "name one with --image"
+        f"{len(found)} firmwares found here: {', '.join(map(str, sorted(found)))}", "choose one with --image"
     )
 
 
@@ -71,7 +71,7 @@ def unpacked(path: Path) -> Iterator[Path]:
         except FileNotFoundError:
             raise InputError(f"{path}: no such file or folder", "check the path") from None
         except (OSError, zipfile.BadZipFile) as error:
-            raise InputError(f"{path} is no whole zip file: {error}", "download it again") from None
+            raise InputError(f"{path} is not a complete zip file: {error}", "download it again") from None
         inner = [about.parent for about in Path(name).rglob(ABOUT)]
         yield inner[0] if inner else Path(name)
 
@@ -86,13 +86,13 @@ def read(folder: Path) -> Image:
         image = Image(**found | {"program_crc": int(found["program_crc"], 16), "pieces": pieces})
     except FileNotFoundError:
         raise InputError(
-            f"{folder} holds no firmware (no {ABOUT})", "make one with 'armtempo firmware'"
+            f"{folder} contains no firmware (no {ABOUT})", "make one with 'armtempo firmware'"
         ) from None
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{folder / ABOUT} cannot be read: {error}", "build the firmware anew") from None
     missing = [piece.file for piece in pieces if not (folder / piece.file).is_file()]
     if missing or not pieces:
         raise InputError(
-            f"{folder} is not whole: {', '.join(missing) or 'no pieces'}", "build the firmware anew"
+            f"{folder} is incomplete: {', '.join(missing) or 'no pieces'}", "build the firmware anew"
         )
     return image

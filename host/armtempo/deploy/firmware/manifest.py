@@ -1,4 +1,4 @@
-"""For MicroPython's FROZEN_MANIFEST: what the board's firmware has anyway, and the board program beside this file.
+"""For MicroPython's FROZEN_MANIFEST: what the board's firmware has anyway, and the board program next to this file.
 
 ``opt=1``: no assertions; line numbers stay, as they take flash only.
 """

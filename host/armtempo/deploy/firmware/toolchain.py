@@ -39,7 +39,7 @@ def run(command: list[str], heard: Callable[[str], None]) -> str:
 
 
 def check(with_mpy_cross: bool) -> None:
-    """ToolError where a program is missing; ``with_mpy_cross``: MicroPython's own compiler is still to be built."""
+    """ToolError if a program is missing; ``with_mpy_cross``: MicroPython's own compiler is still to be built."""
     needed = ["make", CROSS, *(["gcc"] if with_mpy_cross else [])]
     missing = [name for name in needed if shutil.which(name) is None]
     if missing:

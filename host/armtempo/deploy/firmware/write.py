@@ -58,8 +58,8 @@ def flash(given: Path, port: str | None, tool: str | None, tell: Tell, progress:
 
     ``port``: where the board answers. One that is not there, or None: the board in its bootloader, or at the
     ST-LINK; else the only MicroPython board that is plugged in. ``tool``: one of TOOLS; None: the first that is
-    installed. Raises InputError where the folder holds no firmware, LinkError where the board is moving or another
-    one than the firmware is for, ToolError where a tool is missing or fails.
+    installed. Raises InputError if the folder contains no firmware, LinkError if the board is moving or another
+    one than the firmware is for, ToolError if a tool is missing or fails.
     """
     with image.unpacked(given) as folder:
         firmware = image.read(folder)
@@ -81,7 +81,7 @@ def flash(given: Path, port: str | None, tool: str | None, tell: Tell, progress:
 
 
 def _choose(tool: str | None) -> str:
-    """The tool to use; ToolError where it is not installed."""
+    """The tool to use; ToolError if it is not installed."""
     wanted = TOOLS if tool is None else (tool,)
     found = next((name for name in wanted if shutil.which(name)), None)
     if found is None:
@@ -98,7 +98,7 @@ def _prepare(port: str | None, firmware: Image, tool: str, tell: Tell) -> None:
     if port is None:
         return
     if is_sim(port):
-        raise InputError("a virtual board has no flash for a firmware", "name a real one with --port")
+        raise InputError("a virtual board has no flash for a firmware", "give a real one with --port")
     try:
         end_program(port, tell)
     except InputError as error:
@@ -125,7 +125,7 @@ def _check_chip(tool: str, end: int) -> None:
     chips = _chips(tool)
     if len(chips) != 1:
         seen = "no STM32F405 or F407" if not chips else f"{len(chips)} boards"
-        raise ToolError(f"{tool} sees {seen}", _REACH[tool] if not chips else "connect one only")
+        raise ToolError(f"{tool} sees {seen}", _REACH[tool] if not chips else "connect only one")
     if not end <= _FLASH_START + chips[0] <= _FLASH_START + (1 << 20):
         raise ToolError(
             f"the chip has {chips[0] // 1024} KB of flash, the firmware is for another one",
@@ -134,7 +134,7 @@ def _check_chip(tool: str, end: int) -> None:
 
 
 def _chips(tool: str) -> list[int]:
-    """Bytes of flash of each chip that the tool sees; ToolError where it may not look."""
+    """Bytes of flash of each chip that the tool sees; ToolError if it may not look."""
     try:
         done = subprocess.run(_LOOK[tool], capture_output=True, text=True, check=False)
     except FileNotFoundError:
@@ -171,8 +171,8 @@ def _put(folder: Path, firmware: Image, tool: str, progress: Progress) -> None:
                 done += size
                 if reading and back.read_bytes()[:size] != file.read_bytes():  # st-flash reads whole words
                     raise ToolError(
-                        f"what was read back at {piece.address:#010x} is not what was written",
-                        f"flash again, with a shorter cable if it comes again; {_REACH[tool]}",
+                        f"the data read back at {piece.address:#010x} differ from what was written",
+                        f"flash again, with a shorter cable if it happens again; {_REACH[tool]}",
                     )
         vectors = f"{pieces[-1].address:#010x}:4:leave"
         start = [STLINK, "reset"] if tool == STLINK else [*_DFU, vectors, "-U", str(Path(name) / "start")]

@@ -40,7 +40,7 @@ def curve(arm: Arm, job: Job, progress: Progress) -> list[CorridorTime]:
     In mm of the tool where the job has ``corridor_mm``, else in degrees of any joint. The widest corridor is as wide as
     a path uses that none holds back. With stops there is no motion on the spline
     itself, nor in the narrowest corridors. Errors as in
-    ``planner.plan``; InputError where the path is not free.
+    ``planner.plan``; InputError if the path is not free.
     """
     if job.path != "free":
         raise InputError(

@@ -277,7 +277,7 @@ class Improver:
         return replace(
             motion,
             angle_points_deg=self.variables.angle_points(x) * self._size,
-            # A dwell far shorter than the segments beside it may be missed; then it lasts longer.
+            # A dwell far shorter than the segments next to it may be missed; then it lasts longer.
             differences_s=np.maximum(self.variables.time_differences(x), least) * unit_s,
         )
 
@@ -315,6 +315,6 @@ def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bo
     except np.linalg.LinAlgError:
         raise PlanError(
             "no motion was found that meets all via points, rests and dwells",
-            "raise refine, or set it to 'auto'; or bring times and angles closer together in size",
+            "raise refine, or set it to 'auto'; or use times and angles of more similar magnitude",
         ) from None
     return x + factor.solve(gradient, equalities.residual(x))

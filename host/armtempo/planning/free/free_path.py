@@ -38,7 +38,7 @@ class Effort:
     """How much work is put into a free path."""
 
     pieces: int | None
-    """Segments between any two via points; None: as many as pay, more where more time passes."""
+    """Segments between any two via points; None: as many as shorten the motion, more where more time passes."""
     most: int
     """Segments that the record can hold."""
     starts: int
@@ -61,7 +61,7 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     """The fastest motion that meets the demand, from several starts.
 
     Where via points have tolerances it comes from the one that passes them exactly, so it is never slower. Raises
-    PlanError where no start keeps ranges and corridor.
+    PlanError if no start keeps ranges and corridor.
     """
     if demand.tolerances:
         exact = shortest(replace(demand, tolerances={}), effort, progress)
@@ -170,7 +170,7 @@ def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
         points = middle + part * (motion.angle_points_deg - middle)
         motion = replace(motion, angle_points_deg=points).stretched(demand.limits)
     raise PlanError(
-        f"no path was proven to stay within corridor_mm = {demand.corridor_mm:g}",
+        f"no path could be proven to stay within corridor_mm = {demand.corridor_mm:g}",
         "widen the corridor, or "
         + ("take out stops" if demand.stops else "set it to 0 for the spline itself"),
     )

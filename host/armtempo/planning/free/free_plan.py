@@ -34,7 +34,7 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 _BEYOND = 2.0
 """A free path is kept within this many times what its via points span on each side of them."""
 _WORTH_USING = 1e-3
-"""A tolerance of less than so many mm or degrees is not made use of."""
+"""A tolerance of less than this many mm or degrees is not made use of."""
 _ROUNDED = 1.001
 """Time is stretched by no more than this for what rounding does."""
 _START_GAP = 1e-3
@@ -46,7 +46,7 @@ _WIDER = 0.5 * checks.TOLERANCE
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     """The motion through via angles (n + 1, J), which poses with a tolerance may be left by.
 
-    Raises InputError for a job that the board cannot hold, PlanError where no path stays within the ranges.
+    Raises InputError for a job that the board cannot hold, PlanError if no path stays within the ranges.
     """
     most = _most_segments(arm, job, len(via_deg))
     spline = None
@@ -86,7 +86,7 @@ def _in_corridor(job: Job) -> bool:
 
 
 def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned | None:
-    """The plan on the spline through the via points, inside any corridor; None where it leaves a joint's range."""
+    """The plan on the spline through the via points, inside any corridor; None if it leaves a joint's range."""
     on_it = replace(job, path="through", corridor_deg=None, corridor_mm=None, refine="auto")
     try:
         planned = through_plan.motion(arm, on_it, via_deg, progress)
@@ -102,7 +102,7 @@ def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planne
 
 
 def _axis_s(demand: Demand, spline: Planned, pieces: int) -> Array:
-    """Differences of the best time axis that has so many segments for each stretch of the spline."""
+    """Differences of the best time axis that has this many segments for each stretch of the spline."""
     joint = spline.trajectory.joints[0]
     start = time_axis.cut(np.diff(joint.time_points_s), joint.refine, pieces, DEGREE)
     limits = [Limits(*values) for values in demand.limits]

@@ -26,7 +26,7 @@ def nearest(forms: Forms, room: float, fixed: Equalities, wanted: Array) -> Arra
 
     Alike is what has the least squared third differences from it. The bounds are widened until ``wanted``, which
     meets ``fixed``, keeps them, and then drawn in again around the middle of what they leave, until it keeps them
-    by a part of ``room``, which is what the values that are fixed have left. None where there is no way.
+    by a part of ``room``, which is what the values that are fixed have left. None if there is no way.
     """
     x, room = wanted, min(_ROOM * room, _MOST_ROOM)
     excess = _excess(forms, x) + room
@@ -43,7 +43,7 @@ def nearest(forms: Forms, room: float, fixed: Equalities, wanted: Array) -> Arra
 
 
 def _excess(forms: Forms, x: Array) -> float:
-    """How far the farthest form is beyond its bounds, below 0 where none is."""
+    """How far the farthest form is beyond its bounds, below 0 if none is."""
     sums = np.sum(forms.weights * x[forms.columns], axis=1)
     return float(np.max(np.maximum(forms.low - sums, sums - forms.high)))
 

@@ -124,7 +124,7 @@ def shared_out(shares: Array, segments: int, stops: Mapping[int, float]) -> Layo
 def least_pieces(vias: int, stops: Mapping[int, float]) -> Index:
     """Segments between each two of ``vias`` via points at least: (n,).
 
-    A dwell holds the control points of its first segment and of the one behind it. So that none belongs to two
+    A dwell holds the control points of its first segment and of the one after it. So that none belongs to two
     dwells, DEGREE segments lie between them.
     """
     dwells = np.array([stops.get(via, 0.0) > 0.0 for via in range(vias)])

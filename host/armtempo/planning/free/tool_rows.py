@@ -23,7 +23,7 @@ class ToolTargets:
     """(P, 3, 3)."""
     tolerance_mm: Array
     tolerance_deg: Array
-    """How far it may be from them: (P,); infinite where that does not matter."""
+    """How far it may be from them: (P,); infinite if that does not matter."""
 
     def __add__(self, other: ToolTargets) -> ToolTargets:
         """Both."""

@@ -22,7 +22,7 @@ from armtempo.splines import bspline
 
 DEGREE = 5
 _REST, _RAMP = 4, 4
-"""Differences that are zero at an end, and of those behind them the ones that shape its ramp."""
+"""Differences that are zero at an end, and of those after them the ones that shape its ramp."""
 _PEAK = 2.0 / 3.0
 _SHORTEST_S = 0.01
 _GROWTH = 3.0

@@ -19,9 +19,16 @@ from armtempo.kinematics.forward import forward
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import APPROACH, PITCH, ROLL, WHOLE, YAW, Pose
+from armtempo.planning.free.angle_bounds import of_path
+from armtempo.planning.jog.jog_law import DEGREE
+from armtempo.planning.line.deviation import LineDeviation, proven
+from armtempo.planning.line.tool_path import ToolPath, ToolPiece, rotations
+from armtempo.planning.tool import Tool
 
 TOLERANCE_MM, TOLERANCE_DEG = 0.02, 0.02
 """A posture this near to the line is on it."""
+STRAY_MM, STRAY_DEG = 0.2, 1.0
+"""How far the tool may leave its line."""
 STEPS_OF_REACH, STEP_DEG = 250, 1.0
 """The line is looked at in steps of the arm's reach by this, or of that many degrees."""
 MOST_GAIN = 5.0
@@ -83,14 +90,14 @@ class ToolLine:
         """The tool's pose after that many mm or deg, (4, 4)."""
         pose = self._pose.copy()
         if self.about:
-            pose[:3, :3] = _turn(self.direction, math.radians(way)) @ pose[:3, :3]
+            pose[:3, :3] = rotations(math.radians(way) * self.direction[None])[0] @ pose[:3, :3]
         else:
             pose[:3, 3] += way * self.direction
         return pose
 
     @cached_property
     def fixed(self) -> tuple[str, ...]:
-        """What the arm can keep of the tool's orientation on this line; InputError where it cannot even begin."""
+        """What the arm can keep of the tool's orientation on this line; InputError if it cannot even begin."""
         for fixed in _TRIED[:2] if self.about else _TRIED:
             if self._turns(fixed) and self._begins(fixed):
                 return fixed
@@ -211,7 +218,7 @@ class FollowedLine:
         return float(self.ways[-1])
 
     def at(self, ways: Array) -> Array:
-        """The driven joints at ways along the line, degrees (K, J); InputError where one of them is not on it."""
+        """The driven joints at ways along the line, degrees (K, J); InputError if one of them is not on it."""
         found = []
         line = self.line
         for way in ways:
@@ -222,33 +229,19 @@ class FollowedLine:
             found.append(np.degrees(angles[list(line.arm.driven_indices)]))
         return np.array(found)
 
-    def off(self, driven_deg: Array, ways: Array) -> float:
-        """How far the tool leaves the line at postures (K, J) after about ``ways``: mm, or deg of a turn."""
+    def stray(self, angle_points_deg: Array, way_points: Array) -> LineDeviation:
+        """How far splines of the driven joints, (S + 5, J), lead the tool off its place after ways (S + 5,) at most."""
         line = self.line
-        poses = forward(line._solver.geometry, np.radians(all_angles_deg(line.arm, driven_deg)))
-        worst = 0.0
-        for pose, way in zip(poses, ways, strict=True):
-            gap = pose[:3, 3] - line._pose[:3, 3]
-            if line.about:
-                turned = line.pose(float(way))[:3, 2] @ pose[:3, 2]
-                worst = max(
-                    worst,
-                    float(np.linalg.norm(gap)),
-                    0.0 if turned > 1 else math.degrees(math.acos(turned)) - 1,
-                )
-            else:
-                worst = max(worst, float(np.linalg.norm(gap - (gap @ line.direction) * line.direction)))
-        return worst
+        fixed = line.fixed if line.fixed in (WHOLE, (APPROACH,)) else ()
+        turn = math.radians(1.0) * line.direction if line.about else np.zeros(3)
+        direction = np.zeros(3) if line.about else line.direction
+        piece = ToolPiece(line._pose, self.length, direction, np.zeros(3), turn)
+        tool = Tool(line.arm, list(range(len(line.arm.driven))), line.start_deg)
+        angles, ways = of_path(angle_points_deg, DEGREE), of_path(way_points[:, None], DEGREE)[:, :, 0]
+        return proven(angles, ways, tool, ToolPath((piece,)), fixed, LineDeviation(STRAY_MM, STRAY_DEG))
 
 
 def _short(reason: str) -> str:
     """Why a posture was not found, without the figures of the one that comes near."""
     first = reason.partition(";")[0]
     return "the arm reaches no further" if first.startswith("the arm does not reach") else first
-
-
-def _turn(axis: Array, angle_rad: float) -> Array:
-    """Rotation about a unit vector (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle_rad) * cross + (1.0 - math.cos(angle_rad)) * (cross @ cross))

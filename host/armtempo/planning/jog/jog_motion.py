@@ -1,4 +1,4 @@
-"""A jog: one joint, or the tool along or about an axis, from where the arm stands; straight, and quick to stop."""
+"""A jog: one joint, or the tool along or about an axis, from where the arm is; straight, and quick to stop."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from armtempo.model.parts import DrivenJoint
 from armtempo.planning import brake_time, point_to_point, room_check
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.planning.jog import jog_law
-from armtempo.planning.jog.jog_law import DEGREE, WayLaw, WayLimits
-from armtempo.planning.jog.jog_line import AXES, FollowedLine, ToolLine
+from armtempo.planning.jog.jog_law import DEGREE, WayLimits
+from armtempo.planning.jog.jog_line import AXES, STRAY_DEG, STRAY_MM, FollowedLine, ToolLine
 from armtempo.splines import bspline, extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
@@ -29,8 +29,6 @@ SPEED = 0.25
 SLOWEST = 0.01
 RAMP = 0.5
 """Of the acceleration and jerk limits, what a jog uses itself: the rest is for braking at any moment."""
-STRAY_MM = 0.2
-"""How far the tool may leave its line."""
 LINE_PARTS = (8, 16, 32, 64)
 """Into this many parts a line is cut, until the tool stays on it; then its ramps too, which takes longer."""
 _SHORTER = 0.98
@@ -86,7 +84,7 @@ def move_of(
 ) -> JogMove:
     """What is to move: a joint by degrees, or the tool along an axis by mm or about it by degrees.
 
-    Raises InputError where the arguments do not go together, or the arm has no such joint.
+    Raises InputError if the arguments do not go together, or the arm has no such joint.
     """
     ways = [by for by in (by_deg, by_mm) if by is not None]
     if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
@@ -111,9 +109,9 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
             f"a speed of {speed:g} is not allowed", f"give a part of the limits, {SLOWEST:g} to 1"
         )
     if math.isnan(move.by) or move.by == 0.0:
-        raise InputError("a jog by 0 moves nothing", "say how far, in degrees or mm")
+        raise InputError("a jog by 0 moves nothing", "give a distance in degrees or mm")
     if (move.joint is None) == (not move.axis):
-        raise InputError("a jog moves a joint or the tool, one of both", "name a joint, or an axis")
+        raise InputError("a jog moves either a joint or the tool", "name a joint, or an axis")
     trajectory, ends = _in_room(name, arm, start, move, speed)
     limits = [joint.limits for joint in arm.driven]
     return JogMotion(trajectory, brake_time.of_motion(trajectory, limits), ends)
@@ -236,16 +234,18 @@ def _line(arm: Arm, start: Array, move: JogMove) -> ToolLine:
 
 
 def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> Trajectory | None:
-    """The motion along the line; None where a joint would leave its range, or the tool the line."""
+    """The motion along the line; None if a joint would leave its range, or the tool the line."""
     arm = followed.line.arm
     limits = _line_limits(followed, length, speed)
     for short_ramps, parts in itertools.product((False, True), LINE_PARTS):
         law = jog_law.law(length, limits, length / parts, short_ramps)
         angles = followed.at(np.clip(law.at_knots, 0.0, length))
-        trajectory = _trajectory(name, list(bspline.fit(angles, DEGREE).T), law.time_s)
+        points = bspline.fit(angles, DEGREE)
+        trajectory = _trajectory(name, list(points.T), law.time_s)
         if not _within(trajectory, arm):
             return None
-        if _stray(trajectory, law, followed) <= STRAY_MM:
+        stray = followed.stray(points, law.way)
+        if stray.position_mm <= STRAY_MM and stray.rotation_deg <= STRAY_DEG:
             return _slowed(trajectory, arm, speed)
     return None
 
@@ -273,14 +273,6 @@ def _within(trajectory: Trajectory, arm: Arm) -> bool:
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     low, high = np.minimum(low, angles[0]), np.maximum(high, angles[0])  # a whole step may lie just beyond
     return bool(np.all(angles >= low - 1e-9) and np.all(angles <= high + 1e-9))
-
-
-def _stray(trajectory: Trajectory, law: WayLaw, followed: FollowedLine) -> float:
-    """How far the tool leaves the line, in mm (of a turn about an axis: its point)."""
-    way = JointSpline(DEGREE, 1, law.way, law.time_s)
-    knots = way.via_times_s
-    times = (knots[:-1, None] + np.diff(knots)[:, None] * (0.25, 0.5, 0.75)).ravel()
-    return followed.off(trajectory(times), way(times))
 
 
 def _slowed(trajectory: Trajectory, arm: Arm, speed: float) -> Trajectory:

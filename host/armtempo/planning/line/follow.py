@@ -73,9 +73,7 @@ class Followed:
         """The postures at any ways (N,) within it, exactly on it: (N, J)."""
         near = np.stack([np.interp(ways, self.ways, column) for column in self.angles_deg.T], axis=1)
         if _is_loose(self.course, self.tool):
-            from scipy.interpolate import (
-                CubicSpline,
-            )  # here, because loading it takes longer than most commands
+            from scipy.interpolate import CubicSpline  # loading it takes longer than most commands
 
             near = CubicSpline(self.ways, self.angles_deg)(ways)
         angles, missed = _corrected(self.course, self.tool, ways, near)
@@ -199,7 +197,7 @@ def _stuck(course: Course, tool: Tool, way: float, angles_deg: Array) -> PlanErr
         return PlanError(
             f"{place}: the arm comes to a singular posture{_which(course.arm, angles_deg)}, where its joints cannot "
             "follow the tool",
-            "move the line away from it, turn the tool otherwise, or leave line out between these via points",
+            "move the line away from it, turn the tool differently, or leave line out between these via points",
         )
     return PlanError(f"{place}: the arm reaches no further", "move the line nearer to the arm")
 

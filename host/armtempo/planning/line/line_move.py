@@ -1,4 +1,4 @@
-"""A single straight line of the tool from where the arm stands."""
+"""A single straight line of the tool from where the arm is."""
 
 from __future__ import annotations
 

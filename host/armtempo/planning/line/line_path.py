@@ -80,7 +80,7 @@ class LinePath:
 
 
 def led_stretches(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
-    """The stretches of a job in which the tool is led, by their number; PlanError where the arm cannot follow."""
+    """The stretches of a job in which the tool is led, by their number; PlanError if the arm cannot follow."""
     speeds = np.array([limit.speed_deg_s for limit in checks.limits_of(arm)])
     found = {}
     for number, stretch in enumerate(cut.of_job(job)):
@@ -129,7 +129,7 @@ def proven_path(
 ) -> tuple[LinePath, dict[int, LineDeviation]]:
     """The spline with as few segments as prove that the tool stays near its way, and how near in each stretch.
 
-    Raises PlanError where the board could not hold so many.
+    Raises PlanError if the board could not hold that many.
     """
     stretches = cut.of_job(job)
     most = _most_segments(arm)

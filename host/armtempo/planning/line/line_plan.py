@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from armtempo.model.job import Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
-from armtempo.planning.fixed_path import FixedPath
+from armtempo.planning.fixed_path import Along, FixedPath, Optimum
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line.deviation import LineDeviation
 from armtempo.planning.line.follow import passed
@@ -54,66 +56,78 @@ def _away(led: Led, found: LineDeviation) -> str:
 
 
 def _timed(arm: Arm, job: Job, path: LinePath, notes: list[str], progress: Progress) -> Planned:
-    """The shortest time axis on the path."""
+    """The shortest time axis on the path, within the limits of joints and tool."""
     limits = checks.limits_of(arm)
-    segments = path.knots[-1]
-    moving = [
-        int(joint) for joint in np.flatnonzero(np.ptp(path.angle_points_deg, axis=0) > checks.TOLERANCE)
-    ]
+    moving = np.flatnonzero(np.ptp(path.angle_points_deg, axis=0) > checks.TOLERANCE)
     points, own = path.angle_points_deg[:, moving], [limits[joint] for joint in moving]
-    most = time_parameterization.most_refine(job, segments, len(limits))
     tool = Tool(arm, list(range(len(limits))), path.angle_points_deg[0])
     tool_limits = _tool_limits(job, path)
-    pieces = bspline.polynomials(path.angle_points_deg, DEGREE)
+    most = time_parameterization.most_refine(job, path.knots[-1], len(limits))
     levels = [job.refine] if isinstance(job.refine, int) else _levels(most)
-    differences, before, best = np.ones(segments + DEGREE - 1), 1, None
-    history = []
-    for number, refine in enumerate(levels):
-        stage(f"refining to {refine}")
-        watched = None
-        if tool_limits.any:
-            fine = bspline.subdivide(pieces, refine)
-            watched = along(fine, tool, tool_limits.refined(refine))
-        axis = FixedPath(points, DEGREE, own, refine, along=watched)
-        found = axis.optimum(time_axis.cut(differences, before, refine, DEGREE), _GAP)
-        history.append(found.total_s)
-        pays = best is None or found.total_s < best[1].total_s * (1.0 - _PAYS)
-        if best is None or found.total_s < best[1].total_s:
-            best = (refine, found)
-        differences, before = found.differences_s, refine
-        progress(number + 1, len(levels))
-        if not pays:
-            break
-    assert best is not None
-    refine, found = best
+    best = _best_axis(points, own, levels, partial(_watched, path, tool, tool_limits), progress)
+    found = best.found
     stretch = max(1.0, time_parameterization.MIN_DURATION_S / found.total_s)
     if tool_limits.any:
         stage("proving the tool's limits")
-        curve = (
-            _bernstein(path.angle_points_deg, refine),
-            of_path(time_points(found.differences_s, DEGREE)[:, None], DEGREE),
-        )
-        over = excess(curve[0], curve[1][:, :, 0], tool, tool_limits.refined(refine))
-        stretch = max(stretch, over)
+        angles = of_path(bspline.refined(path.angle_points_deg, best.refine, DEGREE), DEGREE)
+        axis = of_path(time_points(found.differences_s, DEGREE)[:, None], DEGREE)[:, :, 0]
+        stretch = max(stretch, excess(angles, axis, tool, tool_limits.refined(best.refine)))
+        notes += _limit_notes(job, path, angles, axis * stretch, tool)
     times = time_points(found.differences_s * stretch, DEGREE)
     joints = tuple(
-        JointSpline(DEGREE, refine, np.ascontiguousarray(column), times, path.arrivals)
+        JointSpline(DEGREE, best.refine, np.ascontiguousarray(column), times, path.arrivals)
         for column in path.angle_points_deg.T
     )
     floor = _floor(points, path.knots, own, found.total_s)
     search = Search(
-        joints=tuple(moving),
+        joints=tuple(map(int, moving)),
         intervals_s=found.differences_s,
         total_s=found.total_s * stretch,
-        searched_s=history[0],
-        evaluations=len(history),
-        history_s=np.minimum.accumulate(history),
+        searched_s=best.history_s[0],
+        evaluations=len(best.history_s),
+        history_s=np.minimum.accumulate(best.history_s),
         optimum_s=found.bound_s,
         floor_s=floor.time_s,
         floor_kind=floor.kind,
     )
-    notes += _limit_notes(job, path, refine, times, tool)
     return Planned(Trajectory(job.name, joints, True), (search,), tuple(notes))
+
+
+class _Axis(NamedTuple):
+    """The best time axis of those tried."""
+
+    refine: int
+    found: Optimum
+    history_s: list[float]
+    """Motion time of each one tried."""
+
+
+def _best_axis(
+    points: Array, limits: Sequence[Limits], levels: Sequence[int], watched: Callable[[int], Along | None],
+    progress: Progress,
+) -> _Axis:  # fmt: skip
+    """The shortest axis of ever more segments, as long as they pay; ``watched``: what else has limits."""
+    differences, before = np.ones(len(points) - 1), 1
+    tried: list[tuple[int, Optimum]] = []
+    for refine in levels:
+        stage(f"refining to {refine}")
+        axis = FixedPath(points, DEGREE, limits, refine, along=watched(refine))
+        found = axis.optimum(time_axis.cut(differences, before, refine, DEGREE), _GAP)
+        tried.append((refine, found))
+        progress(len(tried), len(levels))
+        if found.total_s >= min((one.total_s for _, one in tried[:-1]), default=np.inf) * (1.0 - _PAYS):
+            break
+        differences, before = found.differences_s, refine
+    best = min(tried, key=lambda one: one[1].total_s)
+    return _Axis(*best, [found.total_s for _, found in tried])
+
+
+def _watched(path: LinePath, tool: Tool, limits: ToolLimits, refine: int) -> Along | None:
+    """The way of the tool, where it has limits."""
+    if not limits.any:
+        return None
+    pieces = bspline.subdivide(bspline.polynomials(path.angle_points_deg, DEGREE), refine)
+    return along(pieces, tool, limits.refined(refine))
 
 
 def _levels(most: int) -> list[int]:
@@ -133,13 +147,8 @@ def _floor(points: Array, knots: Sequence[int], limits: Sequence[Limits], about_
     return Floor(sum(part.time_s for part in parts), parts[0].kind)
 
 
-def _bernstein(points: Array, parts: int) -> Array:
-    """Bernstein coefficients of control points (S + 5, J) with each segment cut: (S * parts, 6, J)."""
-    return of_path(bspline.refined(points, parts, DEGREE), DEGREE)
-
-
 def _asked(job: Job, via: int) -> tuple[float, float]:
-    """Limits of the tool's speed and acceleration on the way to a via point; infinite where there is none."""
+    """Limits of the tool's speed and acceleration on the way to a via point; infinite if there is none."""
     way = tool_way.at(job.ways, via)
     both = []
     for key in ("speed_mm_s", "acceleration_mm_s2"):
@@ -160,16 +169,19 @@ def _tool_limits(job: Job, path: LinePath) -> ToolLimits:
     return ToolLimits(*limits)
 
 
-def _limit_notes(job: Job, path: LinePath, refine: int, times: Array, tool: Tool) -> list[str]:
-    """What the tool reaches on each way whose speed or acceleration the job limits, proven."""
-    angles, axis = _bernstein(path.angle_points_deg, refine), of_path(times[:, None], DEGREE)[:, :, 0]
+def _limit_notes(job: Job, path: LinePath, angles: Array, axis_s: Array, tool: Tool) -> list[str]:
+    """What the tool reaches on each way whose speed or acceleration the job limits, proven.
+
+    Of the Bernstein coefficients of angles (S, 6, J) and time (S, 6).
+    """
+    refine = len(angles) // path.knots[-1]
     notes = []
     for via, (first, last) in enumerate(pairwise(path.arrivals), 1):
         asked = _asked(job, via)
         if not np.any(np.isfinite(asked)):
             continue
         own = slice(first * refine, last * refine)
-        found = reached(angles[own], axis[own], tool)
+        found = reached(angles[own], axis_s[own], tool)
         words = [
             f"{value:.4g} {unit}"
             for value, limit, unit in zip(found, asked, ("mm/s", "mm/s²"), strict=True)

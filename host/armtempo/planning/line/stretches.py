@@ -124,7 +124,7 @@ def _piece(way: ToolWay, start: Array, end: Array, fixed: tuple[str, ...]) -> To
 
 
 def _check_cuts(stretch: Stretch, path: ToolPath) -> None:
-    """PlanError where corners are cut over more of a line than there is."""
+    """PlanError if corners are cut over more of a line than there is."""
     ways = [0.0, *path.cuts, 0.0]
     for number, piece in enumerate(path.pieces):
         name = f"P{stretch.first + number} to P{stretch.first + number + 1}"

@@ -14,7 +14,7 @@ from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
 _DIRECTIONS = 8
-"""The acceleration is watched in so many directions of the plane in which the tool moves; between two of them it may be
+"""The acceleration is checked in this many directions of the plane of the motion; between two of them it may be
 2 % larger, so each has as much less."""
 _SHARP = 2e-3
 """How far, relative, a bound may lie above what is reached."""
@@ -23,7 +23,7 @@ _MOST_PIECES = 100_000
 
 @dataclass(frozen=True, eq=False)
 class ToolLimits:
-    """Limits on each segment of a path, (S,); infinite where there is none."""
+    """Limits on each segment of a path, (S,); infinite if there is none."""
 
     speed_mm_s: Array
     acceleration_mm_s2: Array

@@ -78,7 +78,7 @@ class ToolPath:
         return float(self.starts[-1])
 
     def poses(self, way: Array) -> tuple[Array, Array]:
-        """Positions (N, 3) and rotations (N, 3, 3) at ways (N,); beyond the ends the way goes on."""
+        """Positions (N, 3) and rotations (N, 3, 3) at ways (N,); beyond the ends the way continues."""
         starts = self.starts
         number = np.clip(np.searchsorted(starts, way, side="right") - 1, 0, len(self.pieces) - 1)
         positions, rotated = np.empty((len(way), 3)), np.empty((len(way), 3, 3))
@@ -131,7 +131,7 @@ def line(start: Array, end: Array, turn: Array, where: str) -> ToolPiece:
     turned_deg = float(np.degrees(np.linalg.norm(turn)))
     if turned_deg <= _STILL_DEG:
         raise PlanError(
-            f"{where}: the tool is there already", "leave line out, or move one of the via points"
+            f"{where}: the tool is at this point already", "leave line out, or move one of the via points"
         )
     return ToolPiece(start, turned_deg, np.zeros(3), np.zeros(3), turn / turned_deg)
 
@@ -177,7 +177,7 @@ def turn_of_axis(start: Array, end: Array, where: str) -> Array:
 def _check_turn(vector: Array, where: str) -> None:
     if np.degrees(np.linalg.norm(vector)) > _HALF_TURN_DEG:
         raise PlanError(
-            f"{where}: the tool turns by half a turn, and which way is left open",
+            f"{where}: the tool turns by 180 degrees, so its direction is undefined",
             "add a via point with an orientation between the two",
         )
 

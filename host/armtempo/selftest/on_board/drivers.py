@@ -3,7 +3,6 @@
 
 def measure(record):
     """``record``: file of the arm record."""
-    import armtempo_board.hardware.pins
 
     active = None
     joints = []

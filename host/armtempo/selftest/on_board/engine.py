@@ -1,6 +1,9 @@
-"""Goes in front of parts that make steps: the engine for the board's own arm, without drivers, inputs and encoders."""
+"""Goes in front of parts that make steps: the engine for the board's own arm, without its drivers."""
 
 from armtempo_shared import armrecord
+
+_ESTOP_LINE = 15
+_PUPDR_SHIFT = 2 * _ESTOP_LINE
 
 
 class NoPin:
@@ -14,29 +17,52 @@ class NoPin:
 _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 
 
-def make_engine(record, estop=False, rates=None):
-    """(engine, rows of its joints); it steps the pins of this arm and no others.
+def make_engine(record, estop=False, rates=None, encoders=False, workspace=None):
+    """(engine, rows of its joints); it steps the pins of this arm and no others, and the arm's E-stop stops it.
 
-    ``estop``: its interrupt stops it. ``rates``: of so many joints, in the place of the arm's.
+    ``estop``: one is fitted, whatever the arm has. ``rates``: of that many joints, in the place of the arm's.
+    ``encoders``: they are read, but no joint is checked against them. ``workspace``: of a program that has one already.
     """
     from armtempo_board.app import room
     from armtempo_board.motion.engine import Engine
 
     with open(record, "rb") as file:
         head, joints, _ = armrecord.unpack(file.read())
-    head["flags"] &= armrecord.FLAG_ENABLE_HIGH | (armrecord.FLAG_ESTOP_ACTIVE_HIGH if estop else 0)
-    if estop:
-        head["flags"] |= armrecord.FLAG_ESTOP_FITTED
+    kept = armrecord.FLAG_ENABLE_HIGH | armrecord.FLAG_ESTOP_ACTIVE_HIGH | armrecord.FLAG_ESTOP_FITTED
+    head["flags"] = head["flags"] & kept | (armrecord.FLAG_ESTOP_FITTED if estop else 0)
     for joint in joints:
-        joint["encoder"] = joint["limit_low"] = joint["limit_high"] = armrecord.NONE
+        joint["limit_low"] = joint["limit_high"] = armrecord.NONE
         joint["following_counts"] = 0
+        if not encoders:
+            joint["encoder"] = armrecord.NONE
     if rates:
         joints = joints[: len(rates)]
         for joint, rate in zip(joints, rates):
             joint["max_rate"], joint["min_steps"], joint["max_steps"] = rate, -_RANGE, _RANGE
-    engine = Engine(head, joints, room.workspace())
+    if workspace is None:
+        workspace = room.workspace()
+    else:
+        room.share(workspace, len(joints))
+    engine = Engine(head, joints, workspace)
     engine.inputs.enable_pin = NoPin()
+    if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
+        pull_inactive(engine)
     return engine, joints
+
+
+def pull_inactive(engine):
+    """An E-stop that is not wired would be tripped: draw it to the other level. A switch is stronger.
+
+    ValueError where one is pressed.
+    """
+    pull = 2 if engine.inputs._estop_level else 1
+    at = stm.GPIOE + stm.GPIO_PUPDR
+    mem32[at] = mem32[at] & ~(3 << _PUPDR_SHIFT) | pull << _PUPDR_SHIFT
+    time.sleep_ms(1)
+    engine.service()  # notes what tripped until now
+    if not engine.clear():
+        engine.close()
+        raise ValueError("the E-stop is pressed, or wired for the other level")
 
 
 def serve(engine, idle_us):
@@ -47,11 +73,13 @@ def serve(engine, idle_us):
 
 
 def load(engine, motion, start_steps):
-    """Stand at its start and load it; ValueError where the drivers are not off."""
+    """Stand at its start and load it; the motion. ValueError where the drivers are not off."""
     from armtempo_shared.motion import Motion
 
     output, driven, level = enable()
     if not output or driven != level or level == engine.inputs.on_level:
         raise ValueError("ENABLE is not inactive: no steps are made")
     engine.home((1 << len(start_steps)) - 1, start_steps)
-    engine.load(Motion(motion))
+    motion = Motion(motion)
+    engine.load(motion)
+    return motion

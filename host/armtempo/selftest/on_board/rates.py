@@ -1,29 +1,84 @@
-"""Whether the joints keep up with a step rate: a motion that reaches it, with the engine's loop and nothing else."""
+"""Whether the joints keep up with a step rate: a motion that reaches it, in the program's own loop, with a host."""
+
+_COMMAND_MS = 20
 
 
-def measure(record, motion, rates, idle_us):
-    """The first joints of the arm, one for each of ``rates``, from step 0 on: fault, turns of the loop, the longest."""
-    from array import array
+class Host:
+    """In the place of the serial port: a command every 20 ms, and nobody who reads what the board says."""
+
+    def __init__(self, frames):
+        self._frames = frames
+        self._left = b""
+        self._then_ms = time.ticks_ms()
+        self.sent = 0
+
+    def readinto(self, buffer, size):
+        """What is there, as of a port."""
+        if not self._left and time.ticks_diff(time.ticks_ms(), self._then_ms) >= _COMMAND_MS:
+            self._then_ms = time.ticks_ms()
+            self._left = self._frames[2 - self.sent % 2 if self.sent else 0]
+            self.sent += 1
+        piece = self._left[:size]
+        self._left = self._left[size:]
+        buffer[: len(piece)] = piece
+        return len(piece) or None
+
+    def write(self, data, start, size):
+        """All is taken."""
+        return size
+
+
+def measure(record, motion, rates, frames, idle_us):
+    """The first joints of the arm, one for each of ``rates``, from step 0 on: fault, turns of the loop, the longest.
+
+    ``frames``: hello, then two commands that take turns.
+    """
     from binascii import unhexlify
+
+    from armtempo_board.app.app import App
+    from armtempo_shared import codes
 
     feed()
     count_cycles()
-    engine, _ = make_engine(record, rates=rates)
-    sample = array("i", [0] * 32)
-    longest = turns = 0
+    host = Host([unhexlify(frame) for frame in frames])
+    app = App(host, "/none")  # no arm is stored there: no pin is touched
+    engine, _ = make_engine(record, rates=rates, workspace=app.controller.workspace)
+    hand_over(app.controller, engine, len(rates))
+    engine.skip_check = True  # a rate is tried that is not allowed
+    longest = 0
     try:
-        load(engine, unhexlify(motion), [0] * len(rates))
-        engine.start()
+        app.controller.start_loaded(load(engine, unhexlify(motion), [0] * len(rates)), 0)
         then = cycles()
-        while engine.moving:
-            serve(engine, idle_us)
-            engine.next_sample(sample)
+        while app.controller.running:
+            app.turn()
+            if idle_us:
+                time.sleep_us(idle_us)
             now = cycles()
             longest = max(longest, (now - then) & 0xFFFFFFFF)
             then = now
-            turns += 1
     finally:
         engine.freeze()
         off = enable()
         engine.close()
-    return {"fault": engine.fault, "turns": turns, "longest_turn_cycles": longest, "enable": off}
+    fault = app.controller.fault()
+    if fault == codes.ESTOP:
+        raise ValueError("the E-stop was pressed")
+    return {
+        "fault": fault,
+        "turns": app.turns,
+        "longest_turn_cycles": longest,
+        "commands": host.sent,
+        "enable": off,
+    }
+
+
+def hand_over(controller, engine, joints):
+    """The controller has this engine, as when it takes an arm."""
+    from array import array
+
+    from armtempo_board.buffers import COMMANDED
+
+    controller.engine = engine
+    controller.joints = joints
+    controller.raw = array("i", [0] * (COMMANDED + 2 * joints))
+    controller.samples.configure(joints)

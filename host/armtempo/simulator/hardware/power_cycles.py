@@ -63,7 +63,7 @@ def _start(options, repl):
 
 
 def _execute(options, repl, name):
-    """Run a file of flash or card, or of the program that is not deployed; False where it raises."""
+    """Run a file of flash or card, or of the program that is not deployed; False if it raises."""
     folders = [machine_state.flash.cwd] + [folder + "/armtempo_board" for folder in options["program"]]
     for folder in folders:
         try:

@@ -14,8 +14,8 @@ import vfs
 from micropython import const, mem_info
 
 ROOT = "/ram/armtempo"
-_BEYOND = const(0x20020000)  # 60 KB of the emulator's that the chip has not
-_BLOCKS = const(120)
+_BEYOND = const(0x20020000)  # 60 KB of the emulator's that the chip has not; the last 512 bytes: loop_board.c
+_BLOCKS = const(119)
 _BLOCK = const(512)
 _UART = const(3)
 _STARTS = const(6)  # word of the state

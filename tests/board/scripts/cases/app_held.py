@@ -1,6 +1,6 @@
 """Held motions, which brake in silence; drivers off and on."""
 
-# all cases: slow on CPython
+# all cases: slow on CPython, not emulated
 
 import sys
 
@@ -35,7 +35,7 @@ def case_it_brakes_once_in_silence_and_ends_without_a_fault():
     assert app.controller.engine.calls[-1] == "brake"
     calls = len(app.controller.engine.calls)
     host.turn(1000)
-    assert host.ask("hold") == ("ok", (), b"")  # too late: it goes on braking
+    assert host.ask("hold") == ("ok", (), b"")  # too late: it continues braking
     host.turn(1000)
     assert len(app.controller.engine.calls) == calls
     assert state(host) == "braking"
@@ -82,7 +82,7 @@ def case_a_lost_link_may_also_be_a_fault():
     assert app.controller.fault() == codes.LINK_LOST
 
 
-def case_hold_allocates_nothing():
+def case_hold_allocates_nothing():  # emulated
     if sys.implementation.name != "micropython":
         return
     import micropython

@@ -90,7 +90,7 @@ class Here:
         return end - start
 
     def sleep_ms(self, wait_ms):
-        """Time goes on by itself."""
+        """Time continues by itself."""
 
 
 def case_a_program_that_ended_by_itself_lets_no_frame_reach_the_prompt():

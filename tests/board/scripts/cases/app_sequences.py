@@ -1,6 +1,6 @@
 """Sequences that run: step by step, ended by whatever can end one."""
 
-# all cases: slow on CPython
+# all cases: slow on CPython, not emulated
 
 import cases
 import stand_in
@@ -24,7 +24,7 @@ from sequence_rig import (
 )
 
 
-def case_steps_come_one_after_the_other():
+def case_steps_come_one_after_the_other():  # emulated
     app, host = ready(
         [
             (OUTPUT, 0, 7, 0),
@@ -89,7 +89,7 @@ def rows_of(host):
 COUNTING = [(REPEAT, 0, 0, 3), (COUNT, 1, 0, 0), (WAIT, 0, 0, 5000), (END, 0, 1, 0), (COUNT, 0, 0, 0)]
 
 
-def case_counters_count_until_it_begins_anew():
+def case_counters_count_until_it_begins_anew():  # emulated
     _, host = ready(COUNTING, counters=("trays", "parts"))
     begin(host)
     assert counters_of(host) == {"trays": 0, "parts": 1}
@@ -107,14 +107,14 @@ def case_counters_count_until_it_begins_anew():
     assert counters_of(host) == {"trays": 0, "parts": 1}
 
 
-def case_without_counters_there_are_none():  # not emulated
+def case_without_counters_there_are_none():
     _, host = ready([(WAIT, 0, 0, 1)])
     assert host.ask("counter", (0,))[:2] == ("error", "unknown_command")
     begin(host)
     assert counters_of(host) == {}
 
 
-def case_each_row_is_told_when_it_begins():  # not emulated
+def case_each_row_is_told_when_it_begins():
     _, host = ready(COUNTING, counters=("trays", "parts"))
     host.turn()
     host.events = []
@@ -130,7 +130,7 @@ def case_each_row_is_told_when_it_begins():  # not emulated
     assert not any(value for _, row, value in rows if row in (0, 2, 3))
 
 
-def case_a_motions_row_is_told_with_its_run():  # not emulated
+def case_a_motions_row_is_told_with_its_run():
     app, host = ready([(MOVE, "there", 0, 0), (WAIT, 0, 0, 10), (MOVE, "back", 0, 0)])
     host.turn()
     host.events = []
@@ -151,9 +151,9 @@ def case_a_motion_is_checked_once_in_a_run():
         begin(host)
         for at in (10, 0, 10, 0):
             arrive(app, host, at)
-            assert not engine.judged
+            assert not engine.skip_check
         checks = [call for call in engine.calls if call == "check" or call.startswith("load")]
-        assert checks == ["check"] * 3 + ["load judged"] + ["load ready"] * 3, checks
+        assert checks == ["check"] * 3 + ["load unchecked"] + ["load ready"] * 3, checks
     start(host)
     assert engine.calls[-2:] == ["load", "start"]
 
@@ -188,7 +188,7 @@ def case_what_comes_next_is_prepared_over_rows_between():
     for _ in range(2):
         stand_in.Clock.now_ms += 500
         host.turn(5)
-    assert loads(app) == ["judged", "ready", "ready"]
+    assert loads(app) == ["unchecked", "ready", "ready"]
     host.turn(30)
     assert engine.calls.count("prepare") == 2, "nothing comes"
     arrive(app, host, 3)
@@ -207,7 +207,7 @@ def case_without_room_nothing_is_prepared():
         host.turn(20)
         for at in (10, 0, 10, 0):
             arrive(app, host, at)
-        assert stands(host)[0] == "finished" and loads(app) == ["judged"] * 4
+        assert stands(host)[0] == "finished" and loads(app) == ["unchecked"] * 4
         assert engine.calls.count("prepare") == late
         assert engine.calls.count("give back") == late
 
@@ -219,10 +219,10 @@ def case_where_the_arm_stands_elsewhere_what_is_prepared_is_given_up():
     host.turn(20)
     assert engine.calls.count("prepare") == 1
     arrive(app, host, 9)
-    assert loads(app) == ["judged", "judged"]
+    assert loads(app) == ["unchecked", "unchecked"]
     arrive(app, host, 0)
     arrive(app, host, 9)
-    assert loads(app) == ["judged", "judged", "ready", "ready"], "it ends there each time"
+    assert loads(app) == ["unchecked", "unchecked", "ready", "ready"], "it ends there each time"
 
 
 def case_without_time_it_is_prepared_between_two():
@@ -233,14 +233,14 @@ def case_without_time_it_is_prepared_between_two():
     begin(host)
     assert "prepare" not in engine.calls
     arrive(app, host, 10)
-    assert loads(app) == ["judged", "ready"]
+    assert loads(app) == ["unchecked", "ready"]
     host.ask("speed", (500,))
     arrive(app, host, 0)
     host.turn(20)
     assert engine.calls.count("prepare") == 2 and not engine.moving
     stand_in.Clock.now_ms += 500
     host.turn(5)
-    assert loads(app) == ["judged", "ready", "ready"]
+    assert loads(app) == ["unchecked", "ready", "ready"]
 
 
 def case_behind_a_stop_nothing_is_prepared():
@@ -263,7 +263,7 @@ def case_a_motion_that_is_unfit_is_refused_before_anything_moves():
     assert runs(app) == 0 and app.controller.outputs.log == [] and state(host) == "idle"
 
 
-def case_a_record_that_is_another_now_is_refused_though_it_was_checked():  # not emulated
+def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
     app.controller.engine.has_time = False
@@ -273,7 +273,7 @@ def case_a_record_that_is_another_now_is_refused_though_it_was_checked():  # not
         file.write(b"\x55")
     arrive(app, host, 0)
     assert stands(host)[:2] == ("refused", codes.BAD_RECORD), stands(host)
-    assert runs(app) == 2 and not app.controller.engine.judged
+    assert runs(app) == 2 and not app.controller.engine.skip_check
 
 
 def case_for_ever_ends_only_by_a_stop():
@@ -329,7 +329,7 @@ def case_an_input_that_never_comes_stops_it():
     assert state(host) == "idle" and app.controller.outputs.log == []
 
 
-def case_an_input_that_never_comes_is_a_fault():  # not emulated
+def case_an_input_that_never_comes_is_a_fault():
     app, host = _waited_in_vain(sequence.FAULT_THEN)
     assert stands(host) == ("fault", codes.INPUT_TIMEOUT, 1, 0, 0)
     assert state(host) == "fault" and app.controller.outputs.log == []
@@ -338,12 +338,12 @@ def case_an_input_that_never_comes_is_a_fault():  # not emulated
     assert begin(host)[0] == "ok"
 
 
-def case_an_input_that_never_comes_is_passed_over():  # not emulated
+def case_an_input_that_never_comes_is_passed_over():
     app, host = _waited_in_vain(sequence.NEXT_THEN)
     assert stands(host)[0] == "finished" and app.controller.outputs.log == [(0, 1)]
 
 
-def case_a_fault_ends_it_and_says_where():  # not emulated
+def case_a_fault_ends_it_and_says_where():
     app, host = ready([(MOVE, "there", 0, 0), (OUTPUT, 0, 1, 0), (MOVE, "back", 0, 0)])
     begin(host)
     engine = app.controller.engine
@@ -354,7 +354,7 @@ def case_a_fault_ends_it_and_says_where():  # not emulated
     assert app.controller.outputs.log == [] and state(host) == "fault"
 
 
-def case_a_fault_in_a_wait_ends_it():  # not emulated
+def case_a_fault_in_a_wait_ends_it():
     app, host = ready([(WAIT, 0, 0, 100000), (OUTPUT, 0, 1, 0)])
     begin(host)
     app.controller.engine.fault = codes.ESTOP
@@ -362,7 +362,7 @@ def case_a_fault_in_a_wait_ends_it():  # not emulated
     assert app.controller.outputs.log == []
 
 
-def case_a_mistake_of_the_program_ends_it():  # not emulated
+def case_a_mistake_of_the_program_ends_it():
     app, host = ready([(WAIT, 0, 0, 100000), (OUTPUT, 0, 1, 0)])
     begin(host)
     app.controller.engine.explode = ValueError("x")
@@ -370,7 +370,7 @@ def case_a_mistake_of_the_program_ends_it():  # not emulated
     assert app.controller.outputs.log == []
 
 
-def case_what_cannot_go_on_is_named():  # not emulated
+def case_what_cannot_go_on_is_named():
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     begin(host)
     app.controller.engine.refusal = (codes.TOO_FAST, 1, 5)
@@ -379,7 +379,7 @@ def case_what_cannot_go_on_is_named():  # not emulated
     assert state(host) == "idle"
 
 
-def case_nothing_else_is_taken_meanwhile():  # not emulated
+def case_nothing_else_is_taken_meanwhile():
     _, host = ready([(WAIT, 0, 0, 100000)])
     begin(host)
     for name, values, tail in (
@@ -395,12 +395,12 @@ def case_nothing_else_is_taken_meanwhile():  # not emulated
     assert stands(host)[0] == "running"
 
 
-def case_before_any_the_command_is_unknown():  # not emulated
+def case_before_any_the_command_is_unknown():
     _, host = connected()
     assert host.ask("sequence")[:2] == ("error", "unknown_command")
 
 
-def case_while_a_motion_runs_the_last_one_is_told():  # not emulated
+def case_while_a_motion_runs_the_last_one_is_told():
     _, host = ready([(WAIT, 0, 0, 10)])
     begin(host)
     host.turn(20)
@@ -408,7 +408,7 @@ def case_while_a_motion_runs_the_last_one_is_told():  # not emulated
     assert stands(host) == ("finished", 0, 1, 0, 0)
 
 
-def case_hosts_come_and_go():  # not emulated
+def case_hosts_come_and_go():
     app, host = ready([(REPEAT, 0, 0, 5), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
     for cycle in range(5):
@@ -434,7 +434,7 @@ def case_silence_of_the_host_stops_it_where_the_arm_says_so():
     assert stands(host) == ("fault", codes.LINK_LOST, 1, 0, 0)
 
 
-def case_speed_holds_for_the_motions_that_follow():
+def case_speed_holds_for_the_motions_that_follow():  # emulated
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     begin(host)
     assert host.ask("speed", (300,))[0] == "ok"
@@ -459,7 +459,7 @@ def case_speed_between_motions_is_that_of_the_next():
     assert app.controller.engine.rates.wanted == 200
 
 
-def case_the_button_starts_it_as_the_default():  # not emulated
+def case_the_button_starts_it_as_the_default():
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     assert host.ask("set_default", (), "seq")[0] == "ok"
     app.controller.begin(app.controller.store().default(), 0)
@@ -469,7 +469,7 @@ def case_the_button_starts_it_as_the_default():  # not emulated
     assert stands(host)[0] == "finished"
 
 
-def case_code_stays_from_the_first_motion_to_the_end_where_memory_is_not_short():
+def case_code_stays_from_the_first_motion_to_the_end_where_memory_is_not_short():  # emulated
     for is_short in (False, True):
         app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
         app.controller.workspace.is_short = is_short

@@ -32,7 +32,7 @@ def case_both_ways_round():
 
 
 def case_declared():
-    """The count goes on from what was declared, also across the counter's zero."""
+    """The count continues from what was declared, also across the counter's zero."""
     board = bare_board.start()
     encoder = EncoderInput(0, 0)
     board.timers[1].turn(-5)

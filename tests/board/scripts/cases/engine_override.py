@@ -334,7 +334,7 @@ def case_long_pause():  # not emulated
 
 
 def case_refused():  # not emulated
-    """What cannot change its speed says so, and goes on."""
+    """What cannot change its speed says so, and continues."""
     rig, _ = begin(record(NO_RAMPS))
     for rate in (0, 500, RESUME):
         assert refusal(rig, rate) == codes.FIXED_SPEED

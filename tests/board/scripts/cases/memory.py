@@ -22,7 +22,7 @@ LARGE = 3 * 1026
 
 
 def workspace(words, address):
-    """With a memory of so many words."""
+    """With a memory of that many words."""
     made = Workspace(engine_memory.LARGEST_BYTES, address)
     made.make_memory(words)
     return made

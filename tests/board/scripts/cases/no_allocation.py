@@ -116,7 +116,7 @@ def run(joints, brake_at):
 
 
 def heap(count):
-    """Bytes that an engine with so many joints keeps."""
+    """Bytes that an engine with that many joints keeps."""
     gc.collect()
     before = gc.mem_alloc()
     engine = Engine(HEAD, arm(count), WORKSPACE)

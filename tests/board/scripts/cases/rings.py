@@ -22,7 +22,7 @@ def words(count):
 
 
 def ring_state(entries):
-    """The state of a ring with so many entries."""
+    """The state of a ring with that many entries."""
     state = words(isr.STATE_WORDS)
     state[isr.MASK] = entries - 1
     return state

@@ -9,8 +9,9 @@ import stand_in
 
 stand_in.install()
 
+from armtempo_board import step_rates  # noqa: E402
 from armtempo_board.errors import Refused  # noqa: E402
-from armtempo_board.storage import motion_file, store  # noqa: E402
+from armtempo_board.storage import measured_rates, motion_file, store  # noqa: E402
 from armtempo_shared import codes, wire  # noqa: E402
 
 ARM = stand_in.arm()
@@ -162,6 +163,23 @@ def case_set_the_default():
 
 def case_no_default():
     run(lambda place: place.set_default(""))
+
+
+def case_measured_rates_count_for_their_chip_and_program_only():
+    chip, _ = fresh()
+    measured_rates.open = chip.open
+    measured_rates.write("/flash/armtempo", b"chip", 5, (200_000, 150_000, 3))
+    whole = chip.files["/flash/armtempo/rates.bin"]
+    for data, board_id, program_crc, expected in (
+        (whole, b"other", 5, (240_000, 240_000, 0)),
+        (whole, b"chip", 6, (240_000, 240_000, 0)),
+        (whole[:-1], b"chip", 5, (240_000, 240_000, 0)),
+        (b"", b"chip", 5, (240_000, 240_000, 0)),
+        (whole, b"chip", 5, (200_000, 150_000, 3)),
+    ):
+        chip.files["/flash/armtempo/rates.bin"] = data
+        measured_rates.read("/flash/armtempo", board_id, program_crc)
+        assert (step_rates.one, step_rates.together, step_rates.joints) == expected
 
 
 cases.run(globals())

@@ -9,12 +9,14 @@ import random
 import sys
 
 sys.path.insert(0, __file__.rsplit("/", 2)[0] + "/rigs/bare")
+sys.path.append(__file__.rsplit("/", 5)[0] + "/host/armtempo/selftest/on_board")
 
 import machine
 import stand_in
 import stm
 from arm_rows import HEAD, row
 from armtempo_shared import armrecord, engine_memory, motion, wire
+from common import largest
 
 
 class Time:
@@ -38,21 +40,6 @@ from armtempo_board.app.app import App  # noqa: E402
 
 ROOM = 12_000
 """Bytes of memory for engines, about as on MicroPython's own firmware."""
-
-
-def largest():
-    """The largest free block, in bytes, to 64."""
-    gc.collect()
-    low, high = 0, gc.mem_free()
-    while high - low > 64:
-        middle = (low + high) // 2
-        try:
-            bytearray(middle)
-            low = middle
-        except MemoryError:
-            high = middle
-        gc.collect()
-    return low
 
 
 def arm_of(rates, outputs):

@@ -10,11 +10,11 @@ import sys
 from array import array
 
 import micropython
+from armtempo_board import step_rates
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
 from armtempo_board.memory import Memory
 from armtempo_board.motion import motion_check as checking
-from armtempo_board.motion import rate_check
 from armtempo_board.stepgen.override import Override
 from armtempo_board.stepgen.step_generator import StepGenerator
 from armtempo_shared import engine_memory
@@ -23,8 +23,8 @@ from armtempo_shared.motion import RAMP_UNIT_TICKS, Motion
 MASK = 1023
 OVERRIDE = Override()
 NEVER = 1 << 28
-checking.MAX_STEP_RATE = 333_000  # the evaluator is tried beyond what the program's loop keeps up with
-rate_check.MAX_STEP_RATE_SUM = 1_000_000
+step_rates.one = 333_000  # the evaluator is tried beyond what the program's loop keeps up with
+step_rates.together = 1_000_000
 
 
 class SameRamps:

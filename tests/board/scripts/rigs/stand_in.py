@@ -189,7 +189,7 @@ class Engine:
         self.explode = None
         self.rates = Rates()
         self.ticks = 0
-        self.judged = False
+        self.skip_check = False
         self.drives = self
         self.unfit = None
         self.has_time = True
@@ -205,7 +205,7 @@ class Engine:
     def load(self, motion, rate=1000, ready=None, homing=0):
         if ready:
             assert ready.is_ready and ready.motion is motion and ready.rate == rate
-        self.calls.append("load ready" if ready else "load judged" if self.judged else "load")
+        self.calls.append("load ready" if ready else "load unchecked" if self.skip_check else "load")
         self.rates.wanted = rate
         if self.refusal:
             from armtempo_board.errors import Refused

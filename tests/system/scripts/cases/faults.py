@@ -295,7 +295,7 @@ COUNTING = ("JointDrive._count_from", "Ring.stop", "JointDrive.position")
 
 
 def case_exception_anywhere(world):  # not compiled
-    """Each function that the loop calls while it moves raises once, before or behind its work."""
+    """Each function that the loop calls while it moves raises once, before or after its work."""
     yield from world.hello()
     trial = Trial(world)
     found = traps.everywhere()

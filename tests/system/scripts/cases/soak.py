@@ -58,7 +58,7 @@ class Pin:
 
 
 class Watch:
-    """What the pins do, held against the records as each motion ends."""
+    """What the pins do, checked against the records as each motion ends."""
 
     def __init__(self, world):
         board = machine_state.board

@@ -10,6 +10,7 @@ from arm import switches
 from arm.noise import Noise
 from arm.stepper import Stepper
 
+# all cases: not emulated
 MS = 84_000
 MODEL = {
     "holding_torque_nm": 0.65,
@@ -49,7 +50,7 @@ class Encoder:
 
 
 def stepper(seed=1, **changed):
-    """A motor with the paper's first joint behind it, and its DIR line and encoder."""
+    """A motor with the paper's first joint after it, and its DIR line and encoder."""
     joint = {
         "dir_inverted": 0,
         "encoder_inverted": 0,

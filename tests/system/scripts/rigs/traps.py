@@ -21,7 +21,7 @@ class Trap:
         self.calls = 0
 
     def set(self):
-        """Put it there; AttributeError or TypeError where the function is none of the program's."""
+        """Put it there; AttributeError or TypeError if the function is none of the program's."""
 
         def trapped(*arguments, **named):
             self.calls += 1

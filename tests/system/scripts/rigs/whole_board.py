@@ -89,7 +89,7 @@ class World(SilentPort):
                 self._boot(self)
 
     def pump(self):
-        """The line is looked at, once a millisecond: the story goes on."""
+        """The line is looked at, once a millisecond: the story continues."""
         if self.ended:
             return
         try:
@@ -171,7 +171,7 @@ class World(SilentPort):
         set_level(BUTTON, level)
 
     def ask(self, name, values=(), tail=b""):
-        """The answer's fields and tail; AssertionError where the board refuses."""
+        """The answer's fields and tail; AssertionError if the board refuses."""
         kind, fields, rest = yield from self.answer(name, values, tail)
         assert kind == "ok", (name, fields)
         return fields, rest
@@ -217,7 +217,7 @@ class World(SilentPort):
         return found
 
     def home(self, steps):
-        """Declare where the arm stands."""
+        """Declare the arm's position."""
         tail = b"".join([value.to_bytes(4, "little") if value >= 0 else (value + (1 << 32)).to_bytes(4, "little")
                          for value in steps])  # fmt: skip
         yield from self.ask("home", ((1 << len(steps)) - 1,), tail)

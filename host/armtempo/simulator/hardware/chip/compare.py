@@ -8,7 +8,7 @@ from chip import memory
 from chip.timer_registers import CCER, CCMR1, CCR1, CR1, DIER, NEVER, SR
 
 DMA_DELAY_TICKS = 6
-"""A compare value that comes this close behind its predecessor is too late (bus delay)."""
+"""A compare value that comes this close after its predecessor is too late (bus delay)."""
 _FROZEN, _ACTIVE, _INACTIVE, _TOGGLE, _LOW, _HIGH, _PWM, _PWM_INVERTED = range(8)
 
 

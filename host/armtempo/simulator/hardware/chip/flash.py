@@ -51,7 +51,7 @@ class FlashFolder:
         self.renamed = None
 
     def real(self, path):
-        """Where a path of the board is on the host; OSError where nothing is mounted, or can be read."""
+        """Where a path of the board is on the host; OSError if nothing is mounted, or can be read."""
         for program in self._programs:
             if path.startswith(program):
                 return path
@@ -78,7 +78,7 @@ class FlashFolder:
         return "/" + "/".join(parts)
 
     def operation(self, ms=_WRITE_MS):
-        """Count a change; True where the power fails during it."""
+        """Count a change; True if the power fails during it."""
         self.operations += 1
         self._stall(ms + self.busy_ms)
         return self.operations == self._cut_at

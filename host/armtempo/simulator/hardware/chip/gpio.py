@@ -98,7 +98,7 @@ class GpioPort:
         self.routing = None
 
     def sync(self, now):
-        """The program may have written the port's registers; True where a pin's function changed."""
+        """The program may have written the port's registers; True if a pin's function changed."""
         written = memory.words[self.at + BSRR]
         if written:
             odr = memory.words[self.at + ODR] & ~(written >> 16) | written & 0xFFFF

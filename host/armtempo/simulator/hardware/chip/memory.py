@@ -46,7 +46,7 @@ raw, words = _memory(SIZE)
 raw_seen, seen = _memory(SIZE)
 base = uctypes.addressof(words)
 raw_backup, backup = _memory(4 * BACKUP_WORDS)
-"""The backup SRAM: no register, so it is not looked at when the program writes."""
+"""The backup SRAM: no register, so it is not checked when the program writes."""
 backup_base = uctypes.addressof(backup)
 
 objects = {}
@@ -64,7 +64,7 @@ def address(name):
 
 
 def word_at(where):
-    """Word index of the register behind an address; ValueError where the virtual board has no register."""
+    """Word index of the register at an address; ValueError if the virtual board has no register."""
     offset = where - base
     if 0 <= offset < SIZE:
         return offset >> 2
@@ -75,7 +75,7 @@ def word_at(where):
 
 
 def place(where):
-    """(words, index) of the register or the memory behind an address; ValueError as above."""
+    """(words, index) of the register or the memory at an address; ValueError as above."""
     for begin in (backup_base, _BACKUP_ON_CHIP):
         if 0 <= where - begin < 4 * BACKUP_WORDS:
             return backup, where - begin >> 2

@@ -72,7 +72,7 @@ def flash_error(times):
 
 
 def mount(mode, path):
-    """Mount flash and SD card; ``path``: the folders before and behind theirs on ``sys.path``."""
+    """Mount flash and SD card; ``path``: the folders before and after theirs on ``sys.path``."""
     if mode == FACTORY or machine_state.flash.damage == flash.NO_FILE_SYSTEM or _is_new():
         _make_file_system()
     machine_state.flash.mounts = {"/flash": machine_state.flash.root}

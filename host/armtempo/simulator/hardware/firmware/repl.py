@@ -85,11 +85,11 @@ class Repl:
             send("MPY: sync filesystems\r\nMPY: soft reboot\r\n")
 
     def execute(self, text, name="<stdin>", log=False):
-        """Run code; False where it raises, which is shown to the host. SoftReset where it asks to leave."""
+        """Run code; False if it raises, which is shown to the host. SoftReset where it asks to leave."""
         return self._run(lambda: exec(compile(text, name, "exec"), self.names), log)
 
     def _run(self, action, log=False):
-        """Run something with Ctrl-C on; True where it raised nothing."""
+        """Run something with Ctrl-C on; True if it raised nothing."""
         machine_state.serial.interrupt_char = _CTRL_C
         try:
             action()
@@ -211,7 +211,7 @@ class Repl:
             show(repr(value) + "\n")
 
     def _line(self, inside):
-        """One line from the host, echoed; None where the mode changes."""
+        """One line from the host, echoed; None if the mode changes."""
         line = bytearray()
         while True:
             byte = self._byte()

@@ -37,7 +37,7 @@ class SilentPort:
         self.interrupt_char = -1  # until the REPL runs something
 
     def wait(self, ms):
-        """Wait in real time for input, at most so long; True where there is some."""
+        """Wait in real time for input, at most so long; True if there is some."""
         return False
 
     def pump(self):
@@ -72,7 +72,7 @@ class Serial(SilentPort):
         self._chunk = memoryview(bytearray(_CHUNK))
 
     def wait(self, ms):
-        """Wait in real time for input, at most so long; True where there is some."""
+        """Wait in real time for input, at most so long; True if there is some."""
         return bool(self._poll.poll(ms))
 
     def pump(self):
@@ -167,7 +167,7 @@ class USB_VCP:
         return sent
 
     def read(self, size=-1):
-        """What is there, up to ``size``; None where nothing is.
+        """What is there, up to ``size``; None if nothing is.
 
         A program looks here once a turn of its main loop, so finding nothing also stands for the time that the turn's
         own work takes on the chip (option ``turn_us``).
@@ -179,7 +179,7 @@ class USB_VCP:
         return self.recv(there if size < 0 else min(size, there), timeout=0)
 
     def readinto(self, buffer, size=None):
-        """What is there, into a buffer; None where nothing is."""
+        """What is there, into a buffer; None if nothing is."""
         got = self.read(len(buffer) if size is None else size)
         if got is None:
             return None
@@ -187,7 +187,7 @@ class USB_VCP:
         return len(got)
 
     def write(self, data, start=0, size=None):
-        """With CTS flow control: what fits at once, None where nothing does. Without: waits, then drops."""
+        """With CTS flow control: what fits at once, None if nothing does. Without: waits, then drops."""
         if size is not None:
             data = memoryview(data)[start : start + size]
         if self._line.cts:

@@ -1,0 +1,80 @@
+"""Inverse dynamics of a serial arm, recursive Newton-Euler: torques at its rows for a motion, many moments at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.kinematics.forward import array_frames
+from armtempo.kinematics.geometry import Geometry
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Dynamics
+
+GRAVITY_M_S2 = 9.80665
+"""Along the base's -z."""
+_M = 1e-3
+"""Metres in the unit of the geometry, the millimetre."""
+
+
+def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) -> Array:
+    """Torque in Nm that each joint needs, friction included: (N, joints); a row without ``dynamics`` weighs nothing.
+
+    ``angles``, ``rates`` and ``rate_changes`` of all joints, each (N, joints) in rad, rad/s and rad/s^2. What a
+    parallel linkage turns is counted from the link before the previous one: its rods weigh nothing.
+    """
+    bodies = [joint.dynamics or Dynamics(0.0) for joint in arm.joints]
+    geometry = Geometry.of(arm)
+    by_row = _row_torques(geometry, bodies, angles, rates, rate_changes)
+    turns = np.array(geometry.turns(list(np.eye(len(bodies)))))
+    friction, damping = np.array([(body.friction_nm, body.viscous_nm_s) for body in bodies]).T
+    return np.asarray(by_row @ turns + friction * np.sign(rates) + damping * rates)
+
+
+def _row_torques(
+    geometry: Geometry, bodies: Sequence[Dynamics], angles: Array, rates: Array, rate_changes: Array
+) -> Array:
+    """The same about the axis of each row, without friction.
+
+    Recursive Newton-Euler (Luh, Walker, Paul 1980) with all vectors in the base's frame: speeds outwards; forces, and
+    moments about the base's origin, are summed inwards.
+    """
+    chained = array_frames(geometry, angles)
+    turning, bending = (np.stack(geometry.turns(list(each.T))) for each in (rates, rate_changes))
+    spin, spin_change = np.zeros((len(angles), 3)), np.zeros((len(angles), 3))
+    fall = np.tile([0.0, 0.0, GRAVITY_M_S2], (len(angles), 1))  # the base accelerates up: this is gravity
+    forces, moments = [], []
+    for row, body in enumerate(bodies):
+        before, after = chained[row], chained[row + 1]
+        axis, origin = np.stack(before.z, axis=-1), _M * np.stack(before.origin, axis=-1)
+        rate = turning[row, :, None] * axis
+        spin_change = spin_change + bending[row, :, None] * axis + np.cross(spin, rate)
+        spin = spin + rate
+        end = _M * np.stack(after.origin, axis=-1)
+        fall = fall + _carried(end - origin, spin, spin_change)
+        rotation = np.stack([np.stack(part, axis=-1) for part in after[:3]], axis=-1)
+        arm = _M * rotation @ np.array(body.centre_mm)
+        force = body.mass_kg * (fall + _carried(arm, spin, spin_change))
+        tensor = rotation @ inertia_matrix(body.inertia_kg_m2) @ np.swapaxes(rotation, 1, 2)
+        turned, changed = ((tensor @ each[:, :, None])[:, :, 0] for each in (spin, spin_change))
+        forces.append(force)
+        moments.append(changed + np.cross(spin, turned) + np.cross(end + arm, force))
+    found = []
+    force, moment = np.zeros_like(fall), np.zeros_like(fall)
+    for row in reversed(range(len(bodies))):
+        force, moment = force + forces[row], moment + moments[row]
+        axis, origin = (np.stack(part, axis=-1) for part in (chained[row].z, chained[row].origin))
+        found.append(np.einsum("ni,ni->n", axis, moment - np.cross(_M * origin, force)))
+    return np.stack(found[::-1], axis=1)
+
+
+def _carried(arm: Array, spin: Array, spin_change: Array) -> Array:
+    """Acceleration of a point that a body carries at ``arm`` from its origin, less the origin's."""
+    return np.asarray(np.cross(spin_change, arm) + np.cross(spin, np.cross(spin, arm)))
+
+
+def inertia_matrix(inertia: Sequence[float]) -> Array:
+    """(3, 3) of xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = inertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

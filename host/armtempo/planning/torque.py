@@ -1,0 +1,113 @@
+"""Torque that a motion asks of each motor, and what the motor holds at that speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armtempo.basics.arrays import Array
+from armtempo.kinematics.chain import all_angles_deg
+from armtempo.kinematics.dynamics import joint_torques
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
+from armtempo.splines.trajectory import Trajectory
+
+ENOUGH = 1.5
+"""Motors are seldom as strong as their data sheet: less than half as much again is told."""
+_STEP_S, _FEWEST, _MOST = 1e-3, 1000, 20_000
+"""A motion is looked at each millisecond, but at no fewer moments than this and no more than that."""
+
+
+class LeastMargin(NamedTuple):
+    """Where a motor has the least to spare."""
+
+    margin: float
+    """Torque that it holds, of what it needs."""
+    joint: str
+    time_s: float
+    needed_nm: float
+    held_nm: float
+
+    @property
+    def words(self) -> str:
+        """All of it but the joint."""
+        return (
+            f"at {self.time_s:.2f} s its motor needs {self.needed_nm:.3g} Nm and holds {self.held_nm:.3g}, "
+            f"{self.margin:.2f} times as much"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MotorTorques:
+    """Of a motion at N moments."""
+
+    joints: tuple[str, ...]
+    times_s: Array
+    """(N,)."""
+    needed_nm: Array
+    """At the motors' shafts, (N, J)."""
+    held_nm: Array
+    """(N, J); not a number where the arm file does not say."""
+
+    @property
+    def margin(self) -> Array:
+        """Torque held of what is needed: (N, J)."""
+        needed = np.abs(self.needed_nm)
+        return np.divide(self.held_nm, needed, out=np.full_like(needed, np.inf), where=needed > 0.0)
+
+    @property
+    def least(self) -> LeastMargin | None:
+        """The smallest margin; None if no motor's torque is known."""
+        margin = np.where(np.isnan(self.held_nm), np.inf, self.margin)
+        if np.all(np.isnan(self.held_nm)):
+            return None
+        moment, joint = np.unravel_index(np.argmin(margin), margin.shape)
+        figures = (float(each[moment, joint]) for each in (np.abs(self.needed_nm), self.held_nm))
+        return LeastMargin(
+            float(margin[moment, joint]), self.joints[joint], float(self.times_s[moment]), *figures
+        )
+
+
+def held_nm(joint: DrivenJoint, motor_rad_s: ArrayLike) -> Array:
+    """Torque that a motor holds at speeds of its shaft (N,): of its curve, 0 beyond it; else as in the virtual arm.
+
+    There it falls to 0.71 of the holding torque at the corner speed. Not a number where the arm file says neither.
+    """
+    speed, model = np.abs(np.asarray(motor_rad_s, dtype=float)), joint.model
+    if joint.motor.curve_rpm_nm:
+        rpm, torque = np.array(joint.motor.curve_rpm_nm).T
+        return np.asarray(np.interp(speed, np.radians(6.0 * rpm), torque, right=0.0))
+    corner = model.corner_speed_rad_s or np.inf
+    return np.asarray((model.holding_torque_nm or np.nan) / np.hypot(1.0, speed / corner))
+
+
+def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
+    """The torques of a motion, None for an arm without ``dynamics``.
+
+    At the motor: what the joint needs by inverse dynamics and friction over the gear ratio, and the rotor's inertia.
+    """
+    if not any(joint.dynamics for joint in arm.joints):
+        return None
+    count = int(np.clip(np.ceil(trajectory.duration_s / _STEP_S), _FEWEST, _MOST))
+    times = np.linspace(0.0, trajectory.duration_s, count + 1)
+    driven, indices = arm.driven, list(arm.driven_indices)
+    angles = np.radians(all_angles_deg(arm, trajectory(times)))
+    rates, changes = np.zeros_like(angles), np.zeros_like(angles)
+    for order, each in enumerate((rates, changes), 1):
+        each[:, indices] = np.radians(trajectory(times, order))
+    gear = np.array([joint.motor.gear_ratio for joint in driven])
+    rotor = np.array([joint.model.rotor_inertia_kg_m2 for joint in driven])
+    at_joint = joint_torques(arm, angles, rates, changes)[:, indices]
+    needed = at_joint / gear + rotor * gear * changes[:, indices]
+    speeds = gear * rates[:, indices]
+    held = np.stack([held_nm(joint, speed) for joint, speed in zip(driven, speeds.T, strict=True)], axis=1)
+    return MotorTorques(tuple(joint.name for joint in driven), times, needed, held)
+
+
+def least_margin(arm: Arm, trajectory: Trajectory) -> LeastMargin | None:
+    """The smallest margin of a motion; None if the arm file does not say enough."""
+    found = of_motion(arm, trajectory)
+    return found.least if found else None

@@ -1,0 +1,197 @@
+"""The self-test with motors: each joint moves a degree there and back, slowly; switches and E-stop are pressed.
+
+It uses the board program and the moves that everybody has, so whatever stops a motion stops these.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+
+from armtempo_shared import codes
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import ArmtempoError, BoardError, InputError
+from armtempo.diagnosis.finding import Level
+from armtempo.link import Client
+from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
+from armtempo.planning.jog.jog_motion import SLOWEST, move_of
+from armtempo.robot import arm_state, jog
+from armtempo.robot.stop_request import StopRequest
+from armtempo.selftest.result import Measurement, SelfTest, judged
+from armtempo.selftest.selftest import UNIQUE_ID_DIGITS
+
+PART = "motors"
+ARM_FILE = "arm_file"
+"""In the data: lines to put into the arm file."""
+MOST_DEG = 1.0
+_OF_FOLLOWING = 0.4
+"""Part of the joint's following error by which it moves at most: an encoder that counts backwards trips none then."""
+_SPEED = 0.05
+_NOISE_COUNTS = 2
+_RATIO_OFF = 0.03
+_TRIES = 3
+_RELEASE_S = 30.0
+_LOOK_S = 0.2
+_WIRING = "check its wire, its pin in the arm file, and the level at which it trips"
+
+
+def question(arm: Arm, posture_deg: Array) -> str:
+    """What is to be confirmed: names all that moves, from this posture (J,)."""
+    ways = zip(arm.driven, posture_deg, strict=True)
+    joints = ", ".join(f"{joint.name} by {way_deg(joint, at_deg):+.2g}°" for joint, at_deg in ways)
+    return (
+        f"arm {arm.name!r}: the drivers are switched on, and these move there and back, slowly, one after the other: "
+        f"{joints}. Is the arm supported and everybody clear of it?"
+    )
+
+
+def way_deg(joint: DrivenJoint, at_deg: float) -> float:
+    """By how much a joint moves, towards the end of its range that is further away."""
+    low_deg, high_deg = joint.range_deg
+    following_deg = joint.encoder.following_error_deg if joint.encoder else 0.0
+    size_deg = min(MOST_DEG, _OF_FOLLOWING * following_deg) if following_deg else MOST_DEG
+    return size_deg if high_deg - at_deg >= at_deg - low_deg else -size_deg
+
+
+class MotorTest:
+    """``ask``: a question to the person there, True for yes; ``tell``: what to do now."""
+
+    def __init__(
+        self,
+        client: Client,
+        arm: Arm,
+        stop: StopRequest,
+        ask: Callable[[str], bool],
+        tell: Callable[[str], object],
+    ) -> None:
+        info = client.info
+        self.found = SelfTest(info.board_id[:UNIQUE_ID_DIGITS], info.virtual, info.program_crc)
+        self.found.data[ARM_FILE] = []
+        self._client, self._arm, self._stop, self._ask, self._tell = client, arm, stop, ask, tell
+
+    def run(self) -> SelfTest:
+        """All of it. Raises LinkError where a position is unknown, ArmtempoError without a yes; nothing moved then."""
+        posture_deg = arm_state.posture_deg(self._client, self._arm)
+        if not self._ask(question(self._arm, posture_deg)):
+            raise ArmtempoError("the test with motors was not confirmed: nothing moved")
+        try:
+            for joint, at_deg in zip(self._arm.driven, posture_deg, strict=True):
+                self._joint(joint, way_deg(joint, at_deg))
+            for joint in self._arm.driven:
+                self._switches(joint)
+            self._estop()
+        except BoardError as error:
+            self.found.add([judged(PART, "the rest", error.problem, "no fault", False, error.hint)])
+        return self.found
+
+    def _joint(self, joint: DrivenJoint, by_deg: float) -> None:
+        steps, counts = self._moved(joint, by_deg)
+        way = "larger" if by_deg > 0 else "smaller"
+        is_right = self._ask(f"did {joint.name} just turn towards {way} angles?")
+        self._moved(joint, -by_deg)
+        motor = judged(
+            PART, f"{joint.name}: direction", "as the arm file has it" if is_right else "the other way",
+            "as the arm file has it", is_right, "change the motor's direction in the arm file",
+        )  # fmt: skip
+        turned, encoder = judge_encoder(joint, steps, counts if is_right else -counts)
+        self.found.add([motor, turned])
+        lines = [] if is_right else [f"motor: direction = {-joint.motor.direction}"]
+        self.found.data[ARM_FILE] += [f"{joint.name}: {line}" for line in (*lines, *encoder)]
+
+    def _moved(self, joint: DrivenJoint, by_deg: float) -> tuple[int, int]:
+        """Steps and counts of a jog."""
+        index = self._arm.driven.index(joint)
+        before = self._client.status().positions
+        self._jog(joint, by_deg, _SPEED)
+        after = self._client.status().positions
+        return (
+            after.commanded_steps[index] - before.commanded_steps[index],
+            after.counts[index] - before.counts[index],
+        )
+
+    def _jog(self, joint: DrivenJoint, by_deg: float, speed: float) -> None:
+        move = move_of(self._arm, joint.name, None, by_deg, None)
+        jog.step(self._client, self._arm, move, speed, self._stop)
+
+    def _switches(self, joint: DrivenJoint) -> None:
+        for end, side, switch in (("low", -1, joint.switches.low), ("high", 1, joint.switches.high)):
+            if isinstance(switch, int):  # one on a pin ends homing only
+                self._press(f"the switch at the {end} end of {joint.name}", codes.LIMIT_SWITCH, joint, side)
+
+    def _estop(self) -> None:
+        if self._arm.safety.estop_fitted:
+            self._press("the E-stop", codes.ESTOP, self._arm.driven[0], 1)
+        else:
+            self.found.add([Measurement(PART, "E-stop", "none is fitted by the arm file")])
+
+    def _press(self, what: str, code: int, joint: DrivenJoint, side: int) -> None:
+        """Let ``joint`` move away and towards ``side``, slowly, until what is to be pressed stops it."""
+        self._tell(f"press {what} now, while {joint.name} moves slowly to and fro; keep clear of the arm")
+        size_deg = abs(way_deg(joint, joint.home_deg))
+        seen = 0
+        for by_deg in (-side * size_deg, side * size_deg) * _TRIES:
+            try:
+                with suppress(InputError):  # it stands at the end of its range
+                    self._jog(joint, by_deg, SLOWEST)
+            except BoardError as error:
+                seen = error.code
+                self._released(what)
+                break
+        is_seen = seen == code
+        measured = "stopped the joint" if is_seen else f"fault {seen}" if seen else "not seen"
+        self.found.add([judged(PART, what, measured, "stops the joint", is_seen, _WIRING)])
+
+    def _released(self, what: str) -> None:
+        """Clear the fault as soon as that is possible; BoardError where it is not in time."""
+        limit_s = time.monotonic() + _RELEASE_S
+        self._tell(f"release {what}")
+        while True:
+            try:
+                return self._client.clear()
+            except BoardError:
+                if time.monotonic() > limit_s:
+                    raise
+                time.sleep(_LOOK_S)
+
+
+def judge_encoder(joint: DrivenJoint, steps: int, counts: int) -> tuple[Measurement, list[str]]:
+    """What an encoder counted while its joint made this many steps; lines of the arm file's encoder to correct.
+
+    ``counts``: as they are where the motor turns the right way.
+    """
+    what = f"{joint.name}: encoder"
+    if joint.encoder is None:
+        return Measurement(PART, what, "none by the arm file"), []
+    due = float(joint.counts_per_step * steps)
+    allowed = _NOISE_COUNTS + _RATIO_OFF * abs(due)
+    off_deg = abs(counts - due) / joint.counts_per_deg
+    measured = f"{counts} counts for {steps} steps, {off_deg:.2f}° off"
+    expected = f"{due:.0f} counts, within {allowed:.0f}"
+    if abs(counts - due) <= allowed:
+        return Measurement(PART, what, measured, expected, Level.GOOD), []
+    lines = list(_corrections(joint, due, counts))
+    cure = (
+        "see the lines for the arm file"
+        if lines
+        else "check its plug, its coupling, its channel; does the motor turn?"
+    )
+    return Measurement(PART, what, measured, expected, Level.ERROR, cure), lines
+
+
+def _corrections(joint: DrivenJoint, due: float, counts: int) -> Iterator[str]:
+    """Nothing where the encoder hardly turned."""
+    assert joint.encoder is not None
+    if abs(counts) <= _NOISE_COUNTS:
+        return
+    if counts * due < 0:
+        yield f"encoder: direction = {-joint.encoder.direction}"
+    ratio = abs(counts / due)
+    if abs(abs(counts) - abs(due)) > _NOISE_COUNTS + _RATIO_OFF * abs(due):
+        per_rev = round(joint.encoder.counts_per_rev * ratio)
+        yield (
+            f"encoder: counts_per_rev = {per_rev} or so; or the motor's microsteps or gear_ratio, as it moved "
+            f"{ratio:.2g} times as far"
+        )

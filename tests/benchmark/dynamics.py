@@ -1,0 +1,107 @@
+"""Inverse dynamics against pinocchio, at random motions of arms from URDF files.
+
+    python -m tests.benchmark.dynamics [--count 1000]
+
+The test's URDFs with random masses, centres of mass and inertias in every link. Prints the largest difference of any
+joint's torque, as a part of the largest torque; exits with 1 if it exceeds 1e-9. pinocchio: pip install pin.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+from armtempo.kinematics import all_frames
+from armtempo.kinematics.dynamics import GRAVITY_M_S2, joint_torques
+from armtempo.model.arm import Arm
+from armtempo.model.parts import Joint
+from armtempo.new_arm import urdf_reader
+from armtempo.new_arm import urdf_rows as dh
+
+FOLDER = Path(__file__).parents[1] / "data" / "urdf"
+NAMES = ("three_planar", "four_skew", "seven_intersecting")
+SEED = 20_261_124
+ALLOWED = 1e-9
+
+
+def with_masses(text: str, rng: np.random.Generator) -> str:
+    """A URDF whose links all have a mass off their frames' origins, and an inertia that a body can have."""
+
+    def inertial(link: re.Match[str]) -> str:
+        shape = rng.uniform(-0.2, 0.2, (3, 3))
+        tensor = np.trace(shape @ shape.T) * np.eye(3) - shape @ shape.T
+        xyz, rpy = (" ".join(map(repr, map(float, rng.uniform(-size, size, 3)))) for size in (0.1, 3.0))
+        places = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+        inertia = " ".join(f'{key}="{float(tensor[at])!r}"' for key, at in places.items())
+        return (
+            f'<link name="{link[1]}"><inertial><origin xyz="{xyz}" rpy="{rpy}"/>'
+            f'<mass value="{rng.uniform(0.2, 3.0)!r}"/><inertia {inertia}/></inertial></link>'
+        )
+
+    return re.sub(r'<link name="([^"]+)"/>', inertial, text)
+
+
+def arm_of(chain: urdf_reader.Chain) -> Arm:
+    """The arm of a chain with all digits."""
+    axes = [dh.AxisLine(joint.point_mm, joint.direction) for joint in chain.joints]
+    rows = dh.derive(axes, chain.zero_pose, dh.Near(1e-10, 1e-8))
+    joints = []
+    for row, frame in zip(rows, all_frames(dh.geometry(rows), [0.0] * len(rows))[1:], strict=True):
+        body = None if row.joint is None else chain.joints[row.joint].body
+        dynamics = body.in_frame(frame) if body else None
+        name = "fixed" if row.joint is None else chain.joints[row.joint].name
+        range_deg = (-0.001, 0.001) if row.joint is None else (-360.0, 360.0)
+        joints.append(
+            Joint(name, row.d_mm, row.a_mm, row.alpha_deg, row.theta_deg, range_deg, dynamics=dynamics)
+        )
+    return Arm(chain.robot, tuple(joints))
+
+
+def difference(path: Path, count: int, rng: np.random.Generator) -> tuple[float, float]:
+    """Largest difference of torques and largest torque, Nm."""
+    model = pinocchio.buildModelFromUrdf(str(path))
+    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY_M_S2])
+    data = model.createData()
+    arm = arm_of(urdf_reader.read(path))
+    moving = [number for number, joint in enumerate(arm.joints) if joint.name != "fixed"]
+    assert [arm.joints[number].name for number in moving] == list(model.names)[1:]
+    motion = np.zeros((3, count, len(arm.joints)))
+    motion[:, :, moving] = rng.uniform(-3.0, 3.0, (3, count, len(moving)))
+    found = joint_torques(arm, *motion)[:, moving]
+    wanted = np.array(
+        [pinocchio.rnea(model, data, *each) for each in np.swapaxes(motion[:, :, moving], 0, 1)]
+    )
+    return float(np.abs(found - wanted).max()), float(np.abs(wanted).max())
+
+
+def main() -> int:
+    """All arms."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=1000)
+    count = parser.parse_args().count
+    rng, worst = np.random.default_rng(SEED), 0.0
+    print(f"pinocchio {pinocchio.__version__}, seed {SEED}, {count} random motions each")
+    with tempfile.TemporaryDirectory() as folder:
+        for name in NAMES:
+            text = with_masses((FOLDER / f"{name}.urdf").read_text(encoding="utf-8"), rng)
+            endless = re.sub(
+                'type="continuous">',
+                'type="revolute"><limit lower="-3" upper="3" effort="1" velocity="1"/>',
+                text,
+            )
+            path = Path(folder) / f"{name}.urdf"
+            path.write_text(endless, encoding="utf-8")
+            off, most = difference(path, count, rng)
+            print(f"{name}: torques up to {most:.4g} Nm, off by {off:.1e} Nm at most")
+            worst = max(worst, off / most)
+    print(f"largest difference {worst:.1e} of the largest torque")
+    return int(worst > ALLOWED)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
