@@ -185,11 +185,18 @@ def wait_for(page: Any, *words: str, place: str = "armtempo-state") -> None:
     )
 
 
+def answer(page: Any, button: str) -> None:
+    """Press a button of the dialog, and wait until that is gone."""
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_role("button", name=button).click()
+    dialog.wait_for(state="detached")
+
+
 def home(page: Any) -> None:
     """Say that the arm is at home, on the tab where it is moved."""
     page.get_by_role("tab", name="Move").click()
     page.get_by_role("button", name="The arm is at home").click()
-    page.get_by_role("dialog").get_by_role("button", name="The arm is at home").click()
+    answer(page, "The arm is at home")
     page.wait_for_selector('[aria-label$=" +"]:not([disabled])')
 
 

@@ -161,18 +161,17 @@ class ArmScene:
         ui.run_javascript(f"armtempo.line({json.dumps(name)}, {json.dumps(points)}, {json.dumps(colour)})")
 
     def dots(self, points_mm: Array) -> None:
-        """A ball at each via point, (N, 3), that can be clicked and dragged, in the place of those before."""
-        for old in self._dots:
-            old.delete()
+        """A ball at each via point, (N, 3), that can be clicked and dragged."""
+        points = (np.asarray(points_mm) / self._shape.reach_mm).tolist()
+        while len(self._dots) > len(points):
+            self._dots.pop().delete()
         with self.scene:
-            self._dots = [
-                self.scene.sphere(1.3 * _THICK, 16, 12)
-                .material(VIA)
-                .move(*point)
-                .with_name(f"{_VIA_NAME}{number}")
-                .draggable()
-                for number, point in enumerate((np.asarray(points_mm) / self._shape.reach_mm).tolist())
-            ]
+            while len(self._dots) < len(points):
+                ball = self.scene.sphere(1.3 * _THICK, 16, 12).material(VIA)
+                self._dots.append(ball.with_name(f"{_VIA_NAME}{len(self._dots)}").draggable())
+        for dot, point in zip(self._dots, points, strict=True):
+            dot.move(*point)
+        ui.run_javascript("armtempo.changes += 1")
 
     def _clicked(self, event: SceneClickEventArguments) -> None:
         for hit in event.hits:

@@ -30,6 +30,7 @@ window.armtempo = {
     addEventListener("keyup", (event) => event.key === "Enter" && this.release(), true);
     addEventListener("pointerdown", (event) => event.button === 0 && this.press(event), true);
     addEventListener("contextmenu", (event) => event.target.closest("[data-jog]") && event.preventDefault());
+    addEventListener("pointermove", (event) => event.buttons && (this.changes += 1)); // perhaps a via point is dragged
     for (const gone of ["pointerup", "pointercancel", "blur"]) addEventListener(gone, () => this.release());
     document.addEventListener("visibilitychange", () => document.hidden && this.release());
   },
