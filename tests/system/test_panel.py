@@ -101,7 +101,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     show(page, "Run")
     page.get_by_label("Repetitions").fill("0")
     page.get_by_role("button", name="Run", exact=True).click()
-    wait_for(page, "a run of 0 repetitions is none", place="armtempo-said")
+    wait_for(page, "repeat = 0 is not allowed", place="armtempo-said")
     page.get_by_label("Repetitions").fill("1")
     page.get_by_label("Speed, %").click(position={"x": 32, "y": 10})  # of 128, so that the stop is in time
     page.get_by_role("button", name="Run", exact=True).click()
