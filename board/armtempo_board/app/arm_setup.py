@@ -1,7 +1,7 @@
 """Takes an arm record: judges it, makes the engine for it, or says why not. Imported for that and given up after it.
 
-Step by step, so that never more than one of store, check and engine needs memory. Each step is a function of its own:
-what its frame leaves on the stack would keep its modules in memory.
+Step by step, so that never more than one of store, check and engine needs memory. Each step is a function of its own
+(``_step``): what its frame leaves on the stack would keep its modules in memory.
 """
 
 import gc
@@ -18,6 +18,9 @@ from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
     from armtempo_board.app.arm_state import ArmState
     from armtempo_board.motion.arm_check import Record
 
@@ -30,32 +33,38 @@ def take_stored(board: "ArmState") -> None:
     board.arm_waits = False
     board.arm_problem = board.arm_value = 0
     try:
-        _take(board, _checked(board, _stored(board)))
+        _step(_take, board, _step(_checked, board, _step(_stored, board)))
     except Refused as refused:
         if refused.code != codes.NOT_FOUND:
             board.arm_problem, board.arm_value = refused.code, refused.value
     except Exception as error:
         _drop_engine(board)
         board.arm_problem = codes.NO_MEMORY if isinstance(error, MemoryError) else codes.FAILED
-    heap.forget()
 
 
 def take_new(board: "ArmState") -> None:
     """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
     board.arm_waits = False
     try:
-        record = _checked(board, _new(board))
+        record = _step(_checked, board, _step(_new, board))
     except Refused:
-        _decide(board, False)
+        _step(_decide, board, False)
         raise
-    _decide(board, True)
+    _step(_decide, board, True)
     board.arm_problem = board.arm_value = 0
     try:
-        _take(board, record)
+        _step(_take, board, record)
     except Exception:
         _drop_engine(board)
         raise
-    heap.forget()
+
+
+def _step(function: "Callable[..., Any]", board: "ArmState", *arguments: object) -> "Any":
+    """One of the functions below; what it imports is given up."""
+    try:
+        return function(board, *arguments)
+    finally:
+        heap.forget()
 
 
 def _stored(board: "ArmState") -> bytes:
@@ -63,7 +72,6 @@ def _stored(board: "ArmState") -> bytes:
         return bytes(board.store().read(ARM_RECORD_NAME))
     finally:
         board.forget_store()
-        heap.forget()
 
 
 def _new(board: "ArmState") -> bytes:
@@ -71,15 +79,12 @@ def _new(board: "ArmState") -> bytes:
         return bytes(board.store().new_arm())
     finally:
         board.drop_store()
-        heap.forget()
 
 
 def _decide(board: "ArmState", is_fit: bool) -> None:
-    heap.forget()
     from armtempo_board.storage import store  # here, so that it can be forgotten
 
     store.Store(board.root, recover=False).take_arm(is_fit)
-    heap.forget()
 
 
 def _checked(board: "ArmState", data: bytes) -> "Record":

@@ -15,6 +15,7 @@ from armtempo_board.app.sample_buffer import SampleBuffer
 from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
 from armtempo_board.errors import Refused
 from armtempo_board.motion.engine import Engine
+from armtempo_board.motion.engine_parts import EngineParts
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -89,11 +90,11 @@ class ArmState:
         if self.workspace.is_short:
             heap.hold(MOTION_CODE_BYTES)
         try:
-            self.engine = Engine(head, joints, self.workspace)
+            self.engine = Engine(EngineParts(head, joints, self.workspace))
         except MemoryError:  # rather an arm whose motions may be refused for want of a large piece than none
             heap.release()
             gc.collect()
-            self.engine = Engine(head, joints, self.workspace)
+            self.engine = Engine(EngineParts(head, joints, self.workspace))
         finally:
             heap.release()
 

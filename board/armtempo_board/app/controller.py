@@ -191,25 +191,8 @@ class Controller(ArmState):
                 raise Refused(codes.NO_SEQUENCE_ROOM)
 
         def _is_sequence(self, name: str) -> bool:
-            self._make_room()
-            try:
-                return bool(self.store().is_sequence(name))
-            finally:
-                heap.release()
-
-    def _opened(self, name: str, crc: "int | None") -> "MotionFile":
-        try:
-            return self.load(name, crc)
-        except MemoryError:  # beside the pieces that are kept
-            heap.release()
-        self.tidy()
-        return self.load(name, crc)
-
-    def _make_room(self) -> None:
-        """Keep pieces for the code that a motion needs, before anything that its start needs can lie in them."""
-        self.tidy()
-        if self.workspace.is_short:
-            heap.hold(MOTION_CODE_BYTES)
+            self.tidy()
+            return bool(self.store().is_sequence(name))
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a stored motion at ``rate`` thousandths of its speed, or refuse.
@@ -217,9 +200,11 @@ class Controller(ArmState):
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
         heap.collect_often(heap.OFTEN if self.workspace.is_short else heap.SELDOM)
-        self._make_room()
+        self.tidy()
+        if self.workspace.is_short:
+            heap.hold(MOTION_CODE_BYTES)  # before anything that the start needs can lie there
         try:
-            motion = self._opened(name, crc)
+            motion = self.load(name, crc)
             self.tidy()
             homing = self._assume(motion, unknown) if flags & START_HOMING else 0
             self.engine.load(motion, rate, None, homing)

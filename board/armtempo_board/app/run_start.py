@@ -6,6 +6,7 @@ from armtempo_shared import codes
 
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
+from armtempo_board.motion import endpoints
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -38,8 +39,6 @@ def assume(board: "ArmState", motion: "MotionFile", unknown: int) -> int:
 
     ``unknown``: joints of unknown position.
     """
-    from armtempo_board.motion import endpoints  # here, so that it can be forgotten
-
     board.engine.snapshot(board.raw)
     for joint in range(board.joints):
         if endpoints.start_offset(motion, joint, board.raw[COMMANDED + joint]):
@@ -51,8 +50,6 @@ def assume(board: "ArmState", motion: "MotionFile", unknown: int) -> int:
 
 def moving(motion: "MotionFile") -> int:
     """A bit for each joint that stands elsewhere at the end of a motion than at its start."""
-    from armtempo_board.motion import endpoints  # here, so that it can be forgotten
-
     found = 0
     for joint in range(motion.joints):
         if endpoints.at_start(motion, joint) != endpoints.at_end(motion, joint):

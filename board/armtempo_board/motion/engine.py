@@ -27,9 +27,6 @@ from micropython import const
 from armtempo_board import features, heap
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
-from armtempo_board.motion.engine_parts import EngineParts
-from armtempo_board.motion.joint_drive import JointDrive
-from armtempo_board.motion.workspace import Workspace
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -37,6 +34,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from armtempo_shared.motion import MotionHead
+
+    from armtempo_board.motion.engine_parts import EngineParts
 
 LEAD_TICKS = const(1680000)
 """Time from the start of the counters to time 0: 20 ms, in which drivers switch on and DIR settles."""
@@ -53,15 +52,74 @@ _CHECK_FOLLOWING = const(1)
 _CHECK_INTERRUPT = const(2)
 
 
-class Engine(EngineParts):
-    """See ``EngineParts`` for its arguments."""
+class Engine:
+    """Drives the arm whose ``parts`` it gets. Nothing moves, drivers are off."""
 
-    def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:
-        super().__init__(head, joints, workspace)
+    def __init__(self, parts: "EngineParts") -> None:
+        self.feeder = parts.feeder
+        self.block = parts.block
+        self.drives = parts.drives
+        self.clock = parts.clock
+        self.rates = parts.rates
+        self.inputs = parts.inputs
+        self.limits = parts.limits
+        self._sampler = parts.sampler
+        self._encoders = parts.encoders
+        self._readings = parts.readings
+        self._following = parts.following
+        self._pulse_us = parts.pulse_us
+        self.moving = False
+        self.fault = 0
+        self.fault_joint = NO_JOINT
+        self.known = 0
         self._watched_joint = self._background_task = 0
         self._homing = 0  # one bit per joint that moves in a homing motion
         self._in_service = False  # service() or refill() is at work, or has not come to its end
         self.skip_check = False  # the next motion was checked before, and nothing has changed since
+
+    # between motions
+
+    def home(self, mask: int, steps: "list[int]") -> None:
+        """The joints of ``mask`` stand at ``steps`` (one number for every joint)."""
+        for number, joint in enumerate(self.drives):
+            if mask >> number & 1:
+                joint.declare(steps[number])
+                self._encoders[number].declare(self._following[number].expected(steps[number]))
+        self.known |= mask
+
+    def drivers(self, on: int) -> None:
+        """The drivers on, or off: then the arm can be moved by hand, and only its encoders know where to."""
+        self.inputs.enable(on != 0)
+        if not on:
+            self.known = 0
+
+    def clear(self) -> bool:
+        """Clear the fault, unless its cause is still there; True where it is cleared."""
+        if self.moving or self.inputs.estop_active():
+            return False
+        self.block[isr.FAULT] = 0
+        self.fault = 0
+        self.fault_joint = NO_JOINT
+        return True
+
+    def _watch_idle(self) -> None:
+        """While nothing moves: follow the encoders, and look at the E-stop."""
+        for encoder in self._encoders:
+            encoder.update()
+        if self.inputs.estop_active():
+            self.inputs.trip_estop()
+        self._note_trip()
+        if self.block[isr.FAULT] and not self.fault:
+            self._take_fault()
+
+    def _note_trip(self) -> None:
+        """A switch may have tripped: know of it, and that an E-stop released the drivers."""
+        if self.inputs.note_trip() and self.inputs.releases:
+            self.known = 0
+
+    def _take_fault(self) -> None:
+        self.fault = self.block[isr.FAULT]
+        self.fault_joint = self.block[isr.FAULT_JOINT]
 
     # before a motion
 
@@ -91,44 +149,31 @@ class Engine(EngineParts):
                 joint.load(motion, number)
                 if rate != _PERMILLE:
                     joint.follow(override.law, False)
-            self._prefill(joint)
+            now_kiticks = self.clock.kiticks()
+            for _ in range(_PREFILLS):
+                joint.refill(now_kiticks)
         self._homing = homing
         self.fault_joint = NO_JOINT
         self.inputs.watch(homing or _ALL_JOINTS)
         if not ready:
             gc.collect()
 
-    def _checked(self, motion: "MotionHead") -> int:
+    def _override(self, rate: int, motion: "MotionHead") -> "Any":
+        """Check the motion; the law of its time, with the code that only a motion needs."""
         from armtempo_board.motion import start_check  # here, so that it can be forgotten
 
         limits = None if self.skip_check else self.limits
-        return start_check.check_start(motion, self.drives, limits, self.known)
-
-    def _override(self, rate: int, motion: "MotionHead") -> "Any":
-        """The law of the motion's time, with the code that only a motion needs."""
-        duration_ticks = self._checked(motion)
+        duration_ticks = start_check.check_start(motion, self.drives, limits, self.known)
+        del start_check
         heap.release()
-        heap.forget()
-        gc.collect()
-        try:
-            override = self._new_override()
-        except MemoryError:  # what the first attempt left free lies otherwise
-            gc.collect()
-            override = self._new_override()
+        heap.tidy()
+        from armtempo_board.stepgen.override import Override
+
+        override = Override()
         override.begin(rate, motion, duration_ticks)
         if override.end_ticks() > LONGEST_RUN_TICKS:
             raise Refused(codes.TOO_LONG)
         return override
-
-    def _new_override(self) -> "Any":
-        from armtempo_board.stepgen.override import Override  # here, so that it can be forgotten
-
-        return Override()
-
-    def _prefill(self, joint: JointDrive) -> None:
-        now_kiticks = self.clock.kiticks()
-        for _ in range(_PREFILLS):
-            joint.refill(now_kiticks)
 
     def start(self) -> None:
         """Let the counters run."""

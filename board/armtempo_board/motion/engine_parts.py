@@ -1,6 +1,6 @@
-"""The parts of an engine for one arm, and what it does between motions: positions, drivers, E-stop, faults."""
+"""The parts of an engine for one arm, made from its record: hardware, and what serves each joint."""
 
-from armtempo_shared.messages import NO_JOINT
+from armtempo_shared import armrecord
 from micropython import const
 
 from armtempo_board import heap
@@ -26,80 +26,31 @@ class EngineParts:
     """
 
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:
-        from armtempo_shared import armrecord  # here, so that they can be forgotten
-
-        from armtempo_board.hardware import registers
+        from armtempo_board.hardware import registers  # here, so that it can be forgotten
 
         self.feeder = workspace.feeder
-
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
         fitted = [EncoderInput(row["encoder"], row["encoder_inverted"]) for row in rows]
-        self._sampler = workspace.sampler
-        self._sampler.configure(len(joints), tuple([encoder.address for encoder in fitted]))
-        self.block = self._sampler.block
-        self._sampler.connect()
+        self.sampler = workspace.sampler
+        self.sampler.configure(len(joints), tuple([encoder.address for encoder in fitted]))
+        self.block = self.sampler.block
+        self.sampler.connect()
         registers.apply(registers.CLOCKS)
         registers.apply(registers.TIMERS)
         rings = workspace.rings([row["max_rate"] for row in joints])
         heap.forget("room", "engine_memory")
         arm = head, joints
         self.drives = [
-            JointDrive(n, arm, self._sampler, ring, workspace.memory) for n, ring in enumerate(rings)
+            JointDrive(n, arm, self.sampler, ring, workspace.memory) for n, ring in enumerate(rings)
         ]
-        self._encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
+        self.encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
         self.clock = MotionClock()
         self.rates = RateControl(self.clock)
-        self._readings = Readings(self._sampler, self.clock, self.drives, self._encoders, slots)
-        self._following = [FollowingError(row) for row in joints]
-        self.inputs = Inputs(head, joints, self._sampler)
+        self.readings = Readings(self.sampler, self.clock, self.drives, self.encoders, slots)
+        self.following = [FollowingError(row) for row in joints]
+        self.inputs = Inputs(head, joints, self.sampler)
         self.feeder.connect(self.inputs, self.drives, [row["max_rate"] for row in joints])
         registers.apply(registers.PRIORITIES)
         self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
-        self._pulse_us = head["pulse_ticks"] // _TICKS_PER_US + _PULSE_SPARE_US
-        self.moving = False
-        self.fault = 0
-        self.fault_joint = NO_JOINT
-        self.known = 0
-
-    def home(self, mask: int, steps: "list[int]") -> None:
-        """The joints of ``mask`` stand at ``steps`` (one number for every joint)."""
-        for number, joint in enumerate(self.drives):
-            if mask >> number & 1:
-                joint.declare(steps[number])
-                self._encoders[number].declare(self._following[number].expected(steps[number]))
-        self.known |= mask
-
-    def drivers(self, on: int) -> None:
-        """The drivers on, or off: then the arm can be moved by hand, and only its encoders know where to."""
-        self.inputs.enable(on != 0)
-        if not on:
-            self.known = 0
-
-    def clear(self) -> bool:
-        """Clear the fault, unless its cause is still there; True where it is cleared."""
-        if self.moving or self.inputs.estop_active():
-            return False
-        self.block[isr.FAULT] = 0
-        self.fault = 0
-        self.fault_joint = NO_JOINT
-        return True
-
-    def _watch_idle(self) -> None:
-        """While nothing moves: follow the encoders, and look at the E-stop."""
-        for encoder in self._encoders:
-            encoder.update()
-        if self.inputs.estop_active():
-            self.inputs.trip_estop()
-        self._note_trip()
-        if self.block[isr.FAULT] and not self.fault:
-            self._take_fault()
-
-    def _note_trip(self) -> None:
-        """A switch may have tripped: know of it, and that an E-stop released the drivers."""
-        if self.inputs.note_trip() and self.inputs.releases:
-            self.known = 0
-
-    def _take_fault(self) -> None:
-        self.fault = self.block[isr.FAULT]
-        self.fault_joint = self.block[isr.FAULT_JOINT]
+        self.pulse_us = head["pulse_ticks"] // _TICKS_PER_US + _PULSE_SPARE_US

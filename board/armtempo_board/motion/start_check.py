@@ -24,18 +24,6 @@ def check_start(
     if limits is not None:
         check_splines(motion, joints, limits)
     heap.forget()
-    return _check_begin(motion, joints, known)
-
-
-def check_splines(motion: "MotionHead", joints: "list[JointDrive]", limits: "list[dict[str, int]]") -> None:
-    """The motion as such; Refused."""
-    from armtempo_board.motion import motion_check  # here, so that it can be forgotten
-
-    joint = joints[_ANY_JOINT]  # as the gap is the same for all; it walks through the motion
-    motion_check.check(motion, limits, joint.gap_ticks, joint.generator.subintervals)
-
-
-def _check_begin(motion: "MotionHead", joints: "list[JointDrive]", known: int) -> int:
     from armtempo_board.motion import endpoints  # here, so that it can be forgotten
 
     for number, joint in enumerate(joints):
@@ -45,3 +33,11 @@ def _check_begin(motion: "MotionHead", joints: "list[JointDrive]", known: int) -
         if off:
             raise Refused(codes.WRONG_START, number, off)
     return endpoints.duration_ticks(motion)
+
+
+def check_splines(motion: "MotionHead", joints: "list[JointDrive]", limits: "list[dict[str, int]]") -> None:
+    """The motion as such; Refused."""
+    from armtempo_board.motion import motion_check  # here, so that it can be forgotten
+
+    joint = joints[_ANY_JOINT]  # as the gap is the same for all; it walks through the motion
+    motion_check.check(motion, limits, joint.gap_ticks, joint.generator.subintervals)

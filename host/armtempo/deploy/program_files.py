@@ -72,7 +72,7 @@ _AT_REST = {
         "hardware.sampler.Sampler.__init__",
         "link.frame_reader.FrameReader.__init__",
         "link.serial_link.SerialLink.__init__",
-        "motion.engine_parts.EngineParts.home",
+        "motion.engine.Engine.home",
         "motion.ring_feeder.RingFeeder.__init__",
     ),
     "set_up": (

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import io
-import math
 import re
 from functools import lru_cache
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armtempo.formats.plain_text import visible
+from armtempo.formats.text import visible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +19,8 @@ PAGE_COLOUR = "#010203"
 _HIDDEN = '<svg class="sheet" aria-hidden="true" '
 _LARGEST = 1.4
 """How much larger than drawn a figure may become on a page."""
-_MARGIN_PT = 3.0
+_MARGIN_PT = 10.0
+"""To the right of axes, for the half of a label that stands out there."""
 _QUICK = 3
 """Of zlib's levels: a third of the time of the usual 6, files a tenth larger."""
 
@@ -65,20 +65,17 @@ def _shown(description: str, width_pt: float) -> str:
 
 
 def _columns(figure: Figure) -> list[tuple[str, float, float]]:
-    """Title, left and right end in points of each column of axes, without the gaps between them."""
+    """Title, left and right end in points of each column of axes, with the labels to the left of it."""
     _lay_out(figure)
-    ends: dict[int, tuple[str, float, float]] = {}
+    width = 72 * float(figure.get_figwidth())
+    found: dict[int, tuple[str, float]] = {}
     for axis in figure.axes:
-        place, box = axis.get_subplotspec(), axis.get_tightbbox()
-        if place is None or box is None:
-            continue
-        title, left, right = ends.get(place.colspan.start, ("", math.inf, -math.inf))
-        edges = [72 * edge / figure.dpi for edge in (box.x0, box.x1)]
-        left, right = min(left, edges[0]), max(right, edges[1])
-        ends[place.colspan.start] = (title or axis.get_title(), left, right)
-    return [
-        (title, left - _MARGIN_PT, right + _MARGIN_PT) for _, (title, left, right) in sorted(ends.items())
-    ]
+        if (place := axis.get_subplotspec()) is not None:
+            title, right = found.get(place.colspan.start, ("", 0.0))
+            right = max(right, width * axis.get_position().x1 + _MARGIN_PT)
+            found[place.colspan.start] = (title or axis.get_title(), right)
+    titles, rights = zip(*(found[column] for column in sorted(found)), strict=True)
+    return [*zip(titles, (0.0, *rights[:-1]), (*rights[:-1], width), strict=True)]
 
 
 def _lay_out(figure: Figure) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import MissingPackageError
+from armtempo.formats.text import visible
 from armtempo.model.parts import Limits
 from armtempo.planning.torque import MotorTorques
 from armtempo.report.drawing import PAGE_COLOUR
@@ -27,6 +28,8 @@ COLOURS = ("#1f77b4", "#d95f02", "#1b9e77", "#b0479a", "#8c6d1f", "#6b6ecf")
 LIMIT_COLOUR = "#c0392b"
 _LABELS = ("angle (°)", "speed (°/s)", "acceleration (°/s²)", "jerk (°/s³)")
 _POINTS = 600
+_LEFT, _RIGHT, _BOTTOM, _TOP, _BETWEEN = 0.85, 0.15, 0.5, 0.3, 0.35
+"""Inches beside a joint's axes, for labels of up to six digits, and between two rows."""
 
 
 def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Any]:
@@ -42,9 +45,26 @@ def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Fi
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
+def _joint_figure(rows: int, names: Sequence[str], height: float) -> tuple[Figure, Any]:
+    """A figure with a column for each joint, laid out by fixed margins: measuring all labels takes a second."""
+    columns, width = len(names), 3.4 * len(names) + 0.6
+    figure, axes = new_figure(rows, columns, width, height)
+    figure.set_layout_engine(None)
+    wide = (width - _LEFT - _RIGHT - (columns - 1) * (_LEFT + _RIGHT)) / columns
+    high = (height - _BOTTOM - _TOP - (rows - 1) * _BETWEEN) / rows
+    figure.subplots_adjust(
+        _LEFT / width, _BOTTOM / height, 1.0 - _RIGHT / width, 1.0 - _TOP / height,
+        wspace=(_LEFT + _RIGHT) / wide, hspace=_BETWEEN / high,
+    )  # fmt: skip
+    for joint, name in enumerate(names):
+        axes[0][joint].set_title(visible(name), parse_math=False)
+        axes[-1][joint].set_xlabel("time (s)")
+    return figure, axes
+
+
 def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
     """Angle, speed, acceleration and jerk of every joint, with ``limits`` where there are any (Figs. 5 and 7)."""
-    figure, axes = new_figure(4, len(names), 3.4 * len(names) + 0.6, 8.0)
+    figure, axes = _joint_figure(4, names, 8.0)
     times = np.linspace(0.0, trajectory.duration_s, _POINTS)
     for order in range(4):
         values = trajectory(times, order)
@@ -52,7 +72,7 @@ def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str
             axis.plot(times, values[:, joint], color=COLOURS[joint % len(COLOURS)])
             if limits:
                 _mark_limits(axis, limits[joint], order)
-    _label(axes, names, _LABELS)
+    _label(axes, _LABELS)
     return figure
 
 
@@ -61,7 +81,7 @@ def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], na
 
     Of a joint without an encoder the command; ``limits`` may be empty.
     """
-    figure, axes = new_figure(3, len(names), 3.4 * len(names) + 0.6, 6.5)
+    figure, axes = _joint_figure(3, names, 6.5)
     times: Array = np.linspace(0.0, max(trajectory.duration_s, found.times_s[-1]), _POINTS)
     if np.array_equal(found.path_s, found.times_s):
         path_s = times
@@ -82,19 +102,19 @@ def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], na
                 _mark_limits(axis, limits[joint], order)
     for axis in axes[0]:
         axis.legend(frameon=False)
-    _label(axes, names, _LABELS)
+    _label(axes, _LABELS)
     return figure
 
 
 def errors(found: Curves, names: Sequence[str]) -> Figure:
     """Measured, or else commanded, minus planned angle of every repetition and their mean, over time."""
-    figure, axes = new_figure(1, len(names), 3.4 * len(names) + 0.6, 2.6)
+    figure, axes = _joint_figure(1, names, 2.6)
     for joint, axis in enumerate(axes[0]):
         colour = COLOURS[joint % len(COLOURS)]
         for run in found.each[:, 0, :, joint]:
             axis.plot(found.times_s, run - found.theory[0, :, joint], color=colour, alpha=0.3, linewidth=0.8)
         axis.plot(found.times_s, found.mean[0, :, joint] - found.theory[0, :, joint], color=colour)
-    _label(axes, names, ("error (°)",))
+    _label(axes, ("error (°)",))
     return figure
 
 
@@ -123,7 +143,8 @@ def overlay(runs: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
         for axis, values in zip(axes[:, 0], (*mean, error), strict=True):
             axis.plot(times, values, color=COLOURS[index % len(COLOURS)], label=_shown(name))
     axes[0][0].legend(frameon=False)
-    _label(axes, ("",), (*_LABELS[:3], "error (°)"))
+    axes[-1][0].set_xlabel("time (s)")
+    _label(axes, (*_LABELS[:3], "error (°)"))
     return figure
 
 
@@ -154,10 +175,7 @@ def _mark_limits(axis: Axes, limits: Limits, order: int) -> None:
         axis.axhline(value, color=LIMIT_COLOUR, linestyle="--", linewidth=0.8)
 
 
-def _label(axes: Any, names: Sequence[str], labels: Sequence[str]) -> None:
-    for joint, name in enumerate(names):
-        axes[0][joint].set_title(name)
-        axes[-1][joint].set_xlabel("time (s)")
+def _label(axes: Any, labels: Sequence[str]) -> None:
     for row, label in zip(axes, labels, strict=False):
         for axis in row:
             axis.set_ylabel(label)

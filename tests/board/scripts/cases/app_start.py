@@ -131,47 +131,28 @@ def case_an_engine_that_cannot_be_made_is_named():
         assert (hello[1], wire.ERRORS[hello[PROBLEM]][0]) == (0, problem)
 
 
-def case_an_engine_gets_the_held_pieces_only_where_it_needs_them():
-    """Where memory is short, it is made beside the pieces that are kept for a motion's code; where there is no room for
-    both, without them.
-    """
-    root = folder_with(stand_in.arm())
+def case_an_engine_is_made_beside_a_piece_that_is_held_if_memory_is_short():
+    """Or without it, if there is no room for both."""
     engine = arm_state.Engine
     tried = []
 
-    def cramped(*arguments):
+    def looked(parts):
         tried.append(sum([len(piece) for piece in heap._held]))
         if heap._held:
             raise MemoryError
-        return engine(*arguments)
-
-    arm_state.Engine = cramped
-    stand_in.Workspace.is_short = True
-    try:
-        app, _, hello = started(root)
-    finally:
-        arm_state.Engine = engine
-        stand_in.Workspace.is_short = False
-    assert app.controller.engine.joints == 2
-    assert tried == [arm_state.MOTION_CODE_BYTES, 0], tried
-    assert (hello[1], hello[PROBLEM]) == (2, 0)
-    assert heap._held == [], "the motion's code finds no room"
-
-
-def case_no_pieces_are_held_where_memory_is_not_short():
-    engine = arm_state.Engine
-    tried = []
-
-    def looked(*arguments):
-        tried.append(len(heap._held))
-        return engine(*arguments)
+        return engine(parts)
 
     arm_state.Engine = looked
     try:
-        started(folder_with(stand_in.arm()))
+        for stand_in.Workspace.is_short in (True, False):
+            app, _, hello = started(folder_with(stand_in.arm()))
+            assert app.controller.engine.joints == 2
+            assert (hello[1], hello[PROBLEM]) == (2, 0)
+            assert heap._held == [], "the motion's code finds no room"
     finally:
         arm_state.Engine = engine
-    assert tried == [0]
+        stand_in.Workspace.is_short = False
+    assert tried == [arm_state.MOTION_CODE_BYTES, 0, 0], tried
 
 
 def case_a_damaged_motion_is_listed_and_refused():

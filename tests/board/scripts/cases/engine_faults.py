@@ -7,7 +7,7 @@ import random
 import cases
 import machine_state
 from armtempo_shared import armrecord, codes
-from engine_rig import FEWER, HEAD, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, row
+from engine_rig import FEWER, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, row
 from firmware import external_interrupts
 
 FREEZE_TICKS = 84 * 10
@@ -393,8 +393,8 @@ def case_close_and_anew():  # not emulated
     first.run_to(1_000_000)
     first.engine.close()
     assert first.commanded() == first.stepped()
-    engine = type(first.engine)(dict(HEAD, flags=flags), arm(2), first.workspace)
-    first.engine = engine
+    first.make_engine(arm(2))
+    engine = first.engine
     engine.home(3, [0, 0])
     for pulses in first.pulses:
         pulses.net = 0

@@ -18,6 +18,7 @@ from arm_rows import HEAD, arm
 from armtempo_board.hardware import isr, registers  # noqa: F401  they are forgotten again: not counted
 from armtempo_board.motion import motion_check  # noqa: F401  they are forgotten again: not counted
 from armtempo_board.motion.engine import Engine
+from armtempo_board.motion.engine_parts import EngineParts
 from armtempo_board.motion.workspace import Workspace
 from armtempo_shared import armrecord, engine_memory  # noqa: F401
 from brake_motion import record
@@ -91,7 +92,7 @@ def locked(function, argument=None):
 def run(joints, brake_at):
     """A whole motion, braked at a time (or not)."""
     stm.BLOCKS["TIM1"][isr.CNT] = 0
-    engine = Engine(HEAD, joints, WORKSPACE)
+    engine = Engine(EngineParts(HEAD, joints, WORKSPACE))
     engine.home(7, [0, 0, 0])
     motion = record()
     engine.load(motion)
@@ -119,7 +120,7 @@ def heap(count):
     """Bytes that an engine with that many joints keeps."""
     gc.collect()
     before = gc.mem_alloc()
-    engine = Engine(HEAD, arm(count), WORKSPACE)
+    engine = Engine(EngineParts(HEAD, arm(count), WORKSPACE))
     gc.collect()
     return gc.mem_alloc() - before if engine else 0
 

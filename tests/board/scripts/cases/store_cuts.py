@@ -133,6 +133,24 @@ def again(operation, place, after):
     assert content(place) == after
 
 
+def case_a_flash_with_too_few_blocks_refuses_before_it_writes():
+    """With each number of free blocks, for a new name and an old one: the folder may grow by one."""
+    needed = -(-len(NEW) // flash.BLOCK) + 1
+    for name in ("other", "feed"):
+        taken = 0
+        for free in range(2 * needed):
+            chip, place = fresh()
+            chip.free_blocks = free
+            before, changes = content(place), chip.changes
+            try:
+                put(place, name, NEW)
+                taken += 1
+            except Refused as refused:
+                assert (refused.code, refused.value) == (codes.FLASH_FULL, free * flash.BLOCK)
+                assert (content(place), chip.changes) == (before, changes), "something was written"
+        assert taken == needed, (name, taken)
+
+
 def case_put_a_new_one():
     run(lambda place: put(place, "other", NEW))
 

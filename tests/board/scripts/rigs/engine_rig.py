@@ -249,7 +249,6 @@ class Rig:
         self.board = bare_board.start()
         self.board.observers.append(self)
         self._zero = 0
-        import armtempo_board.motion.engine
         import armtempo_board.motion.joint_drive
         import armtempo_board.motion.motion_check
         from armtempo_board import heap
@@ -267,8 +266,15 @@ class Rig:
             for joint in joints
         ]
         self.workspace = self._workspace()
-        self.engine = armtempo_board.motion.engine.Engine(self.head, joints, self.workspace)
+        self.make_engine(joints)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
+
+    def make_engine(self, joints):
+        """The engine for the rig's head and these joints."""
+        from armtempo_board.motion.engine import Engine
+        from armtempo_board.motion.engine_parts import EngineParts
+
+        self.engine = Engine(EngineParts(self.head, joints, self.workspace))
 
     @staticmethod
     def _workspace():

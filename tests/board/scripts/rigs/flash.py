@@ -6,6 +6,7 @@ removes that one. A cut leaves the change it hits undone.
 """
 
 ENOENT, EIO, ENOSPC = 2, 5, 28
+BLOCK = 512
 
 
 class PowerCut(BaseException):
@@ -26,7 +27,7 @@ class Flash:
         self.changes = 0
         self.fail_at = 0
         self.error = None
-        self.free = 1 << 20
+        self.free_blocks = 1 << 11
         self.undone = undone
         self._lasting = {}
 
@@ -64,12 +65,18 @@ class Flash:
         return (0, 0, 0, 0, 0, 0, len(self.files[path]))
 
     def statvfs(self, path):
-        return (1, 1, self.free, self.free, 0)
+        return (BLOCK, BLOCK, self.free_blocks, self.free_blocks, self.free_blocks)
+
+    def take(self, blocks):
+        """Take blocks, or give back if below 0."""
+        if blocks > self.free_blocks:
+            raise OSError(ENOSPC)
+        self.free_blocks -= blocks
 
     def remove(self, path):
         self.stat(path)
         self.change()
-        del self.files[path]
+        self.take(-_blocks(self.files.pop(path)))
         self._forget(path)
 
     def rename(self, old, new):
@@ -95,12 +102,17 @@ class Flash:
     def open(self, path, mode):
         if "w" in mode:
             self.change()
+            self.take(-_blocks(self.files.get(path, b"")))
             self.files[path] = b""
             self._forget(path)
             self.opened.append(path)
         elif path not in self.files:
             raise OSError(ENOENT)
         return File(self, path, "w" in mode)
+
+
+def _blocks(data):
+    return -(-len(data) // BLOCK)
 
 
 class File:
@@ -112,6 +124,8 @@ class File:
 
     def write(self, data):
         self.flash.change()
+        before = self.flash.files[self.path]
+        self.flash.take(_blocks(before + bytes(data)) - _blocks(before))
         self.flash.files[self.path] += bytes(data)
         return len(data)
 

@@ -90,6 +90,8 @@ def install():
     pyb.Timer = Timer
     engine = Module()
     engine.Engine = Engine
+    parts = Module()
+    parts.EngineParts = lambda *parts: parts
     room = Module()
     room.workspace = Workspace
     room.sample_bytes = lambda: 4096
@@ -109,6 +111,7 @@ def install():
     sys.modules["machine"] = machine
     sys.modules["pyb"] = pyb
     sys.modules["armtempo_board.motion.engine"] = engine
+    sys.modules["armtempo_board.motion.engine_parts"] = parts
     sys.modules["armtempo_board.app.room"] = room
     sys.modules["armtempo_board.motion.endpoints"] = ends
     sys.modules["armtempo_board.motion.start_check"] = checks
@@ -175,7 +178,8 @@ class NextMotion:
 class Engine:
     """Moves when told, ends when told; remembers what was asked of it."""
 
-    def __init__(self, head, joints, workspace):
+    def __init__(self, parts):
+        _, joints, _ = parts
         self.joints = len(joints)
         self.limits = joints
         self.known = 0
