@@ -97,13 +97,13 @@ def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
 # a host that is busy for a moment: the virtual board does not run away from it
 
 
-AWAY_S = 1.5
-SPEED_DEG_S = 12.0
+AWAY_S = 3.0
+SPEED_DEG_S = 6.0
 FASTEST = interpreters.starter(interpreters.AVAILABLE[min(1, len(interpreters.AVAILABLE) - 1)])
 
 
 def test_samples_wait_for_a_host_that_does_not_read() -> None:
-    """In virtual time a motion of half a minute would be over long before the host is back."""
+    """In virtual time a motion of a minute would be over long before the host is back."""
     shipped = Arm.paper()
     joints = [
         replace(joint, limits=replace(joint.limits, speed_deg_s=SPEED_DEG_S)) if joint.limits else joint
@@ -119,7 +119,7 @@ def test_samples_wait_for_a_host_that_does_not_read() -> None:
         arm_state.home(board, arm)
         stored = stored_motion.store(board, "slow", encoded_motion.of_trajectory(motion, arm).data)
         started = board.start(stored.name, stored.crc)
-        assert started.duration_s > 25.0
+        assert started.duration_s > 50.0
         follower = Follower(board, started.run)
         time.sleep(AWAY_S)
         indices = [sample.index for sample in follower.samples()]

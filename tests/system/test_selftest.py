@@ -145,8 +145,8 @@ def test_a_rate_that_could_not_be_tried_is_not_found() -> None:
 
 CABLE_OUT = 4
 """The motion, counted from power-up, at which the cable is out: the first E-stop."""
-HANGS = 8
-"""The same of the first motion for a rate."""
+HANGS = 2
+"""The same of the first one whose pulses are captured."""
 BROKEN = (
     (
         (
@@ -156,7 +156,7 @@ BROKEN = (
             InjectedFault("late_interrupts", 0, 0, ms=0.05),
         ),
         (
-            "PA1, forward: 385 steps, those of PA15 among them",
+            "PA1, forward: 383 steps, those of PA15 among them",
             "PB10, forward: 0 steps",
             "flash: write",
             "E-stop to frozen outputs",
@@ -227,17 +227,17 @@ def test_motors_that_turn_in_spite_of_enable_stop_it(tmp_path: Path) -> None:
     with board(tmp_path, wrong, arm=boards.ARM) as port:
         code, found = selftest(port, tmp_path)
     assert (code, words(found, "wrong")) == (1, ["drivers: encoders while STEP toggles"])
-    assert all(rises(tmp_path, pin) < 20 for pin in STEPS)
+    assert all(rises(tmp_path, pin) < 40 for pin in STEPS)
 
 
 def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A part hangs; Ctrl-C, then a kill, while pulses are made. The watchdog brings the program back after the kill."""
     edges = tmp_path / "edges"
-    with board(tmp_path, faults=[InjectedFault("hang", 0.05, HANGS)]) as port:
+    with board(tmp_path, faults=[InjectedFault("hang", 0.03, HANGS)]) as port:
         with monkeypatch.context() as patch:
-            impatient(patch, "rates")
+            impatient(patch, "pulses")
             code, found = selftest(port, tmp_path)
-        assert (code, words(found, "wrong")) == (1, ["rates: the whole part"])
+        assert (code, words(found, "wrong")) == (1, ["pulses: the whole part"])
         for end in (signal.SIGINT, signal.SIGKILL):
             commandline.wait_for(lambda: _state(port) in ("unhomed", "fault"), "the program")
             written = edges.stat().st_size
