@@ -175,7 +175,7 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module(f"{__name__}.{name}")
     if name == "__version__":
-        value = import_module("armtempo.basics.version").installed_version()
+        value = import_module("armtempo.basics.installation").installed_version()
     elif name in _HOME_OF:
         value = getattr(import_module(_HOME_OF[name]), name)
     else:

@@ -73,13 +73,18 @@ class Ear(Cable):
         return (self.end.ticks - before[1].ticks) / TICK_HZ - (begin_s - before[0])
 
 
-def moving(ear: Ear) -> tuple[float, Sample]:
-    """The last sample of a motion that is under way."""
-    limit_s = time.monotonic() + _PATIENCE_S
-    while ear.end is not None or ear.sample is None or ear.sample[1].index < 3:
-        assert time.monotonic() < limit_s, "no motion"
-        time.sleep(0.01)
-    return ear.sample
+def moving(page: Any, ear: Ear) -> tuple[float, Sample]:
+    """The last sample of a held jog; held again if it ended, as a busy browser was silent for too long."""
+    for _ in range(20):
+        panels.hold(page)
+        limit_s = time.monotonic() + 5.0
+        while time.monotonic() < limit_s:
+            if ear.end is None and ear.sample is not None and ear.sample[1].index >= 3:
+                return ear.sample
+            time.sleep(0.01)
+        page.mouse.up()
+        panels.wait_for(page, "idle")
+    raise AssertionError("no motion")
 
 
 def held_jog(play: Any, browser: Any, running: Panels, ear: Ear, how: str) -> float:
@@ -100,14 +105,13 @@ def held_jog(play: Any, browser: Any, running: Panels, ear: Ear, how: str) -> fl
 def _ended(window: Any, panel: Panel, ear: Ear, how: Any) -> float:
     page = panels.opened(window, panel.address)
     panels.home(page)
-    panels.hold(page)
     end = {
         "button": page.mouse.up,
         "tab": page.close,
         "server": panel.process.kill,
         "cable": lambda: panel.cut(True),
     }.get(how, how)
-    before = moving(ear)
+    before = moving(page, ear)
     begin_s = time.monotonic()
     end()
     found = ear.rest_s(begin_s, before)
@@ -151,8 +155,7 @@ def stops(page: Any, ear: Ear, times: int) -> list[float]:
     """Seconds from the key press to the board's answer."""
     found = []
     for _ in range(times):
-        panels.hold(page)
-        moving(ear)
+        moving(page, ear)
         begin_s = time.monotonic()
         page.keyboard.press("Escape")
         limit_s = begin_s + _PATIENCE_S

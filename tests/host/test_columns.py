@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from armtempo.cli import stored
 from armtempo.diagnosis.finding import Finding, Level
-from armtempo.formats.text_table import aligned
+from armtempo.formats.text import aligned
 from armtempo.model.plan import Plan
 from armtempo.records import encoded_motion
 from armtempo.report import text_summary

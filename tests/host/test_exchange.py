@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
+from armtempo.formats import number_table
 from armtempo.model import exchange, shipped, thinning, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -81,7 +82,9 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
     table = tmp_path / "via.csv"
     table.write_text(text, encoding="utf-8")
     np.testing.assert_allclose(
-        via_table.via_from_csv(table, ARM, radians).via_deg, [[0, -60, 40], [20, -75, 50]], atol=1e-6
+        via_table.via_points(number_table.read(table), ARM, radians).via_deg,
+        [[0, -60, 40], [20, -75, 50]],
+        atol=1e-6,
     )
 
 
@@ -104,7 +107,7 @@ def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text:
     table = tmp_path / "via.csv"
     table.write_text(text)
     with pytest.raises(InputError, match=said):
-        via_table.via_from_csv(table, ARM)
+        via_table.via_points(number_table.read(table), ARM)
 
 
 @pytest.mark.slow
@@ -113,7 +116,7 @@ def test_an_exported_motion_comes_back_thinned_to_the_tolerance(tmp_path: Path, 
     plan = shipped_plan()
     table = tmp_path / "feed.csv"
     table.write_text(plan.to_csv(60.0))
-    found = via_table.via_from_csv(table, ARM, tolerance_deg=tolerance)
+    found = via_table.via_points(number_table.read(table), ARM, tolerance_deg=tolerance)
     assert found.lines == 409
     assert 5 < len(found.via_deg) < {1.0: 15, 0.1: 25, 0.01: 50}[tolerance]
     times = exchange.times_s(plan.trajectory.duration_s, 60.0)
@@ -130,8 +133,8 @@ def test_a_path_without_times_is_thinned_where_asked(tmp_path: Path) -> None:
     table = tmp_path / "arc.csv"
     turn = np.linspace(0.0, np.pi, 600)
     table.write_text("".join(f"{20 * np.cos(a)},{-60 + 20 * np.sin(a)},40\n" for a in np.repeat(turn, 2)))
-    assert len(via_table.via_from_csv(table, ARM).via_deg) == 1200
-    found = via_table.via_from_csv(table, ARM, tolerance_deg=0.1)
+    assert len(via_table.via_points(number_table.read(table), ARM).via_deg) == 1200
+    found = via_table.via_points(number_table.read(table), ARM, tolerance_deg=0.1)
     assert 3 < len(found.via_deg) < 25
     np.testing.assert_allclose(found.via_deg[[0, -1]], [[20, -60, 40], [-20, -60, 40]], atol=1e-9)
 

@@ -98,8 +98,10 @@ def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond_and_stops_soon() ->
 def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
     here = on_steps(PAPER, [0.0, -60.0, 40.0])
     end = jog_motion.plan("x", PAPER, here, JogMove(INF, joint=1)).end_deg
-    with pytest.raises(InputError, match="joint 2 is at the end of its range"):
+    with pytest.raises(InputError, match="joint 2 is at the end of its range") as refused:
         jog_motion.plan("x", PAPER, end, JogMove(1.0, joint=1))
+    assert jog_motion.problem(PAPER, end.tolist(), JogMove(INF, joint=1)) == str(refused.value)
+    assert not jog_motion.problem(PAPER, end.tolist(), JogMove(-INF, joint=1))
     back = jog_motion.plan("x", PAPER, end, JogMove(-1.0, joint=1))
     assert back.end_deg[1] == pytest.approx(end[1] - 1.0)
 
@@ -249,5 +251,8 @@ def test_a_stretched_arm_is_said_to_be_singular(stretched: tuple[float, float]) 
     arm = Arm.load("scara")
     here = [*stretched, *[joint.home_deg for joint in arm.driven[2:]]]
     axis = "x" if stretched[0] == 0.0 else "tool-x"
-    with pytest.raises(InputError, match="the posture is singular, stretched or folded; bend it first"):
+    with pytest.raises(
+        InputError, match="the posture is singular, stretched or folded; bend it first"
+    ) as refused:
         jog_motion.plan("jog", arm, here, JogMove(10.0, axis=axis))
+    assert jog_motion.problem(arm, here, JogMove(INF, axis=axis)) == str(refused.value)

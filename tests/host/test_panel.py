@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.room import FAR_MM, ArmRoom, KeepOut
 from armtempo.panel.access import COOKIE, MOST_BYTES, Access
+from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.desk import Desk
-from armtempo.panel.held_jog import ALIVE_S, ButtonHold, JogButton
+from armtempo.panel.held_jog import ALIVE_S, ButtonHold
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.sequence_desk import SequenceDesk
+from armtempo.planning.jog.jog_motion import JogMove
 
 ARM = Arm.paper()
 ME, OTHER = "me", "other"
@@ -205,7 +211,7 @@ def test_stop_twice_freezes(operator: Operator) -> None:
 @pytest.mark.parametrize("how", ["released", "silent", "other in control"])
 def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
-    hold.press(ME, JogButton(joint=1), 0.25)
+    hold.press(ME, JogMove(math.inf, joint=0), 0.25)
     wait(lambda: jog.held > 2)
     begin_s = time.monotonic()
     if how == "released":
@@ -226,7 +232,7 @@ def test_saving_keeps_the_comments_of_the_job_file(tmp_path: Path) -> None:
     )
     desk = Desk(ARM, tmp_path, file)
     rows = [[0.0, -60.0, 40.0], [10.5, -70.0, 45.0], [20.0, -75.0, 50.0]]
-    desk.save(desk.job_with(rows, "free"))
+    desk.save(rows, "free")
     text = file.read_text()
     assert "# my job" in text
     assert "# its name" in text
@@ -235,13 +241,30 @@ def test_saving_keeps_the_comments_of_the_job_file(tmp_path: Path) -> None:
     assert (again.path, again.seed, again.name) == ("free", 7, "feed")
 
 
+def test_the_picture_has_the_radii_and_the_room_of_the_arm_file() -> None:
+    room = ArmRoom(
+        (KeepOut("tray", (100.0, -50.0, 0.0), (200.0, 50.0, 30.0)),), low_mm=(-FAR_MM, -FAR_MM, -20.0)
+    )
+    thick = tuple(
+        replace(joint, radius_mm=40.0 if number == 2 else 0.0) for number, joint in enumerate(ARM.joints)
+    )
+    shape = ArmShape(replace(ARM, joints=thick, room=room))
+    radii = {index // 2: radius * shape.reach_mm for index, _, radius in shape.pieces}
+    assert radii[2] == pytest.approx(40.0)
+    assert all(radius > 5.0 for radius in radii.values())  # what the file does not say is drawn all the same
+    tray, (floor_low, floor_high) = shape.room
+    assert np.array(tray) * shape.reach_mm == pytest.approx(np.array([[100, -50, 0], [200, 50, 30]]))
+    assert floor_low[2] == floor_high[2] == pytest.approx(-20.0 / shape.reach_mm)
+    assert all(floor_high[:2] - floor_low[:2] > 1.0)
+
+
 def test_nothing_is_written_outside_of_the_folder(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     file = tmp_path / "job.toml"
     file.write_text(text := 'name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n')
     desk = Desk(ARM, tmp_path / "other", file)
     with pytest.raises(InputError, match="outside of the project folder"):
-        desk.save(desk.job_with(desk.rows(), "through"))
+        desk.save(desk.rows(), "through")
     assert file.read_text() == text
 
 

@@ -185,9 +185,11 @@ def called(where: str, name: str, objects: dict[str, Any]) -> Callable[..., Any]
 def refusal(call: Callable[..., Any], values: dict[str, Any], several: bool) -> armtempo.ArmtempoError | None:
     """The error that a call ends with; None without one."""
     try:
-        call(*values.values()) if several else call(**values)
+        made = call(*values.values()) if several else call(**values)
     except armtempo.ArmtempoError as error:
         return error
+    if isinstance(made, armtempo.SharedBoard):  # of another program on this machine
+        made.close()
     return None
 
 

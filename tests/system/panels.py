@@ -162,6 +162,11 @@ def opened(window: Any, address: str) -> Any:
     page = window.new_page()
     page.set_default_timeout(WAIT_S * 1000)
     page.goto(address)
+    return in_control(page)
+
+
+def in_control(page: Any) -> Any:
+    """A page that has control, and knows the board."""
     page.wait_for_selector("button:has-text('control')")
     take = page.get_by_role("button", name="Take control")
     if take.is_visible():
@@ -171,36 +176,47 @@ def opened(window: Any, address: str) -> Any:
     return page
 
 
-def wait_for(page: Any, *words: str) -> None:
-    """Until the line of the state has all the words."""
+def wait_for(page: Any, *words: str, place: str = "armtempo-state") -> None:
+    """Until the line of the state, or another place, has all the words."""
     page.wait_for_function(
-        "words => words.every(word => document.getElementById('armtempo-state').textContent.includes(word))",
-        arg=list(words),
+        "([place, words]) => words.every(word => document.getElementById(place).textContent.includes(word))",
+        arg=[place, words],
         polling=50,
     )
 
 
+def answer(page: Any, button: str) -> None:
+    """Press a button of the dialog, and wait until that is gone."""
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_role("button", name=button).click()
+    dialog.wait_for(state="detached")
+
+
 def home(page: Any) -> None:
-    """Say that the arm is at home."""
+    """Say that the arm is at home, on the tab where it is moved."""
+    page.get_by_role("tab", name="Move").click()
     page.get_by_role("button", name="The arm is at home").click()
-    page.get_by_role("dialog").get_by_role("button", name="The arm is at home").click()
+    answer(page, "The arm is at home")
     page.wait_for_selector('[aria-label$=" +"]:not([disabled])')
 
 
-def hold(page: Any) -> None:
+def hold(page: Any, by_key: bool = False) -> None:
     """Hold a jog button until the arm moves; again if a busy browser was silent for too long, as then it lets go."""
     button = page.locator('[aria-label$=" +"]').first
     for _ in range(20):
-        button.hover()
-        page.mouse.down()
+        (button.focus if by_key else button.hover)()
+        before = page.inner_text("#armtempo-where")
+        page.keyboard.down("Enter") if by_key else page.mouse.down()
         with suppress(Exception):  # a time-out
             page.wait_for_function(
-                "document.getElementById('armtempo-state').textContent.includes('moving')",
+                """before => document.getElementById('armtempo-state').textContent.includes('moving')
+                   && document.getElementById('armtempo-where').textContent != before""",
+                arg=before,
                 timeout=3000,
                 polling=50,
             )
             return
-        page.mouse.up()
+        page.keyboard.up("Enter") if by_key else page.mouse.up()
         wait_for(page, "idle")
     raise AssertionError("the arm does not move")
 

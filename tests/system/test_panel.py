@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests import browser
-from tests.system import panels
+from tests.system import commandline, panels
 from tests.system.panels import Panel, Panels, hold, home, opened, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("panel")]
@@ -44,34 +44,79 @@ def panel(running: Panels) -> Panel:
     return running()
 
 
+@pytest.fixture(scope="module")
+def window(chromium: Any) -> Any:
+    """A window of the browser."""
+    return chromium.new_context(viewport=panels.SMALL)
+
+
 @pytest.fixture
-def window(chromium: Any) -> Iterator[Any]:
-    """A window of its own, closed at the end: a page that stays open continues drawing."""
-    made = chromium.new_context(viewport=panels.SMALL)
-    yield made
-    made.close()
+def page(window: Any, panel: Panel) -> Any:
+    """One page as long as it and the panel live, in control: each takes seconds to open."""
+    for one in window.pages:
+        if one.url == panel.address:
+            return panels.in_control(one)
+        one.close()
+    return panels.opened(window, panel.address)
 
 
-def test_the_whole_way(window: Any, panel: Panel) -> None:
-    """Home, plan, run, stop, go on, report."""
-    page = opened(window, panel.address)
+def show(page: Any, tab: str) -> None:
+    """Go to a tab."""
+    page.get_by_role("tab", name=tab).click()
+
+
+def confirm(page: Any, button: str) -> None:
+    """Press a button, and the same in the dialog that asks."""
+    page.get_by_role("button", name=button).click()
+    panels.answer(page, button)
+
+
+_SHIFTS = """() => new Promise(resolve => {
+  let sum = 0;
+  new PerformanceObserver(list => list.getEntries().forEach(one => sum += one.hadRecentInput ? 0 : one.value))
+    .observe({type: 'layout-shift', buffered: true});
+  setTimeout(() => resolve(sum), 200);
+})"""
+"""How much jumped on the page since it was opened, as browsers count it; below 0.1 is good."""
+
+
+def test_the_whole_way(page: Any, panel: Panel) -> None:
+    """Home, plan, run, pause, go on, stop, begin again, report; the board's tab."""
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    if not all(joint.known for joint in panel.state().joints):
-        assert page.get_by_label("joint 1 +").is_disabled()
+    assert page.get_by_label("joint 1 +").is_disabled()
+    show(page, "Board")
+    confirm(page, "Self-test")  # before the drivers are on
+    page.wait_for_selector("td:has-text('cycles a tick of TIM2')")
     home(page)
+    page.get_by_label("⟳ x +").hover(force=True)
+    page.wait_for_selector("text=the arm cannot turn the tool about x from here")
+    assert page.get_by_label("⟳ x +").is_disabled()
     for number in ("1e9", "-1", "true", "'x'", "null", "[1]", "{}"):  # buttons that there are not
         page.evaluate(f"emitEvent('armtempo-press', {number})")
     page.evaluate("window.socket.emit('event', {id: 'x', client_id: 'x', listener_id: 5, args: []})")
-    page.get_by_role("tab", name="Plan").click()
+    show(page, "Plan")
     page.get_by_role("button", name="Plan", exact=True).click()
     page.wait_for_selector("text=Motion time 6.79")
-    page.get_by_role("tab", name="Run").click()
+    show(page, "Run")
+    page.get_by_label("Repetitions").fill("0")
     page.get_by_role("button", name="Run", exact=True).click()
-    wait_for(page, "moving", "Run")
-    page.keyboard.press("Escape")
+    wait_for(page, "repeat = 0 is not allowed", place="armtempo-said")
+    page.get_by_label("Repetitions").fill("1")
+    page.get_by_label("Speed, %").click(position={"x": 32, "y": 10})  # of 128, so that the stop is in time
+    page.get_by_role("button", name="Run", exact=True).click()
+    wait_for(page, "moving", "at 2", "Run")
+    page.get_by_role("button", name="Pause").click()
+    wait_for(page, "in a pause", "Run")
+    page.get_by_role("button", name="Resume").click()  # on along the path
+    page.wait_for_function("!document.getElementById('armtempo-state').textContent.includes('in a pause')")
+    page.keyboard.press(" ")  # the button just pressed has the focus, and does not take it
     wait_for(page, "idle")
-    page.get_by_role("button", name="Go to the start").click()
+    joints = panel.state().joints
+    panels.wait_for(page, *(f"{joint.angle_deg:.2f}°" for joint in joints), place="armtempo-where")
+    assert 0.0 < (joints[0].angle_deg or 0.0) < 180.0
+    page.get_by_label("Speed, %").click(position={"x": 127, "y": 10})
+    page.get_by_role("button", name="Go to the start").click()  # after a stop a motion only begins anew
     wait_for(page, "moving")
     page.get_by_role("button", name="Run", exact=True).click()
     wait_for(page, "moving")
@@ -79,32 +124,137 @@ def test_the_whole_way(window: Any, panel: Panel) -> None:
     with page.expect_popup() as popup:
         page.get_by_role("link", name="Report").first.click()
     popup.value.wait_for_selector("text=joint 1")
+    popup.value.close()  # a page that is hidden is not drawn
     assert len(list((panel.folder / "runs").glob("*/run.json"))) == 2
-    page.get_by_role("tab", name="Board").click()
-    page.wait_for_selector("text=Stop: the arm brakes along its path.")
+    show(page, "Board")
+    page.wait_for_selector(".nicegui-log >> text=Stop: the arm brakes along its path.")
     assert "jog" not in page.inner_text(".nicegui-log")
+    page.get_by_label("Read again").click()
+    for name, said in (("no good", "'no good' is n"), ("food", "food · 6.79")):
+        page.get_by_role("button", name="Rename").click()
+        page.get_by_label("New name").fill(name)
+        panels.answer(page, "Rename")
+        page.get_by_text(said).wait_for()
+    confirm(page, "Remove")
+    page.wait_for_selector("text=food · 6.79", state="detached")
+    confirm(page, "Flash")
+    wait_for(page, "Flash: no firmware is named", place="armtempo-said")
+    assert page.evaluate(_SHIFTS) < 0.1
     assert not errors
 
 
-@pytest.mark.parametrize("how", ["button", "tab", "browser", "cable", "server"])
+_BALL = """(name => {
+  const objects = [...getElement(armtempo.parts.scene).objects.values()];
+  return objects.find(one => one.mesh && one.mesh.name === name);
+})"""
+_PLACE = f"""name => {{
+  const scene = getElement(armtempo.parts.scene), frame = scene.renderer.domElement.getBoundingClientRect();
+  const at = {_BALL}(name).mesh.position.clone().project(scene.camera);
+  return [frame.x + (at.x + 1) / 2 * frame.width, frame.y + (1 - at.y) / 2 * frame.height];
+}}"""
+
+
+def test_a_via_point_is_clicked_and_dragged_in_the_picture(page: Any) -> None:
+    show(page, "Plan")
+    page.wait_for_function(f"{_BALL}('via 3')")
+    page.evaluate("scrollTo(0, 0)")  # not under the header
+    cell = page.get_by_label("P3 joint 1")
+    before = cell.input_value()
+    page.mouse.click(*page.evaluate(_PLACE, "via 3"))
+    page.wait_for_selector("text=P3: postures of the arm with the tool there")
+    assert cell.input_value() == before
+    x, y = page.evaluate(_PLACE, "via 3")
+    page.mouse.down()
+    page.mouse.move(x + 15, y + 15, steps=5)
+    page.mouse.up()
+    moved = "before => document.querySelector('[aria-label=\"P3 joint 1\"]').value != before"
+    page.wait_for_function(moved, arg=before)
+
+
+_JOB = 'name = "feed"\nvia_deg = [[%s, -60.0, 40.0], [0.0, -60.0, 40.0]]'
+_WRONG = [
+    ("", "P0 joint 1", "999", "Plan", "plan --arm paper --job", "job.toml", _JOB % "999.0"),
+    ("", "P0 joint 1", "", "Plan", "plan --arm paper --job", "job.toml", _JOB % "nan"),
+    ("Paste", "Rows of angles", "1;2\n3;4", "Paste", "import --arm paper", "the pasted rows", "1;2\n3;4"),
+    (
+        "Paste",
+        "Rows of angles",
+        "1;2;x\n3;4;5",
+        "Paste",
+        "import --arm paper",
+        "the pasted rows",
+        "1;2;x\n3;4;5",
+    ),
+    ("Paste", "Rows of angles", "1\t2\t3", "Paste", "import --arm paper", "the pasted rows", "1\t2\t3"),
+]
+"""What opens the field, the field, what is wrong in it, what takes it, and a command with a file of the same."""
+
+
+def refusal(folder: Path, command: str, name: str, text: str) -> str:
+    """What the command line says of a file."""
+    (folder / name).write_text(text)
+    ended = commandline.run(*command.split(), name, folder=folder)
+    assert ended.exit_code == 2
+    return ended.errors.splitlines()[0].removeprefix("armtempo: ")
+
+
+def test_wrong_input_is_refused_in_the_words_of_the_command_line(page: Any, tmp_path: Path) -> None:
+    show(page, "Plan")
+    for opens, field, text, takes, *same in _WRONG:
+        if opens:
+            page.get_by_role("button", name=opens).click()
+        page.get_by_label(field).fill(text)
+        if opens:
+            panels.answer(page, takes)
+        else:
+            page.get_by_role("button", name=takes, exact=True).click()
+        page.locator(".q-notification", has_text=refusal(tmp_path, *same)).first.wait_for()
+
+
+def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel, tmp_path: Path) -> None:
+    file = panel.folder / "day.toml"
+    file.write_text('name = "day"  # my name\n[[step]]\ngoto = "home"\n[[step]]\nwait_s = 9  # it settles\n')
+    home(page)
+    show(page, "Sequence")
+    page.get_by_role("combobox", name="Sequence").click()
+    page.get_by_role("option", name="day.toml").click()
+    wrong = refusal(tmp_path, "plan --arm paper", "day.toml", file.read_text().replace("9", "'soon'"))
+    page.get_by_label("step 2: wait_s").fill("soon")
+    page.get_by_label("step 2: wait_s").press("Tab")
+    page.get_by_role("button", name="Save the sequence").click()
+    page.locator(".q-notification", has_text=wrong).wait_for()
+    page.get_by_label("step 2: wait_s").fill("600")
+    page.get_by_label("step 2: wait_s").press("Tab")
+    page.get_by_role("button", name="Save the sequence").click()
+    page.wait_for_selector("text=Saved")
+    assert "wait_s = 600  # it settles" in file.read_text()
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.wait_for_selector(".armtempo-lit:has-text('2')")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("text=cycle 0: stopped")
+    assert page.locator(".armtempo-lit").count() == 0
+
+
+@pytest.mark.parametrize("how", ["button", "key", "cable", "browser", "tab", "server"])
 def test_a_held_jog_ends_with_what_holds_it(
-    play: Any, window: Any, running: Panels, tmp_path: Path, how: str
+    play: Any, page: Any, running: Panels, tmp_path: Path, how: str
 ) -> None:
     """The arm rests before the end of its range, where it would else have gone."""
     panel = running()
     if how == "browser":
         with panels.chromium_to_kill(play, tmp_path) as (made, process):
-            page = opened(made.new_context(viewport=panels.SMALL), panel.address)
-            home(page)
-            hold(page)
+            other = opened(made.new_context(viewport=panels.SMALL), panel.address)
+            home(other)
+            hold(other)
             process.kill()
             process.wait()
     else:
-        page = opened(window, panel.address)
         home(page)
-        hold(page)
+        hold(page, by_key=how == "key")
         if how == "button":
             page.mouse.up()
+        elif how == "key":
+            page.keyboard.up("Enter")
         elif how == "tab":
             page.close()
         elif how == "server":
@@ -121,26 +271,6 @@ def test_a_held_jog_ends_with_what_holds_it(
     assert angle_deg is not None
     assert 0.0 < angle_deg < panels.ARM.driven[0].range_deg[1] - 1.0
     assert panel.running == (how != "server")
-
-
-def test_a_sequence_is_edited_saved_and_run(window: Any, panel: Panel) -> None:
-    file = panel.folder / "day.toml"
-    file.write_text('name = "day"  # my name\n[[step]]\ngoto = "home"\n[[step]]\nwait_s = 9  # it settles\n')
-    page = opened(window, panel.address)
-    home(page)
-    page.get_by_role("tab", name="Sequence").click()
-    page.get_by_role("combobox", name="Sequence").click()
-    page.get_by_role("option", name="day.toml").click()
-    page.get_by_label("step 2: wait_s").fill("600")
-    page.get_by_label("step 2: wait_s").press("Tab")
-    page.get_by_role("button", name="Save the sequence").click()
-    page.wait_for_selector("text=Saved")
-    assert "wait_s = 600  # it settles" in file.read_text()
-    page.get_by_role("button", name="Run", exact=True).click()
-    page.wait_for_selector(".armtempo-lit:has-text('2')")
-    page.keyboard.press("Escape")
-    page.wait_for_selector("text=cycle 0: stopped")
-    assert page.locator(".armtempo-lit").count() == 0
 
 
 _SOCKET = b"/_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -171,8 +301,31 @@ def test_what_is_no_request_of_its_pages_is_refused(panel: Panel, request_: byte
     assert panels.asked(panel.address, request_).split(b" ")[1:2] == [status]
 
 
-def test_it_fits_desktop_tablet_and_phone(window: Any, panel: Panel) -> None:
-    page = opened(window, panel.address)
+_FOCUS = """() => {
+  const one = document.activeElement, field = one.closest('.q-field');
+  const shown = getComputedStyle(one).boxShadow.includes('5px') || (field && field.matches('.q-field--focused'));
+  return [one.ariaLabel || one.innerText.split('\\n').pop(), Boolean(shown) || one === document.body];
+}"""
+
+
+def test_every_control_is_reached_by_the_tabulator_and_shows_it(page: Any) -> None:
+    home(page)
+    for tab in ("Move", "Plan"):
+        show(page, tab)
+        wanted = page.locator("button:visible:not([disabled]), input:visible:not([disabled])").all()
+        names = {one.get_attribute("aria-label") or one.inner_text().split("\n")[-1] for one in wanted} - {""}
+        found: dict[str, bool] = {}
+        page.get_by_role("button", name="Stop").focus()
+        page.keyboard.press("Shift+Tab")
+        for _ in range(len(wanted) + 12):  # sliders and tabs are no buttons
+            page.keyboard.press("Tab")
+            name, shown = page.evaluate(_FOCUS)
+            found[name] = shown
+        assert all(found.values()), found
+        assert names <= found.keys(), names - found.keys()
+
+
+def test_it_fits_desktop_tablet_and_phone(page: Any) -> None:
     for width, height in ((1280, 800), (820, 1180), (390, 844)):
         page.set_viewport_size({"width": width, "height": height})
         for tab in ("Move", "Plan", "Run", "Sequence", "Board"):

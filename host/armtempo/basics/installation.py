@@ -1,9 +1,10 @@
-"""How armtempo was installed, and so how a package that is missing comes to it."""
+"""Which version of armtempo is installed, and how, and so how a package that is missing comes to it."""
 
 from __future__ import annotations
 
 import os
 import sys
+from functools import cache
 
 
 def command(package: str, extra: str) -> str:
@@ -22,3 +23,14 @@ def upgrade(package: str) -> str:
     if os.path.exists(os.path.join(sys.prefix, "uv-receipt.toml")):
         return "uv tool upgrade armtempo"
     return f"pip install --upgrade {package}"
+
+
+@cache
+def installed_version() -> str:
+    """Such as ``"0.2.0"``; ``"0+unknown"`` in a folder that was never installed."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("armtempo")
+    except PackageNotFoundError:
+        return "0+unknown"

@@ -17,10 +17,10 @@ import click
 from click.shell_completion import CompletionItem
 
 from armtempo.basics.errors import INTERRUPTED, ArmtempoError
-from armtempo.basics.version import installed_version
+from armtempo.basics.installation import installed_version
 from armtempo.cli import results
 from armtempo.cli.commands import COMMANDS, GROUPS
-from armtempo.formats.spelling import did_you_mean
+from armtempo.formats.text import did_you_mean
 
 _EXAMPLES = """\
 Examples:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from armtempo.basics.errors import InputError, PortGivenUpError
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import tell
-from armtempo.formats.spelling import did_you_mean
+from armtempo.formats.text import did_you_mean
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, is_name

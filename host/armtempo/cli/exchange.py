@@ -9,7 +9,7 @@ from armtempo_shared.limits import MAX_JOINTS
 
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
-from armtempo.formats import toml_table
+from armtempo.formats import number_table, toml_table
 from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.model import via_table
 from armtempo.model.arm import Arm
@@ -62,7 +62,7 @@ def import_table(
     title = name or table.stem
     target = output or Path(f"{title}.toml")
     check_not_input(target, (table, arm.source))
-    found = via_table.via_from_csv(table, arm, radians, tolerance_deg)
+    found = via_table.via_points(number_table.read(table), arm, radians, tolerance_deg)
     text = via_table.job_text(title, found)
     Job.of_table(toml_table.parse(text, str(table)), arm)
     check_replaceable(target, text, force)

@@ -17,7 +17,7 @@ from armtempo.cli import chosen, results
 from armtempo.cli.progress import ProgressBar
 from armtempo.cli.state import counted
 from armtempo.formats.atomic_file import check_not_input
-from armtempo.formats.text_table import aligned
+from armtempo.formats.text import aligned
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share

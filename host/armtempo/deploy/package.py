@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from armtempo.basics.errors import InputError
-from armtempo.basics.version import installed_version
+from armtempo.basics.installation import installed_version
 from armtempo.deploy import program_files
 
 PACKAGE = "package.json"

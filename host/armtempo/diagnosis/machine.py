@@ -20,7 +20,7 @@ _GROUP = "sudo usermod -a -G dialout $USER, then log in again"
 
 def examine_machine() -> list[Finding]:
     """Versions of armtempo, Python and the operating system."""
-    from armtempo.basics.version import installed_version
+    from armtempo.basics.installation import installed_version
 
     python = f"{platform.python_version()} ({platform.python_implementation()})"
     fits = sys.version_info[:2] >= LEAST_PYTHON

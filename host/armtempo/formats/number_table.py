@@ -18,7 +18,8 @@ _SEPARATORS = (";", "\t", ",")
 class NumberTable:
     """The cells of a table; ``header`` is None if the first line is all numbers."""
 
-    path: Path
+    path: Path | str
+    """Its file, or what it is, in words."""
     header: list[str] | None
     rows: list[tuple[int, list[str]]]
     """Line number from 1, and its cells."""
@@ -43,13 +44,18 @@ class NumberTable:
 
 
 def read(path: Path) -> NumberTable:
-    """The table in a text file; empty lines are left out. InputError if it cannot be read."""
+    """The table in a text file, as ``of_text``. InputError if it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}: cannot be read: {why(error)}", "check the path, and that it is a text file in UTF-8"
         ) from None
+    return of_text(text, path)
+
+
+def of_text(text: str, path: Path | str) -> NumberTable:
+    """The table in a text that comes from ``path``; empty lines are left out. InputError if it is not a table."""
     separator = _separator(text)
     try:
         lines = list(enumerate(csv.reader(text.splitlines(), delimiter=separator), 1))

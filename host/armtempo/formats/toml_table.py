@@ -12,8 +12,7 @@ from typing import Any
 
 from armtempo.basics.errors import InputError
 from armtempo.formats.atomic_file import why
-from armtempo.formats.plain_text import is_plain
-from armtempo.formats.spelling import did_you_mean, misspelt
+from armtempo.formats.text import did_you_mean, is_plain, misspelt
 
 _REQUIRED: Any = object()
 

@@ -12,7 +12,7 @@ from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
 from armtempo.basics.virtual_id import is_virtual
-from armtempo.formats.plain_text import visible
+from armtempo.formats.text import visible
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.formats import json_codec, toml_table
-from armtempo.formats.spelling import did_you_mean
+from armtempo.formats.text import did_you_mean
 from armtempo.formats.toml_table import Table
 from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, room, shipped
 from armtempo.model import posture as named

@@ -11,7 +11,7 @@ from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec, toml_table
+from armtempo.formats import json_codec, number_table, toml_table
 from armtempo.formats.toml_table import Table
 from armtempo.model import pose_table, shipped, tool_way, via_table
 from armtempo.model.arm import Arm
@@ -190,7 +190,7 @@ class Job:
         with line and value for what is no angle.
         """
         file = Path(path)
-        found = via_table.via_from_csv(file, Arm.of(arm), radians, tolerance_deg)
+        found = via_table.via_points(number_table.read(file), Arm.of(arm), radians, tolerance_deg)
         timing = cls.timing if found.thinned_to_deg is None else "shared"
         return cls(file.stem, via_deg=found.via_deg.tolist(), timing=timing)
 

@@ -12,7 +12,7 @@ from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.formats import toml_table
-from armtempo.formats.spelling import did_you_mean
+from armtempo.formats.text import did_you_mean
 from armtempo.formats.toml_table import Table
 from armtempo.model import tool_way
 from armtempo.model.arm import Arm, read_posture

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.formats import number_table
 from armtempo.formats.number_table import NumberTable
 from armtempo.model import thinning
 from armtempo.model.arm import Arm
@@ -32,8 +30,8 @@ class ImportedPath:
     """The tolerance they keep to where there were more; None if every line is a via point."""
 
 
-def via_from_csv(
-    path: Path, arm: Arm, radians: bool = False, tolerance_deg: float | None = None
+def via_points(
+    table: NumberTable, arm: Arm, radians: bool = False, tolerance_deg: float | None = None
 ) -> ImportedPath:
     """Via points from a table: a line a point, a column a driven joint; separated by commas, semicolons or tabs.
 
@@ -42,12 +40,11 @@ def via_from_csv(
     thinned to ``tolerance_deg``, without one to TOLERANCE_DEG; other tables only where a tolerance is given.
     Raises InputError with line and value.
     """
-    table = number_table.read(path)
     columns = _columns(table, arm)
     points = np.array(table.numbers(columns)).reshape(-1, len(columns))
     if len(points) < 2:
         raise InputError(
-            f"{path}: {len(points)} via points are not a motion", "give at least 2 lines of angles"
+            f"{table.path}: {len(points)} via points are not a motion", "give at least 2 lines of angles"
         )
     angles = np.degrees(points) if radians else points
     times = _times(table)

@@ -16,14 +16,19 @@ from armtempo.kinematics.chain import all_angles_deg, outline_mm
 from armtempo.kinematics.forward import all_frames
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
+from armtempo.model.room import FAR_MM
+from armtempo.planning.room_check import Bodies
 
-COLOUR, GHOST, PATH, RUN, VIA = "#4477aa", "#999999", "#228833", "#ee6677", "#ccbb44"
+COLOUR, GHOST, PATH, RUN, VIA, ROOM = "#4477aa", "#999999", "#228833", "#ee6677", "#ccbb44", "#aa3377"
 """Of Paul Tol's bright scheme, which the colour-blind can tell apart."""
 _THICK = 0.03
-"""Radius of a link as a share of the arm's reach, for arms whose file gives none."""
+"""Radius of a link as a share of the arm's reach, where the arm file gives none."""
 _SHORT_MM = 1e-6
 _OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25
+_ROOM_OPACITY = 0.3
+_SHOWN = 1.2
+"""Walls are shown so far from the arm's base, as a share of its reach."""
 _VIA_NAME = "via "
 FOLLOW = "follow"
 """The view that keeps the tool in the middle."""
@@ -57,19 +62,32 @@ class ArmShape:
         return found
 
     @cached_property
-    def pieces(self) -> list[tuple[int, float]]:
-        """The point at which each link begins in the outline, and its length; none of no length."""
+    def pieces(self) -> list[tuple[int, float, float]]:
+        """The point at which each link begins in the outline, its length and its radius; none of no length."""
+        radii = [radius / self.reach_mm or _THICK for radius in Bodies(self.arm).radius_mm]
         points = self.outline(np.array(self.arm.home_deg))
         lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
         return [
-            (index, float(length))
+            (index, float(length), radii[index])
             for index, length in enumerate(lengths)
             if length * self.reach_mm > _SHORT_MM
         ]
 
+    @property
+    def room(self) -> list[tuple[Array, Array]]:
+        """The corners, (3,), of each box to keep out of, and of each wall, which is flat."""
+        found = []
+        for box in Bodies(self.arm).obstacles:
+            low, high = np.array(box.low_mm), np.array(box.high_mm)
+            below, above = low <= -FAR_MM, high >= FAR_MM
+            low, high = np.where(below & ~above, high, low), np.where(above & ~below, low, high)
+            low, high = np.clip(np.array((low, high)) / self.reach_mm, -_SHOWN, _SHOWN)
+            found.append((low, high))
+        return found
+
     def poses(self, angles_deg: Array) -> list[list[float]]:
         """x, y, z and the quaternion x, y, z, w of each piece's middle: its y axis points along it."""
-        points, first = self.outline(angles_deg), [index for index, _ in self.pieces]
+        points, first = self.outline(angles_deg), [index for index, *_ in self.pieces]
         begin, end = points[first], points[np.array(first) + 1]
         along = (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
         zero = np.zeros(len(along))
@@ -99,19 +117,28 @@ class ArmScene:
         ) as self.scene:
             self._links = self._capsules(COLOUR, 1.0)
             self._ghost = self._capsules(GHOST, _GHOST_OPACITY)
+            self._room()
         self._dots: list[Object3D] = []
         self.look("free")
 
     def _capsules(self, colour: str, opacity: float) -> list[str]:
         """A capsule for each piece; their numbers in the scene."""
         found = []
-        for _, length in self._shape.pieces:
+        for _, length, radius in self._shape.pieces:
             with self.scene.group() as capsule:
-                self.scene.cylinder(_THICK, _THICK, length, 16).material(colour, opacity)
+                self.scene.cylinder(radius, radius, length, 16).material(colour, opacity)
                 for end in (-length / 2, length / 2):
-                    self.scene.sphere(_THICK, 16, 12).material(colour, opacity).move(0, end, 0)
+                    self.scene.sphere(radius, 16, 12).material(colour, opacity).move(0, end, 0)
             found.append(str(capsule.id))
         return found
+
+    def _room(self) -> None:
+        """The boxes to keep out of, and frames for the walls."""
+        for low, high in self._shape.room:
+            is_wall = not (high - low).all()
+            width, height, depth = (high - low).tolist()
+            box = self.scene.box(width, height, depth, wireframe=is_wall)
+            box.material(ROOM, _ROOM_OPACITY).move(*((low + high) / 2).tolist())
 
     @property
     def parts(self) -> str:
@@ -124,7 +151,7 @@ class ArmScene:
     def look(self, view: str) -> None:
         """Look from the side, from above, from in front and above, or follow the tool."""
         if view != FOLLOW:
-            eye = {"side": (0.01, -1.4, 0.25), "top": (0.01, -0.01, 1.6), "free": (0.8, -1.0, 0.7)}[view]
+            eye = {"side": (0.01, -1.4, 0.25), "top": (0.01, -0.01, 1.6), "free": (0.7, -0.85, 0.6)}[view]
             self.scene.move_camera(*eye, 0, 0, 0.15, duration=0.3)
         ui.run_javascript(f"armtempo.follow = {json.dumps(view == FOLLOW)}")
 
@@ -134,18 +161,17 @@ class ArmScene:
         ui.run_javascript(f"armtempo.line({json.dumps(name)}, {json.dumps(points)}, {json.dumps(colour)})")
 
     def dots(self, points_mm: Array) -> None:
-        """A ball at each via point, (N, 3), that can be clicked and dragged, in the place of those before."""
-        for old in self._dots:
-            old.delete()
+        """A ball at each via point, (N, 3), that can be clicked and dragged."""
+        points = (np.asarray(points_mm) / self._shape.reach_mm).tolist()
+        while len(self._dots) > len(points):
+            self._dots.pop().delete()
         with self.scene:
-            self._dots = [
-                self.scene.sphere(1.3 * _THICK, 16, 12)
-                .material(VIA)
-                .move(*point)
-                .with_name(f"{_VIA_NAME}{number}")
-                .draggable()
-                for number, point in enumerate((np.asarray(points_mm) / self._shape.reach_mm).tolist())
-            ]
+            while len(self._dots) < len(points):
+                ball = self.scene.sphere(1.3 * _THICK, 16, 12).material(VIA)
+                self._dots.append(ball.with_name(f"{_VIA_NAME}{len(self._dots)}").draggable())
+        for dot, point in zip(self._dots, points, strict=True):
+            dot.move(*point)
+        ui.run_javascript("armtempo.changes += 1")
 
     def _clicked(self, event: SceneClickEventArguments) -> None:
         for hit in event.hits:

@@ -18,6 +18,7 @@ from armtempo.panel.operator import Needs
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
+    from armtempo.selftest.result import SelfTest
 
 _SHOWN = (
     "port",
@@ -43,6 +44,7 @@ class BoardTab:
         self._page = page
         self._operator = operator = page.operator
         self._stored_of = ""
+        self._tested: SelfTest | None = None
         ui.label(words.STATUS).classes("text-subtitle2")
         columns = [{"name": name, "label": "", "field": name, "align": "left"} for name in ("key", "value")]
         self._state = ui.table(columns=columns, rows=[]).props("dense flat hide-header wrap-cells")
@@ -53,13 +55,14 @@ class BoardTab:
         self._stored = ui.column()
         ui.label(words.PROGRAM).classes("text-subtitle2")
         with ui.row():
-            for text, sure, call in (
-                (words.DEPLOY, words.SURE_DEPLOY, self._deploy),
-                (words.FLASH, words.SURE_FLASH, self._flash),
+            for text, sure, call, needs in (
+                (words.DEPLOY, words.SURE_DEPLOY, self._deploy, Needs.IDLE),
+                (words.FLASH, words.SURE_FLASH, self._flash, Needs.IDLE),
+                (words.SELFTEST, words.SURE_SELFTEST, self._selftest, Needs.COMMAND),
             ):
                 button = ui.button(text).props("outline no-caps")
                 button.on_click(lambda text=text, sure=sure, call=call: self._if_sure(text, sure, call))
-                page.control(button, Needs.IDLE)
+                page.control(button, needs)
         ui.label(words.LOG).classes("text-subtitle2")
         self._log = _Lines(lambda: (operator.log, operator.lines))
         with ui.row():
@@ -69,6 +72,9 @@ class BoardTab:
             )
         self._traffic = _Lines(lambda: (operator.traffic, operator.messages))
         self._traffic.log.set_visibility(False)
+        columns = [{"name": key, "label": key, "field": key, "align": "left"} for key in words.VERDICT_KEYS]
+        self._verdicts = ui.table(columns=columns, rows=[]).props("dense flat wrap-cells hide-bottom")
+        self._verdicts.set_visibility(False)  # at the end, where it moves nothing
         page.on_look(self._look)
 
     def _look(self) -> None:
@@ -85,6 +91,11 @@ class BoardTab:
             if self._stored_of != state.board_id and not self._operator.busy:
                 self._stored_of = state.board_id
                 self._read()
+        tested = self._operator.tested
+        if tested is not None and tested is not self._tested:
+            self._tested = tested
+            self._verdicts.rows = tested.to_json()["lines"]
+            self._verdicts.set_visibility(True)
         self._log.look()
         if self._page.client in self._operator.monitors:
             self._traffic.look()
@@ -163,6 +174,9 @@ class BoardTab:
             operator.without_board(lambda: deploy(port, tell=operator.say, progress=operator.part))
 
         self._page.do(words.DEPLOY, work, Needs.IDLE)
+
+    def _selftest(self) -> None:
+        self._page.do(words.SELFTEST, self._operator.selftest, Needs.COMMAND)
 
     def _flash(self) -> None:
         operator, port = self._operator, self._operator.port

@@ -7,6 +7,7 @@ from nicegui import ui
 
 from armtempo.basics.arrays import Array
 from armtempo.model.arm import Arm
+from armtempo.panel import words
 
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
 """Paul Tol's bright scheme."""
@@ -27,6 +28,8 @@ class CurveChart:
             "tooltip": {"trigger": "axis"},
             "xAxis": {
                 "type": "value",
+                "name": words.TIME_S,
+                "nameGap": 4,
                 "max": "dataMax",
                 "axisLabel": {"showMaxLabel": False},
                 "splitLine": _GRID,

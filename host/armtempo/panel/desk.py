@@ -33,43 +33,43 @@ class Desk:
         return [list(map(float, row)) for row in planner.via_angles(self.arm, self.job)[0]]
 
     def job_with(self, rows: Sequence[Sequence[float]], path: str) -> Job:
-        """The job through other via points; InputError for fewer than two, or outside of a range."""
-        if len(rows) < 2:
-            raise InputError("a motion needs two via points", "add one")
-        for number, row in enumerate(rows):
-            if problem := self.arm.angles_problem(row):
-                raise InputError(f"P{number}: {problem}", "change it")
-        vias = tuple(tuple(map(float, row)) for row in rows)
-        stops = tuple(stop for stop in self.job.stops if stop.via < len(vias) - 1)
-        ways = tuple(way for way in self.job.ways if way.via < len(vias))
-        return replace(self.job, via=vias, path=path, stops=stops, ways=ways)
+        """The job through other via points; InputError as for the file that ``save`` would write."""
+        job = Job.of_table(toml_table.parse(self._text(rows, path), str(self._target)), self.arm)
+        last = len(rows) - 1
+        stops = tuple(stop for stop in self.job.stops if stop.via < last)
+        return replace(job, stops=stops, ways=tuple(way for way in self.job.ways if way.via <= last))
 
-    def save(self, job: Job) -> Path:
-        """Write the via points and the path into the job's file; its other lines and comments stay.
+    @property
+    def _target(self) -> Path:
+        """The job's file; one in the folder for a job without."""
+        return self.file or self.folder / f"{self.job.name}.toml"
 
-        A job without a file gets one in the folder. InputError if it cannot be written.
-        """
+    def _text(self, rows: Sequence[Sequence[float]], path: str) -> str:
+        """The job's file with other via points and path; its other lines and comments stay."""
+        file = self._target
+        text = file.read_text(encoding="utf-8") if file.is_file() else f'name = "{self.job.name}"\n'
+        content = tomlkit.parse(text)
+        content.pop("via", None)
+        via = tomlkit.array()
+        for row in rows:
+            via.append([round(float(angle), 6) for angle in row])
+        content["via_deg"] = via.multiline(True)
+        if path != Job.path or "path" in content:
+            content["path"] = path
+        return tomlkit.dumps(content)
+
+    def save(self, rows: Sequence[Sequence[float]], path: str) -> Path:
+        """Write the via points and the path into the job's file; InputError, and nothing written, if it cannot be."""
+        job, file = self.job_with(rows, path), self._target
         if job.ways or job.stops:
             raise InputError(
                 "the panel writes via points as angles alone: lines, speeds and stops of the job would be lost",
                 "change the via points in the job's file",
             )
-        file = self.file or self.folder / f"{job.name}.toml"
         if not file.resolve().is_relative_to(self.folder.resolve()):
             raise InputError(
                 f"{file} is outside of the project folder", "copy it there; the panel writes nothing else"
             )
-        text = file.read_text(encoding="utf-8") if file.is_file() else f'name = "{job.name}"\n'
-        content = tomlkit.parse(text)
-        content.pop("via", None)
-        rows = tomlkit.array()
-        for row in job.via:
-            rows.append([round(float(angle), 6) for angle in row])  # type: ignore[union-attr]
-        content["via_deg"] = rows.multiline(True)
-        if job.path != Job.path or "path" in content:
-            content["path"] = job.path
-        new = tomlkit.dumps(content)
-        Job.of_table(toml_table.parse(new, str(file)), self.arm)
-        replace_text(file, new)
+        replace_text(file, self._text(rows, path))
         self.file, self.job = file, job
         return file

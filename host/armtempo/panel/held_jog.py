@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import time
-from dataclasses import dataclass
 
 from armtempo.panel.operator import Operator
+from armtempo.planning.jog.jog_motion import JogMove
 
 ALIVE_S = 0.35
 """A button counts as released if the browser has not said for this long that it is held; it says so every 0.1 s."""
 _STEP_S = 0.05
-
-
-@dataclass(frozen=True)
-class JogButton:
-    """What a button moves: a joint (from 1), or the tool along or about an axis."""
-
-    joint: int | None = None
-    axis: str | None = None
-    turn: bool = False
-    direction: int = 1
 
 
 class ButtonHold:
@@ -30,10 +21,10 @@ class ButtonHold:
         self._client = ""
         self._said_s = 0.0
 
-    def press(self, client: str, button: JogButton, speed: float) -> None:
+    def press(self, client: str, move: JogMove, speed: float) -> None:
         """Begin; InputError if it cannot be now. ``speed``: part of the limits, 0.01 to 1."""
         self._client, self._said_s = client, time.monotonic()
-        self._operator.do("jog", client, lambda: self._jog(client, button, speed))
+        self._operator.do("jog", client, lambda: self._jog(client, move, speed))
 
     def alive(self, client: str) -> None:
         """The browser says that the button is still held."""
@@ -45,11 +36,20 @@ class ButtonHold:
         if client == self._client:
             self._client = ""
 
-    def _held(self, client: str) -> bool:
-        return client == self._client == self._operator.holder and time.monotonic() - self._said_s < ALIVE_S
+    def held_by(self, client: str) -> bool:
+        """Whether a client holds the button."""
+        return client == self._client
 
-    def _jog(self, client: str, button: JogButton, speed: float) -> None:
-        board = self._operator.board
-        with board.held_jog(button.joint, button.axis, button.direction, button.turn, speed) as jog:
+    def _held(self, client: str) -> bool:
+        return (
+            self.held_by(client)
+            and client == self._operator.holder
+            and time.monotonic() - self._said_s < ALIVE_S
+        )
+
+    def _jog(self, client: str, move: JogMove, speed: float) -> None:
+        joint = None if move.joint is None else move.joint + 1
+        way = int(math.copysign(1, move.by))
+        with self._operator.board.held_jog(joint, move.axis or None, way, move.about, speed) as jog:
             while self._held(client) and jog.hold(_STEP_S):
                 self._operator.angles_deg = jog.angles_deg

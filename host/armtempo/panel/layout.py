@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import tool_path_mm
 from armtempo.kinematics.of_arm import forward
 from armtempo.panel import arm_scene, board_tab, move_tab, plan_tab, run_tab, sequence_tab, words
-from armtempo.panel.arm_scene import ArmScene, ArmShape
+from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
-from armtempo.panel.operator import Operator
+from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.panel_page import LOOK_S, PanelPage
 
 TELL_S = 0.1
@@ -37,17 +38,35 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     _header(page)
     with ui.element("div").classes("armtempo-page"):
         with ui.column().classes("armtempo-half"):
-            with ui.element("div").classes("armtempo-scene"):
-                page.scene = ArmScene(shape)
-            with ui.row():
-                for view, text in words.VIEWS.items():
-                    ui.button(text, on_click=lambda view=view: page.scene.look(view)).props("flat dense")
+            page.picture = ui.element("div").classes("armtempo-scene")
+            _below_scene(page)
         page.on_look(Paths(page).look)
         with ui.column().classes("armtempo-half"):
             _tabs(page)
     _events(page)
+    ui.timer(0.0, lambda: page.scene, once=True)
     ui.timer(LOOK_S, page.refresh)
     return page
+
+
+def _below_scene(page: PanelPage) -> None:
+    """Views, how fast what moves continues, and where the arm is: in sight from every tab."""
+    operator = page.operator
+    with ui.row():
+        for view, text in words.VIEWS.items():
+            ui.button(text, on_click=lambda view=view: page.scene.look(view)).props("flat dense")
+        for text, call in (
+            (words.PAUSE, lambda: operator.board.pause()),
+            (words.RESUME, lambda: operator.board.resume()),
+        ):
+            button = ui.button(text, on_click=lambda call=call: page.at_once(call, Needs.PAUSE))
+            page.control(button.props("outline dense no-caps").classes("armtempo-pause"), Needs.PAUSE)
+        speed = ui.slider(min=1, max=100, value=100).props(f'label aria-label="{words.SPEED_OF_MOTION}"')
+        speed.on("change", lambda event: page.at_once(lambda: operator.board.speed(float(event.args) / 100)))
+        ui.label(words.SPEED_OF_MOTION).classes("text-caption")
+        page.control(speed.classes("armtempo-speed"), Needs.BOARD)
+    ui.label("").props('id="armtempo-where"')
+    ui.label("").props('id="armtempo-said" role="status"')
 
 
 class Paths:
@@ -125,28 +144,28 @@ def _events(page: PanelPage) -> None:
 
     def press(event: Any) -> None:
         number = event.args
-        if type(number) is int and 0 <= number < len(page.buttons):
-            page.attempt(lambda: hold.press(page.client, page.buttons[number], page.jog_percent / 100))
+        if type(number) is int and 0 <= number < len(page.jogs):
+            page.attempt(lambda: hold.press(page.client, page.jogs[number], page.jog_percent / 100))
 
     ui.on("armtempo-stop", lambda: operator.stop())
     ui.on("armtempo-press", press)
     ui.on("armtempo-held", lambda: hold.alive(page.client))
     ui.on("armtempo-release", lambda: hold.release(page.client))
     lost = json.dumps(words.LOST)
-    ui.run_javascript(f"document.body.dataset.lost = {lost}; armtempo.begin({page.scene.parts})")
+    ui.run_javascript(f"document.body.dataset.lost = {lost}; armtempo.begin()")
 
 
 def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
     """What all pages are told: where the arm is, and the numbers that change while it moves."""
     angles = operator.angles_deg
-    texts = {"armtempo-state": state_line(operator)}
+    where = "  ".join(f"{angle:.2f}°" for angle in angles)
+    with suppress(InputError):
+        x, y, z = forward(operator.arm, angles)[:3, 3]
+        where = f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  {where}"
+    said = operator.log[-1] if operator.log else ""
+    texts = {"armtempo-state": state_line(operator), "armtempo-where": where, "armtempo-said": said}
     for number, angle in enumerate(angles, 1):
         texts[f"armtempo-angle-{number}"] = f"{angle:.2f}°"
-    try:
-        x, y, z = forward(operator.arm, angles)[:3, 3]
-        texts["armtempo-tool"] = f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm"
-    except InputError:
-        pass
     target = operator.target_deg
     ghost = None if target is None else shape.poses(target)
     return {"links": shape.poses(angles), "dials": shape.dials(angles), "ghost": ghost, "texts": texts}
@@ -163,5 +182,10 @@ def state_line(operator: Operator) -> str:
     doing = f" · {operator.busy}" if operator.busy else ""
     if operator.busy and operator.progress:
         doing += f" {operator.progress:.0%}"
+    if state.moving and state.speed_percent != 100:
+        speed = (
+            words.AT_SPEED.format(percent=state.speed_percent) if state.speed_percent else words.IN_A_PAUSE
+        )
+        doing = f" {speed}{doing}"
     fault = f" · {words.FAULT.format(fault=state.fault)}" if state.fault else ""
     return f"{state.state}{doing} · {state.port}{kind}{fault}"

@@ -1,14 +1,16 @@
-"""Moving by hand: buttons to hold, postures, home, outputs and inputs, speed and pause."""
+"""Moving by hand: buttons to hold, postures, home, outputs and inputs."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from nicegui import ui
 
 from armtempo.panel import words
-from armtempo.panel.held_jog import JogButton
 from armtempo.panel.operator import Needs
+from armtempo.planning.jog.jog_motion import JogMove
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -20,49 +22,40 @@ def build(page: PanelPage) -> None:
     """The tab."""
     _jog(page)
     _postures(page)
-    _motion(page)
+    _home(page)
     _outputs(page)
 
 
-def _hold_button(page: PanelPage, button: JogButton, text: str, label: str) -> None:
-    """A button that moves the arm while it is held."""
-    page.buttons.append(button)
-    number = len(page.buttons) - 1
-    made = ui.button(text).classes("armtempo-touch").props(f'unelevated aria-label="{label}"')
-    made.on(
-        "pointerdown",
-        js_handler=f"(event) => {{ if (event.button === 0) {{ event.preventDefault(); armtempo.press({number}); }} }}",
-    )
-    made.on("contextmenu", js_handler="(event) => event.preventDefault()")
-    page.control(made)
+def _hold_button(page: PanelPage, move: JogMove, sign: str, name: str) -> None:
+    """A button that moves the arm while it is held; the page's script finds it by its number."""
+    made = ui.button(sign).classes("armtempo-touch")
+    page.control(made.props(f'unelevated aria-label="{name} {sign}" data-jog={len(page.jogs)}'), jog=move)
+    page.jogs.append(move)
 
 
-def _pair(page: PanelPage, name: str, number_id: str, made: dict[str, object]) -> None:
-    """A row: minus, name and number, plus."""
-    with ui.row().classes("no-wrap"):
-        _hold_button(page, JogButton(**made, direction=-1), "−", f"{name} −")  # type: ignore[arg-type]
-        ui.label(name).classes("armtempo-name ellipsis")
-        _hold_button(page, JogButton(**made, direction=1), "+", f"{name} +")  # type: ignore[arg-type]
-        if number_id:
-            ui.label("").classes("armtempo-number").props(f'id="{number_id}"')
+def _pair(page: PanelPage, name: str, move: JogMove) -> None:
+    """Minus, name, plus."""
+    _hold_button(page, replace(move, by=-move.by), "−", name)
+    ui.label(name).classes("armtempo-name ellipsis")
+    _hold_button(page, move, "+", name)
 
 
 def _jog(page: PanelPage) -> None:
     with ui.row().classes("armtempo-apart"):
         with ui.column():
             ui.label(words.JOINTS).classes("text-subtitle2")
-            for number, joint in enumerate(page.operator.arm.driven, 1):
+            for number, joint in enumerate(page.operator.arm.driven):
                 low, high = joint.range_deg
                 with ui.row().classes("no-wrap"):
-                    _pair(page, joint.name, f"armtempo-angle-{number}", {"joint": number})
+                    _pair(page, joint.name, JogMove(math.inf, joint=number))
+                    ui.label("").classes("armtempo-number").props(f'id="armtempo-angle-{number + 1}"')
                     ui.label(f"{low:g}° … {high:g}°").classes("armtempo-note")
         with ui.column():
             ui.label(words.TOOL).classes("text-subtitle2")
             for axis in AXES:
-                _pair(page, axis, "", {"axis": axis})
-            for axis in AXES:
-                _pair(page, f"⟳ {axis}", "", {"axis": axis, "turn": True})
-            ui.label("").props('id="armtempo-tool"').style("white-space: pre")
+                with ui.row().classes("no-wrap"):
+                    _pair(page, axis, JogMove(math.inf, axis=axis))
+                    _pair(page, f"⟳ {axis}", JogMove(math.inf, axis=axis, about=True))
     ui.label(words.HOLD_HINT).classes("armtempo-note")
     ui.label(words.SPEED_OF_JOG).classes("text-caption")
     slider = ui.slider(min=1, max=100, value=page.jog_percent).props("label").classes("armtempo-slider")
@@ -80,7 +73,7 @@ def _postures(page: PanelPage) -> None:
             page.control(go)
 
 
-def _motion(page: PanelPage) -> None:
+def _home(page: PanelPage) -> None:
     operator = page.operator
 
     async def home() -> None:
@@ -97,16 +90,6 @@ def _motion(page: PanelPage) -> None:
         clear = ui.button(words.CLEAR).props("outline no-caps")
         clear.on_click(lambda: page.do(words.CLEAR, lambda: operator.board.clear(), Needs.COMMAND))
         page.control(clear, Needs.COMMAND)
-        for text, call in (
-            (words.PAUSE, lambda: operator.board.pause()),
-            (words.RESUME, lambda: operator.board.resume()),
-        ):
-            button = ui.button(text, on_click=lambda call=call: page.at_once(call)).props("outline no-caps")
-            page.control(button, Needs.BOARD)
-    ui.label(words.SPEED_OF_MOTION).classes("text-caption")
-    speed = ui.slider(min=1, max=100, value=100).props("label").classes("armtempo-slider")
-    speed.on("change", lambda event: page.at_once(lambda: operator.board.speed(float(event.args) / 100)))
-    page.control(speed, Needs.BOARD)
 
 
 def _outputs(page: PanelPage) -> None:

@@ -23,11 +23,14 @@ from armtempo.model.plan import Plan
 from armtempo.panel import words
 from armtempo.panel.desk import Desk
 from armtempo.panel.sequence_desk import SequenceDesk
+from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.robot.board import Board
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.sharing import sample_json
 from armtempo.robot.stop_request import Stopped
 from armtempo.robot.where import Where, posture_deg
+from armtempo.selftest.result import SelfTest
 
 LOOK_S = 0.25
 """Interval of the board's states while no samples come."""
@@ -47,7 +50,10 @@ class Needs(Flag):
     """The board answers."""
     REST = auto()
     """The arm is at rest, its position known, and no fault pending."""
+    MOTION = auto()
+    """Something moves."""
     COMMAND = IDLE | BOARD
+    PAUSE = BOARD | MOTION
     MOVE = IDLE | BOARD | REST
 
 
@@ -129,6 +135,8 @@ class Operator:
         self.sequences = SequenceDesk(desk.arm, desk.folder)
         self.sequence: SequenceState | None = None
         """Where the sequence that was started last is."""
+        self.tested: SelfTest | None = None
+        """The last self-test."""
         self.target_deg: Array | None = None
         """Where the arm goes, (J,), while it goes to a posture."""
         self.traffic: deque[str] = deque(maxlen=500)
@@ -148,6 +156,9 @@ class Operator:
         """How many lines the log has ever had."""
         self.holder = ""
         """The client that has control; "" for none."""
+        self._jogs_from: tuple[float, ...] = ()
+        self._jogs: dict[JogMove, str] = {}
+        """The answers of ``why_no_jog`` for these angles."""
         self._lock = Lock()
         self._closed = ThreadEvent()
         self._stopped_s = -FREEZE_AFTER_S
@@ -219,6 +230,8 @@ class Operator:
             return words.OTHER_IN_CONTROL if self.holder else words.NOBODY_IN_CONTROL
         if self.busy and Needs.IDLE in needs:
             return words.BUSY.format(what=self.busy)
+        if Needs.MOTION in needs and (self.state is None or not self.state.moving):
+            return words.AT_REST
         if Needs.REST not in needs or self.state is None:
             return ""
         if self.state.fault:
@@ -226,6 +239,15 @@ class Operator:
         if not all(joint.known for joint in self.state.joints):
             return words.NOT_HOMED
         return words.MOVING if self.state.moving else ""
+
+    def why_no_jog(self, move: JogMove) -> str:
+        """Why the arm cannot jog that way from where it is, in words; "" if it can."""
+        here = tuple(self.angles_deg)
+        if here != self._jogs_from:
+            self._jogs_from, self._jogs = here, {}
+        if move not in self._jogs:
+            self._jogs[move] = jog_motion.problem(self.arm, here, move)
+        return self._jogs[move]
 
     # commands
 
@@ -268,6 +290,10 @@ class Operator:
         self.board.upload(plan, replace=True)
         self.plan_run = plan
         self.board.run(plan, times, self.runs, self.part).report()
+
+    def selftest(self) -> None:
+        """Let the board measure itself."""
+        self.tested = self.board.selftest(self.part)
 
     def part(self, done: float, whole: float) -> None:
         """The progress of what is under way."""
@@ -327,7 +353,7 @@ class Operator:
                 if board is self._board:
                     self.trouble = str(error)
                 continue
-            self.state, self.trouble = state, ""
             angles = [joint.angle_deg for joint in state.joints]
             if all(angle is not None for angle in angles):
                 self.angles_deg = np.array(angles, dtype=float)
+            self.state, self.trouble = state, ""

@@ -17,18 +17,20 @@ window.armtempo = {
   SMOOTH_MS: 100,
   SILENT_MS: 900,
 
-  begin(parts) {
+  // the scene is there, some time after the page
+  show(parts) {
     this.parts = parts;
     import("nicegui-scene").then((module) => (this.THREE = module.THREE));
     requestAnimationFrame(() => this.draw());
+  },
+
+  begin() {
     setInterval(() => this.look(), 100);
-    addEventListener("keydown", (event) => {
-      const typing = /INPUT|TEXTAREA|SELECT/.test(event.target.tagName);
-      if (event.key === "Escape" || (event.key === " " && !typing)) {
-        event.preventDefault();
-        if (!event.repeat) emitEvent("armtempo-stop");
-      }
-    });
+    addEventListener("keydown", (event) => this.key(event), true); // before a button takes the space bar for itself
+    addEventListener("keyup", (event) => event.key === "Enter" && this.release(), true);
+    addEventListener("pointerdown", (event) => event.button === 0 && this.press(event), true);
+    addEventListener("contextmenu", (event) => event.target.closest("[data-jog]") && event.preventDefault());
+    addEventListener("pointermove", (event) => event.buttons && (this.changes += 1)); // perhaps a via point is dragged
     for (const gone of ["pointerup", "pointercancel", "blur"]) addEventListener(gone, () => this.release());
     document.addEventListener("visibilitychange", () => document.hidden && this.release());
   },
@@ -147,9 +149,22 @@ window.armtempo = {
     });
   },
 
-  press(button) {
-    this.held = button;
-    emitEvent("armtempo-press", button);
+  // The space bar stops from everywhere but where it writes a space; Enter holds a jog button as a finger does.
+  key(event) {
+    const typing = event.target.matches("textarea, input[type=text]:not([readonly])");
+    if (event.key === "Escape" || (event.key === " " && !typing)) {
+      event.preventDefault();
+      if (event.key === " ") event.stopPropagation(); // Escape closes dialogs besides
+      if (!event.repeat) emitEvent("armtempo-stop");
+    } else if (event.key === "Enter" && !event.repeat) this.press(event);
+  },
+
+  press(event) {
+    const button = event.target.closest("[data-jog]:not([disabled])");
+    if (!button || this.held !== null) return;
+    event.preventDefault();
+    this.held = Number(button.dataset.jog);
+    emitEvent("armtempo-press", this.held);
   },
 
   release() {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from nicegui import ui
@@ -14,8 +15,9 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.panel import words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
-from armtempo.panel.held_jog import ButtonHold, JogButton
+from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Needs, Operator
+from armtempo.planning.jog.jog_motion import JogMove
 
 LOOK_S = 0.25
 """Interval at which a page looks at what has changed, but for what moves."""
@@ -27,6 +29,8 @@ class _Control:
 
     element: Element
     needs: Needs
+    jog: JogMove | None
+    """What it moves while it is held."""
     reason: str = "-"
     """Why it cannot be pressed."""
 
@@ -56,18 +60,32 @@ class PanelPage:
     """The tab that is shown."""
     listeners: list[tuple[str, Callable[[], None]]] = field(default_factory=list)
     """Called every LOOK_S while their tab is shown; those of no tab always."""
-    buttons: list[JogButton] = field(default_factory=list)
+    jogs: list[JogMove] = field(default_factory=list)
+    """What the buttons move that are held, by their numbers."""
     jog_percent: float = 25.0
-    scene: ArmScene = field(init=False)
+    picture: Element = field(init=False)
+    """Where the scene is."""
 
-    def control(self, element: Element, needs: Needs = Needs.MOVE) -> Any:
+    @cached_property
+    def scene(self) -> ArmScene:
+        """The arm in 3-D, made when it is first needed: the first view does not wait for what draws it."""
+        with self.picture:
+            scene = ArmScene(self.shape)
+            ui.run_javascript(f"armtempo.show({scene.parts})")
+        return scene
+
+    def control(self, element: Element, needs: Needs = Needs.MOVE, jog: JogMove | None = None) -> Any:
         """An element that is greyed, with the reason as its hint, while it cannot be used."""
         with element:
             ui.tooltip("")
-        control = _Control(element, needs)
-        control.grey(self.operator.why_not(self.client, needs))
+        control = _Control(element, needs, jog)
+        control.grey(self._why_not(control))
         self.controls.append(control)
         return element
+
+    def _why_not(self, control: _Control) -> str:
+        reason = self.operator.why_not(self.client, control.needs)
+        return reason or (self.operator.why_no_jog(control.jog) if control.jog else "")
 
     def on_look(self, listener: Callable[[], None]) -> None:
         """Let what is built now, in the tab that is shown, look at what has changed."""
@@ -102,12 +120,11 @@ class PanelPage:
     def refresh(self) -> None:
         """Grey what cannot be used now, with the reason."""
         self.controls = [control for control in self.controls if not control.element.is_deleted]
-        reasons = {
-            needs: self.operator.why_not(self.client, needs)
-            for needs in {control.needs for control in self.controls}
-        }
         for control in self.controls:
-            control.grey(reasons[control.needs])
+            if control.jog is None or not self.hold.held_by(
+                self.client
+            ):  # what is held keeps the keyboard's focus
+                control.grey(self._why_not(control))
         for tab, listener in self.listeners:
             if tab in ("", self.shown):
                 listener()

@@ -12,9 +12,10 @@ from nicegui import run, ui
 from armtempo import pipeline
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.formats import number_table
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.moved_tool import moved_tool_deg
-from armtempo.model.job import PATHS, Job
+from armtempo.model import via_table
 from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
 
@@ -79,10 +80,8 @@ class PlanTab:
             for number, row in enumerate(self._rows):
                 ui.label(f"P{number}")
                 for index, joint in enumerate(joints):
-                    low, high = joint.range_deg
-                    box = ui.number(value=row[index], min=low, max=high, step=1, format="%.3f").props(
-                        "dense outlined"
-                    )
+                    box = ui.number(value=row[index], step=1, format="%.3f")
+                    box.props(f'dense outlined aria-label="P{number} {joint.name}"')
                     box.on_value_change(
                         lambda event, number=number, index=index: self._edit(number, index, event.value)
                     )
@@ -91,9 +90,8 @@ class PlanTab:
                 )
 
     def _edit(self, number: int, index: int, value: float | None) -> None:
-        if value is not None and math.isfinite(value):
-            self._rows[number][index] = float(value)
-            self._draw_vias()
+        self._rows[number][index] = math.nan if value is None else float(value)
+        self._draw_vias()
 
     def _add_via(self) -> None:
         self._rows.append(list(self._rows[-1]) if self._rows else list(self._operator.arm.home_deg))
@@ -118,18 +116,8 @@ class PlanTab:
             self._page.attempt(lambda: self._take_rows(given))
 
     def _take_rows(self, text: str) -> None:
-        count, rows = len(self._operator.arm.driven), []
-        for number, line in enumerate(filter(str.strip, text.splitlines()), 1):
-            try:
-                row = [float(part) for part in line.replace(";", " ").replace(",", " ").split()]
-            except ValueError:
-                raise InputError(
-                    f"line {number}: {line!r} is no row of angles", "give numbers only"
-                ) from None
-            if len(row) != count:
-                raise InputError(f"line {number} has {len(row)} angles", f"the arm drives {count} joints")
-            rows.append(row)
-        self._rows = rows
+        table = number_table.of_text(text, words.PASTED)
+        self._rows = via_table.via_points(table, self._operator.arm).via_deg.tolist()
         self._changed()
 
     def _changed(self) -> None:
@@ -137,8 +125,9 @@ class PlanTab:
         self._draw_vias()
 
     def _draw_vias(self) -> None:
-        tools = chains_mm(self._operator.arm, np.array(self._rows))[:, -1] if self._rows else np.empty((0, 3))
-        self._page.scene.dots(tools)
+        rows = np.array(self._rows).reshape(-1, len(self._operator.arm.driven))
+        if np.isfinite(rows).all():
+            self._page.scene.dots(chains_mm(self._operator.arm, rows)[:, -1])
 
     # in 3-D
 
@@ -179,18 +168,13 @@ class PlanTab:
 
     # the plan
 
-    def _job(self) -> Job:
-        return self._operator.desk.job_with(
-            self._rows, self._path.value if self._path.value in PATHS else PATHS[0]
-        )
-
     async def _plan(self) -> None:
         self._cancelled = False
         self._bar.set_visibility(True)
         self._stop.set_visibility(True)
         self._go.set_enabled(False)
         try:
-            job = self._job()
+            job = self._operator.desk.job_with(self._rows, str(self._path.value))
             self._operator.desk.plan = await run.io_bound(
                 pipeline.plan, self._operator.arm, job, self._progress
             )
@@ -212,7 +196,10 @@ class PlanTab:
         self._cancelled = True
 
     def _save(self) -> None:
-        self._page.attempt(lambda: ui.notify(words.SAVED.format(path=self._operator.desk.save(self._job()))))
+        def save() -> None:
+            ui.notify(words.SAVED.format(path=self._operator.desk.save(self._rows, str(self._path.value))))
+
+        self._page.attempt(save)
 
     def _look(self) -> None:
         """Show a plan that is new, whichever page made it."""

@@ -31,9 +31,7 @@ class RunTab:
         with ui.row():
             page.control(ui.button(words.TO_START, on_click=self._to_start))
             page.control(ui.button(words.RUN, icon="play_arrow", on_click=self._run))
-            self._repeat = ui.number(words.REPEAT, value=1, min=1, max=10_000, precision=0).props(
-                "dense outlined"
-            )
+            self._repeat = ui.number(words.REPEAT, value=1, max=99, precision=0).props("dense outlined")
         ui.label(words.DOTTED).classes("armtempo-note")
         self._angles = CurveChart(self._operator.arm, words.ANGLE, 0)
         self._speeds = CurveChart(self._operator.arm, words.SPEED, 1)
@@ -55,7 +53,7 @@ class RunTab:
         if plan is None:
             ui.notify(words.NO_PLAN)
             return
-        operator, times = self._operator, int(self._repeat.value or 1)
+        operator, times = self._operator, int(self._repeat.value or 0)
         self._page.do(words.RUN, lambda: operator.run(plan, times))
 
     def _look(self) -> None:

@@ -67,7 +67,7 @@ class SequenceTab:
             for key in (kind, *KINDS[kind]):
                 box = ui.input(None if key == kind else words.STEP_KEYS[key], value=step.get(key, ""))
                 box.props(f'dense outlined aria-label="{words.STEP} {index + 1}: {key}"')
-                box.on("change", lambda key=key, box=box: desk.set(index, key, str(box.value or "").strip()))
+                box.on("change", lambda key=key, box=box: self._set(index, key, str(box.value or "").strip()))
                 page.control(box.classes("armtempo-value"), Needs.IDLE)
             for icon, text, call in (
                 ("arrow_upward", words.UP, lambda: desk.move(index, -1)),
@@ -80,6 +80,12 @@ class SequenceTab:
                     button.props(f'flat dense aria-label="{text} {words.STEP} {index + 1}"'), Needs.IDLE
                 )
         return row
+
+    def _set(self, index: int, key: str, text: str) -> None:
+        """Take what was typed; the table stays as it is, for who types on in the next box."""
+        others = self._desk.version - self._shown
+        self._desk.set(index, key, text)
+        self._shown = self._desk.version - others
 
     def _look(self) -> None:
         if self._desk.version != self._shown:

@@ -9,6 +9,8 @@ BUSY = "Wait: {what} is under way."
 FAULT = "A fault is pending ({fault}): remove its cause, then clear it."
 NOT_HOMED = "The arm's position is unknown: home it first."
 MOVING = "The arm is moving."
+AT_REST = "Nothing moves."
+IN_A_PAUSE, AT_SPEED = "in a pause", "at {percent:g} %"
 NO_BOARD, NO_BOARD_HINT = "The board is not connected.", "wait until it is"
 WAIT = "try again when that is over"
 DONE = "{what}: done"
@@ -29,8 +31,8 @@ VIEWS = {"side": "Side", "top": "Top", "free": "Free", "follow": "Follow"}
 
 JOINTS, TOOL, POSTURES, OUTPUTS, INPUTS = "Joints", "Tool", "Postures", "Outputs", "Inputs"
 SPEED_OF_JOG = "Speed of jogs, % of the limits"
-SPEED_OF_MOTION = "Speed of the motion, %"
-HOLD_HINT = "Moves while the button is held."
+SPEED_OF_MOTION = "Speed, %"
+HOLD_HINT = "Moves while the button, or Enter on it, is held."
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
 SURE = "Is the arm in its home posture? Its position is taken as this."
 
@@ -38,6 +40,7 @@ DRAG_HINT = "Drag a via point in the picture, or click it to see the other postu
 POSTURES_OF = "P{number}: postures of the arm with the tool there, {count}; the nearest is taken"
 NEW_VIA, FROM_ARM, DELETE = "Add a via point", "Take the arm's posture", "Delete"
 PASTE, PASTE_HINT = "Paste", "Rows of angles from a spreadsheet, one row a via point"
+PASTED = "the pasted rows"
 PLAN, CANCEL, SAVE = "Plan", "Cancel", "Save the job"
 PATH, PATHS = "Path", {"through": "spline through the via points", "free": "free between the via points"}
 MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {floor:.3f} s."
@@ -84,6 +87,11 @@ STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
 REFRESH, RENAME, REMOVE, NEW_NAME = "Read again", "Rename", "Remove", "New name"
 A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
+SELFTEST, SURE_SELFTEST = (
+    "Self-test",
+    "The board measures itself with its drivers off, and is reset: the arm's position is unknown afterwards.",
+)
+VERDICT_KEYS = ("verdict", "part", "what", "measured", "expected", "cure")
 PROGRAM, DEPLOY, FLASH = "Board program", "Deploy", "Flash"
 SURE_DEPLOY = "Put this version's program on the board? The arm's position is unknown afterwards."
 SURE_FLASH = (

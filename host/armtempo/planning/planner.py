@@ -10,8 +10,8 @@ from importlib.metadata import version
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.installation import installed_version
 from armtempo.basics.progress import Progress, watched
-from armtempo.basics.version import installed_version
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan

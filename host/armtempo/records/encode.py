@@ -1,4 +1,4 @@
-"""From degrees and seconds to the board's steps, counts and ticks: arm record and motion record."""
+"""From degrees and seconds to the board's steps, counts and ticks: arm record with its outputs, motion record."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ from armtempo_shared.wire import record_crc
 from numpy.typing import NDArray
 
 from armtempo.basics.errors import InputError
+from armtempo.model import pin_use
 from armtempo.model.arm import Arm
-from armtempo.model.boards import pin_number
+from armtempo.model.boards import TimerOutput, pin_number
+from armtempo.model.outputs import SERVO, Output
 from armtempo.model.parts import DrivenJoint
+from armtempo.model.pin_use import Period
 from armtempo.planning import checks
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.records import output_rows
 from armtempo.splines.trajectory import Trajectory
 
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
@@ -32,7 +34,7 @@ def arm_record(arm: Arm) -> bytes:
     Raises InputError if a figure does not fit the board.
     """
     joints = [_joint(joint) for joint in arm.driven]
-    return armrecord.pack(_head(arm), joints, output_rows.outputs(arm), output_rows.inputs(arm))
+    return armrecord.pack(_head(arm), joints, outputs(arm), inputs(arm))
 
 
 def step_rates(arm: Arm) -> list[int]:
@@ -181,3 +183,41 @@ def _max_rate(joint: DrivenJoint) -> int:
             "check the unit, microsteps and gear_ratio",
         )
     return int(rate * 1.01) + 1
+
+
+def outputs(arm: Arm) -> list[dict[str, Any]]:
+    """Rows of ``armrecord.OUTPUT``, of an arm without problems (``pin_use``)."""
+    places = pin_use.timer_outputs(arm) if arm.outputs else {}
+    return [_output(output, places.get(output.name)) for output in arm.outputs]
+
+
+def inputs(arm: Arm) -> list[dict[str, Any]]:
+    """Rows of ``armrecord.INPUT``."""
+    return [
+        {
+            "pin": pin_number(entry.pin),
+            "active_high": int(entry.active == "high"),
+            "debounce_ms": entry.debounce_ms,
+        }
+        for entry in arm.inputs
+    ]
+
+
+def _output(output: Output, place: TimerOutput | None) -> dict[str, Any]:
+    row = {"pin": pin_number(output.pin), "spare": 0, "safe": output.raw(output.safe)}
+    if place is None:
+        on = int(output.active == "high")
+        return {**row, "timer": 0, "channel": 0, "prescaler": 0, "period": 0, "low": 1 - on, "high": on}
+    period = Period.of(output, place)
+    low, high = 0, period.counts
+    if output.kind == SERVO:
+        low, high = (period.counts_in(width, place) for width in output.pulse_us)
+    return {
+        **row,
+        "timer": place.timer,
+        "channel": place.channel,
+        "prescaler": period.prescaler - 1,
+        "period": period.counts - 1,
+        "low": low,
+        "high": high,
+    }

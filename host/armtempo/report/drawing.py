@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armtempo.formats.plain_text import visible
+from armtempo.formats.text import visible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import MissingPackageError
-from armtempo.formats.plain_text import visible
+from armtempo.formats.text import visible
 from armtempo.model.parts import Limits
 from armtempo.planning.torque import MotorTorques
 from armtempo.report.drawing import PAGE_COLOUR

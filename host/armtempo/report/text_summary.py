@@ -9,7 +9,7 @@ from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
 from armtempo.diagnosis.resolution import findings as coarse_steps
-from armtempo.formats.text_table import aligned
+from armtempo.formats.text import aligned
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, path_deviation, torque

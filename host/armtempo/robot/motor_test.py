@@ -76,7 +76,10 @@ class MotorTest:
         """All of it. Raises LinkError where a position is unknown, ArmtempoError without a yes; nothing moved then."""
         posture_deg = arm_state.posture_deg(self._client, self._arm)
         if not self._ask(question(self._arm, posture_deg)):
-            raise ArmtempoError("the test with motors was not confirmed: nothing moved")
+            raise ArmtempoError(
+                "the test with motors was not confirmed: nothing moved",
+                "run it again and answer y when it is safe",
+            )
         try:
             for joint, at_deg in zip(self._arm.driven, posture_deg, strict=True):
                 self._joint(joint, way_deg(joint, at_deg))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import RunFolderError
-from armtempo.formats.plain_text import visible
+from armtempo.formats.text import visible
 from armtempo.link.follow import Gap
 from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition
 from armtempo.runs.sequence_folder import FORMAT as SEQUENCE_FORMAT

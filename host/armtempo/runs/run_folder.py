@@ -27,7 +27,7 @@ from typing import Any, Self
 from armtempo_shared import limits
 
 from armtempo.basics.errors import InputError, RunFolderError
-from armtempo.basics.version import installed_version
+from armtempo.basics.installation import installed_version
 from armtempo.formats.atomic_file import replace_text
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.link.follow import Gap

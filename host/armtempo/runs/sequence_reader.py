@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import ArmtempoError, RunFolderError
-from armtempo.formats.plain_text import visible
+from armtempo.formats.text import visible
 from armtempo.records import decode
 from armtempo.runs import reader
 from armtempo.runs.reader import RepetitionData

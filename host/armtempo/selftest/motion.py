@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,35 +19,60 @@ _DEGREE = 5
 _MOST_STEPS = 200
 _FEWER = 15
 """Steps by which each joint makes fewer than the one before it, so that they step at different times."""
-_SHORTEST_S = 0.06
+DURATION_S = 0.06
 _PEAK = 1.875
 """Peak speed of 10 u³ - 15 u⁴ + 6 u⁵ over u in 0..1."""
-_OF_RATE = 0.5
+_ABOVE = 1.01
+"""A joint's limit is this much above the rate that is wanted, so that rounding does not exceed it."""
+_GENTLE = 0.5
+_COUNTS, _LEAST_STEPS = 8, 20
+"""A gentle motion turns an encoder by so much, or a joint by so many steps."""
 
 
 @dataclass(frozen=True)
 class TestMotion:
-    """Where it begins, in steps; its record; and when each joint steps, seconds."""
+    """Where it begins, in steps; its record; when each joint steps, seconds; the step rates that it needs."""
 
     start_steps: list[int]
     record: bytes
     steps_s: list[Array]
+    rates: list[int]
 
     __test__ = False  # for pytest
 
 
+def limit(rate: float) -> int:
+    """The joint's limit in the arm record for a motion that reaches ``rate``."""
+    return math.ceil(rate * _ABOVE)
+
+
 def make(joints: Sequence[dict[str, Any]], forward: bool) -> TestMotion:
-    """``joints``: rows of the arm record; ``forward``: towards more steps, about the middle of each range."""
-    counts = [
-        min(_MOST_STEPS - _FEWER * number, joint["max_steps"] - joint["min_steps"])
-        for number, joint in enumerate(joints)
-    ]
+    """Quick, for drivers that are off: faster than the joints may be. ``joints``: rows of the arm record."""
+    counts = [_MOST_STEPS - _FEWER * number for number in range(len(joints))]
+    return _of(joints, counts, DURATION_S, forward)
+
+
+def gentle(joints: Sequence[dict[str, Any]]) -> TestMotion:
+    """So slow and small that no harm is done where the drivers are on: towards more steps, in the joints' ranges."""
+    counts = [min(_steps_to_see(joint), joint["max_steps"] - joint["min_steps"]) for joint in joints]
+    slowest = min(joint["max_rate"] / max(count, 1) for joint, count in zip(joints, counts, strict=True))
+    return _of(joints, counts, max(DURATION_S, _PEAK / (_GENTLE * slowest)), True)
+
+
+def _steps_to_see(joint: dict[str, Any]) -> int:
+    """Steps by which an encoder turns enough to be seen."""
+    needed = _COUNTS * joint["counts_den"] // max(abs(joint["counts_num"]), 1)
+    return int(min(max(needed, _LEAST_STEPS), _MOST_STEPS))
+
+
+def _of(
+    joints: Sequence[dict[str, Any]], counts: Sequence[int], duration_s: float, forward: bool
+) -> TestMotion:
+    """All joints together, about the middle of each range."""
     lows = [
         (joint["max_steps"] + joint["min_steps"] - count) // 2
         for joint, count in zip(joints, counts, strict=True)
     ]
-    slowest = min(joint["max_rate"] / max(count, 1) for joint, count in zip(joints, counts, strict=True))
-    duration_s = max(_SHORTEST_S, _PEAK / (_OF_RATE * slowest))
     ends = [
         (low, low + count) if forward else (low + count, low) for low, count in zip(lows, counts, strict=True)
     ]
@@ -56,7 +82,11 @@ def make(joints: Sequence[dict[str, Any]], forward: bool) -> TestMotion:
     axis = _fixed(times * TICK_HZ, TICK_FRACTION_BITS)
     record = motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.NO_RAMPS, 0)
     steps = [_crossings_s(spline, *end, duration_s) for spline, end in zip(splines, ends, strict=True)]
-    return TestMotion([end[0] for end in ends], record, steps)
+    rates = [
+        max(joint["max_rate"], limit(_PEAK * count / duration_s))
+        for joint, count in zip(joints, counts, strict=True)
+    ]
+    return TestMotion([end[0] for end in ends], record, steps, rates)
 
 
 def at_rates(rates: Sequence[int], duration_s: float) -> bytes:
@@ -77,7 +107,7 @@ def _crossings_s(spline: JointSpline, start: int, end: int, duration_s: float) -
     sign = 1 if end > start else -1
     halves = start + sign * (np.arange(abs(end - start)) + 0.5)
     low, high = np.zeros(len(halves)), np.full(len(halves), duration_s)
-    for _ in range(50):
+    for _ in range(30):  # to 0.1 ns
         middle = (low + high) / 2
         before = sign * (spline(middle) - halves) < 0
         low, high = np.where(before, middle, low), np.where(before, high, middle)

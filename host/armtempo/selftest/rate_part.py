@@ -15,17 +15,10 @@ from armtempo.selftest.result import Measurement, judged
 PART = "rates"
 JOINTS = (1, 2, 3, 6)
 DURATION_S = 0.4
-SIMULATED_DURATION_S = 0.1
+SIMULATED_DURATION_S = 0.05
 KEPT = 0.8
 """Part of the rate that was found which the board states; it never states more than one that was not measured."""
-_ABOVE = 1.01
-"""The joint's limit is this much above the rate that is wanted, so that rounding does not exceed it."""
 _ROUNDS = 5
-
-
-def limit(rate: int) -> int:
-    """The joint's limit in the arm record for a motion that reaches ``rate``."""
-    return round(rate * _ABOVE)
 
 
 def frames() -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from armtempo_shared import codes
+from armtempo_shared.limits import MAX_STEP_RATE_SUM
 from armtempo_shared.meanings import ERRORS
 
 from armtempo.basics.errors import LinkError
@@ -28,9 +29,10 @@ _ARM_RECORD = f"{_ROOT}/arm.ata"
 _BACK_S = 60.0
 _SIMULATED_TURN_US = 1000
 """What a turn of the loop takes on a virtual board, about as on the chip."""
-_SEED, _STOPS, _WAITS_US = 5, 50, (22_000, 75_000)
-_SIMULATED_STOPS = 3
-"""E-stops at random moments of the motion, which begins 20 ms after its start."""
+_SEED, _STOPS, _SIMULATED_STOPS = 5, 50, 3
+_WAITS_US = (22_000, 78_000)
+"""E-stops at random moments of ``motion.make``, which begins 20 ms after its start."""
+_STARVED_S = 0.06
 _LOOK_S = 0.3
 
 
@@ -156,7 +158,7 @@ def _failed(part: str, error: LinkError) -> Measurement:
 
 def _is_still(prompt: Prompt, found: SelfTest) -> bool:
     """Whether no encoder turns with the first steps: where ENABLE is wired or named wrong, nothing else is made."""
-    arguments = _arguments(motion.make(found.data[DRIVERS]["joints"], True), found)
+    arguments = _arguments(motion.gentle(found.data[DRIVERS]["joints"]), found)
     measured = _part(prompt, found, "encoders", "engine", "encoders", **arguments)
     if measured is None:
         return False
@@ -178,7 +180,7 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     for done, forward in ((0.4, True), (0.5, False)):
         work(done, 1)
         moved = motion.make(joints, forward)
-        arguments = _arguments(moved, found)
+        arguments = {**_arguments(moved, found), "rates": moved.rates}
         if measured := _part(prompt, found, pulse_part.PULSES, "engine", "pulses", **arguments):
             found.add(pulse_part.judge(measured, moved, joints, forward))
             found.add([_still_off(measured, found)])
@@ -188,9 +190,17 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     work(0.6, 1)
     count = _SIMULATED_STOPS if found.simulated else _STOPS
     waits_us = np.random.default_rng(_SEED).integers(*_WAITS_US, count).tolist()
-    if measured := _part(prompt, found, pulse_part.SAFETY, "engine", "estop", waits_us=waits_us, **arguments):
+    motions = [arguments.pop("motion"), motion.at_rates(_own(joints), _STARVED_S).hex()]
+    arguments |= {"motions": motions, "waits_us": waits_us}
+    if measured := _part(prompt, found, pulse_part.SAFETY, "engine", "estop", **arguments):
         found.add(pulse_part.judge_stops(measured.values))
         found.add([_still_off(measured, found)])
+
+
+def _own(joints: Sequence[dict[str, Any]]) -> list[int]:
+    """The joints' own highest rates, as far as the board makes them together: their rings last shortest then."""
+    rates = [joint["max_rate"] for joint in joints]
+    return [round(rate * min(1.0, MAX_STEP_RATE_SUM / sum(rates)) / 1.1) for rate in rates]
 
 
 def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
@@ -204,7 +214,7 @@ def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         found.add(rate_part.judge(highest[count], count))
     states = rate_part.to_state(highest)
     found.data[rate_part.PART] = {"highest": highest, "states": states}
-    if states and not found.failed_in(DRIVERS, pulse_part.PULSES, pulse_part.SAFETY, rate_part.PART):
+    if states and not found.failed_in(DRIVERS, pulse_part.SAFETY):
         arguments = {"root": _ROOT, "program_crc": found.program_crc, "rates": (*states, most)}
         _part(prompt, found, "keep", "keep", **arguments)
 
@@ -215,7 +225,7 @@ def _keeps_up(prompt: Prompt, found: SelfTest, rates: Sequence[int]) -> bool | N
     arguments = {
         "record": _ARM_RECORD,
         "motion": motion.at_rates(rates, duration_s).hex(),
-        "rates": [rate_part.limit(rate) for rate in rates],
+        "rates": [motion.limit(rate) for rate in rates],
         "frames": rate_part.frames(),
         "idle_us": _SIMULATED_TURN_US if found.simulated else 0,
     }

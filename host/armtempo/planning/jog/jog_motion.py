@@ -117,6 +117,19 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
     return JogMotion(trajectory, brake_time.of_motion(trajectory, limits), ends)
 
 
+def problem(arm: Arm, here_deg: Sequence[float], move: JogMove) -> str:
+    """Why a jog cannot begin at ``here_deg`` (J,), in words; "" if it can, as far as the room is not looked at."""
+    start = np.array(here_deg, dtype=float)
+    try:
+        if move.joint is not None:
+            _end_deg(arm.driven[move.joint], start[move.joint], move.by)
+        else:
+            _ = _line(arm, start, move).fixed
+    except InputError as error:
+        return str(error)
+    return ""
+
+
 def _in_room(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
     """The jog as far as the arm stays in its room, and why it ends before it was to."""
     why = ""
@@ -163,10 +176,7 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
     assert move.joint is not None
     joint = arm.driven[move.joint]
     end, ends = _end_deg(joint, start[move.joint], move.by)
-    length = abs(end - start[move.joint])
-    if length * joint.steps_per_deg < _INSIDE_STEPS:
-        raise InputError(f"{joint.name} is at the end of its range, {end:g} degrees", "jog it the other way")
-    found = jog_law.law(length, _limits(joint, speed))
+    found = jog_law.law(abs(end - start[move.joint]), _limits(joint, speed))
     way = math.copysign(1.0, end - start[move.joint]) * found.way
     rows = [
         start[index] + (way if index == move.joint else np.zeros_like(way))
@@ -176,7 +186,10 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
 
 
 def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
-    """Where a joint is to end, on a whole step within its range if that is what ends it, and why there."""
+    """Where a joint is to end, on a whole step within its range if that is what ends it, and why there.
+
+    InputError where it cannot move that way.
+    """
     low, high = joint.range_deg
     wanted = here + by
     if low <= wanted <= high:
@@ -185,6 +198,8 @@ def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
     scale = joint.steps_per_deg
     inside = math.floor(edge * scale + 1e-9) / scale if by > 0 else math.ceil(edge * scale - 1e-9) / scale
     end = max(inside, here) if by > 0 else min(inside, here)
+    if abs(end - here) * scale < _INSIDE_STEPS:
+        raise InputError(f"{joint.name} is at the end of its range, {end:g} degrees", "jog it the other way")
     return end, f"{joint.name} is at the end of its range, {edge:g} degrees"
 
 
@@ -194,10 +209,7 @@ def _limits(joint: DrivenJoint, speed: float) -> WayLimits:
 
 
 def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
-    if move.axis not in AXES:
-        raise InputError(f"there is no axis {move.axis!r}", f"give one of {', '.join(AXES)}")
-    point_to_point.posture(start, arm)
-    line = ToolLine(arm, start, move.axis, move.about, 1 if move.by > 0 else -1)
+    line = _line(arm, start, move)
     longest = 360.0 if move.about else 2.0 * line.reach_mm
     followed = line.followed(min(abs(move.by), longest))
     ends = followed.ends
@@ -211,6 +223,14 @@ def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tup
         length *= _SHORTER
         ends = ends or "the joints cannot follow the line any further"
     raise PlanError("the tool cannot follow this line", "jog single joints")
+
+
+def _line(arm: Arm, start: Array, move: JogMove) -> ToolLine:
+    """The line of the tool; InputError where there is no such axis, or the arm cannot be at ``start``."""
+    if move.axis not in AXES:
+        raise InputError(f"there is no axis {move.axis!r}", f"give one of {', '.join(AXES)}")
+    point_to_point.posture(start, arm)
+    return ToolLine(arm, start, move.axis, move.about, 1 if move.by > 0 else -1)
 
 
 def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> Trajectory | None:

@@ -20,11 +20,13 @@ _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 def make_engine(record, estop=False, rates=None, encoders=False, workspace=None):
     """(engine, rows of its joints); it steps the pins of this arm and no others, and the arm's E-stop stops it.
 
-    ``estop``: one is fitted, whatever the arm has. ``rates``: of that many joints, in the place of the arm's.
+    ``estop``: one is fitted, whatever the arm has. ``rates``: of that many joints, instead of the arm's;
+    they can go anywhere then.
     ``encoders``: they are read, but no joint is checked against them. ``workspace``: of a program that has one already.
     """
     from armtempo_board.app import room
     from armtempo_board.motion.engine import Engine
+    from armtempo_board.motion.engine_parts import EngineParts
 
     with open(record, "rb") as file:
         head, joints, _ = armrecord.unpack(file.read())
@@ -43,7 +45,7 @@ def make_engine(record, estop=False, rates=None, encoders=False, workspace=None)
         workspace = room.workspace()
     else:
         room.share(workspace, len(joints))
-    engine = Engine(head, joints, workspace)
+    engine = Engine(EngineParts(head, joints, workspace))
     engine.inputs.enable_pin = NoPin()
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         pull_inactive(engine)

@@ -19,7 +19,7 @@ def trial(engine, wait_us, bit, idle_us):
 
 
 def starve(engine, motion, start_steps, idle_us):
-    """The fault after the interrupt that fills the rings was held off (TIM6 stopped) in a motion."""
+    """The fault where the interrupt that fills the rings is held off (TIM6 stops); the motion lasts longer."""
     load(engine, motion, start_steps)
     engine.start()
     then = time.ticks_us()
@@ -32,33 +32,37 @@ def starve(engine, motion, start_steps, idle_us):
     return fault
 
 
-def measure(record, motion, start_steps, waits_us, idle_us):
-    """Cycles of each trial, the writing of the register taken off; the fault of each."""
+def measure(record, motions, start_steps, rates, waits_us, idle_us):
+    """Cycles of each trial, the writing of the register taken off; the fault of each.
+
+    ``motions``: that of the trials, and the one in which the rings run dry, from step 0.
+    """
     from binascii import unhexlify
 
     feed()
     count_cycles()
-    engine, _ = make_engine(record, True)
+    engine, _ = make_engine(record, True, rates)
     nothing = min([trial_cost() for _ in range(5)])
     took = []
     faults = []
-    motion = unhexlify(motion)
+    motion, starved = [unhexlify(one) for one in motions]
     try:
         for wait_us in waits_us:
             load(engine, motion, start_steps)
-            engine.judged = True  # the next ones are the same motion
+            engine.skip_check = True  # the next ones are the same motion
             took.append(max(trial(engine, wait_us, 1 << _ESTOP_LINE, idle_us) - nothing, -1))
             while engine.moving:
                 serve(engine, idle_us)
             faults.append(engine.fault)
             engine.clear()
             feed()
-        starved = starve(engine, motion, start_steps, idle_us)
+        engine.skip_check = False
+        fault = starve(engine, starved, [0] * len(rates), idle_us)
     finally:
         engine.freeze()
         off = enable()
         engine.close()
-    return {"cycles": took, "faults": faults, "starved": starved, "enable": off}
+    return {"cycles": took, "faults": faults, "starved": fault, "enable": off}
 
 
 def trial_cost():

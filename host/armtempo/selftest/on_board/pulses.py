@@ -131,16 +131,18 @@ def captured(joints):
     return found, steps
 
 
-def measure(record, motion, start_steps, idle_us):
+def measure(record, motion, start_steps, rates, idle_us):
     """Run the motion (a record in hex) once; the edges go out as bulk data, 4 bytes each, port by port."""
     from binascii import unhexlify
 
     feed()
     count_cycles()
-    engine, joints = make_engine(record)
-    stages = {"engine": free()}
-    found, steps = captured(joints)
+    with open(record, "rb") as file:
+        _, joints, _ = armrecord.unpack(file.read())
+    found, steps = captured(joints)  # first: the engine leaves no room in one piece for it
     captures = [capture for _, capture in found]
+    engine, joints = make_engine(record, rates=rates)
+    stages = {"engine": free()}
     longest = turns = 0
     turned = None
     try:
