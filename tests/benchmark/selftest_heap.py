@@ -2,8 +2,8 @@
 
     python -m tests.benchmark.selftest_heap MICROPYTHON FOLDER
 
-MICROPYTHON as for tests/benchmark/firmware.py. The firmware with the program is built in FOLDER, a new one, and run by QEMU; the
-parts are sent to its prompt and loaded up to the start of their motion. QEMU has no watchdog, DWT, random numbers,
+MICROPYTHON as for tests/benchmark/firmware.py. The firmware with the program is built in FOLDER (new), and run by QEMU;
+the parts are sent to its prompt and loaded up to the start of their motion. QEMU has no watchdog, DWT, random numbers,
 backup SRAM, nor DMA for these timers, and cannot write the flash, so what goes beyond that runs on no emulator.
 """
 
