@@ -228,7 +228,7 @@ def test_an_arm_and_a_sequence_are_made_in_code() -> None:
     steps = (armtempo.Goto((45.0,)), armtempo.SetOutput("gripper", "closed"), armtempo.RunMotion(swing))
     sequence = armtempo.Sequence("pick", (armtempo.Repeat(steps, times=2), armtempo.Wait(0.5)))
     planned = armtempo.plan_sequence(arm, sequence)
-    assert planned.start_deg == (45.0,)
+    assert planned.start_deg == pytest.approx((45.0,))
     assert [row.words for row in planned.rows if row.words.startswith("output")] == 2 * [
         "output gripper closed"
     ]
