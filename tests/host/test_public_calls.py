@@ -130,6 +130,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "raw": 0,
         "gear_ratio": 10.0,
         "counts_per_rev": 4000,
+        "mass_kg": 1.0,
         "range_deg": (-10, 10),
         "speed_deg_s": 1.0,
         "target": "home",
