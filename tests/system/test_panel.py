@@ -310,8 +310,9 @@ _FOCUS = """() => {
 
 def test_every_control_is_reached_by_the_tabulator_and_shows_it(page: Any) -> None:
     home(page)
-    for tab in ("Move", "Plan"):
+    for tab, last in (("Move", "home"), ("Plan", "Play on the model")):
         show(page, tab)
+        page.get_by_role("button", name=last, exact=last == "home").wait_for()
         wanted = page.locator("button:visible:not([disabled]), input:visible:not([disabled])").all()
         names = {one.get_attribute("aria-label") or one.inner_text().split("\n")[-1] for one in wanted} - {""}
         found: dict[str, bool] = {}
