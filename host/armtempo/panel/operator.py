@@ -11,6 +11,7 @@ from enum import Flag, auto
 from pathlib import Path
 from threading import Event as ThreadEvent
 from threading import Lock, Thread
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +39,8 @@ FREEZE_AFTER_S = 5.0
 """A second press of stop within this time freezes the outputs instead of braking."""
 _MOST_POINTS = 300
 """Of the path of a run that is shown."""
+_ROWS = ("path_s", "commanded_deg", "angle_deg", "time_s")
+"""The times last: another thread that reads as many rows as there are times finds them all."""
 _LOG = logging.getLogger("armtempo")
 
 
@@ -67,16 +70,13 @@ class LiveCurves:
     angle_deg: list[list[float | None]] = field(default_factory=list)
     run: int = -1
 
-    def take(self, sample: dict[str, object]) -> None:
+    def take(self, sample: dict[str, Any]) -> None:
         """Add a sample, as ``sharing.sample_json`` gives it; a new run begins anew."""
         if sample["run"] != self.run:
-            self.__init__(run=sample["run"])  # type: ignore[misc]
-        for name in (
-            "path_s",
-            "commanded_deg",
-            "angle_deg",
-            "time_s",
-        ):  # the times last: all rows are there then
+            self.run = sample["run"]
+            for name in reversed(_ROWS):
+                setattr(self, name, [])
+        for name in _ROWS:
             getattr(self, name).append(sample[name])
 
     def thinned(self, most: int) -> LiveArrays:
