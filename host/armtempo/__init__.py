@@ -28,6 +28,7 @@ __all__ = [
     "BoardState",
     "Count",
     "Driver",
+    "Dynamics",
     "Encoder",
     "Goto",
     "Input",
@@ -99,7 +100,7 @@ if TYPE_CHECKING:
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
-    from armtempo.model.parts import Driver, Encoder, Joint, Limits, LimitSwitches, Motor, Safety
+    from armtempo.model.parts import Driver, Dynamics, Encoder, Joint, Limits, LimitSwitches, Motor, Safety
     from armtempo.model.plan import Plan
     from armtempo.model.posture import ArmPosture
     from armtempo.model.sequence import Sequence
@@ -135,7 +136,16 @@ _HOMES = {
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job", "Stop"),
     "armtempo.model.outputs": ("Input", "Output"),
-    "armtempo.model.parts": ("Driver", "Encoder", "Joint", "LimitSwitches", "Limits", "Motor", "Safety"),
+    "armtempo.model.parts": (
+        "Driver",
+        "Dynamics",
+        "Encoder",
+        "Joint",
+        "LimitSwitches",
+        "Limits",
+        "Motor",
+        "Safety",
+    ),
     "armtempo.model.posture": ("ArmPosture",),
     "armtempo.model.steps": (
         "Count",

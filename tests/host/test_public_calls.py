@@ -130,6 +130,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "raw": 0,
         "gear_ratio": 10.0,
         "counts_per_rev": 4000,
+        "mass_kg": 1.0,
         "range_deg": (-10, 10),
         "speed_deg_s": 1.0,
         "target": "home",
@@ -185,9 +186,11 @@ def called(where: str, name: str, objects: dict[str, Any]) -> Callable[..., Any]
 def refusal(call: Callable[..., Any], values: dict[str, Any], several: bool) -> armtempo.ArmtempoError | None:
     """The error that a call ends with; None without one."""
     try:
-        call(*values.values()) if several else call(**values)
+        made = call(*values.values()) if several else call(**values)
     except armtempo.ArmtempoError as error:
         return error
+    if isinstance(made, armtempo.SharedBoard):  # of another program on this machine
+        made.close()
     return None
 
 

@@ -176,12 +176,27 @@ REFUSED = [
 ]
 
 
+J2_LIMIT = '    <limit lower="-2.0" upper="2.0" effort="10" velocity="1.5"/>\n'
+SPOILED = {
+    "broken": lambda text: text[: text.index(J2_LIMIT)],
+    "no_limits": lambda text: text.replace(J2_LIMIT, ""),
+    "optenv": lambda text: text.replace('"0 0 0.08"', '"$(optenv LENGTH 0.3) 0 0"'),
+    "xacro": lambda text: text.replace("<link", '<xacro:property name="a" value="1"/>\n  <link', 1).replace(
+        "<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"'
+    ),
+}
+"""By name: what is done to the planar arm."""
+
+
 @pytest.mark.parametrize(("name", "options", "said"), REFUSED)
 def test_what_does_not_fit_is_refused_with_its_reasons(
     tmp_path: Path, name: str, options: list[str], said: list[str]
 ) -> None:
-    out = tmp_path / "arm.toml"
-    result = CliRunner().invoke(main, ["import-urdf", str(FOLDER / f"{name}.urdf"), "-o", str(out), *options])
+    urdf, out = FOLDER / f"{name}.urdf", tmp_path / "arm.toml"
+    if name in SPOILED:
+        urdf = tmp_path / urdf.name
+        urdf.write_text(SPOILED[name]((FOLDER / "three_planar.urdf").read_text()))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out), *options])
     assert result.exit_code == 2
     for text in said:
         assert text in result.output

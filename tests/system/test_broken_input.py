@@ -76,5 +76,5 @@ def test_a_board_that_does_not_answer(tmp_path: Path) -> None:
     finally:
         os.close(ours)
         os.close(theirs)
-    done.said("does not answer within 2 s", "check the cable", "reset button")
+    done.said("does not answer within 2 s", "check the cable", "reset a board that hangs")
     assert done.exit_code == 1

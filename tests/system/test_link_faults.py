@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +25,16 @@ from tests.system.commandline import wait_for
 from tests.system.relay import Relay
 
 
+def begun(port: str, folder: Path, lines: int) -> subprocess.Popen[str]:
+    """A run of some seconds whose file of samples has that many lines."""
+    file = small_plan(folder / "small.json", (90.0, -75.0, 50.0))
+    armtempo("home", "--arm", "paper", "--port", port, cwd=folder)
+    process = start("run", file, "--port", port, cwd=folder)
+    path = folder / "runs" / "small-001" / "samples-01.csv"
+    wait_for(lambda: path.is_file() and path.read_text().count("\n") >= lines, "the first samples")
+    return process
+
+
 @pytest.mark.parametrize("kind", ["lose", "double", "flip", "cut"])
 def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
     file = small_plan(tmp_path / "small.json")
@@ -39,18 +50,11 @@ def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
 
 
 def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
-    file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
     with (
         launch(LaunchOptions(virtual_time=False)) as board,
         Relay(board.port, tmp_path / "port", clean, clean) as relay,
     ):
-        armtempo("home", "--arm", "paper", "--port", relay.port, cwd=tmp_path)
-        process = start("run", file, "--port", relay.port, cwd=tmp_path)
-        path = tmp_path / "runs" / "small-001" / "samples-01.csv"
-        limit = time.monotonic() + TIMEOUT_S
-        while not path.is_file() or path.read_text().count("\n") < 8:
-            assert time.monotonic() < limit
-            time.sleep(0.02)
+        process = begun(relay.port, tmp_path, lines=8)
         relay.unplug()
         time.sleep(1.0)
         relay.plug()
@@ -64,14 +68,10 @@ def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
 
 
 def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
-    file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
-    path = tmp_path / "runs" / "small-001" / "samples-01.csv"
     with launch(LaunchOptions(virtual_time=False)) as board, launch(LaunchOptions(seed=1)) as other:
         armtempo("home", "--arm", "paper", "--port", other.port, cwd=tmp_path)
         with Relay(board.port, tmp_path / "port", clean, clean) as relay:
-            armtempo("home", "--arm", "paper", "--port", relay.port, cwd=tmp_path)
-            process = start("run", file, "--port", relay.port, cwd=tmp_path)
-            wait_for(lambda: path.is_file() and path.read_text().count("\n") > 4, "the first samples")
+            process = begun(relay.port, tmp_path, lines=5)
         with Relay(other.port, tmp_path / "port", clean, clean):
             out, error = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 1, out + error
@@ -80,18 +80,11 @@ def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
 
 
 def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
-    file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
     with (
         launch(LaunchOptions(virtual_time=False)) as board,
         Relay(board.port, tmp_path / "port", clean, clean) as relay,
     ):
-        armtempo("home", "--arm", "paper", "--port", relay.port, cwd=tmp_path)
-        process = start("run", file, "--port", relay.port, cwd=tmp_path)
-        path = tmp_path / "runs" / "small-001" / "samples-01.csv"
-        limit = time.monotonic() + TIMEOUT_S
-        while not path.is_file() or path.read_text().count("\n") < 5:
-            assert time.monotonic() < limit
-            time.sleep(0.02)
+        process = begun(relay.port, tmp_path, lines=5)
         relay.unplug()
         process.terminate()
         time.sleep(0.5)

@@ -138,7 +138,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     confirm(page, "Remove")
     page.wait_for_selector("text=food · 6.79", state="detached")
     confirm(page, "Flash")
-    wait_for(page, "then: armtempo flash --image FILE", place="armtempo-said")
+    wait_for(page, "Flash: no firmware given", place="armtempo-said")
     assert page.evaluate(_SHIFTS) < 0.1
     assert not errors
 

@@ -89,11 +89,9 @@ def words(found: dict[str, Any], verdict: str) -> list[str]:
 
 def test_a_sound_board_passes(tmp_path: Path) -> None:
     with board(tmp_path) as port:
-        estimated = _status(port, tmp_path)
         code, found = selftest(port, tmp_path)
-        measured = _status(port, tmp_path)
+        measured = commandline.run("status", "--port", port, folder=tmp_path).output
     assert (code, words(found, "wrong")) == (0, []), found
-    assert "240000 all together, estimated; run 'armtempo selftest'" in estimated
     assert "240000 all together, measured" in measured
     assert found["simulated"]
     assert all(rises(tmp_path, pin) > 300 for pin in STEPS)  # pulses there were
@@ -196,20 +194,6 @@ def test_what_is_wrong_is_named(
     assert not is_enabled(tmp_path)
 
 
-def test_with_drivers_on_nothing_is_done(tmp_path: Path) -> None:
-    """The drivers hold a homed arm: it is refused, and the arm is held and homed as before; so without the firmware."""
-    with board(tmp_path) as port, connect(port) as used:
-        used.home(boards.ARM)
-        used.goto(np.array(boards.ARM.home_deg) + 1.0)
-        steps = used.status().positions
-        with pytest.raises(LinkError, match="drivers are on"):
-            used.selftest()
-        assert (used.status().state, used.status().positions) == ("idle", steps)
-        used.client._info = replace(used.info, features=0)
-        with pytest.raises(LinkError, match=r"MicroPython's own firmware.*armtempo flash"):
-            used.selftest()
-
-
 def test_no_pulses_where_enable_cannot_be_inactive(tmp_path: Path) -> None:
     """ENABLE, active low, is shorted to ground."""
     with board(tmp_path, faults=[InjectedFault("dead_pin", 0, 0, name=ENABLE)]) as port:
@@ -253,59 +237,72 @@ def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.M
 
 PRESSED = [
     InjectedFault("input", at_s, run, name=pin, level=level)
-    for run, pin in ((6, "D8"), (9, "E15"))  # the 5th and 6th motions are away from the switch and towards it
+    for run, pin in ((4, "D8"), (7, "E15"))  # after the joint's two motions and one away from the switch
     for at_s, level in ((0.1, 0), (0.2, 1))
 ]
 
 
-def test_what_the_motors_show_is_said_for_the_arm_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An encoder reversed; one of another ratio, on a motor that turns the other way; a switch that never comes."""
+def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An encoder reversed, a switch that never comes. The drivers are on then, and the self-test without does nothing:
+    the arm is held and homed as before; so without the firmware."""
     for name, value in (("_TRIES", 1), ("_SPEED", 0.5), ("SLOWEST", 0.2)):
         monkeypatch.setattr(motor_test, name, value)
-    switches = (LimitSwitches(low=1, high=2), LimitSwitches())
-    pairs = zip(boards.ARM.joints, switches, strict=False)
-    joints = tuple(replace(joint, model=JointModel(), switches=fitted) for joint, fitted in pairs)
-    real = replace(boards.ARM, joints=joints, safety=Safety(estop_fitted=True))
-    named = replace(
-        real, joints=(_encoder(joints[0], direction=-1), _encoder(joints[1], counts_per_rev=8000))
-    )
+    (joint,) = boards.ARM.joints[:1]
+    joint = replace(joint, model=JointModel(), switches=LimitSwitches(low=1, high=2))
+    real = replace(boards.ARM, joints=(joint,), safety=Safety(estop_fitted=True))
+    named = replace(real, joints=(_encoder(joint, direction=-1),))
     said: list[str] = []
-
-    def yes(question: str) -> bool:
-        said.append(question)
-        return "did joint 2" not in question
-
     with board(tmp_path, named, arm=real, faults=PRESSED) as port, connect(port) as used:
         used.home(named)
         with pytest.raises(ArmtempoError, match="nothing moved"):
             used.motor_test(named, lambda _: False)
         assert not is_enabled(tmp_path)
-        found = used.motor_test(named, yes, said.append)
-    assert "joint 1 by +0.8°, joint 2 by -0.8°. Is the arm supported" in said[0]
-    assert found.data["arm_file"] == [
-        "joint 1: encoder: direction = 1",
-        "joint 2: motor: direction = -1",
-        "joint 2: encoder: direction = -1",
-        "joint 2: encoder: counts_per_rev = 4056 or so; or the motor's microsteps or gear_ratio, as it moved 0.51 "
-        "times as far",
-    ]
-    wrong = {line.what: line.measured for line in found.failed}
-    assert wrong.pop("the switch at the high end of joint 1") == "not seen"
-    assert set(wrong) == {"joint 1: encoder", "joint 2: direction", "joint 2: encoder"}
-    assert {line.what for line in found.lines if line.measured == "stopped the joint"} == {
-        "the switch at the low end of joint 1",
-        "the E-stop",
+        found = used.motor_test(named, lambda question: not said.append(question), said.append)  # type: ignore[func-returns-value]
+        before = (used.status().state, used.status().positions)
+        with pytest.raises(LinkError, match="drivers are on"):
+            used.selftest()
+        assert (used.status().state, used.status().positions) == before
+        used.client._info = replace(used.info, features=0)
+        with pytest.raises(LinkError, match=r"MicroPython's own firmware.*armtempo flash"):
+            used.selftest()
+    assert before[0] == "idle"
+    assert "joint 1 by +0.8°. Is the arm supported" in said[0]
+    assert found.data["arm_file"] == ["joint 1: encoder: direction = 1"]
+    lines = {line.what: (line.verdict, line.measured.split(",")[0]) for line in found.lines}
+    assert lines == {
+        "joint 1: direction": (Level.GOOD, "as the arm file has it"),
+        "joint 1: encoder": (Level.ERROR, "-9 counts for 28 steps"),
+        "the switch at the low end of joint 1": (Level.GOOD, "stopped the joint"),
+        "the switch at the high end of joint 1": (Level.ERROR, "not seen"),
+        "the E-stop": (Level.GOOD, "stopped the joint"),
     }
+
+
+@pytest.mark.parametrize(
+    ("part", "lines"),
+    [
+        (1.0, []),
+        (0.0, []),  # it does not turn: its plug, not the arm file
+        (-1.0, ["encoder: direction = -1"]),
+        (
+            0.5,
+            [
+                "encoder: counts_per_rev = 2000 or so; or the motor's microsteps or gear_ratio, as it moved 0.5"
+            ],
+        ),
+    ],
+)
+def test_what_an_encoder_shows(part: float, lines: list[str]) -> None:
+    """It counts so much of what is due."""
+    joint = boards.ARM.driven[0]
+    steps = 640
+    line, found = motor_test.judge_encoder(joint, steps, round(part * float(steps * joint.counts_per_step)))
+    assert [one.removesuffix(" times as far") for one in found] == lines
+    assert line.verdict is (Level.GOOD if part == 1.0 else Level.ERROR)
 
 
 def _encoder(joint: Any, **changes: int) -> Any:
     return replace(joint, encoder=replace(joint.encoder, **changes))
-
-
-def _status(port: str, folder: Path) -> str:
-    return commandline.run("status", "--port", port, folder=folder).output
 
 
 def _state(port: str) -> str:

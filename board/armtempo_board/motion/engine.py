@@ -167,8 +167,11 @@ class Engine:
         del start_check
         heap.release()
         heap.tidy()
-        from armtempo_board.stepgen.override import Override
-
+        try:
+            from armtempo_board.stepgen.override import Override
+        except MemoryError:  # what the first attempt left free lies otherwise
+            gc.collect()
+            from armtempo_board.stepgen.override import Override
         override = Override()
         override.begin(rate, motion, duration_ticks)
         if override.end_ticks() > LONGEST_RUN_TICKS:

@@ -147,8 +147,9 @@ class JointModel:
 class Dynamics:
     """What a row of the table carries, and the friction of its joint."""
 
-    mass_kg: float
-    """Of the link with all that is fixed to it: motors, the tool and what it holds."""
+    mass_kg: float = field(
+        metadata=key("of the link with all that is fixed to it: motors, the tool and what it holds", 0.0, 1e3)
+    )
     centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Its centre of mass in the frame after the row."""
     inertia_kg_m2: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -157,6 +158,10 @@ class Dynamics:
         default=0.0, metadata=key("at the joint, against its motion whatever the speed (Coulomb)", 0.0, 1e4)
     )
     viscous_nm_s: float = field(default=0.0, metadata=key("at the joint, for a rad/s", 0.0, 1e4))
+
+    def __post_init__(self) -> None:
+        """InputError for figures that no link has."""
+        check(self)
 
 
 @checked_fields

@@ -31,7 +31,6 @@ MAX_LENGTH_MM = 1e6
 """Longest link that an arm file may describe."""
 
 _LOCKED_DEG = 0.001
-_MOST_KG = 1e3
 
 
 def driver(table: Table | None) -> Driver:
@@ -91,12 +90,9 @@ def joint(table: Table, number: int) -> Joint:
 def _dynamics(table: Table | None) -> Dynamics | None:
     if table is None:
         return None
-    mass = table.number("mass_kg", least=0.0, most=_MOST_KG)
-    x, y, z = table.numbers("centre_mm", 3, *[] if mass else [(0.0,) * 3])
+    x, y, z = table.numbers("centre_mm", 3, *[] if table.peek("mass_kg") else [(0.0,) * 3])
     xx, yy, zz, xy, xz, yz = table.numbers("inertia_kg_m2", 6, (0.0,) * 6)
-    return part.read(
-        Dynamics, table, mass_kg=mass, centre_mm=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz)
-    )
+    return part.read(Dynamics, table, centre_mm=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
 
 
 def _home(table: Table, low: float, high: float) -> float:

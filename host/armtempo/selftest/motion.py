@@ -107,7 +107,7 @@ def _crossings_s(spline: JointSpline, start: int, end: int, duration_s: float) -
     sign = 1 if end > start else -1
     halves = start + sign * (np.arange(abs(end - start)) + 0.5)
     low, high = np.zeros(len(halves)), np.full(len(halves), duration_s)
-    for _ in range(50):
+    for _ in range(30):  # to 0.1 ns
         middle = (low + high) / 2
         before = sign * (spline(middle) - halves) < 0
         low, high = np.where(before, middle, low), np.where(before, high, middle)

@@ -32,7 +32,7 @@ _SIMULATED_TURN_US = 1000
 _SEED, _STOPS, _SIMULATED_STOPS = 5, 50, 3
 _WAITS_US = (22_000, 78_000)
 """E-stops at random moments of ``motion.make``, which begins 20 ms after its start."""
-_STARVED_S = 0.1
+_STARVED_S = 0.06
 _LOOK_S = 0.3
 
 
@@ -214,7 +214,7 @@ def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         found.add(rate_part.judge(highest[count], count))
     states = rate_part.to_state(highest)
     found.data[rate_part.PART] = {"highest": highest, "states": states}
-    if states and not found.failed_in(DRIVERS, pulse_part.PULSES, pulse_part.SAFETY, rate_part.PART):
+    if states and not found.failed_in(DRIVERS, pulse_part.SAFETY):
         arguments = {"root": _ROOT, "program_crc": found.program_crc, "rates": (*states, most)}
         _part(prompt, found, "keep", "keep", **arguments)
 

@@ -92,7 +92,7 @@ class Pace:
 
     def _nap(self):
         """Nothing moves: sleep until input comes, and let as much virtual time pass as that took."""
-        if not self._serial.received and not self._serial.sending:
+        if not self._serial.received and not self._serial.stuck():
             self._serial.wait(_NAP_MS)
             self._serial.pump()
         slept_ms = min(self._elapsed_us() // 1000, 10 * _NAP_MS)

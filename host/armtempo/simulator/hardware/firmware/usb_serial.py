@@ -69,11 +69,12 @@ class Serial(SilentPort):
         self._out = open(1, "wb", buffering=0)  # noqa: SIM115
         self._poll = select.poll()
         self._poll.register(self._in, _POLLIN)
+        self._nothing = select.poll()
         self._chunk = memoryview(bytearray(_CHUNK))
 
     def wait(self, ms):
-        """Wait in real time for input, at most so long; True if there is some."""
-        return bool(self._poll.poll(ms))
+        """Wait in real time for input, at most so long; True if there is some. Silenced, it looks at none."""
+        return bool((self._nothing if self.silent else self._poll).poll(ms))
 
     def pump(self):
         """Move bytes between the buffers and the host."""

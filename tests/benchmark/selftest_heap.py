@@ -1,0 +1,107 @@
+"""The heap that the self-test's parts leave on the chip: the figures of host/docs/first-power-on.md.
+
+    python -m tests.benchmark.selftest_heap MICROPYTHON FOLDER
+
+MICROPYTHON as for tests/benchmark/firmware.py. The firmware with the program is built in FOLDER (new), and run by QEMU;
+the parts are sent to its prompt and loaded up to the start of their motion. QEMU has no watchdog, DWT, random numbers,
+backup SRAM, nor DMA for these timers, and cannot write the flash, so what goes beyond that runs on no emulator.
+"""
+
+import socket
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from armtempo.deploy.firmware import frozen
+from armtempo.model.arm import Arm
+from armtempo.records import encode
+from armtempo.selftest import motion, prompt, rate_part
+from armtempo_shared import armrecord
+
+from tests.benchmark import firmware
+
+RECORD = "/flash/armtempo/arm.ata"
+BOOT_S = 10
+STAND_INS = """
+import sys, os, machine
+from armtempo_board.hardware import backup_sram
+class Beyond:
+    def __init__(self, module, **own):
+        self._module, self._own = module, own
+    def __getattr__(self, name):
+        return self._own.get(name) or getattr(self._module, name)
+sys.modules["os"] = Beyond(os, urandom=bytes)
+sys.modules["machine"] = Beyond(machine, unique_id=lambda: bytes(12))
+backup_sram.find = lambda: 0x20020000
+def feed():
+    pass
+def enable():
+    return 1, 1, 1
+def idle(engine, *_):
+    raise OSError("{'free': %d, 'largest': %d}" % (free(), largest()))
+from armtempo_board.motion.engine import Engine
+Engine.start = idle
+"""
+
+
+def parts(record: bytes) -> dict[str, tuple[str, dict[str, object]]]:
+    """By title: the part and its arguments."""
+    _, joints, _ = armrecord.unpack(record)
+    moved, gentle = motion.make(joints, True), motion.gentle(joints)
+    common: dict[str, object] = {"record": RECORD, "idle_us": 0}
+    starts = {"motion": moved.record.hex(), "start_steps": moved.start_steps, "rates": moved.rates}
+    found: dict[str, tuple[str, dict[str, object]]] = {
+        "encoders": ("encoders", {"motion": gentle.record.hex(), "start_steps": gentle.start_steps}),
+        "pulses": ("pulses", starts),
+    }
+    for count in (1, 3):
+        rates = [round(rate_part.stated(count) / rate_part.KEPT)] * count
+        tried = {"motion": motion.at_rates(rates, 0.4).hex(), "rates": [motion.limit(rate) for rate in rates]}
+        found[f"rates, {count}"] = ("rates", {**tried, "frames": rate_part.frames()})
+    return {title: (part, {**common, **own}) for title, (part, own) in found.items()}
+
+
+def main(micropython: Path, folder: Path) -> None:
+    """Print the figures."""
+    frozen.write(folder / "program")
+    elf = firmware.build(micropython, folder, folder / "program" / frozen.MANIFEST)
+    record = encode.arm_record(Arm.paper())
+    tree = folder / "tree"
+    (tree / "armtempo").mkdir(parents=True, exist_ok=True)
+    (tree / "armtempo" / "arm.ata").write_bytes(record)
+    (tree / "boot.py").write_text("import pyb\npyb.usb_mode(None)\n")
+    (tree / "main.py").write_text("")
+    cut = folder / "cut"
+    cut.write_bytes(struct.pack("<i", 0))
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = firmware.emulator(elf, firmware.make_image(tree), cut)
+    command[command.index("stdio")] = f"tcp:127.0.0.1:{port},server=on,wait=on,nodelay=on"
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            time.sleep(1)
+            with prompt.at_prompt(f"socket://127.0.0.1:{port}") as there:
+                there.at_end = "pass"
+                time.sleep(BOOT_S)
+                for title, (part, arguments) in parts(record).items():
+                    there.enter(soft_reset=title != "encoders")
+                    print(f"{title:<10}", _said(there, part, arguments))
+        finally:
+            process.kill()
+
+
+def _said(there: prompt.Prompt, part: str, arguments: dict[str, object]) -> str:
+    folder = Path(prompt.__file__).with_name("on_board")
+    texts = [(folder / f"{name}.py").read_text() for name in ("common", "engine", part)]
+    texts[1:1] = [STAND_INS]
+    try:
+        return str(there._run(part, f"{''.join(texts)}\nmeasure(**{arguments!r})\n"))
+    except prompt.PartError as error:
+        return error.problem.partition("OSError: ")[2] or error.problem
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
