@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from functools import cache
 
 
 def command(package: str, extra: str) -> str:
@@ -25,7 +24,6 @@ def upgrade(package: str) -> str:
     return f"pip install --upgrade {package}"
 
 
-@cache
 def installed_version() -> str:
     """Such as ``"0.2.0"``; ``"0+unknown"`` in a folder that was never installed."""
     from importlib.metadata import PackageNotFoundError, version
