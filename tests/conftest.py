@@ -39,8 +39,8 @@ def interpreter(request: pytest.FixtureRequest) -> str:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One more than there are cores: a test that waits for its board leaves its core to another."""
-    return (os.cpu_count() or 1) + 1
+    """Two more than there are cores: a test that waits for its board leaves its core to another."""
+    return (os.cpu_count() or 1) + 2
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

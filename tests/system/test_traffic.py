@@ -33,6 +33,7 @@ pytestmark = pytest.mark.xdist_group("traffic")  # what they share is made once
 AWAY_DEG = np.array([20.0, -10.0, 15.0])
 INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
 WAIT_S = 60.0
+TRIES = 5
 LATE_TICKS = round(20e-6 * limits.TICK_HZ)
 """How late the sample interrupt may read the clock, so how far two recordings may differ."""
 PASSING = {
@@ -61,8 +62,18 @@ class Recording:
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """A session in which nothing had to be said twice, as a host does on a busy machine: that cannot be replayed."""
+    for _ in range(TRIES):
+        made = _recorded(tmp_path_factory.mktemp("traffic") / "traffic.log")
+        said = list(frames(made.data(TO_BOARD)))
+        if len(set(said)) == len(said):
+            return made
+    pytest.fail(f"the board answered late in {TRIES} recordings")
+
+
+def _recorded(path: Path) -> Recording:
     """Greeting, arm, home, upload, a refusal, a run, status, the store's commands; as ``--log-traffic`` writes it."""
-    made = Recording(tmp_path_factory.mktemp("traffic") / "traffic.log")
+    made = Recording(path)
     home_deg = np.array(boards.ARM.home_deg)
     data = encode.motion_record(
         point_to_point.straight("go", home_deg, home_deg + AWAY_DEG, boards.ARM), boards.ARM
@@ -175,7 +186,7 @@ def test_the_host_takes_the_board_s_bytes_in_the_same_way(recording: Recording) 
     session = Session(ReplayTransport(chunks))
     events: list[Event] = []
     said = 0
-    for _, number, payload in _without_repeats(recording.data(TO_BOARD)):
+    for _, number, payload in frames(recording.data(TO_BOARD)):
         entry = wire.COMMAND_BY_ID[number]
         values, tail = wire.decode(entry, payload)
         for _ in chunks:  # each look takes one of them or less; the host's next word drops the rest
@@ -190,14 +201,6 @@ def test_the_host_takes_the_board_s_bytes_in_the_same_way(recording: Recording) 
     assert [event for event in events if isinstance(event, Sample)] == recording.samples
     (done,) = (event for event in events if isinstance(event, Done))
     assert done.positions == recording.samples[-1].positions
-
-
-def _without_repeats(data: bytes) -> list[tuple[int, int, bytes]]:
-    found: list[tuple[int, int, bytes]] = []
-    for frame in frames(data):
-        if not found or found[-1] != frame:
-            found.append(frame)
-    return found
 
 
 @pytest.mark.parametrize("piece", [1, 7, 1 << 20])
