@@ -10,8 +10,8 @@ PYTHON ?= python3
 export PYTHONDONTWRITEBYTECODE =
 VENV := .venv
 BIN := $(VENV)/bin
-# One worker more than processors: many tests wait for a motion in real time.
-WORKERS ?= $(shell $(PYTHON) -c 'import os; print(1 + (os.cpu_count() or 1))')
+# tests/conftest.py says how many that are.
+WORKERS ?= auto
 
 .PHONY: demo test quick check docs clean
 
@@ -23,7 +23,7 @@ test: $(VENV)/test
 	"$(BIN)/python" -m pytest -n $(WORKERS) --dist loadgroup $(PYTEST_ARGS)
 
 quick: $(VENV)/test
-	"$(BIN)/python" -m pytest -q -n auto --dist loadgroup -m "not slow" --ignore=tests/system $(PYTEST_ARGS)
+	"$(BIN)/python" -m pytest -q -n $(WORKERS) --dist loadgroup -m "not slow" --ignore=tests/system $(PYTEST_ARGS)
 
 check: $(VENV)/test .cache/typings
 	"$(BIN)/ruff" check .
