@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -36,7 +37,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
             "give each joint with a motor its dynamics, and each motor its curve_rpm_nm",
         )
     best, short = None, ""
-    factor, low, high = 1.0, 0.0, float("inf")
+    factor, low, high = 1.0, 0.0, math.inf
     for number in range(_TRIES):
         found = planner.plan(_scaled(arm, factor), job, part(progress, number, _TRIES))
         least = torque.least_margin(found.arm, found.trajectory)
@@ -46,7 +47,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
             break
         else:
             best, low = found, factor
-        factor = 2.0 * low if high == float("inf") else (low * high) ** 0.5 if low else 0.5 * high
+        factor = _between(low, high)
         if high < _NEAR * low or factor < _LEAST:
             break
     if best is None:
@@ -56,6 +57,13 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
         )
     words = f"acceleration and jerk limits are {low:.3g} times the arm file's, as the motors' torque allows"
     return replace(best, notes=(*best.notes, words))
+
+
+def _between(low: float, high: float) -> float:
+    """The next factor to try: the motors hold ``low`` (0: none yet), but not ``high`` (infinite: none yet)."""
+    if high == math.inf:
+        return 2.0 * low
+    return math.sqrt(low * high) if low else 0.5 * high
 
 
 def _scaled(arm: Arm, factor: float) -> Arm:

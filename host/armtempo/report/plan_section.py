@@ -21,7 +21,7 @@ _EXTREMES = {
 def extremes(sheet: html_page.Page, plan: Plan) -> None:
     """Motion times with their lower bounds and exact extremes next to the limits; then the planner's notes."""
     rows = [_extremes_row(plan, joint) for joint in range(len(plan.extremes))]
-    sheet.table(tuple(_EXTREMES), rows, "Motion time, and largest magnitudes beside the limits", _EXTREMES)
+    sheet.table(tuple(_EXTREMES), rows, "Motion time, and largest magnitudes with their limits", _EXTREMES)
     for note in plan.notes:
         sheet.note(f"Note: {note}")
 

@@ -107,7 +107,7 @@ def _peaks(sheet: html_page.Page, found: Evaluation) -> None:
             cells = (name, quantity, f"{value:.2f}", f"{check.limit:g} {unit}")
             rows.append((*cells, *_measured_peak(check)) if seen else cells)
     columns = {name: text for name, text in _PEAKS.items() if seen or name not in _MEASURED_PEAKS}
-    sheet.table(tuple(columns), rows, "Peaks beside the limits", columns)
+    sheet.table(tuple(columns), rows, "Peaks and their limits", columns)
 
 
 def _measured_peak(check: peaks.LimitCheck) -> tuple[object, object]:
