@@ -29,6 +29,8 @@ WAIT_S = 120.0
 """Nothing here takes longer, on however loaded a machine."""
 SMALL = {"width": 640, "height": 900}
 """Size of a window that is drawn quickly by a processor."""
+_SELDOM = "{const soon = requestAnimationFrame; requestAnimationFrame = (call) => setTimeout(() => soon(call), 200);}"
+"""The scene is drawn by the processor too, which has more to do than to draw it 20 times a second."""
 
 
 @contextmanager
@@ -161,6 +163,7 @@ def opened(window: Any, address: str) -> Any:
     """The panel's page in a window (a Playwright context), in control of the board."""
     page = window.new_page()
     page.set_default_timeout(WAIT_S * 1000)
+    page.add_init_script(_SELDOM)
     page.goto(address)
     return in_control(page)
 

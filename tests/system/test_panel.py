@@ -92,8 +92,9 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     page.get_by_label("⟳ x +").hover(force=True)
     page.wait_for_selector("text=the arm cannot turn the tool about x from here")
     assert page.get_by_label("⟳ x +").is_disabled()
-    for number in ("1e9", "-1", "true", "'x'", "null", "[1]", "{}"):  # buttons that there are not
-        page.evaluate(f"emitEvent('armtempo-press', {number})")
+    page.evaluate(
+        "[1e9, -1, true, 'x', null, [1], {}].forEach(one => emitEvent('armtempo-press', one))"
+    )  # no buttons
     page.evaluate("window.socket.emit('event', {id: 'x', client_id: 'x', listener_id: 5, args: []})")
     show(page, "Plan")
     page.get_by_role("button", name="Plan", exact=True).click()
@@ -103,9 +104,11 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     page.get_by_role("button", name="Run", exact=True).click()
     wait_for(page, "repeat = 0 is not allowed", place="armtempo-said")
     page.get_by_label("Repetitions").fill("1")
-    page.get_by_label("Speed, %").click(position={"x": 32, "y": 10})  # of 128, so that the stop is in time
+    page.get_by_label("Speed, %").click(
+        position={"x": 6, "y": 10}
+    )  # of 128: two minutes, so that the stop is in time
     page.get_by_role("button", name="Run", exact=True).click()
-    wait_for(page, "moving", "at 2", "Run")
+    wait_for(page, "moving", "at ", "Run")
     page.get_by_role("button", name="Pause").click()
     wait_for(page, "in a pause", "Run")
     page.get_by_role("button", name="Resume").click()  # on along the path
@@ -174,18 +177,7 @@ def test_a_via_point_is_clicked_and_dragged_in_the_picture(page: Any) -> None:
 _JOB = 'name = "feed"\nvia_deg = [[%s, -60.0, 40.0], [0.0, -60.0, 40.0]]'
 _WRONG = [
     ("", "P0 joint 1", "999", "Plan", "plan --arm paper --job", "job.toml", _JOB % "999.0"),
-    ("", "P0 joint 1", "", "Plan", "plan --arm paper --job", "job.toml", _JOB % "nan"),
     ("Paste", "Rows of angles", "1;2\n3;4", "Paste", "import --arm paper", "the pasted rows", "1;2\n3;4"),
-    (
-        "Paste",
-        "Rows of angles",
-        "1;2;x\n3;4;5",
-        "Paste",
-        "import --arm paper",
-        "the pasted rows",
-        "1;2;x\n3;4;5",
-    ),
-    ("Paste", "Rows of angles", "1\t2\t3", "Paste", "import --arm paper", "the pasted rows", "1\t2\t3"),
 ]
 """What opens the field, the field, what is wrong in it, what takes it, and a command with a file of the same."""
 
@@ -244,12 +236,12 @@ def test_a_held_jog_ends_with_what_holds_it(
     if how == "browser":
         with panels.chromium_to_kill(play, tmp_path) as (made, process):
             other = opened(made.new_context(viewport=panels.SMALL), panel.address)
-            home(other)
             hold(other)
             process.kill()
             process.wait()
     else:
-        home(page)
+        if how == "button":
+            home(page)
         hold(page, by_key=how == "key")
         if how == "button":
             page.mouse.up()
@@ -301,39 +293,32 @@ def test_what_is_no_request_of_its_pages_is_refused(panel: Panel, request_: byte
     assert panels.asked(panel.address, request_).split(b" ")[1:2] == [status]
 
 
-_FOCUS = """() => {
-  const one = document.activeElement, field = one.closest('.q-field');
-  const shown = getComputedStyle(one).boxShadow.includes('5px') || (field && field.matches('.q-field--focused'));
-  return [one.ariaLabel || one.innerText.split('\\n').pop(), Boolean(shown) || one === document.body];
+_FOCUS = """async () => {
+  const found = [], tick = (ms) => new Promise(resolve => setTimeout(resolve, ms));
+  for (const one of document.querySelectorAll('button, input, [tabindex="0"]:not(.q-tab)')) {
+    if (!one.checkVisibility({visibilityProperty: true}) || one.disabled || one.closest('.disabled')) continue;
+    const field = one.closest('.q-field');
+    const shown = () => getComputedStyle(one).boxShadow.includes('5px') || field?.matches('.q-field--focused');
+    for (let tries = 0; tries < 5 && !(document.activeElement === one && shown()); tries++) {
+      one.focus();
+      await tick(20 * tries); // a page that has just been built may take it away once
+    }
+    if (one.tabIndex < 0 || document.activeElement !== one || !shown()) found.push(one.outerHTML);
+  }
+  return found;
 }"""
+"""Controls that the tabulator does not reach, or that do not show it."""
+_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 
-def test_every_control_is_reached_by_the_tabulator_and_shows_it(page: Any) -> None:
-    home(page)
-    for tab, last in (("Move", "home"), ("Plan", "Play on the model")):
+def test_each_tab_is_for_the_keyboard_and_fits_desktop_tablet_and_phone(page: Any) -> None:
+    for tab in ("Move", "Plan", "Run", "Sequence", "Board"):
         show(page, tab)
-        page.get_by_role("button", name=last, exact=last == "home").wait_for()
-        wanted = page.locator("button:visible:not([disabled]), input:visible:not([disabled])").all()
-        names = {one.get_attribute("aria-label") or one.inner_text().split("\n")[-1] for one in wanted} - {""}
-        found: dict[str, bool] = {}
-        page.get_by_role("button", name="Stop").focus()
-        page.keyboard.press("Shift+Tab")
-        for _ in range(len(wanted) + 12):  # sliders and tabs are no buttons
-            page.keyboard.press("Tab")
-            name, shown = page.evaluate(_FOCUS)
-            found[name] = shown
-        assert all(found.values()), found
-        assert names <= found.keys(), names - found.keys()
-
-
-def test_it_fits_desktop_tablet_and_phone(page: Any) -> None:
-    for width, height in ((1280, 800), (820, 1180), (390, 844)):
-        page.set_viewport_size({"width": width, "height": height})
-        for tab in ("Move", "Plan", "Run", "Sequence", "Board"):
-            page.get_by_role("tab", name=tab).click()
-            page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
-            over = page.evaluate(
-                "document.documentElement.scrollWidth - document.documentElement.clientWidth"
-            )
-            assert over <= 0, (width, tab, over)
+        page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
+        page.keyboard.press("Tab")  # the focus shows if the last key was one of the keyboard
+        assert page.evaluate(_FOCUS) == []
+        for width, height in ((1280, 800), (820, 1180), (390, 844)):
+            page.set_viewport_size({"width": width, "height": height})
+            assert page.evaluate(_WIDE) <= 0, (width, tab)
             assert page.get_by_role("button", name="Stop").is_visible()
+    page.set_viewport_size(panels.SMALL)

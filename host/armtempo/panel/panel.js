@@ -21,7 +21,7 @@ window.armtempo = {
   show(parts) {
     this.parts = parts;
     import("nicegui-scene").then((module) => (this.THREE = module.THREE));
-    requestAnimationFrame(() => this.draw());
+    setInterval(() => this.draw(), 50); // as often as the scene is drawn: at each frame it would cost twice as much
   },
 
   begin() {
@@ -72,7 +72,6 @@ window.armtempo = {
       this.place(scene, this.parts.ghost, this.ghost || this.target);
       this.turn(scene);
     }
-    requestAnimationFrame(() => this.draw());
   },
 
   // The scene draws 20 times a second; what has not changed is drawn once a second, which spares a tablet's battery.
