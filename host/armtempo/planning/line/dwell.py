@@ -18,7 +18,7 @@ _LEAST_STEP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Timed:
+class TimedPath:
     """A path of S segments on a time axis with ``refine`` segments for each of them."""
 
     angle_points_deg: Array
@@ -29,7 +29,7 @@ class Timed:
     """Segments before each via point."""
     refine: int
 
-    def with_dwells(self, dwells_s: Mapping[int, float]) -> Timed:
+    def with_dwells(self, dwells_s: Mapping[int, float]) -> TimedPath:
         """The same with waits, in seconds by via point; each is at a rest, where five control points are the same.
 
         The time axis before and after stays the same. The four of its differences that both sides of the rest have in
@@ -40,7 +40,7 @@ class Timed:
             timed = timed._with_dwell(via, dwells_s[via])
         return timed
 
-    def _with_dwell(self, via: int, dwell_s: float) -> Timed:
+    def _with_dwell(self, via: int, dwell_s: float) -> TimedPath:
         knot, shared = self.arrivals[via], DEGREE - 1
         segments = -(-DEGREE // self.refine)
         first, count = knot * self.refine, segments * self.refine
@@ -48,7 +48,7 @@ class Timed:
         twice = np.concatenate([before[-shared:], np.zeros(count - shared), after[:shared]])
         lasts_s = float(np.convolve(np.ones(count), mean_slopes(DEGREE)) @ twice)
         step = max((dwell_s - lasts_s) / (count - shared), _LEAST_STEP * before[-1])
-        return Timed(
+        return TimedPath(
             np.insert(self.angle_points_deg, [knot] * segments, self.angle_points_deg[knot], axis=0),
             np.concatenate([before, np.full(count - shared, step), after]),
             tuple(at + segments * (number > via) for number, at in enumerate(self.arrivals)),

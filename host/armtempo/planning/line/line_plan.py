@@ -22,7 +22,7 @@ from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import stretches as cut
 from armtempo.planning.line.between import between
 from armtempo.planning.line.deviation import LineDeviation
-from armtempo.planning.line.dwell import DWELL_SEGMENTS, Timed
+from armtempo.planning.line.dwell import DWELL_SEGMENTS, TimedPath
 from armtempo.planning.line.follow import passed
 from armtempo.planning.line.line_path import DEGREE, Led, LinePath, led_stretches, proven_path
 from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
@@ -90,7 +90,7 @@ def _timed(
         axis = of_path(time_points(found.differences_s, DEGREE)[:, None], DEGREE)[:, :, 0]
         stretch = max(stretch, excess(angles, axis, tool, tool_limits.refined(best.refine)))
         notes += _limit_notes(job, path, angles, axis * stretch, tool)
-    timed = Timed(path.angle_points_deg, found.differences_s * stretch, path.arrivals, best.refine)
+    timed = TimedPath(path.angle_points_deg, found.differences_s * stretch, path.arrivals, best.refine)
     timed = timed.with_dwells(dwells_s)
     times = time_points(timed.differences_s, DEGREE)
     joints = tuple(
