@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +44,10 @@ _PROBE = """<script>addEventListener('load', () => {
     colour: style.color, background: style.backgroundColor,
   }), '*');
 });</script>"""
-_FRAME = """<!DOCTYPE html><meta charset="utf-8"><meta name="color-scheme" content="light dark">
-<body><script>addEventListener('message', got => document.body.setAttribute('data-probe', got.data));</script>
-<iframe src="{page}" style="width: {width}px; height: 900px; border: 0"></iframe></body>"""
+_FRAMES = """<!DOCTYPE html><meta charset="utf-8"><meta name="color-scheme" content="light dark">
+<body><script>addEventListener('message', got => document.body.append(
+  Object.assign(document.createElement('pre'), {className: 'probe', textContent: got.data})));</script>"""
+_FRAME = '<iframe src="{page}" style="width: {width}px; height: 900px; border: 0"></iframe>'
 """The page as wide as a phone: a window of its own cannot be narrower than 500 pixels."""
 
 
@@ -64,17 +67,19 @@ def _run(page: Path, profile: Path, *options: str) -> str:
     return done.stdout
 
 
-def probe(page: Path, folder: Path, width: int, dark: bool = False) -> dict[str, Any]:
-    """What the browser finds in the page at this width: see ``_PROBE``."""
-    copy = folder / f"probe-{width}-{dark}.html"
+def probe(page: Path, folder: Path, widths: Sequence[int], dark: bool = False) -> list[dict[str, Any]]:
+    """What the browser finds in the page at each of these widths: see ``_PROBE``."""
+    copy = folder / "probe.html"
     copy.write_text(page.read_text(encoding="utf-8").replace("</body>", _PROBE + "</body>"), encoding="utf-8")
     scheme = f"--blink-settings=preferredColorScheme={0 if dark else 1}"
-    frame = folder / f"frame-{width}-{dark}.html"
-    frame.write_text(_FRAME.format(page=copy.name, width=width), encoding="utf-8")
+    frames = folder / "frames.html"
+    shown = "".join(_FRAME.format(page=copy.name, width=width) for width in widths)
+    frames.write_text(_FRAMES + shown, encoding="utf-8")
     # A virtual clock: the page has its time however busy the machine is.
-    dom = _run(frame, folder / "profile", "--virtual-time-budget=10000", scheme, "--dump-dom")
-    found = re.search(r'data-probe="([^"]*)"', dom)
-    assert found, dom[-2000:]
-    text = found.group(1).replace("&quot;", '"').replace("&lt;", "<").replace("&gt;", ">")
-    answer: dict[str, Any] = json.loads(text.replace("&nbsp;", " ").replace("&amp;", "&"))
-    return answer
+    dom = _run(frames, folder / "profile", "--virtual-time-budget=10000", scheme, "--dump-dom")
+    found = [
+        json.loads(html.unescape(text))
+        for text in re.findall('<pre class="probe">(.*?)</pre>', dom, re.DOTALL)
+    ]
+    assert len(found) == len(widths), dom[-2000:]
+    return sorted(found, key=lambda one: widths.index(one["width"]))

@@ -197,7 +197,7 @@ class Pipe:
     def swap_board(self, board_id: bytes) -> None:
         """Another board at the same port, which some host has greeted before."""
         self.start_board()
-        self.app.controller.board_id = board_id
+        self.app.controller.board.board_id = board_id
         self.app.commands.greeted = True
 
     def _check(self) -> None:
@@ -228,7 +228,7 @@ class Pipe:
                     self.port.outbox = bytearray()
 
     def _move(self) -> None:
-        engine = self.app.controller.engine
+        engine = self.app.controller.board.engine
         if engine is None or not engine.moving:
             self._sample_s = self.clock()
         elif self.clock() >= self._sample_s + _SAMPLE_S:

@@ -6,6 +6,9 @@ rate of the motion's own time go from 1 to 0 (its second derivative constant ove
 and jerk within EXCESS times the limits? Linear programs, each linear in the change of the rate, for shorter and
 shorter times; what none is found for counts as too short, so the optimum may be missed by a little. The look-ahead
 of the board (75 ms) comes on top of each.
+
+``--parts N``: instead, how close a table would come that holds a shape of N parts for each of its spaces, fit for a
+brake that begins at its start, middle or end.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from armtempo.basics.arrays import Array
@@ -23,6 +27,7 @@ from armtempo.model.parts import Limits
 from armtempo.planning import brake_time, planner
 from armtempo.planning.brake_time import EXCESS, TO_REST, UNIT_S
 from armtempo.splines.trajectory import Trajectory
+from armtempo_shared.motion import RAMP_ENTRIES
 from scipy.optimize import linprog
 
 from tests.host import problems
@@ -34,6 +39,8 @@ LONGEST_S = 65535 * UNIT_S
 ROUNDS = 12
 SAMPLES = 4000
 SHORTEST_S = 1e-3
+SPACES = 5
+ROUNDED = 1e-9
 
 
 def main() -> None:
@@ -41,11 +48,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--parts", type=int, choices=[n for n in range(4, PARTS) if PARTS % n == 0])
     options = parser.parse_args()
+    compare = ratios if options.parts is None else partial(table_ratios, parts=options.parts)
     arm = Arm.paper()
     limits = [joint.limits for joint in arm.driven]
-    show("shipped", [ratios(planner.plan(arm, Job.paper(arm)).trajectory, limits)])
-    show("random", [ratios(*motion) for motion in random_motions(options.first, options.count)])
+    show("shipped", [compare(planner.plan(arm, Job.paper(arm)).trajectory, limits)])
+    show("random", [compare(*motion) for motion in random_motions(options.first, options.count)])
 
 
 def random_motions(first: int, count: int) -> Iterator[tuple[Trajectory, Sequence[Limits]]]:
@@ -73,28 +82,48 @@ def ratios(trajectory: Trajectory, limits: Sequence[Limits]) -> Array:
     ramps = brake_time._Ramps(trajectory, allowed)
     lawful_s = ramps.shortest_s(moments, TO_REST[:1], np.full(MOMENTS, SHORTEST_S))
     any_s = [
-        Shortest(trajectory, allowed, moment)(time) for moment, time in zip(moments, lawful_s, strict=True)
+        Shortest(trajectory, allowed, [moment])(time) for moment, time in zip(moments, lawful_s, strict=True)
     ]
     left_s = trajectory.duration_s * (1.0 - moments)
     return np.array([record_s / lawful_s, record_s / any_s, np.minimum(record_s, left_s) / any_s])
 
 
+def table_ratios(trajectory: Trajectory, limits: Sequence[Limits], parts: int) -> Array:
+    """(1, SPACES): the time of the best shape of so many parts, in some spaces of the table, over that of any law."""
+    allowed = np.array([limit.values for limit in limits])
+    spaces = np.linspace(1, RAMP_ENTRIES - 3, SPACES).astype(int)[:, None]
+    starts = (spaces + np.array([0.0, 0.5, 1.0])) / (RAMP_ENTRIES - 1)
+    lawful_s = brake_time._Ramps(trajectory, allowed).shortest_s(
+        starts[:, 1], TO_REST[:1], np.full(SPACES, SHORTEST_S)
+    )
+    found = []
+    for space, known_s in zip(starts, lawful_s, strict=True):
+        any_s = Shortest(trajectory, allowed, space[1:2])(known_s)
+        shape = Shortest(trajectory, allowed, space, parts)
+        found.append(shape(shape.lengthened(any_s)) / any_s)
+    return np.array([found])
+
+
 def show(what: str, found: list[Array]) -> None:
     """Medians over the moments of each motion."""
     medians = np.median(found, axis=2)
-    for name, values in zip(
-        ("its own law", "any law", "any law, or the motion's end"), medians.T, strict=True
-    ):
+    names = ("its own law", "any law", "any law, or the motion's end")
+    for name, values in zip(names if len(medians.T) > 1 else names[1:2], medians.T, strict=True):
         middle, high = np.quantile(values, (0.5, 0.9))
         print(f"{what}: over {name}: median {middle:.2f}, nine in ten below {high:.2f}", flush=True)
 
 
 class Shortest:
-    """The shortest brake from one moment, a part of the motion's time."""
+    """The shortest brake that may begin at any of some moments, parts of the motion's time."""
 
-    def __init__(self, trajectory: Trajectory, allowed: Array, moment: float) -> None:
+    def __init__(
+        self, trajectory: Trajectory, allowed: Array, moments: Sequence[float], parts: int = PARTS
+    ) -> None:
         self._allowed = allowed[:, 1:]
-        self._start_s = moment * trajectory.duration_s
+        self._starts_s = [moment * trajectory.duration_s for moment in moments]
+        self._shape = np.kron(
+            np.eye(parts), np.ones((PARTS // parts, 1))
+        )  # second derivatives (PARTS, parts)
         self._grid_s = np.linspace(0.0, trajectory.duration_s, SAMPLES)
         motion = [trajectory(self._grid_s, order) for order in (1, 2, 3)]
         self._motion = [*motion, np.gradient(motion[2], self._grid_s, axis=0)]
@@ -108,8 +137,15 @@ class Shortest:
         self._second = np.concatenate([np.eye(PARTS)] * 2)
         self._at = nodes[both, 0]
         self._ends = np.array([sums[0][-1], sums[1][-1]])
-        straight = np.interp(np.arange(PARTS) + 0.5, [0.0, PARTS], [-6.0, 6.0])
-        self._first = straight - np.linalg.lstsq(self._ends, self._ends @ straight - [0.0, -1.0])[0]
+        straight = np.interp(np.arange(parts) + 0.5, [0.0, parts], [-6.0, 6.0])
+        ends = self._ends @ self._shape
+        self._first = self._shape @ (straight - np.linalg.lstsq(ends, ends @ straight - [0.0, -1.0])[0])
+
+    def lengthened(self, time_s: float) -> float:
+        """A time from this on that is enough."""
+        while self._meet(time_s, self._first) is None:
+            time_s /= SHORTER**3
+        return time_s
 
     def __call__(self, known_s: float) -> float:
         """Seconds; ``known_s`` is enough."""
@@ -142,24 +178,29 @@ class Shortest:
     def _step(self, ratio: Array, slopes: Array, second: Array, reach: float) -> Array | None:
         """The step within ``reach`` that makes the largest of the linearised ratios least."""
         rate = 1.0 + self._rate @ second
+        slopes, by_rate = slopes @ self._shape, self._rate @ self._shape
         rows = [np.column_stack([sign * slopes, np.full(len(slopes), -1.0)]) for sign in (1.0, -1.0)]
-        rows += [np.column_stack([sign * self._rate, np.zeros(len(rate))]) for sign in (1.0, -1.0)]
+        rows += [np.column_stack([sign * by_rate, np.zeros(len(rate))]) for sign in (1.0, -1.0)]
         found = linprog(
-            np.append(np.zeros(PARTS), 1.0),
+            np.append(np.zeros(slopes.shape[1]), 1.0),
             A_ub=np.concatenate(rows),
-            b_ub=np.concatenate([-ratio, ratio, 1.0 - rate, rate]),
-            A_eq=np.column_stack([self._ends, [0.0, 0.0]]),
+            b_ub=np.concatenate([-ratio, ratio, 1.0 - rate + ROUNDED, rate + ROUNDED]),
+            A_eq=np.column_stack([self._ends @ self._shape, [0.0, 0.0]]),
             b_eq=np.array([0.0, -1.0]) - self._ends @ second,
-            bounds=[(-reach, reach)] * PARTS + [(0.0, None)],
+            bounds=[(-reach, reach)] * slopes.shape[1] + [(0.0, None)],
         )
-        return None if found.status else np.asarray(found.x[:-1])
+        return None if found.status else self._shape @ found.x[:-1]
 
     def _ratios(self, time_s: float, second: Array) -> tuple[Array, Array]:
-        """Accelerations and jerks over their limits, and their derivatives by ``second``."""
+        """Accelerations and jerks over their limits, and their derivatives by ``second``, from every start."""
+        found = [self._ratios_from(start_s, time_s, second) for start_s in self._starts_s]
+        return np.concatenate([one for one, _ in found]), np.concatenate([one for _, one in found])
+
+    def _ratios_from(self, start_s: float, time_s: float, second: Array) -> tuple[Array, Array]:
         rate = (1.0 + self._rate @ second)[:, None]
         slope = (self._slope @ second)[:, None] / time_s
         bend = (self._second @ second)[:, None] / time_s**2
-        way = self._start_s + time_s * (self._at + self._way @ second)
+        way = start_s + time_s * (self._at + self._way @ second)
         v, a, j, s = (
             np.column_stack([np.interp(way, self._grid_s, row, right=0.0) for row in values.T])
             for values in self._motion

@@ -1,4 +1,4 @@
-"""Random lines, arcs, cut corners and speeds of the tool, planned and looked at by code of its own.
+"""Random lines, arcs, cut corners, waits and speeds of the tool, planned and looked at by code of its own.
 
     python -m tests.benchmark.lines [--first 0] [--count 100] [--minutes M]
 
@@ -22,7 +22,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 from armtempo.basics.errors import PlanError  # noqa: E402
 from armtempo.model.arm import Arm  # noqa: E402
-from armtempo.model.job import Job  # noqa: E402
+from armtempo.model.job import Job, Stop  # noqa: E402
 from armtempo.model.plan import Plan  # noqa: E402
 from armtempo.model.tool_pose import APPROACH, WHOLE, Pose  # noqa: E402
 from armtempo.model.tool_way import ToolWay  # noqa: E402
@@ -166,7 +166,13 @@ def random_lines(seed: int) -> tuple[Arm, Job]:
                 acceleration_mm_s2=float(10.0 ** rng.uniform(1.5, 3.5)) if limited else None,
             )
         )  # fmt: skip
-    return arm, Job("lines", via=tuple(vias), ways=_with_cuts(ways, vias, arm, rng))
+    job = Job("lines", via=tuple(vias), ways=_with_cuts(ways, vias, arm, rng))
+    stops = tuple(
+        Stop(via, float(10.0 ** rng.uniform(-2.0, 1.0)))
+        for via in range(1, count)
+        if rng.random() < 0.3 and not any(way.blend_mm and way.via == via for way in job.ways)
+    )
+    return arm, replace(job, stops=stops, path="free" if rng.random() < 0.3 else "through")
 
 
 def _with_cuts(

@@ -49,7 +49,7 @@ Engine.start = idle
 def parts(record: bytes) -> dict[str, tuple[str, dict[str, object]]]:
     """By title: the part and its arguments."""
     _, joints, _ = armrecord.unpack(record)
-    moved, gentle = motion.make(joints, True), motion.gentle(joints)
+    moved, gentle = motion.back_in_turn(joints), motion.gentle(joints)
     common: dict[str, object] = {"record": RECORD, "idle_us": 0}
     starts = {"motion": moved.record.hex(), "start_steps": moved.start_steps, "rates": moved.rates}
     found: dict[str, tuple[str, dict[str, object]]] = {

@@ -79,11 +79,11 @@ def faults(plan: Plan, at_via_deg: float = 1e-7, points: int = POINTS) -> list[s
 def _at_stops(plan: Plan, number: int) -> list[str]:
     """Dwells that are shorter than asked for, or in which the joint moves."""
     spline, found = plan.trajectory.joints[number], []
-    time = _bspline(spline.time_points_s, spline.degree, 1.0)
+    time = _bspline(spline.time_points_s, spline.degree, 1.0 / spline.refine)
     angle = _bspline(spline.angle_points_deg, spline.degree, 1.0)
     for stop in plan.job.stops:
         if stop.dwell_s and spline.via_segments:
-            u = float(spline.via_segments[stop.via]) + np.linspace(0.0, 5.0, 21)
+            u = float(spline.via_segments[stop.via]) + np.linspace(0.0, np.ceil(5.0 / spline.refine), 21)
             lasts_s = float(time(u[-1]) - time(u[0]))
             moves_deg = float(np.ptp(angle(u)))
             if lasts_s < stop.dwell_s * (1 - 1e-9) or moves_deg > 1e-9 * max(1.0, np.abs(angle(u)).max()):

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
@@ -14,6 +15,7 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
 from armtempo.records import encoded_motion
+from armtempo.report import arm_figure, drawing, plots
 from armtempo.runs import run_folder
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 
@@ -25,6 +27,12 @@ def shipped_plan() -> Plan:
     return planner.plan(arm, Job.paper(arm))
 
 
+@cache
+def shipped_record() -> bytes:
+    """Its record for the board."""
+    return encoded_motion.of_plan(shipped_plan()).data
+
+
 def blind_plan(*joints: int) -> Plan:
     """The shipped plan for the same arm without encoders at these joints."""
     whole = shipped_plan()
@@ -33,6 +41,18 @@ def blind_plan(*joints: int) -> Plan:
         for number, joint in enumerate(whole.arm.joints)
     )
     return replace(whole, arm=replace(whole.arm, joints=left))
+
+
+def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures take most of a page's time; a test of what it says in words has them left empty."""
+    for module, names in (
+        (plots, ("tracking", "errors", "convergence", "overlay")),
+        (arm_figure, ("postures",)),
+    ):
+        for name in names:
+            monkeypatch.setattr(module, name, lambda *_: None)
+    monkeypatch.setattr(drawing, "save", lambda figure, path: path.write_bytes(b""))
+    monkeypatch.setattr(drawing, "inline_svg", lambda figure, name, description: "<svg></svg>")
 
 
 def make(
@@ -52,7 +72,7 @@ def make(
     rng = np.random.default_rng(seed)
     path.mkdir(parents=True)
     folder = run_folder.RunFolder(path, made.job.name, run_folder.scales(made.arm), {"port": "sim"})
-    folder.write_motion(encoded_motion.of_plan(made).data)
+    folder.write_motion(shipped_record() if plan is None else encoded_motion.of_plan(made).data)
     if on_board:
         arm_json.save(made.arm, path / run_folder.ARM)
     else:
@@ -69,16 +89,13 @@ def make(
 def _samples(made: Plan, scatter_deg: float, rng: np.random.Generator) -> list[Sample]:
     scales = run_folder.scales(made.arm)
     end = round(made.trajectory.duration_s * TICK_HZ)
-    ticks = [*range(0, end, SAMPLE_TICKS), end]
-    found = []
-    for index, tick in enumerate(ticks):
-        angles = made.trajectory(tick / TICK_HZ)
-        steps = tuple(round(a * s.steps_per_deg) for a, s in zip(angles, scales, strict=True))
-        seen = angles + rng.normal(scale=scatter_deg, size=len(angles))
-        counts = tuple(round(a * s.counts_per_deg) for a, s in zip(seen, scales, strict=True))
-        found.append(
-            Sample(
-                run=1, index=index, ticks=tick, path_ticks=tick, flags=0, positions=Positions(steps, counts)
-            )
-        )
-    return found
+    ticks = np.append(np.arange(0, end, SAMPLE_TICKS), end)
+    angles = made.trajectory(ticks / TICK_HZ)
+    seen = angles + rng.normal(scale=scatter_deg, size=angles.shape)
+    steps = np.rint(angles * [scale.steps_per_deg for scale in scales]).astype(int).tolist()
+    counts = np.rint(seen * [scale.counts_per_deg for scale in scales]).astype(int).tolist()
+    rows = enumerate(zip(ticks.tolist(), steps, counts, strict=True))
+    return [
+        Sample(run=1, index=n, ticks=t, path_ticks=t, flags=0, positions=Positions(tuple(step), tuple(count)))
+        for n, (t, step, count) in rows
+    ]

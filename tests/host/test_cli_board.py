@@ -124,7 +124,7 @@ def test_run_by_stored_name(run: Run, file: str) -> None:
 def test_fault_during_a_run(run: Run, file: str, pipe: Pipe, monkeypatch: pytest.MonkeyPatch) -> None:
     run("upload", file)
     run("home")
-    engine = pipe.app.controller.engine
+    engine = pipe.app.controller.board.engine
 
     def stall(samples: int) -> None:
         engine.fault, engine.fault_joint = 42, 1
@@ -148,7 +148,7 @@ def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
     pipe.run_samples = samples
     run("upload", file)
     run("home")
-    engine = pipe.app.controller.engine
+    engine = pipe.app.controller.board.engine
     advance = engine.advance
 
     def interrupt(samples: int) -> None:

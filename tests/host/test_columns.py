@@ -11,6 +11,7 @@ from armtempo.cli import stored
 from armtempo.diagnosis.finding import Finding, Level
 from armtempo.formats.text import aligned
 from armtempo.model.plan import Plan
+from armtempo.planning import lower_bounds
 from armtempo.records import encoded_motion
 from armtempo.report import text_summary
 from armtempo.runs import run_folder
@@ -67,6 +68,24 @@ def test_a_plan_tells_of_coarse_steps(made: Plan, monkeypatch: pytest.MonkeyPatc
     assert (
         text_summary.lines(made)[-1] == f"{Level.WARNING.value}: waist: a step is 1.8°; use more microsteps"
     )
+
+
+def test_a_plan_tells_what_a_free_path_may_save_unless_little_or_the_job_gives_the_path(made: Plan) -> None:
+    floor_s = lower_bounds.of_vias(made.via_deg, [joint.limits for joint in made.arm.driven], {}).time_s
+    said = f'path = "free" may save up to {100 - 100 * floor_s / made.total_s:.0f} %: '
+    assert [line.startswith(said) for line in text_summary.lines(made)].count(True) == 1
+    shorter = replace(
+        made,
+        trajectory=replace(
+            made.trajectory,
+            joints=tuple(
+                replace(joint, time_points_s=joint.time_points_s * (1.02 * floor_s / made.total_s))
+                for joint in made.trajectory.joints
+            ),
+        ),
+    )
+    for other in (shorter, replace(made, job=replace(made.job, path="free"))):
+        assert not any("may save" in line for line in text_summary.lines(other))
 
 
 def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:

@@ -68,7 +68,7 @@ def test_repeated_command_acts_once(tmp_path: Path) -> None:
     pipe._send = lambda way, frame: None if way == 1 and lost and lost.pop() else send(way, frame)  # type: ignore[method-assign]
     run = board.start("feed", wire.record_crc(data)).run
     assert board.session.repeats == 1
-    assert (run, pipe.app.controller.engine.calls.count("start")) == (1, 1)
+    assert (run, pipe.app.controller.board.engine.calls.count("start")) == (1, 1)
 
 
 def test_a_frame_that_never_ends_hides_the_answer_behind_it_for_an_instant_only(tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_fault_ends_the_run(tmp_path: Path) -> None:
     follower = started(pipe)
     for sample in follower.samples():
         if sample.index == 10:
-            engine = pipe.app.controller.engine
+            engine = pipe.app.controller.board.engine
             engine.fault, engine.fault_joint = wire.ERROR_CODES["following"], 1
             engine.finish()
     assert follower.ended
@@ -167,8 +167,8 @@ def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pyt
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)
     board.start("feed", wire.record_crc(data))
-    monkeypatch.setattr(pipe.app.controller.engine, "brake", lambda: None)
-    monkeypatch.setattr(pipe.app.controller.engine, "freeze", lambda: None)
+    monkeypatch.setattr(pipe.app.controller.board.engine, "brake", lambda: None)
+    monkeypatch.setattr(pipe.app.controller.board.engine, "freeze", lambda: None)
     begin_s = pipe.clock()
     pipe.run_samples = 10_000
     with pytest.raises(LinkError, match="does not; switch off"):
@@ -183,7 +183,7 @@ def test_what_was_to_stop_before_does_not_start(tmp_path: Path) -> None:
     stop.wanted = True
     with pytest.raises(KeyboardInterrupt):
         stored_motion.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
-    assert pipe.app.controller.engine.calls.count("start") == 0
+    assert pipe.app.controller.board.engine.calls.count("start") == 0
 
 
 class Late:

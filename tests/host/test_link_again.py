@@ -73,12 +73,12 @@ def test_another_board_at_the_same_port_gets_no_command(tmp_path: Path) -> None:
     def swap() -> None:
         pipe.unplug_for(1.0)
         pipe.swap_board(b"another")
-        pipe.app.controller.engine.moving = True
+        pipe.app.controller.board.engine.moving = True
 
     with pytest.raises(LinkError, match=r"another board is on pipe now \(another, before") as caught:
         replay(board, stored, swap)
     assert "the last sample" in str(caught.value)
-    assert pipe.app.controller.engine.calls == []  # above all no stop
+    assert pipe.app.controller.board.engine.calls == []  # above all no stop
 
 
 @pytest.mark.slow
@@ -86,10 +86,10 @@ def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: P
     pipe = Pipe(tmp_path / "flash")
     board, _ = prepared(pipe)
     pipe.unplug_for(1.0)
-    pipe.swap_board(pipe.app.controller.board_id)
+    pipe.swap_board(pipe.app.controller.board.board_id)
     with pytest.raises(OtherBoardError, match="restarted"):
         board.home([1, 2, 3])
-    assert "home" not in pipe.app.controller.engine.calls
+    assert "home" not in pipe.app.controller.board.engine.calls
     assert board.session.reopen is not None
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
@@ -14,7 +14,7 @@ from armtempo.link import board_messages
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.report import comparison, run_report
+from armtempo.report import drawing, plots, run_report
 from armtempo_shared import wire
 from click.testing import CliRunner
 
@@ -38,20 +38,33 @@ def shown_safely(text: str) -> bool:
 
 
 @pytest.mark.slow
-def test_a_formula_in_a_name_is_text_in_every_figure(tmp_path: Path) -> None:
-    path = made_runs.make(tmp_path / "run", repetitions=1, plan=named(*FORMULAS))
+def test_formulas_and_control_characters_are_text_in_a_report(tmp_path: Path) -> None:
+    path = made_runs.make(tmp_path / "run", repetitions=1)
+    meta = json.loads((path / "run.json").read_text())
+    meta["name"] = meta["port"] = CONTROL[0] + CONTROL[-1]
+    for joint, name in zip(meta["joints"], (FORMULAS[0], FORMULAS[1] + CONTROL[0], FORMULAS[2]), strict=True):
+        joint["name"] = name
+    (path / "run.json").write_text(json.dumps(meta))
     result = CliRunner().invoke(main, ["report", str(path)])
     assert result.exit_code == 0, result.output
+    assert shown_safely(result.output)
+    drawn = {file.stem: file.read_text() for file in path.glob("*.svg")}
+    assert set(drawn) == {"tracking", "errors", "convergence", "postures"}
     page = (path / run_report.PAGE).read_text()
+    assert all(shown_safely(text) for text in (page, *drawn.values()))
     for name in FORMULAS:
-        assert f">{name}</text>" in (path / "tracking.svg").read_text()
-        assert f">{name}</td>" in page
-    assert f"> {FORMULAS[2]}</text>" in (path / "convergence.svg").read_text()  # its line is in the legend
-    other = shutil.copytree(path, tmp_path / "_other")
-    comparison.write([path, other], tmp_path / "two.html")
-    text = (tmp_path / "two.html").read_text()
+        assert f">{name}" in drawn["tracking"]
+        assert f">{name}" in page
+    assert f"> {FORMULAS[2]}</text>" in drawn["convergence"]  # its line is in the legend
+
+
+@pytest.mark.slow
+def test_a_name_with_an_underscore_first_is_in_a_comparison_s_legend() -> None:
+    line = np.arange(3.0)
+    drawn = plots.overlay({name: (line, np.zeros((3, 3)), line) for name in ("$$", "_other")})
+    text = drawing.inline_svg(drawn, "x", "")
     assert "> _other</text>" in text
-    assert "$$" in text
+    assert ">$$</text>" in text
 
 
 @pytest.mark.parametrize("name", CONTROL)
@@ -82,20 +95,6 @@ def test_a_trajectory_file_with_them_is_refused(tmp_path: Path, name: str) -> No
     with pytest.raises(InputError, match="control characters") as caught:
         Plan.load(path, altered=True)
     assert shown_safely(str(caught.value))
-
-
-@pytest.mark.slow
-def test_they_are_spelt_out_in_a_run_folder(tmp_path: Path) -> None:
-    path = made_runs.make(tmp_path / "run", repetitions=1, on_board=True)
-    meta = json.loads((path / "run.json").read_text())
-    meta["joints"][0]["name"] = meta["name"] = meta["port"] = CONTROL[0] + CONTROL[-1]
-    (path / "run.json").write_text(json.dumps(meta))
-    result = CliRunner().invoke(main, ["report", str(path)])
-    assert result.exit_code == 0, result.output
-    assert shown_safely(result.output)
-    files = [path / run_report.PAGE, *path.glob("*.svg")]
-    assert len(files) == 5
-    assert all(shown_safely(file.read_text()) for file in files)
 
 
 def test_what_a_board_says_cannot_steer_the_terminal() -> None:

@@ -17,7 +17,7 @@ from tests.system.commandline import Ended
 
 pytestmark = pytest.mark.xdist_group("demo")  # what they share is made once
 
-FIGURES = ("tracking", "errors", "motion", "convergence", "postures")
+FIGURES = ("tracking", "errors", "convergence", "postures")
 LIMITS = {"joint 1": (50.0, 50.0, 150.0), "joint 2": (40.0, 30.0, 120.0), "joint 3": (60.0, 40.0, 150.0)}
 """Speed, acceleration and jerk (Tables 5 and 7)."""
 BLOCKED = "raise ImportError('not here')\n"
@@ -58,7 +58,6 @@ def test_its_report_is_there(demo: tuple[Ended, Path]) -> None:
     assert "armtempo panel --port sim" in done.output
     assert (folder / PAGE).read_text(encoding="utf-8").count("<figure") == len(FIGURES)
     for name in FIGURES:
-        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert (folder / f"{name}.svg").stat().st_size > 0
 
 

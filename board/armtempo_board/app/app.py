@@ -17,6 +17,7 @@ from armtempo_shared.messages import MAX_PAYLOAD
 from micropython import const
 
 from armtempo_board import heap
+from armtempo_board.app.board import Board
 from armtempo_board.app.commands import Commands
 from armtempo_board.app.controller import Controller
 from armtempo_board.app.events import Events
@@ -35,7 +36,7 @@ class App:
 
     def __init__(self, stream: object, root: str, program_crc: int = 0, fault: int = 0) -> None:
         self.link = SerialLink(stream)
-        self.controller = Controller(root, program_crc, fault)
+        self.controller = Controller(Board(root, program_crc, fault))
         self.commands = Commands(self.controller, self.link)
         self.events = Events(self.controller, self.link)
         self.turns = self._failed = 0  # turns of the loop, and the last of them that failed
@@ -68,9 +69,10 @@ class App:
         if link.poll():
             controller.refill()
             self.commands.act()
-        if controller.engine:
+        board = controller.board
+        if board.engine:
             controller.service(time.ticks_diff(time.ticks_ms(), link.heard_ms))
-            self.events.note_fault(controller.fault())
+            self.events.note_fault(board.fault())
         if self.commands.greeted and self.events.push():
             controller.refill()
         link.flush()
@@ -78,7 +80,7 @@ class App:
             self._escape()
         for _ in range(_EXTRA_SERVICES_PER_TURN):
             if controller.moving():
-                controller.engine.service()
+                board.engine.service()
 
     def _escape(self) -> None:
         self.link.escape = False

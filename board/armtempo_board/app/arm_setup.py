@@ -12,7 +12,7 @@ from armtempo_shared.messages import ARM_RECORD_NAME
 from pyb import Pin, Timer
 
 from armtempo_board import features, heap
-from armtempo_board.app.arm_state import NEVER_MS
+from armtempo_board.app.board import NEVER_MS
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from armtempo_board.app.arm_state import ArmState
+    from armtempo_board.app.board import Board
     from armtempo_board.motion.arm_check import Record
 
 
-def take_stored(board: "ArmState") -> None:
+def take_stored(board: "Board") -> None:
     """Take the stored arm record; without one, or where it cannot be used, the board stays unconfigured.
 
     What stands in the flash never keeps the program from starting: ``arm_problem`` says what is wrong with it.
@@ -42,7 +42,7 @@ def take_stored(board: "ArmState") -> None:
         board.arm_problem = codes.NO_MEMORY if isinstance(error, MemoryError) else codes.FAILED
 
 
-def take_new(board: "ArmState") -> None:
+def take_new(board: "Board") -> None:
     """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
     board.arm_waits = False
     try:
@@ -59,7 +59,7 @@ def take_new(board: "ArmState") -> None:
         raise
 
 
-def _step(function: "Callable[..., Any]", board: "ArmState", *arguments: object) -> "Any":
+def _step(function: "Callable[..., Any]", board: "Board", *arguments: object) -> "Any":
     """One of the functions below; what it imports is given up."""
     try:
         return function(board, *arguments)
@@ -67,34 +67,34 @@ def _step(function: "Callable[..., Any]", board: "ArmState", *arguments: object)
         heap.forget()
 
 
-def _stored(board: "ArmState") -> bytes:
+def _stored(board: "Board") -> bytes:
     try:
         return bytes(board.store().read(ARM_RECORD_NAME))
     finally:
         board.forget_store()
 
 
-def _new(board: "ArmState") -> bytes:
+def _new(board: "Board") -> bytes:
     try:
         return bytes(board.store().new_arm())
     finally:
         board.drop_store()
 
 
-def _decide(board: "ArmState", is_fit: bool) -> None:
+def _decide(board: "Board", is_fit: bool) -> None:
     from armtempo_board.storage import store  # here, so that it can be forgotten
 
     store.Store(board.root, recover=False).take_arm(is_fit)
 
 
-def _checked(board: "ArmState", data: bytes) -> "Record":
+def _checked(board: "Board", data: bytes) -> "Record":
     """An arm record that can be taken, unpacked; else Refused."""
     from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 
     return arm_check.checked(data, board.workspace.room)
 
 
-def _take(board: "ArmState", record: "Record") -> None:
+def _take(board: "Board", record: "Record") -> None:
     head, joints, crc, outputs, inputs = record
     if crc == board.arm_crc:
         return
@@ -129,13 +129,13 @@ def _facts(record: "Record") -> "tuple[int, int]":
     return armrecord.without_limits(head, joints), head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
 
 
-def _share_room(board: "ArmState", joints: int) -> None:
+def _share_room(board: "Board", joints: int) -> None:
     from armtempo_board.app import room  # here, so that it can be forgotten
 
     room.share(board.workspace, joints)
 
 
-def _drop_engine(board: "ArmState") -> None:
+def _drop_engine(board: "Board") -> None:
     """Before another takes its place: the heap is to be as it was without one."""
     if board.engine:
         board.engine.close()
@@ -149,7 +149,7 @@ def _drop_engine(board: "ArmState") -> None:
     gc.collect()
 
 
-def drop_outputs(board: "ArmState") -> None:
+def drop_outputs(board: "Board") -> None:
     """Safe values, then release pins and timers."""
     outputs = board.outputs
     outputs.safe()

@@ -1,6 +1,6 @@
 """What the board does for each command of the message table; refusals are raised as ``Refused``.
 
-While a motion runs only the commands of ``_WHILE_MOVING`` and those of ``Controller.rows`` are taken, and all of them
+While a motion runs only the commands of ``_WHILE_MOVING`` and those of ``Board.rows`` are taken, and all of them
 but ``hello``, ``stop`` and ``speed`` allocate nothing. Those about the store and the drivers are in
 ``store_commands.py``, which is imported when one comes; those about outputs and inputs in ``output_commands.py``, which
 is there for arms that have any, and the one about sequences in ``sequence_command.py``, once one has been started.
@@ -55,6 +55,7 @@ class Commands:
         from armtempo_board.app.command_rows import ROWS
 
         self.controller = controller
+        self.board = controller.board
         self.greeted = False  # a host has said hello
         self.leaving = False  # a host has asked for the REPL
         self.link = link
@@ -85,7 +86,7 @@ class Commands:
             raise
 
     def _dispatch(self, number: int) -> None:
-        row = self._while_moving.get(number) or self.controller.rows.get(number)
+        row = self._while_moving.get(number) or self.board.rows.get(number)
         if row is None:
             if number not in self._numbers:
                 return self._refuse(number, _UNKNOWN)
@@ -106,7 +107,7 @@ class Commands:
         size = self._store(handler, row, length) if isinstance(handler, str) else handler(self, row, length)
         if size is not None and size < 0:
             return self._refuse(number, -size)
-        if self.controller.arm_waits:
+        if self.board.arm_waits:
             self.controller.take_new_arm()
         self.controller.refill()
         self.link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
@@ -168,12 +169,12 @@ class Commands:
             raise Refused(codes.PROTOCOL, value=PROTOCOL_VERSION)
         if not self.greeted or session != self._session:
             self._begin_session(session)
-        controller = self.controller
+        board, controller = self.board, self.controller
         controller.measure_free()
         size = self.reply(
             row,
             PROTOCOL_VERSION,
-            controller.joints,
+            board.joints,
             limits.MAX_ENCODERS,
             controller.state(),
             limits.TICK_HZ,
@@ -181,38 +182,38 @@ class Commands:
             step_rates.together,
             controller.free_flash,
             controller.free_heap,
-            controller.arm_crc,
-            controller.program_crc,
-            controller.boot,
-            controller.engine_room(),
-            features.BITS | (RATES_MEASURED if 0 < controller.joints <= step_rates.joints else 0),
-            controller.arm_problem,
-            controller.arm_value,
+            board.arm_crc,
+            board.program_crc,
+            board.boot,
+            board.engine_room(),
+            features.BITS | (RATES_MEASURED if 0 < board.joints <= step_rates.joints else 0),
+            board.arm_problem,
+            board.arm_value,
         )
-        return self.reply_tail(size, controller.board_id)
+        return self.reply_tail(size, board.board_id)
 
     def _begin_session(self, session: int) -> None:
         self.greeted = True
         self._session = session
         self.link.forget()
-        self.controller.samples.skip()
+        self.board.samples.skip()
         if features.SPEED:
             self.controller.forget_speed()
-        self.controller.forget_store()
+        self.board.forget_store()
 
     def status(self, row: tuple, length: int) -> int:
         """What it does, and where the joints stand."""
-        controller = self.controller
+        board, controller = self.board, self.controller
         reply = self.link.reply
-        samples = controller.samples
+        samples = board.samples
         pack_into(
             row[_ANSWER],
             reply,
             _ANSWER_AT,
             controller.state(),
-            controller.fault(),
-            controller.fault_joint(),
-            controller.known(),
+            board.fault(),
+            board.fault_joint(),
+            board.known(),
             controller.run_number,
             0,
             0,
@@ -223,7 +224,7 @@ class Commands:
             controller.rest_ms(),
         )
         size = calcsize(row[_ANSWER])
-        return size + controller.put_snapshot(reply, self._ticks_at, _ANSWER_AT + size)
+        return size + board.put_snapshot(reply, self._ticks_at, _ANSWER_AT + size)
 
     def leave(self, row: tuple, length: int) -> None:
         """The REPL is wanted."""
@@ -234,8 +235,8 @@ class Commands:
     def home(self, row: tuple, length: int) -> None:
         """Declare where joints stand."""
         (mask,) = self.fields(row)
-        joints = self.controller.joints
-        self.controller.check_ready()
+        joints = self.board.joints
+        self.board.check_ready()
         fixed = calcsize(row[_FIELDS])
         if length - fixed != _BYTES_PER_POSITION * joints or mask >> joints:
             raise Refused(codes.MALFORMED)
@@ -277,12 +278,12 @@ class Commands:
 
     def clear(self, row: tuple, length: int) -> None:
         """Clear the pending fault."""
-        self.controller.clear()
+        self.board.clear()
 
     def samples(self, row: tuple, length: int) -> int:
         """Acknowledge samples, and ask for some again."""
         data = self.link.reader.data
-        samples = self.controller.samples
+        samples = self.board.samples
         acknowledged = u32(data, PAYLOAD_AT)
         wanted_at = PAYLOAD_AT + _BYTES_OF_INDEX
         samples.acknowledge(acknowledged)

@@ -17,7 +17,7 @@ from armtempo_shared.messages import RESUME, SAMPLE_BRAKING, START_HELD, START_H
 from micropython import const
 
 from armtempo_board import features, heap
-from armtempo_board.app.arm_state import MOTION_CODE_BYTES, ArmState
+from armtempo_board.app.board import MOTION_CODE_BYTES
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -25,16 +25,18 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
+    from armtempo_board.app.board import Board
     from armtempo_board.storage.motion_file import MotionFile
 
 _PERMILLE = const(1000)
 
 
-class Controller(ArmState):
-    """See ``ArmState`` for its arguments."""
+class Controller:
+    """Of a board."""
 
-    def __init__(self, root: str, program_crc: int, fault: int) -> None:
-        super().__init__(root, program_crc, fault)
+    def __init__(self, board: "Board") -> None:
+        self.board = board
+        self.sequence: "Any" = None  # the one under way
         self.free_flash = 0
         self.free_heap = 0
         self.run_number = 0
@@ -53,17 +55,18 @@ class Controller(ArmState):
 
     def service(self, silent_ms: int) -> None:
         """Keep steps and samples coming; notice the end of a run, or that the host was silent for too long."""
-        self.engine.service()
+        board = self.board
+        board.engine.service()
         self._collect()
-        if features.OUTPUTS and self.outputs:
-            if self.fault():
-                self.outputs.safe()
-            self.inputs.poll(time.ticks_ms())
+        if features.OUTPUTS and board.outputs:
+            if board.fault():
+                board.outputs.safe()
+            board.inputs.poll(time.ticks_ms())
         if self.running:
-            if not self.engine.moving:
+            if not board.engine.moving:
                 self._end()
-            elif silent_ms > self.silence_ms and self._by_host and not self._braking:
-                self.pending = codes.LINK_LOST
+            elif silent_ms > board.silence_ms and self._by_host and not self._braking:
+                board.pending = codes.LINK_LOST
                 self.stop(0)
             elif (
                 features.JOG
@@ -72,19 +75,20 @@ class Controller(ArmState):
             ):
                 self.stop(0)
         if features.SEQUENCES and self.sequence:
-            if self.engine.moving:
+            if board.engine.moving:
                 self.sequence.prepare()
             else:
                 self.sequence.go_on()
 
     def refill(self) -> None:
         """What cannot wait for the end of longer work while something moves."""
-        if self.engine:
-            self.engine.refill()
+        if self.board.engine:
+            self.board.engine.refill()
 
     def _collect(self) -> None:
-        while self.engine.next_sample(self.raw):
-            self.samples.add(self.raw, SAMPLE_BRAKING if self._braking else 0)
+        board = self.board
+        while board.engine.next_sample(board.raw):
+            board.samples.add(board.raw, SAMPLE_BRAKING if self._braking else 0)
 
     def _end(self) -> None:
         self._collect()
@@ -93,26 +97,33 @@ class Controller(ArmState):
             heap.collect_often()
         self.running = False
         self._braking = False
-        if not self.fault():
+        if not self.board.fault():
             self.done = True
 
     def fail(self) -> None:
         """The program has failed: freeze, and INTERNAL is the pending fault."""
-        self.pending = codes.INTERNAL
-        if features.OUTPUTS and self.outputs:
-            self.outputs.safe()
-        if self.engine:
-            self.engine.freeze()
+        board = self.board
+        board.pending = codes.INTERNAL
+        if features.OUTPUTS and board.outputs:
+            board.outputs.safe()
+        if board.engine:
+            board.engine.freeze()
             self._withdraw_assumed()
 
     def halt(self) -> None:
         """Freeze what still moves, outputs to their safe values; the position stays known."""
         if features.SEQUENCES and self.sequence:
             self.sequence.stopping = True
-        if features.OUTPUTS and self.outputs:
-            self.outputs.safe()
-        if self.engine and self.engine.moving:
-            self.engine.freeze()
+        board = self.board
+        if features.OUTPUTS and board.outputs:
+            board.outputs.safe()
+        if board.engine and board.engine.moving:
+            board.engine.freeze()
+
+    def moving(self) -> bool:
+        """Whether steps may still come; a sequence has more to come while it waits."""
+        engine = self.board.engine
+        return engine is not None and (engine.moving or (features.SEQUENCES and self.sequence is not None))
 
     # what commands, button and prompt ask for
 
@@ -120,25 +131,25 @@ class Controller(ArmState):
         """Take the stored arm record, if there is one that can be taken."""
         from armtempo_board.app import arm_setup  # here, so that it can be forgotten
 
-        arm_setup.take_stored(self)
+        arm_setup.take_stored(self.board)
 
     def take_new_arm(self) -> None:
         """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
         from armtempo_board.app import arm_setup  # here, so that it can be forgotten
 
-        arm_setup.take_new(self)
+        arm_setup.take_new(self.board)
 
     def home(self, mask: int, steps: "Sequence[int]") -> None:
         """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
         from armtempo_board.app import run_start  # here, so that it can be forgotten
 
-        run_start.home(self, mask, steps)
+        run_start.home(self.board, mask, steps)
 
     def load(self, name: str, crc: "int | None" = None) -> "MotionFile":
         """The stored motion, checked as far as its head and checksum go, or refused."""
         from armtempo_board.app import run_start  # here, so that it can be forgotten
 
-        return run_start.opened(self, name, crc)
+        return run_start.opened(self.board, name, crc)
 
     def _assume(self, motion: "MotionFile", unknown: int) -> int:
         """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it.
@@ -147,23 +158,24 @@ class Controller(ArmState):
         """
         from armtempo_board.app import run_start  # here, so that it can be forgotten
 
-        self._assumed = run_start.assume(self, motion, unknown)
+        self._assumed = run_start.assume(self.board, motion, unknown)
         return run_start.moving(motion)
 
     def tidy(self) -> None:
         """Free what only the last commands needed: what comes then lies close to what stays."""
-        self.forget_store()
+        self.board.forget_store()
         heap.tidy()
 
     def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
         """Start a stored motion or sequence, or refuse. ``crc``: of the record that the host means; None: there is no
         host.
         """
-        self.check_ready()
+        board = self.board
+        board.check_ready()
         if flags & START_HELD and not features.JOG:
             raise Refused(codes.NEEDS_FIRMWARE)
         homing = bool(flags & START_HOMING)
-        unknown = self.everyone() & ~self.known()
+        unknown = board.everyone() & ~board.known()
         if unknown and not homing:
             raise Refused(codes.UNHOMED, _lowest(unknown))
         self._by_host = crc is not None
@@ -192,22 +204,22 @@ class Controller(ArmState):
 
         def _is_sequence(self, name: str) -> bool:
             self.tidy()
-            return bool(self.store().is_sequence(name))
+            return bool(self.board.store().is_sequence(name))
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a stored motion at ``rate`` thousandths of its speed, or refuse.
 
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
-        heap.collect_often(heap.OFTEN if self.workspace.is_short else heap.SELDOM)
+        heap.collect_often(heap.OFTEN if self.board.workspace.is_short else heap.SELDOM)
         self.tidy()
-        if self.workspace.is_short:
+        if self.board.workspace.is_short:
             heap.hold(MOTION_CODE_BYTES)  # before anything that the start needs can lie there
         try:
             motion = self.load(name, crc)
             self.tidy()
             homing = self._assume(motion, unknown) if flags & START_HOMING else 0
-            self.engine.load(motion, rate, None, homing)
+            self.board.engine.load(motion, rate, None, homing)
         except Refused:
             self._withdraw_assumed()
             heap.collect_often()
@@ -218,9 +230,9 @@ class Controller(ArmState):
 
     def start_loaded(self, motion: "MotionFile", flags: int) -> None:
         """Start what the engine has loaded; ``flags`` as for ``begin``."""
-        self.samples.clear()
+        self.board.samples.clear()
         self.done = False
-        self.duration_ticks = self.engine.rates.duration_ticks
+        self.duration_ticks = self.board.engine.rates.duration_ticks
         self.run_number += 1
         self._braking = False
         self._can_brake = motion.can_brake
@@ -230,32 +242,32 @@ class Controller(ArmState):
         if features.JOG:
             self._held = flags & START_HELD
             self.hold()
-        self.engine.start()
+        self.board.engine.start()
 
     def _withdraw_assumed(self) -> None:
         if self._assumed:
-            self.engine.known &= ~self._assumed
+            self.board.engine.known &= ~self._assumed
             self._assumed = 0
 
     def stop(self, now: int) -> None:
         """Brake along the path; freeze where ``now``, or where the motion has no way to. A sequence ends there."""
         if features.SEQUENCES and self.sequence:
             self.sequence.stopping = True
-            if not self.engine.moving:
+            if not self.board.engine.moving:
                 return
         self._braking = True
         self._held = 0
         if now or not self._can_brake:
-            self.engine.freeze()
+            self.board.engine.freeze()
         else:
-            self.engine.brake()
+            self.board.engine.brake()
 
     if features.SPEED:
 
         def change_speed(self, rate: int) -> None:
             """``rate`` thousandths (0: pause, RESUME: as before) for what moves, or for a host's next run."""
             if self.moving():
-                (self.sequence or self.engine).change_rate(rate)
+                (self.sequence or self.board.engine).change_rate(rate)
             elif rate in (0, RESUME):
                 raise Refused(codes.NOT_MOVING)
             else:
@@ -272,26 +284,28 @@ class Controller(ArmState):
     def measure_free(self) -> None:
         """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
         if not self.moving():
-            self.free_flash = self.store().free()
+            self.free_flash = self.board.store().free()
             self.free_heap = _free_heap()
 
     def speed(self) -> int:
         """The rate that is wanted of the motion's own time, in thousandths; 0 in a pause."""
-        return self.engine.rates.wanted if self.moving() else self._next_rate
+        return self.board.engine.rates.wanted if self.moving() else self._next_rate
 
     def rest_ms(self) -> int:
         """In how many milliseconds what moves rests after a stop, now or before; 0: at once."""
-        return self.engine.rest_ms() if self.engine and self.engine.moving else 0
+        engine = self.board.engine
+        return engine.rest_ms() if engine and engine.moving else 0
 
     def state(self) -> int:
         """Number of the state (messages.STATES)."""
         if self.moving():
             return messages.BRAKING if self._braking else messages.MOVING
-        if self.fault():
+        board = self.board
+        if board.fault():
             return messages.FAULT
-        if not self.engine:
+        if not board.engine:
             return messages.UNCONFIGURED
-        return messages.IDLE if self.known() == self.everyone() else messages.UNHOMED
+        return messages.IDLE if board.known() == board.everyone() else messages.UNHOMED
 
 
 def _lowest(mask: int) -> int:

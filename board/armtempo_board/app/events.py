@@ -22,6 +22,7 @@ class Events:
         from armtempo_shared.table import offset, rows  # here, so that it can be forgotten
 
         self._controller = controller
+        self._board = controller.board
         self._link = link
         found = {name: (number, layout) for name, number, layout, _, _ in rows("E")}
         self._sample, self._sample_layout = found["sample"]
@@ -54,13 +55,13 @@ class Events:
             self._controller.sequence.tell(self._link)
         if self._push_sample():
             return True
-        if self._controller.samples.waiting() < 0:
+        if self._board.samples.waiting() < 0:
             self._push_end()
         self._push_notice()
         return False
 
     def _push_sample(self) -> bool:
-        samples = self._controller.samples
+        samples = self._board.samples
         index = samples.waiting()
         size = self._slot_at + samples.size
         link = self._link
@@ -76,15 +77,17 @@ class Events:
         controller = self._controller
         if controller.done and self._room(self._done):
             controller.done = False
-            samples = controller.samples
+            samples = self._board.samples
             self._put(self._done, controller.run_number, 0, 0, samples.next, samples.lost)
         if self._fault_waits and self._room(self._fault):
             self._fault_waits = False
-            self._put(self._fault, controller.run_number, controller.fault(), controller.fault_joint(), 0, 0)
+            self._put(
+                self._fault, controller.run_number, self._board.fault(), self._board.fault_joint(), 0, 0
+            )
 
     def _room(self, event: "tuple[int, str, int]") -> int:
         _, layout, _ = event
-        return self._link.room(calcsize(layout) + _BYTES_PER_JOINT * self._controller.joints)
+        return self._link.room(calcsize(layout) + _BYTES_PER_JOINT * self._board.joints)
 
     def _put(self, event: "tuple[int, str, int]", *values: int) -> None:
         """``values``: of the event's fields; both times, which are 0 there, and the joints are put in here."""
@@ -93,7 +96,7 @@ class Events:
         at = link.payload()
         pack_into(layout, link.out, at, *values)
         size = calcsize(layout)
-        size += self._controller.put_snapshot(link.out, at + ticks_at, at + size)
+        size += self._board.put_snapshot(link.out, at + ticks_at, at + size)
         link.event(number, size)
 
     def _push_notice(self) -> None:

@@ -20,42 +20,34 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any, Protocol
 
-    class Controller(Protocol):
-        """What has outputs and inputs, see ``controller.Controller``."""
-
-        outputs: Any
-        inputs: Any
-
-        def fault(self) -> int: ...
+    from armtempo_board.app.board import Board
 
     class Caller(Protocol):
         """What is asked of the caller, see ``commands.Commands``."""
 
-        @property
-        def controller(self) -> Controller: ...
-
+        board: Board
         link: Any
 
 
 def output(commands: "Caller", row: tuple, length: int) -> int:
     """Set an output."""
-    controller = commands.controller
+    board = commands.board
     data = commands.link.reader.data
     number = data[PAYLOAD_AT]
-    if number >= len(controller.outputs.values):
+    if number >= len(board.outputs.values):
         return -codes.NO_OUTPUT
-    if controller.fault():
+    if board.fault():
         return -codes.FAULT_PENDING
-    controller.outputs.set(number, data[_VALUE_AT] | data[_VALUE_HIGH_AT] << 8)
+    board.outputs.set(number, data[_VALUE_AT] | data[_VALUE_HIGH_AT] << 8)
     return 0
 
 
 def inputs_and_outputs(commands: "Caller", row: tuple, length: int) -> int:
     """What the inputs are, and what the outputs are set to."""
     reply = commands.link.reply
-    reply[_ANSWER_AT] = commands.controller.inputs.levels
+    reply[_ANSWER_AT] = commands.board.inputs.levels
     size = _LEVELS_BYTES
-    for value in commands.controller.outputs.values:
+    for value in commands.board.outputs.values:
         pack_into("<H", reply, _ANSWER_AT + size, value)
         size += _BYTES_PER_VALUE
     return size

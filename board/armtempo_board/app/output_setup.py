@@ -9,23 +9,17 @@ from armtempo_board import heap
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any, Protocol
+    from typing import Any
 
+    from armtempo_board.app.board import Board
     from armtempo_board.hardware.digital_inputs import DigitalInputs
     from armtempo_board.hardware.outputs import Outputs
 
     Rows = list[dict[str, int]]
 
-    class Controller(Protocol):
-        """What has outputs and inputs, see ``controller.Controller``."""
 
-        outputs: Any
-        inputs: Any
-        rows: "dict[int, Any]"
-
-
-def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
-    """Give the controller the outputs, with their safe values, the inputs, and the commands about them.
+def attach(board: "Board", outputs: "Rows", inputs: "Rows") -> None:
+    """Give the board the outputs, with their safe values, the inputs, and the commands about them.
 
     ``outputs``, ``inputs``: rows of the arm record (``armrecord.OUTPUT``, ``INPUT``).
     """
@@ -33,11 +27,11 @@ def attach(controller: "Controller", outputs: "Rows", inputs: "Rows") -> None:
 
     from armtempo_board.app import output_commands
 
-    controller.outputs = outputs_of(outputs)
-    controller.inputs = inputs_of(inputs)
+    board.outputs = outputs_of(outputs)
+    board.inputs = inputs_of(inputs)
     handlers = output_commands.output, output_commands.inputs_and_outputs
     for (_, number, fields, _, tail), (_, _, values, _, _), handler in zip(rows("O"), rows("P"), handlers):
-        controller.rows[number] = (handler, fields, values, tail)
+        board.rows[number] = (handler, fields, values, tail)
     heap.forget(
         "output_commands", "outputs", "digital_inputs"
     )  # they stay, and are not known by name any more

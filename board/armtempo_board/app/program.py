@@ -59,11 +59,11 @@ def _build(port: "pyb.USB_VCP", root: str) -> App:
     crc = program_crc(armtempo_board.__file__, armtempo_shared.__file__)
     del program_crc
     built = App(port, root, crc, codes.WATCHDOG if has_reset() else 0)
-    built.controller.forget_store()
+    built.controller.board.forget_store()
     if features.ALL:
         from armtempo_board.storage import measured_rates  # here, so that it can be forgotten
 
-        measured_rates.read(root, built.controller.board_id, crc)
+        measured_rates.read(root, built.controller.board.board_id, crc)
     heap.forget()
     return built
 
@@ -104,7 +104,7 @@ def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
 
 def _replay_default() -> None:
     try:
-        app.controller.begin(app.controller.store().default(), 0)
+        app.controller.begin(app.controller.board.store().default(), 0)
     except Refused as refused:
         app.events.note("button: error %d" % refused.code)
 

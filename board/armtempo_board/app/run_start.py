@@ -12,18 +12,18 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from armtempo_board.app.arm_state import ArmState
+    from armtempo_board.app.board import Board
     from armtempo_board.storage.motion_file import MotionFile
 
 
-def opened(board: "ArmState", name: str, crc: "int | None") -> "MotionFile":
+def opened(board: "Board", name: str, crc: "int | None") -> "MotionFile":
     """The stored motion, checked as far as its head and checksum go, or Refused; ``crc``: see ``Controller.begin``."""
     store = board.store()
     gc.collect()  # what stays while it runs is to lie low
     return checked(board, store.motion(name), crc)
 
 
-def checked(board: "ArmState", motion: "MotionFile", crc: "int | None") -> "MotionFile":
+def checked(board: "Board", motion: "MotionFile", crc: "int | None") -> "MotionFile":
     """The motion, if it is the one that is meant, and for the board's arm; else Refused."""
     if crc is not None and motion.crc != crc:
         raise Refused(codes.BAD_CHECKSUM)
@@ -34,7 +34,7 @@ def checked(board: "ArmState", motion: "MotionFile", crc: "int | None") -> "Moti
     return motion
 
 
-def assume(board: "ArmState", motion: "MotionFile", unknown: int) -> int:
+def assume(board: "Board", motion: "MotionFile", unknown: int) -> int:
     """Declare that the joints stand where a homing motion begins; those that are not known to (one bit per joint).
 
     ``unknown``: joints of unknown position.
@@ -57,7 +57,7 @@ def moving(motion: "MotionFile") -> int:
     return found
 
 
-def home(board: "ArmState", mask: int, steps: "Sequence[int]") -> None:
+def home(board: "Board", mask: int, steps: "Sequence[int]") -> None:
     """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
     for joint in range(board.joints):
         row = board.engine.limits[joint]

@@ -50,13 +50,13 @@ class AheadSequencer(Sequencer):
 
         super().begin()
         controller = self._controller
-        joints = controller.joints
+        joints = controller.board.joints
         gc.collect()
         if hasattr(gc, "mem_free") and gc.mem_free() < _BESIDE_BYTES + ahead_bytes(joints):
             return
         try:
             ends = array("i", [MOST_STEPS] * (self._record.motions * joints))
-            self._prepared = NextMotion(controller.engine)
+            self._prepared = NextMotion(controller.board.engine)
             self._ends = ends  # where each motion was seen to end, steps; MOST_STEPS: not yet
         except MemoryError:  # it is not in one piece
             self._prepared = None
@@ -66,13 +66,13 @@ class AheadSequencer(Sequencer):
         self._replan_if_rate_changed()
         if self._work and self._prepared and not self.stopping and self._prepared.has_time():
             self._do_slice()
-            self._controller.engine.refill()
+            self._controller.board.engine.refill()
 
     def go_on(self) -> None:
         """See ``Sequencer``; in a wait there is time, too."""
         super().go_on()
         self._replan_if_rate_changed()
-        if self._work and not self._controller.engine.moving:
+        if self._work and not self._controller.board.engine.moving:
             self._do_slice()
 
     def _do_slice(self) -> None:
@@ -130,16 +130,16 @@ class AheadSequencer(Sequencer):
         return _NONE
 
     def _open(self, number: int) -> "MotionFile":
-        controller: "Any" = self._controller
+        board = self._controller.board
         name, crc = self._record.motion(number)
-        return checked(controller, store.Store(controller.root, recover=False).motion(name), crc)
+        return checked(board, store.Store(board.root, recover=False).motion(name), crc)
 
     def _stands_at(self, motion: "MotionHead", joint: int) -> int:
         """Where a joint will stand before it, in steps."""
-        engine = self._controller.engine
+        engine = self._controller.board.engine
         if not engine.moving:
             return int(engine.commanded(joint))
-        end = self._ends[self._running_index * self._controller.joints + joint]
+        end = self._ends[self._running_index * self._controller.board.joints + joint]
         return endpoints.start_offset(motion, joint, 0) if end == MOST_STEPS else end
 
     def _move(self, number: int) -> None:
@@ -151,7 +151,7 @@ class AheadSequencer(Sequencer):
         self._running_index = number
         if self._prepared and self._prepared_index == number and self._prepared.starts_from_here():
             motion = self._prepared.motion
-            self._controller.engine.load(motion, self._rate, self._prepared)
+            self._controller.board.engine.load(motion, self._rate, self._prepared)
             self._controller.start_loaded(motion, 0)
             self._drop()
         else:
@@ -162,9 +162,11 @@ class AheadSequencer(Sequencer):
     def _note_end(self) -> None:
         """Where the motion before ended: a posture between two steps leads to either."""
         if self._running_index != _NONE and self._prepared:
-            joints = self._controller.joints
+            joints = self._controller.board.joints
             for joint in range(joints):
-                self._ends[self._running_index * joints + joint] = self._controller.engine.commanded(joint)
+                self._ends[self._running_index * joints + joint] = self._controller.board.engine.commanded(
+                    joint
+                )
 
     def _end(self, ending: int, code: int = 0) -> None:
         self._drop()

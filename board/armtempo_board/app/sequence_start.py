@@ -27,10 +27,10 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, fla
     """
     if flags:
         raise Refused(codes.IS_SEQUENCE)
-    record = controller.store().sequence(name)
+    record = controller.board.store().sequence(name)
     if crc is not None and record.crc != crc:
         raise Refused(codes.BAD_CHECKSUM)
-    if record.arm_crc != controller.arm_crc:
+    if record.arm_crc != controller.board.arm_crc:
         raise Refused(codes.ARM_MISMATCH)
     try:
         check(record)
@@ -43,7 +43,7 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, fla
 
 def _kind(controller: "Runner") -> "type[Sequencer]":
     """One that prepares the next motion, where there is memory for it."""
-    if not controller.workspace.is_short:
+    if not controller.board.workspace.is_short:
         try:
             from armtempo_board.app.sequence_ahead import AheadSequencer  # here, so that it can be forgotten
 
@@ -68,7 +68,8 @@ class _Ends:
         self.first = [endpoints.at_start(motion, joint) for joint in joints]
         self.last = [endpoints.at_end(motion, joint) for joint in joints]
         self.away = [
-            endpoints.start_offset(motion, joint, controller.engine.commanded(joint)) for joint in joints
+            endpoints.start_offset(motion, joint, controller.board.engine.commanded(joint))
+            for joint in joints
         ]
 
     def check_follows(self, before: "_Ends", step: int) -> None:
@@ -81,8 +82,9 @@ class _Ends:
 def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[_Ends]") -> None:
     last = _NONE  # motion that was run last
     firsts: "list[int]" = []  # the first motion in each repeat that has begun
-    outputs = len(controller.outputs.values) if controller.outputs else 0
-    inputs = controller.inputs.count if controller.inputs else 0
+    board = controller.board
+    outputs = len(board.outputs.values) if board.outputs else 0
+    inputs = board.inputs.count if board.inputs else 0
     for index in range(record.rows):
         op, number, _, _, step = record.row(index)
         if op == sequence.MOVE:

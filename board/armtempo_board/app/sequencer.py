@@ -28,25 +28,16 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any, Protocol
 
+    from armtempo_board.app.board import Board
     from armtempo_board.storage.motion_file import MotionFile
     from armtempo_board.storage.sequence_file import SequenceFile
 
     class Runner(Protocol):
         """What is asked of who runs the motions, see ``controller.Controller``."""
 
-        engine: Any
-        outputs: Any
-        inputs: Any
+        board: Board
         sequence: Any
-        rows: dict[int, Any]
-        pending: int
         run_number: int
-        arm_crc: int
-        workspace: Any
-        joints: int
-        root: str
-
-        def store(self) -> Any: ...
 
         def load(self, name: str, crc: "int | None" = None) -> MotionFile: ...
 
@@ -55,8 +46,6 @@ if TYPE_CHECKING:
         def begin_motion(self, name: str, crc: "int | None", rate: int) -> None: ...
 
         def start_loaded(self, motion: MotionFile, flags: int) -> None: ...
-
-        def fault(self) -> int: ...
 
 
 _OP, _NUMBER, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(3), const(4)  # of a row
@@ -125,12 +114,12 @@ class Sequencer:
             controller.sequence = None
             heap.forget()
             raise Refused(codes.NO_SEQUENCE_ROOM, value=_START_BYTES - free)
-        heap.keep_code(not controller.workspace.is_short)
-        self._command.attach(controller.rows)
+        heap.keep_code(not controller.board.workspace.is_short)
+        self._command.attach(controller.board.rows)
 
     def change_rate(self, rate: int) -> None:
         """As the engine's; of the motions to come too, and while none moves."""
-        engine = self._controller.engine
+        engine = self._controller.board.engine
         if engine.moving:
             engine.change_rate(rate)
             self._rate = rate if 0 < rate < messages.RESUME else self._rate
@@ -145,8 +134,8 @@ class Sequencer:
     def go_on(self) -> None:
         """Called while nothing moves: end, wait on, or do what the next row says."""
         controller = self._controller
-        if controller.fault():
-            return self._end(sequence.FAULTED, controller.fault())
+        if controller.board.fault():
+            return self._end(sequence.FAULTED, controller.board.fault())
         if self.stopping:
             return self._end(sequence.STOPPED)
         if not self._is_over():
@@ -169,7 +158,7 @@ class Sequencer:
         record = self._record
         name, crc = record.motion(self._checked)
         try:
-            engine = self._controller.engine
+            engine = self._controller.board.engine
             check_splines(self._controller.load(name, crc), engine.drives, engine.limits)
         except Refused:
             for self.told[ROW] in range(record.rows):
@@ -192,7 +181,7 @@ class Sequencer:
         if op == sequence.MOVE:
             self._move(number)
         elif op == sequence.OUTPUT:
-            self._controller.outputs.set(number, value)
+            self._controller.board.outputs.set(number, value)
         elif op in (sequence.REPEAT, sequence.END):
             self.told[CYCLE] = (self.told[CYCLE] + value) & _MOST
         elif op == sequence.COUNT:
@@ -203,7 +192,7 @@ class Sequencer:
     def _move(self, number: int) -> None:
         """Begin a motion."""
         name, crc = self._record.motion(number)
-        engine = self._controller.engine
+        engine = self._controller.board.engine
         engine.skip_check = True
         try:
             self._controller.begin_motion(name, crc, self._rate)
@@ -218,7 +207,7 @@ class Sequencer:
         late = time.ticks_diff(time.ticks_ms(), self._since_ms) >= amount
         if op == sequence.WAIT:
             return late
-        if self._controller.inputs.level(number) == value & sequence.ACTIVE:
+        if self._controller.board.inputs.level(number) == value & sequence.ACTIVE:
             return True
         if not late or not amount:
             return False
@@ -228,7 +217,7 @@ class Sequencer:
         if then == sequence.STOP_THEN:
             self._end(sequence.TIMED_OUT)
         elif then == sequence.FAULT_THEN:
-            self._controller.pending = codes.INPUT_TIMEOUT  # the next turn ends it
+            self._controller.board.pending = codes.INPUT_TIMEOUT  # the next turn ends it
         return then == sequence.NEXT_THEN
 
     def _end(self, ending: int, code: int = 0) -> None:

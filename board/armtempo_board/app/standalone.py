@@ -38,15 +38,16 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
     nobody = _Nobody()
     app = program.app = program.app or App(nobody, root)
     controller = app.controller
+    board = controller.board
     port, app.link.stream = app.link.stream, nobody
     watchdog = Watchdog()
     micropython.kbd_intr(-1)  # KeyboardInterrupt could come in the midst of anything
     try:
-        _begin(controller, name or controller.store().default())
+        _begin(controller, name or board.store().default())
         _follow(app, controller, watchdog)
-        fault = controller.fault()
+        fault = board.fault()
         said = "fault: " + _name(fault) if fault else "done"
-        print(said, "at steps", [controller.engine.commanded(joint) for joint in range(controller.joints)])
+        print(said, "at steps", [board.engine.commanded(joint) for joint in range(board.joints)])
     except Refused as refused:
         joint = refused.joint
         where = "" if joint == NO_JOINT else "joint %d" % (joint + 1)
@@ -59,13 +60,14 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
 
 
 def _begin(controller: "Controller", name: str) -> None:
-    if not controller.fault():
-        unknown = controller.everyone() & ~controller.known()
+    board = controller.board
+    if not board.fault():
+        unknown = board.everyone() & ~board.known()
         if unknown:
             motion = controller.load(name)
             print("taking the posture of the arm as the start of", name)
             controller.home(
-                unknown, [endpoints.start_offset(motion, joint, 0) for joint in range(controller.joints)]
+                unknown, [endpoints.start_offset(motion, joint, 0) for joint in range(board.joints)]
             )
     controller.begin(name, 0)
 

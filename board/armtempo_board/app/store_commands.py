@@ -18,12 +18,12 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Protocol
 
-    from armtempo_board.app.controller import Controller
+    from armtempo_board.app.board import Board
 
     class Caller(Protocol):
         """What is asked of the caller, see ``commands.Commands``."""
 
-        controller: Controller
+        board: Board
 
         def fields(self, row: tuple) -> tuple: ...
 
@@ -39,26 +39,26 @@ if TYPE_CHECKING:
 def put_begin(commands: "Caller", row: tuple, length: int) -> None:
     """Begin an upload."""
     size, _ = commands.fields(row)
-    commands.controller.store().begin(commands.text(row, length), size)
+    commands.board.store().begin(commands.text(row, length), size)
 
 
 def put_data(commands: "Caller", row: tuple, length: int) -> int:
     """Add a piece to it."""
     (offset,) = commands.fields(row)
-    return commands.reply(row, commands.controller.store().write(offset, commands.tail(row, length)))
+    return commands.reply(row, commands.board.store().write(offset, commands.tail(row, length)))
 
 
 def put_commit(commands: "Caller", row: tuple, length: int) -> None:
     """Check it and put it in place; an arm record is taken when this has returned."""
     (crc,) = commands.fields(row)
-    controller = commands.controller
-    controller.arm_waits = controller.store().commit(crc) == ARM_RECORD_NAME
+    board = commands.board
+    board.arm_waits = board.store().commit(crc) == ARM_RECORD_NAME
 
 
 def list(commands: "Caller", row: tuple, length: int) -> int:
     """One of the stored motions and sequences, and how many there are."""
     (index,) = commands.fields(row)
-    store = commands.controller.store()
+    store = commands.board.store()
     names = store.names()
     if index >= len(names):
         raise Refused(codes.NOT_FOUND)
@@ -80,14 +80,14 @@ def list(commands: "Caller", row: tuple, length: int) -> int:
 
 def remove(commands: "Caller", row: tuple, length: int) -> None:
     """Remove a motion."""
-    commands.controller.store().remove(commands.text(row, length))
+    commands.board.store().remove(commands.text(row, length))
 
 
 def rename(commands: "Caller", row: tuple, length: int) -> None:
     """Give a motion another name."""
     (old_length,) = commands.fields(row)
     names = commands.text(row, length)
-    commands.controller.store().rename(names[:old_length], names[old_length:])
+    commands.board.store().rename(names[:old_length], names[old_length:])
 
 
 def get(commands: "Caller", row: tuple, length: int) -> int:
@@ -95,19 +95,19 @@ def get(commands: "Caller", row: tuple, length: int) -> int:
     offset, wanted = commands.fields(row)
     fixed = commands.reply(row, 0)
     wanted = min(wanted, MAX_PAYLOAD - _NUMBER_BYTES - fixed)
-    size, data = commands.controller.store().part(commands.text(row, length), offset, wanted)
+    size, data = commands.board.store().part(commands.text(row, length), offset, wanted)
     commands.reply(row, size)
     return commands.reply_tail(fixed, data)
 
 
 def set_default(commands: "Caller", row: tuple, length: int) -> None:
     """Make a motion the one that the button starts."""
-    commands.controller.store().set_default(commands.text(row, length))
+    commands.board.store().set_default(commands.text(row, length))
 
 
 def drivers(commands: "Caller", row: tuple, length: int) -> None:
     """The motors' current on or off."""
     (on,) = commands.fields(row)
-    controller = commands.controller
-    controller.check_ready()
-    controller.engine.drivers(on)
+    board = commands.board
+    board.check_ready()
+    board.engine.drivers(on)

@@ -66,7 +66,7 @@ _IN_FIRMWARE = (
 """Modules of what the core is without: there is no heap for these if it is in files (board/docs/memory.md)."""
 _AT_REST = {
     "start_up": (
-        "app.arm_state.ArmState.__init__",
+        "app.board.Board.__init__",
         "app.commands.Commands.__init__",
         "app.events.Events.__init__",
         "hardware.sampler.Sampler.__init__",

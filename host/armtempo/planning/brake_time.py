@@ -106,10 +106,14 @@ def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array) -> Array:
     _lift(table, place, needed)
     table = np.minimum(np.ceil(table), _LONGEST)
     place = np.arange(2 * _STARTS * parts + 1) / (2 * _STARTS)
+    length_s = np.zeros(len(place))
+    found = np.zeros(len(place), bool)
     while True:
-        length_s = UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), table)
-        excess = ramps.excess(place / parts, length_s, rates)
-        if not np.any(found := (excess > EXCESS) & (length_s < UNIT_S * _LONGEST)):
+        before_s, length_s = length_s, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), table)
+        new = np.flatnonzero(length_s != before_s)
+        found[new] = ramps.excess(place[new] / parts, length_s[new], rates) > EXCESS
+        found &= length_s < UNIT_S * _LONGEST
+        if not np.any(found):
             return table
         _lift(table, place, np.where(found, _LONGER * length_s / UNIT_S, 0.0))
         table = np.minimum(np.ceil(table), _LONGEST)
@@ -136,8 +140,9 @@ class _Ramps:
         self._allowed = allowed
         time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
         # speeds, accelerations and jerks over their limits' units; rest after the end
-        self._motion = np.stack([trajectory(time, order) for order in (1, 2, 3)], axis=1)  # (T, 3, J)
-        self.worst_of_motion = float(np.max(np.abs(self._motion[:, 1:]) / allowed.T[1:]))
+        # (3, J, T): what is computed for each time stands together, which NumPy goes through quickest
+        self._motion = np.stack([trajectory(time, order).T for order in (1, 2, 3)])
+        self.worst_of_motion = float(np.max(np.abs(self._motion[1:]) / allowed.T[1:, :, None]))
 
     def shortest_s(self, starts: Array, rates: Rates, least_s: Array) -> Array:
         """From ``least_s`` on, to 1 %, for each of ``starts``, parts of the motion's time."""
@@ -163,23 +168,23 @@ class _Ramps:
         length = length_s[:, None]
         for before, after in rates:
             change = after - before
-            rate = (before + change * x**3 * (10 - 15 * x + 6 * x**2))[:, None]
-            rate1 = (change * 30 * x**2 * (1 - x) ** 2 / length)[..., None]
-            rate2 = (change * 60 * x * (1 - x) * (1 - 2 * x) / length**2)[..., None]
+            rate = before + change * x**3 * (10 - 15 * x + 6 * x**2)
+            rate1 = change * 30 * x**2 * (1 - x) ** 2 / length
+            rate2 = change * 60 * x * (1 - x) * (1 - 2 * x) / length**2
             passed = before * x + change * x**4 * (2.5 - 3 * x + x**2)
             speed, acceleration, jerk = self._at(self._duration_s * starts[:, None] + length * passed)
             changed2 = acceleration * rate**2 + speed * rate1
             changed3 = jerk * rate**3 + 3 * acceleration * rate * rate1 + speed * rate2
             for changed, limit in ((changed2, self._allowed[:, 1]), (changed3, self._allowed[:, 2])):
-                worst = np.maximum(worst, np.max(np.abs(changed) / limit, axis=(1, 2)))
+                over = np.max(np.abs(changed), axis=2) / limit[:, None]
+                worst = np.maximum(worst, np.max(over, axis=0))
         return worst
 
     def _at(self, time_s: Array) -> tuple[Array, Array, Array]:
-        """Speed, acceleration and jerk at times, each (..., J)."""
+        """Speed, acceleration and jerk at times, each (J, ...)."""
         place = time_s * ((_SAMPLES - 1) / self._duration_s)
         before = np.minimum(place.astype(int), _SAMPLES - 2)
-        part = (place - before)[..., None, None]
-        values = self._motion[before]
-        values += part * (self._motion[before + 1] - values)
-        values[place > _SAMPLES - 1] = 0.0
-        return values[..., 0, :], values[..., 1, :], values[..., 2, :]
+        values = self._motion.take(before, axis=2)
+        values += (place - before) * (self._motion.take(before + 1, axis=2) - values)
+        np.copyto(values, 0.0, where=place > _SAMPLES - 1)
+        return values[0], values[1], values[2]

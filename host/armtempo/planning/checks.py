@@ -108,15 +108,15 @@ def leads_tool(job: Job) -> bool:
 
 def _check_ways(job: Job, where: str) -> None:
     """InputError for lines and speeds of the tool that do not go together with the rest of the job."""
-    if is_free(job):
-        raise InputError(
-            f"{where}: lines and speeds of the tool need a path that is fixed before its time",
-            'take path = "through", or leave them out',
-        )
     if job.timing != "shared" or job.degree != 5:
         raise InputError(
             f'{where}: lines and speeds of the tool need timing = "shared" and degree 5',
             "leave timing and degree out",
+        )
+    if is_free(job) and (job.corridor_deg is not None or job.corridor_mm is not None):
+        raise InputError(
+            f"{where}: lines and speeds of the tool do not go together with a corridor",
+            "leave one of them out",
         )
     vias = [way.via for way in job.ways]
     if vias != sorted(set(vias)) or (vias and vias[-1] >= len(job.via)):
@@ -131,11 +131,6 @@ def _check_ways(job: Job, where: str) -> None:
                 "leave it out: the motion rests there; or give the next via point line = true",
             )
     for stop in job.stops:
-        if stop.dwell_s > 0.0:
-            raise InputError(
-                f"{where}: lines of the tool and dwell_s do not go together",
-                "leave dwell_s out, or wait in a sequence",
-            )
         if any(way.blend_mm and way.via == stop.via for way in job.ways):
             raise InputError(
                 f"{where}: the motion cannot rest at P{stop.via} and cut its corner", "leave one out"

@@ -32,8 +32,10 @@ _LEFT, _RIGHT, _BOTTOM, _TOP, _BETWEEN = 0.85, 0.15, 0.5, 0.3, 0.35
 """Inches beside a joint's axes, for labels of up to six digits, and between two rows."""
 
 
-def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Any]:
-    """A figure and its axes, an array (rows, columns).
+def new_figure(
+    rows: int, columns: int, width: float, height: float, share: bool = False
+) -> tuple[Figure, Any]:
+    """A figure and its axes, an array (rows, columns); ``share``: one time axis below each column, half the work.
 
     Raises MissingPackageError if matplotlib is not installed.
     """
@@ -42,13 +44,13 @@ def new_figure(rows: int, columns: int, width: float, height: float) -> tuple[Fi
     except ImportError:
         raise MissingPackageError("a figure", "matplotlib", "plot") from None
     figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots(rows, columns, squeeze=False)
+    return figure, figure.subplots(rows, columns, squeeze=False, sharex="col" if share else False)
 
 
 def _joint_figure(rows: int, names: Sequence[str], height: float) -> tuple[Figure, Any]:
     """A figure with a column for each joint, laid out by fixed margins: measuring all labels takes a second."""
     columns, width = len(names), 3.4 * len(names) + 0.6
-    figure, axes = new_figure(rows, columns, width, height)
+    figure, axes = new_figure(rows, columns, width, height, share=True)
     figure.set_layout_engine(None)
     wide = (width - _LEFT - _RIGHT - (columns - 1) * (_LEFT + _RIGHT)) / columns
     high = (height - _BOTTOM - _TOP - (rows - 1) * _BETWEEN) / rows
@@ -77,26 +79,23 @@ def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str
 
 
 def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
-    """Measured mean with its standard error as a band, against theory (Figs. 11 and 12).
+    """Measured mean with its standard error as a band, against theory (Figs. 11 and 12), and the jerk of the plan.
 
     Of a joint without an encoder the command; ``limits`` may be empty.
     """
-    figure, axes = _joint_figure(3, names, 6.5)
+    figure, axes = _joint_figure(4, names, 8.0)
     times: Array = np.linspace(0.0, max(trajectory.duration_s, found.times_s[-1]), _POINTS)
     if np.array_equal(found.path_s, found.times_s):
-        path_s = times
+        planned = [trajectory(times, order) for order in range(4)]
     else:
         times = times[times <= found.times_s[-1]]
-        path_s = np.interp(times, found.times_s, found.path_s)
-    curves = stretched.theory(trajectory, times, path_s)
-    for order in range(3):
-        theory = curves[order]
+        slower = stretched.theory(trajectory, times, np.interp(times, found.times_s, found.path_s))
+        jerk = np.gradient(slower[2], times, axis=0) if len(times) > 1 else np.zeros_like(slower[2])
+        planned = [*slower, jerk]
+    for order, theory in enumerate(planned):
         for joint, axis in enumerate(axes[order]):
-            colour = COLOURS[joint % len(COLOURS)]
-            mean, sem = found.mean[order, :, joint], found.sem[order, :, joint]
-            axis.fill_between(found.times_s, mean - sem, mean + sem, color=colour, alpha=0.3, linewidth=0)
-            seen = "measured" if found.measured[joint] else "commanded"
-            axis.plot(found.times_s, mean, color=colour, label=seen)
+            if order < len(found.mean):
+                _draw_mean(axis, found, order, joint)
             axis.plot(times, theory[:, joint], ":", color=PAGE_COLOUR, label="planned")
             if limits:
                 _mark_limits(axis, limits[joint], order)
@@ -104,6 +103,13 @@ def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], na
         axis.legend(frameon=False)
     _label(axes, _LABELS)
     return figure
+
+
+def _draw_mean(axis: Axes, found: Curves, order: int, joint: int) -> None:
+    colour = COLOURS[joint % len(COLOURS)]
+    mean, sem = found.mean[order, :, joint], found.sem[order, :, joint]
+    axis.fill_between(found.times_s, mean - sem, mean + sem, color=colour, alpha=0.3, linewidth=0)
+    axis.plot(found.times_s, mean, color=colour, label="measured" if found.measured[joint] else "commanded")
 
 
 def errors(found: Curves, names: Sequence[str]) -> Figure:
@@ -138,7 +144,7 @@ def torque(found: MotorTorques, enough: float) -> Figure:
 
 def overlay(runs: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
     """One joint of several runs: times (K,), mean angle, speed, acceleration (3, K), angle error (K,)."""
-    figure, axes = new_figure(4, 1, 4.8, 8.0)
+    figure, axes = new_figure(4, 1, 4.8, 8.0, share=True)
     for index, (name, (times, mean, error)) in enumerate(runs.items()):
         for axis, values in zip(axes[:, 0], (*mean, error), strict=True):
             axis.plot(times, values, color=COLOURS[index % len(COLOURS)], label=_shown(name))

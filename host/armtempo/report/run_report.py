@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 PAGE = "report.html"
 _HEADINGS = {
-    "motion": "The plan",
     "torque": "Torque",
     "convergence": "The search",
     "postures": "The arm along its path",
@@ -32,15 +31,14 @@ _PATH_POINTS = 300
 
 
 def write(folder: Path) -> Path:
-    """Write report.html and its figures (PNG and SVG) into the run folder; returns the page's path.
+    """Write report.html and its figures (SVG) into the run folder; returns the page's path.
 
     Raises RunFolderError if it is not known what was to move, or there is not one sample.
     """
     found = evaluate(folder)
     drawn = figures(found)
     for name, (figure, _) in drawn.items():
-        for suffix in (".png", ".svg"):
-            drawing.save(figure, folder / f"{name}{suffix}")
+        drawing.save(figure, folder / f"{name}.svg")
     path = folder / PAGE
     replace_text(path, render(found, drawn))
     return path
@@ -59,7 +57,6 @@ def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
             plots.errors(found.curves, names),
             f"{_what_is_seen(found)} minus planned angle: every repetition (pale) and their mean.",
         ),
-        "motion": (plots.motion(trajectory, limits, names), "The planned motion and its limits (dashed)."),
     }
     if found.plan and found.plan.searches:
         histories = {_serves(names, search.joints): search.history_s for search in found.plan.searches}
@@ -113,18 +110,18 @@ def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
     for name, (figure, caption) in drawn.items():
         if name in _HEADINGS:
             sheet.heading(_HEADINGS[name])
-        if name == "motion":
-            _before_motion(sheet, found)
         sheet.figure(drawing.inline_svg(figure, name, caption), caption)
-        if name == "motion" and found.plan:
-            plan_section.timing(sheet, found.plan)
+        if name == "errors":
+            _planned(sheet, found)
     _origin(sheet, found)
     return sheet.render()
 
 
-def _before_motion(sheet: html_page.Page, found: Evaluation) -> None:
+def _planned(sheet: html_page.Page, found: Evaluation) -> None:
+    sheet.heading("The plan")
     if found.plan:
         plan_section.extremes(sheet, found.plan)
+        plan_section.timing(sheet, found.plan)
         return
     sheet.note(
         f"How this motion was planned is not known: it was on the board, and is read back from its record. It lasts "

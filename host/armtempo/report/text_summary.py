@@ -13,6 +13,7 @@ from armtempo.formats.text import aligned
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, path_deviation, torque
+from armtempo.planning.free import free_plan
 from armtempo.runs.replayed import JointResult
 
 _HEAD = (
@@ -27,6 +28,8 @@ _FLOORS = {
     "vias": "through the via angles of a joint under its speed, acceleration and jerk limits, whatever the path",
 }
 """What ``Search.floor_kind`` means."""
+_WORTH_SAYING = 0.03
+"""A free path is named where it might save more than this part of the motion time."""
 
 
 def lines(plan: Plan) -> list[str]:
@@ -39,6 +42,7 @@ def lines(plan: Plan) -> list[str]:
     text.extend(aligned([*_HEAD, *(_row(plan, joint) for joint in range(len(plan.extremes)))], _WIDTHS))
     for kind in sorted({search.floor_kind for search in plan.searches}):
         text.append(f"floor: least time {_FLOORS[kind]}")
+    text.extend(_free_path(plan))
     text.extend(_polished(search) for search in plan.searches if search.optimum_s)
     text.extend(_started(search) for search in plan.searches if len(search.starts_s))
     if job.timing == "per-joint" and len(plan.searches) > 1:
@@ -120,6 +124,20 @@ def _polished(search: Search) -> str:
         f"polished, driven joint {joints}: {search.searched_s:.4f} s to {search.total_s:.4f} s, "
         f"within {gap:.1e} of the best nearby with {len(search.intervals_s)} variables"
     )
+
+
+def _free_path(plan: Plan) -> list[str]:
+    """What a free path could save at most; nothing where that is little or the job gives the path."""
+    job, total_s = plan.job, plan.trajectory.duration_s
+    if job.path != "through" or checks.leads_tool(job):
+        return []
+    floor_s = free_plan.floor_of(plan.arm, job, plan.via_deg, [*range(len(plan.arm.driven))]).time_s
+    if (saved := 1.0 - floor_s / total_s) <= _WORTH_SAYING:
+        return []
+    return [
+        f'path = "free" may save up to {100.0 * saved:.0f} %: no path through the via points takes less than '
+        f"{floor_s:.4f} s"
+    ]
 
 
 def _separation(plan: Plan) -> list[str]:

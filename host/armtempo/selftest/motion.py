@@ -1,4 +1,4 @@
-"""The motion of the self-test: all joints of the board's arm together, a few steps from rest to rest."""
+"""The motions of the self-test: joints of the board's arm, a few steps from rest to rest."""
 
 from __future__ import annotations
 
@@ -25,6 +25,10 @@ _PEAK = 1.875
 _ABOVE = 1.01
 """A joint's limit is this much above the rate that is wanted, so that rounding does not exceed it."""
 _GENTLE = 0.5
+_SLOT = _DEGREE + 1
+"""Segments for each joint that moves alone: as many as one control point acts on, and one at rest."""
+_LOOKS = 1000
+"""Moments of a motion at which its speed is looked at."""
 _COUNTS, _LEAST_STEPS = 8, 20
 """A gentle motion turns an encoder by so much, or a joint by so many steps."""
 
@@ -46,17 +50,38 @@ def limit(rate: float) -> int:
     return math.ceil(rate * _ABOVE)
 
 
-def make(joints: Sequence[dict[str, Any]], forward: bool) -> TestMotion:
+def make(joints: Sequence[dict[str, Any]]) -> TestMotion:
     """Quick, for drivers that are off: faster than the joints may be. ``joints``: rows of the arm record."""
-    counts = [_MOST_STEPS - _FEWER * number for number in range(len(joints))]
-    return _of(joints, counts, DURATION_S, forward)
+    ends = _about_middle(joints, _quick(joints))
+    return _of(joints, [bspline.fit(end, _DEGREE) for end in ends], ends, [DURATION_S])
+
+
+def back_in_turn(joints: Sequence[dict[str, Any]]) -> TestMotion:
+    """Back, so that each channel is alone on its pin: a joint stands while another one moves."""
+    ends = [(end, start) for start, end in _about_middle(joints, _quick(joints))]
+    size = _SLOT * len(joints) + _DEGREE
+    points = []
+    for number, (start, end) in enumerate(ends):
+        before = _SLOT * number + _DEGREE  # control points: it moves in the segments that have some of both
+        points.append(np.array([start] * before + [end] * (size - before), dtype=float))
+    return _of(joints, points, ends, [DURATION_S / _SLOT] * (_SLOT * len(joints)))
 
 
 def gentle(joints: Sequence[dict[str, Any]]) -> TestMotion:
     """So slow and small that no harm is done where the drivers are on: towards more steps, in the joints' ranges."""
     counts = [min(_steps_to_see(joint), joint["max_steps"] - joint["min_steps"]) for joint in joints]
     slowest = min(joint["max_rate"] / max(count, 1) for joint, count in zip(joints, counts, strict=True))
-    return _of(joints, counts, max(DURATION_S, _PEAK / (_GENTLE * slowest)), True)
+    ends = _about_middle(joints, counts)
+    return _of(
+        joints,
+        [bspline.fit(end, _DEGREE) for end in ends],
+        ends,
+        [max(DURATION_S, _PEAK / (_GENTLE * slowest))],
+    )
+
+
+def _quick(joints: Sequence[dict[str, Any]]) -> list[int]:
+    return [_MOST_STEPS - _FEWER * number for number in range(len(joints))]
 
 
 def _steps_to_see(joint: dict[str, Any]) -> int:
@@ -65,26 +90,33 @@ def _steps_to_see(joint: dict[str, Any]) -> int:
     return int(min(max(needed, _LEAST_STEPS), _MOST_STEPS))
 
 
-def _of(
-    joints: Sequence[dict[str, Any]], counts: Sequence[int], duration_s: float, forward: bool
-) -> TestMotion:
-    """All joints together, about the middle of each range."""
+def _about_middle(joints: Sequence[dict[str, Any]], counts: Sequence[int]) -> list[tuple[int, int]]:
+    """Start and end of each joint, so many steps apart, about the middle of its range."""
     lows = [
         (joint["max_steps"] + joint["min_steps"] - count) // 2
         for joint, count in zip(joints, counts, strict=True)
     ]
-    ends = [
-        (low, low + count) if forward else (low + count, low) for low, count in zip(lows, counts, strict=True)
-    ]
-    times = time_axis.control_points([duration_s], _DEGREE)
-    splines = [JointSpline(_DEGREE, 1, bspline.fit(end, _DEGREE), times) for end in ends]
+    return [(low, low + count) for low, count in zip(lows, counts, strict=True)]
+
+
+def _of(
+    joints: Sequence[dict[str, Any]],
+    points: Sequence[Array],
+    ends: Sequence[tuple[int, int]],
+    intervals_s: Sequence[float],
+) -> TestMotion:
+    """``points``: control points of each joint, steps; ``ends``: first and last step; ``intervals_s``: of segments."""
+    times = time_axis.control_points(intervals_s, _DEGREE)
+    splines = [JointSpline(_DEGREE, 1, one, times) for one in points]
     angles = [_fixed(spline.angle_points_deg, STEP_FRACTION_BITS) for spline in splines]
     axis = _fixed(times * TICK_HZ, TICK_FRACTION_BITS)
     record = motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.NO_RAMPS, 0)
+    duration_s = sum(intervals_s)
     steps = [_crossings_s(spline, *end, duration_s) for spline, end in zip(splines, ends, strict=True)]
+    looks = np.linspace(0.0, duration_s, _LOOKS)
     rates = [
-        max(joint["max_rate"], limit(_PEAK * count / duration_s))
-        for joint, count in zip(joints, counts, strict=True)
+        max(joint["max_rate"], limit(float(np.max(np.abs(spline(looks, 1))))))
+        for joint, spline in zip(joints, splines, strict=True)
     ]
     return TestMotion([end[0] for end in ends], record, steps, rates)
 

@@ -71,7 +71,8 @@ def _figures(data: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
         axis.set(xlabel="time of the step, ms", ylabel="captured − planned, µs")
         axis.legend()
         yield "Step times", _svg(figure, "steps"), "Each step of the motion there, captured on its pin."
-    if took := data.get(SAFETY, {}).get("cycles"):
+    stops = data.get(SAFETY, {})
+    if took := stops.get("cycles", []) + stops.get("edge_cycles", []):
         figure = Figure(figsize=(7, 2.2), layout="constrained")
         axis = figure.add_subplot()
         axis.hist([cycles / CYCLES_PER_US for cycles in took], bins=20, color="tab:blue")

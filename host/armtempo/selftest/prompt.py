@@ -28,6 +28,15 @@ CONTINUE = "import armtempo_board\narmtempo_board.start()"
 """The board program continues as it was before it was left; only before a soft reset."""
 RESET = "import machine\nmachine.reset()"
 """As the reset button: the program starts anew, and nothing is left of what was done at the prompt."""
+WATCHDOG_RESET = f"""import machine, time
+from armtempo_board.app.watchdog import _kept
+if _kept: _kept.deinit()
+machine.WDT(timeout=100)
+time.sleep(2)
+{RESET}"""
+"""The same by the watchdog, which nobody feeds; by ``RESET`` where it does not come."""
+PARTS = ("drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep")
+"""By their numbers, from 1 on, the board remembers over a reset which one it is in."""
 
 
 class PartError(LinkError):
@@ -67,7 +76,10 @@ class Prompt:
         """Send files of ``on_board`` and call ``measure`` of the last one with these arguments."""
         part = parts[-1]
         text = "".join((_FOLDER / f"{name}.py").read_text(encoding="utf-8") for name in ("common", *parts))
-        return self._run(part, f"{text}\ntell(measure(**{arguments!r}))\n")
+        number = PARTS.index(part) + 1
+        return self._run(
+            part, f"{text}\nnoted = note({number})\ntry: tell(measure(**{arguments!r}))\nfinally: note(0)\n"
+        )
 
     def rates(self) -> dict[str, float]:
         """Kilobytes a second, from the board and to it."""

@@ -10,6 +10,7 @@ from armtempo_shared import codes
 from armtempo_shared.meanings import ERRORS
 
 from armtempo.basics.arrays import Array
+from armtempo.diagnosis.finding import Level
 from armtempo.selftest.motion import TestMotion
 from armtempo.selftest.prompt import Measured
 from armtempo.selftest.result import Measurement, judged
@@ -55,7 +56,7 @@ def judge(
 ) -> Iterator[Measurement]:
     """Lines about ``measured`` of ``on_board/pulses.py``, which ran ``motion``."""
     values = measured.values
-    way = "forward" if forward else "back"
+    way = "forward together" if forward else "back alone"
     if values["fault"]:
         name, meaning, cure = ERRORS[values["fault"]]
         yield judged(PULSES, f"motion {way}", f"fault {name}: {meaning}", "no fault", False, cure)
@@ -75,9 +76,9 @@ def judge(
     yield judged(
         PULSES,
         f"DIR of the joints, {way}",
-        "never seen" if values["directions"] is None else str(values["directions"])[1:-1],
+        str(values["directions"])[1:-1],
         str(levels)[1:-1],
-        values["directions"] in (levels, None),
+        values["directions"] == levels,
         "look for a short at the DIR pins, see 'armtempo help hardware'",
     )
 
@@ -140,24 +141,23 @@ def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
 
 def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
     """Lines about what ``on_board/estop.py`` measured."""
-    took_us = np.array(values["cycles"]) / CYCLES_PER_US
-    gone_on = int(np.sum(took_us < 0))
     wrong = sum(fault != codes.ESTOP for fault in values["faults"])
+    yield _stops("by software", values["cycles"])
+    if values["edge_cycles"]:
+        yield _stops("by an edge", values["edge_cycles"])
+    else:
+        yield Measurement(
+            SAFETY, "E-stop by an edge", "left out: what is wired to PE15 holds it", "", Level.NOTE,
+            "press it in 'armtempo selftest --with-motors'",
+        )  # fmt: skip
+    end = values["starved"]
+    name, _, _ = ERRORS.get(end["fault"], ("none", "", ""))
     yield judged(
         SAFETY,
-        f"E-stop to frozen outputs, {len(took_us)} times",
-        f"worst {took_us.max():.1f} us" + (f", {gone_on} times they went on" if gone_on else ""),
-        f"below {_SLOWEST_STOP_US:g} us each time",
-        not gone_on and float(took_us.max()) < _SLOWEST_STOP_US,
-        "do not connect drivers: the E-stop does not stop the pulses; please report it with the output",
-    )
-    name, _, _ = ERRORS.get(values["starved"], ("none", "", ""))
-    yield judged(
-        SAFETY,
-        "fault when the interrupt that fills the rings is held off",
-        name,
-        "internal or underrun",
-        values["starved"] in (codes.INTERNAL, codes.UNDERRUN),
+        "the interrupt that fills the rings held off",
+        f"fault {name}, outputs {'low' if end['low'] else 'high'}, position {'known' if end['known'] else 'unknown'}",
+        "internal or underrun, low, known",
+        end["fault"] in (codes.INTERNAL, codes.UNDERRUN) and end["low"] and end["known"],
         "do not connect drivers; please report it with the output",
     )
     yield judged(
@@ -167,4 +167,17 @@ def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
         "estop each time",
         not wrong,
         "do not connect drivers; please report it with the output",
+    )
+
+
+def _stops(way: str, cycles: Sequence[int]) -> Measurement:
+    took_us = np.array(cycles) / CYCLES_PER_US
+    gone_on = int(np.sum(took_us < 0))
+    return judged(
+        SAFETY,
+        f"E-stop {way} to frozen outputs, {len(took_us)} times",
+        f"worst {took_us.max():.1f} us" + (f", {gone_on} times they went on" if gone_on else ""),
+        f"below {_SLOWEST_STOP_US:g} us each time",
+        not gone_on and float(took_us.max()) < _SLOWEST_STOP_US,
+        "do not connect drivers: the E-stop does not stop the pulses; please report it with the output",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -12,13 +12,22 @@ from armtempo_shared import codes
 from armtempo_shared.limits import MAX_STEP_RATE_SUM
 from armtempo_shared.meanings import ERRORS
 
-from armtempo.basics.errors import LinkError
+from armtempo.basics.errors import BoardError, LinkError
 from armtempo.basics.progress import Progress, stage, watched
 from armtempo.diagnosis.finding import Level
 from armtempo.link import Client
 from armtempo.selftest import board_part, drivers_part, link_part, motion, pulse_part, rate_part
 from armtempo.selftest.drivers_part import DRIVERS
-from armtempo.selftest.prompt import RESET, Measured, PartError, Prompt, SilentError, at_prompt
+from armtempo.selftest.prompt import (
+    PARTS,
+    RESET,
+    WATCHDOG_RESET,
+    Measured,
+    PartError,
+    Prompt,
+    SilentError,
+    at_prompt,
+)
 from armtempo.selftest.result import Measurement, SelfTest, judged
 
 _FEATURE = "sequences"
@@ -29,11 +38,15 @@ _ARM_RECORD = f"{_ROOT}/arm.ata"
 _BACK_S = 60.0
 _SIMULATED_TURN_US = 1000
 """What a turn of the loop takes on a virtual board, about as on the chip."""
-_SEED, _STOPS, _SIMULATED_STOPS = 5, 50, 3
+_SEED = 5
+_STOPS, _BATCH, _SIMULATED_STOPS = 1000, 100, 4
+"""Every second one by an edge. A batch is one call of the part."""
 _WAITS_US = (22_000, 78_000)
 """E-stops at random moments of ``motion.make``, which begins 20 ms after its start."""
 _STARVED_S = 0.06
 _LOOK_S = 0.3
+SILENT = "silence"
+"""In the data: the part in which the board fell silent."""
 
 
 def run(client: Client, progress: Progress | None = None) -> SelfTest:
@@ -49,8 +62,9 @@ def run(client: Client, progress: Progress | None = None) -> SelfTest:
         stage("link")
         work(0, 1)
         found.data[link_part.PART] = link_part.trips(client)
-        _leave(client, lambda prompt: _at_prompt(prompt, found, work))
+        _leave(client, found, lambda prompt: _at_prompt(prompt, found, work))
         found.add([_same_room(info.engine_room, client.info.engine_room)])
+        found.add(_watchdog(client, found))
         found.add(rate_part.judge_stated(found.data.get(rate_part.PART), client.info))
         work(1, 1)
     return found
@@ -67,6 +81,23 @@ def _same_room(before: int, after: int) -> Measurement:
     )
 
 
+def _watchdog(client: Client, found: SelfTest) -> Iterator[Measurement]:
+    """What the program says of the reset, after a self-test that came to its end; its fault is cleared."""
+    if SILENT in found.data:
+        return
+    fault = client.status().fault
+    yield judged(
+        pulse_part.SAFETY,
+        "watchdog, not fed for 100 ms",
+        "reset the board" if fault == codes.WATCHDOG else "did not reset the board",
+        "resets the board",
+        fault == codes.WATCHDOG,
+        "do not connect drivers: a program that hangs would not end; please report it with the output",
+    )
+    with suppress(BoardError):  # an E-stop that is not wired keeps its own
+        client.clear()
+
+
 def _check_rest(client: Client) -> None:
     client.need(_FEATURE, "the self-test")
     status = client.status()
@@ -81,7 +112,7 @@ def _check_rest(client: Client) -> None:
         raise LinkError(f"the board has fault {name} pending", "remove its cause, then 'armtempo clear'")
 
 
-def _leave(client: Client, work: Callable[[Prompt], None]) -> None:
+def _leave(client: Client, found: SelfTest, work: Callable[[Prompt], None]) -> None:
     """Do ``work`` at the prompt of the board; then its program answers again."""
     session = client.session
     with session.turns:
@@ -89,25 +120,35 @@ def _leave(client: Client, work: Callable[[Prompt], None]) -> None:
         session.transport.close()
         try:
             with at_prompt(session.transport.name) as prompt:
-                _check_drivers(prompt)
+                _check_drivers(prompt, found)
                 work(prompt)
         finally:
             _back(client)
 
 
-def _check_drivers(prompt: Prompt) -> None:
+def _check_drivers(prompt: Prompt, found: SelfTest) -> None:
     """LinkError, and the program continues as it was, unless ENABLE is inactive or the board has no arm.
 
     From here on the end of the prompt is a reset, which switches drivers off that are on.
     """
     prompt.enter(soft_reset=False)
-    if drivers_part.is_on(_drivers(prompt)):
+    drivers = _drivers(prompt)
+    if drivers_part.is_on(drivers):
         raise LinkError(
             "the drivers are on (ENABLE, PE12, is active)",
             "support the arm, then press the board's reset button, which switches them off, and run the self-test "
             "again; if they are still on, look for a short at PE12",
         )
     prompt.at_end = RESET
+    if 0 < drivers["noted"] <= len(PARTS):
+        found.add([_hung(PARTS[drivers["noted"] - 1])])
+
+
+def _hung(part: str) -> Measurement:
+    return Measurement(
+        board_part.BOARD, "the self-test before", f"the board hung in {part!r} and was reset", "", Level.NOTE,
+        f"where it hangs in {part!r} again, please report it with the output",
+    )  # fmt: skip
 
 
 def _drivers(prompt: Prompt) -> dict[str, Any]:
@@ -136,7 +177,9 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
                 line.part == pulse_part.PULSES for line in found.failed
             ):  # else no rate tells anything
                 _rates(prompt, found, work)
+        prompt.at_end = WATCHDOG_RESET
     except SilentError as error:
+        found.data[SILENT] = error.part
         found.add([_failed(error.part, error)])
 
 
@@ -163,15 +206,13 @@ def _is_still(prompt: Prompt, found: SelfTest) -> bool:
     if measured is None:
         return False
     lines = list(drivers_part.judge_encoders(measured.values))
-    found.add([*lines, _still_off(measured, found)])
+    found.add([*lines, _still_off(measured.values, found)])
     return lines[0].verdict is Level.GOOD
 
 
-def _still_off(measured: Measured, found: SelfTest) -> Measurement:
+def _still_off(values: dict[str, Any], found: SelfTest) -> Measurement:
     """After a part that made steps."""
-    return drivers_part.off_line(
-        "ENABLE after that", found.data[DRIVERS]["active"], measured.values["enable"]
-    )
+    return drivers_part.off_line("ENABLE after that", found.data[DRIVERS]["active"], values["enable"])
 
 
 def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
@@ -179,22 +220,38 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     joints = found.data[DRIVERS]["joints"]
     for done, forward in ((0.4, True), (0.5, False)):
         work(done, 1)
-        moved = motion.make(joints, forward)
+        moved = motion.make(joints) if forward else motion.back_in_turn(joints)
         arguments = {**_arguments(moved, found), "rates": moved.rates}
         if measured := _part(prompt, found, pulse_part.PULSES, "engine", "pulses", **arguments):
             found.add(pulse_part.judge(measured, moved, joints, forward))
-            found.add([_still_off(measured, found)])
+            found.add([_still_off(measured.values, found)])
             if forward:
                 found.data[pulse_part.PULSES]["error_us"] = pulse_part.errors_us(measured, moved)
                 found.add(pulse_part.judge_turns(measured.values))
-    work(0.6, 1)
+    moved = motion.make(joints)
+    arguments = {**_arguments(moved, found), "rates": moved.rates}
+    motions = [arguments.pop("motion"), motion.at_rates(_own(joints), _STARVED_S).hex()]
+    _stop(prompt, found, {**arguments, "motions": motions}, work)
+
+
+def _stop(prompt: Prompt, found: SelfTest, arguments: dict[str, Any], work: Progress) -> None:
+    """E-stops at random moments, in batches that take some seconds each."""
     count = _SIMULATED_STOPS if found.simulated else _STOPS
     waits_us = np.random.default_rng(_SEED).integers(*_WAITS_US, count).tolist()
-    motions = [arguments.pop("motion"), motion.at_rates(_own(joints), _STARVED_S).hex()]
-    arguments |= {"motions": motions, "waits_us": waits_us}
-    if measured := _part(prompt, found, pulse_part.SAFETY, "engine", "estop", **arguments):
-        found.add(pulse_part.judge_stops(measured.values))
-        found.add([_still_off(measured, found)])
+    all_of: dict[str, Any] = {}
+    for begin in range(0, count, _BATCH):
+        work(0.6 + 0.1 * begin / count, 1)
+        arguments["waits_us"] = waits_us[begin : begin + _BATCH]
+        measured = _part(prompt, found, pulse_part.SAFETY, "engine", "estop", **arguments)
+        if measured is None:
+            return
+        before = all_of
+        all_of = dict(measured.values)
+        for name in ("cycles", "edge_cycles", "faults"):
+            all_of[name] = before.get(name, []) + all_of[name]
+    found.data[pulse_part.SAFETY] = all_of
+    found.add(pulse_part.judge_stops(all_of))
+    found.add([_still_off(all_of, found)])
 
 
 def _own(joints: Sequence[dict[str, Any]]) -> list[int]:

@@ -19,14 +19,16 @@ from armtempo.model.job import Job
 from armtempo.planning import checks
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import stretches as cut
+from armtempo.planning.line.between import Between
 from armtempo.planning.line.deviation import LineDeviation, proven
+from armtempo.planning.line.dwell import DWELL_SEGMENTS
 from armtempo.planning.line.follow import Followed, follow
 from armtempo.planning.line.stretches import Stretch
 from armtempo.splines import bspline
 
 DEGREE = 5
-_LINE_PIECES, _THROUGH_PIECES = 8, 8
-"""Segments of a line at first, and of the spline between two via points."""
+_LINE_PIECES = 8
+"""Segments of a line at first."""
 _SAME_DEG = 1e-4
 """Two postures as near as this are one."""
 _FLOOR, _CORNER = 0.2, 2.5
@@ -125,17 +127,17 @@ def _places(found: Followed, speeds: Array) -> Array:
 
 
 def proven_path(
-    arm: Arm, job: Job, via_deg: Array, led: Mapping[int, Led]
+    arm: Arm, job: Job, via_deg: Array, led: Mapping[int, Led], others: Mapping[int, Between]
 ) -> tuple[LinePath, dict[int, LineDeviation]]:
     """The spline with as few segments as prove that the tool stays near its way, and how near in each stretch.
 
     Raises PlanError if the board could not hold that many.
     """
     stretches = cut.of_job(job)
-    most = _most_segments(arm)
+    most = _most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
     pieces = [
-        _LINE_PIECES * len(stretch.ways) if stretch.ways else _THROUGH_PIECES * (stretch.last - stretch.first)
-        for stretch in stretches
+        _LINE_PIECES * len(stretch.ways) if stretch.ways else others[number].segments
+        for number, stretch in enumerate(stretches)
     ]
     if sum(pieces) > most:
         raise PlanError(
@@ -144,7 +146,7 @@ def proven_path(
             "use fewer via points, or plan the stretches between rests one by one with --split",
         )
     while True:
-        path = _path(stretches, pieces, via_deg, led)
+        path = _path(stretches, pieces, via_deg, {**led, **others})
         found = {number: path.deviation(number, one) for number, one in led.items()}
         wide = [number for number, one in led.items() if not one.keeps(found[number])]
         if not wide:
@@ -169,23 +171,22 @@ def _most_segments(arm: Arm) -> int:
 
 
 def _path(
-    stretches: Sequence[Stretch], pieces: Sequence[int], via_deg: Array, led: Mapping[int, Led]
+    stretches: Sequence[Stretch], pieces: Sequence[int], via_deg: Array, parts: Mapping[int, Led | Between]
 ) -> LinePath:
     """The spline through postures of all stretches, with a rest between each two."""
     knots, arrivals = [0], [0]
     rows = []
     before = 0.0
     for number, (stretch, count) in enumerate(zip(stretches, pieces, strict=True)):
-        if number in led:
-            ways = led[number].ways(count)
-            angles = led[number].followed.at(ways)
-            passed = _passed(led[number], ways)
+        one = parts[number]
+        if isinstance(one, Led):
+            ways = one.ways(count)
+            angles = one.followed.at(ways)
+            passed = _passed(one, ways)
         else:
-            points = bspline.fit(via_deg[stretch.first : stretch.last + 1], DEGREE)
-            fine = bspline.polynomials(bspline.refined(points, _THROUGH_PIECES, DEGREE), DEGREE)
-            angles = np.concatenate([fine[:, 0], fine[-1:].sum(axis=1)])
             ways = np.linspace(0.0, 1.0, count + 1)
-            passed = [_THROUGH_PIECES * via for via in range(1, stretch.last - stretch.first + 1)]
+            angles = one.at_knots
+            passed = list(one.arrivals[1:])
         angles[[0, -1]] = via_deg[[stretch.first, stretch.last]]
         rows.append(np.column_stack([angles, before + ways])[0 if number == 0 else 1 :])
         before += float(ways[-1])

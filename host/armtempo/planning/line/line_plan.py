@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
@@ -19,7 +19,10 @@ from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.fixed_path import Along, FixedPath, Optimum
 from armtempo.planning.free.angle_bounds import of_path
+from armtempo.planning.line import stretches as cut
+from armtempo.planning.line.between import between
 from armtempo.planning.line.deviation import LineDeviation
+from armtempo.planning.line.dwell import DWELL_SEGMENTS, TimedPath
 from armtempo.planning.line.follow import passed
 from armtempo.planning.line.line_path import DEGREE, Led, LinePath, led_stretches, proven_path
 from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
@@ -43,11 +46,16 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     """
     stage("following the tool's way")
     led = led_stretches(arm, job, via_deg)
-    path, away = proven_path(arm, job, via_deg, led)
+    others = {
+        number: between(arm, job, stretch, via_deg, progress)
+        for number, stretch in enumerate(cut.of_job(job))
+        if not stretch.ways
+    }
+    path, away = proven_path(arm, job, via_deg, led, others)
     checks.check_ranges(arm, path.angle_points_deg, DEGREE)
     notes = [_away(led[number], found) for number, found in away.items()]
     notes += [words for one in led.values() for words in passed(one.followed)]
-    return _timed(arm, job, path, notes, progress)
+    return _timed(arm, job, path, {number: one.floor for number, one in others.items()}, notes, progress)
 
 
 def _away(led: Led, found: LineDeviation) -> str:
@@ -55,14 +63,23 @@ def _away(led: Led, found: LineDeviation) -> str:
     return f"{led.stretch.name}: the tool leaves its way by no more than {found.position_mm:.2g} mm{turned} (proven)"
 
 
-def _timed(arm: Arm, job: Job, path: LinePath, notes: list[str], progress: Progress) -> Planned:
-    """The shortest time axis on the path, within the limits of joints and tool."""
+def _timed(
+    arm: Arm,
+    job: Job,
+    path: LinePath,
+    floors: Mapping[int, Floor | None],
+    notes: list[str],
+    progress: Progress,
+) -> Planned:
+    """The shortest time axis on the path, within the limits of joints and tool; with the waits of its dwells."""
     limits = checks.limits_of(arm)
     moving = np.flatnonzero(np.ptp(path.angle_points_deg, axis=0) > checks.TOLERANCE)
     points, own = path.angle_points_deg[:, moving], [limits[joint] for joint in moving]
     tool = Tool(arm, list(range(len(limits))), path.angle_points_deg[0])
     tool_limits = _tool_limits(job, path)
-    most = time_parameterization.most_refine(job, path.knots[-1], len(limits))
+    dwells_s = {stop.via: stop.dwell_s for stop in job.stops if stop.dwell_s > 0.0}
+    segments = path.knots[-1] + DWELL_SEGMENTS * len(dwells_s)
+    most = time_parameterization.most_refine(job, segments, len(limits))
     levels = [job.refine] if isinstance(job.refine, int) else _levels(most)
     best = _best_axis(points, own, levels, partial(_watched, path, tool, tool_limits), progress)
     found = best.found
@@ -73,21 +90,24 @@ def _timed(arm: Arm, job: Job, path: LinePath, notes: list[str], progress: Progr
         axis = of_path(time_points(found.differences_s, DEGREE)[:, None], DEGREE)[:, :, 0]
         stretch = max(stretch, excess(angles, axis, tool, tool_limits.refined(best.refine)))
         notes += _limit_notes(job, path, angles, axis * stretch, tool)
-    times = time_points(found.differences_s * stretch, DEGREE)
+    timed = TimedPath(path.angle_points_deg, found.differences_s * stretch, path.arrivals, best.refine)
+    timed = timed.with_dwells(dwells_s)
+    times = time_points(timed.differences_s, DEGREE)
     joints = tuple(
-        JointSpline(DEGREE, best.refine, np.ascontiguousarray(column), times, path.arrivals)
-        for column in path.angle_points_deg.T
+        JointSpline(DEGREE, best.refine, np.ascontiguousarray(column), times, timed.arrivals)
+        for column in timed.angle_points_deg.T
     )
-    floor = _floor(points, path.knots, own, found.total_s)
+    waits_s = joints[0].duration_s - found.total_s * stretch
+    floor = _floor(points, path.knots, own, found.total_s, floors)
     search = Search(
         joints=tuple(map(int, moving)),
-        intervals_s=found.differences_s,
-        total_s=found.total_s * stretch,
-        searched_s=best.history_s[0],
+        intervals_s=timed.differences_s,
+        total_s=joints[0].duration_s,
+        searched_s=best.history_s[0] + waits_s,
         evaluations=len(best.history_s),
-        history_s=np.minimum.accumulate(best.history_s),
-        optimum_s=found.bound_s,
-        floor_s=floor.time_s,
+        history_s=np.minimum.accumulate(best.history_s) + waits_s,
+        optimum_s=found.bound_s + waits_s,
+        floor_s=floor.time_s + sum(dwells_s.values()),
         floor_kind=floor.kind,
     )
     return Planned(Trajectory(job.name, joints, True), (search,), tuple(notes))
@@ -135,15 +155,21 @@ def _levels(most: int) -> list[int]:
     return [1, min(_REFINE_FACTOR, most)][: min(most, 2)]
 
 
-def _floor(points: Array, knots: Sequence[int], limits: Sequence[Limits], about_s: float) -> Floor:
-    """No time law along the path that rests between its stretches takes less."""
+def _floor(
+    points: Array,
+    knots: Sequence[int],
+    limits: Sequence[Limits],
+    about_s: float,
+    floors: Mapping[int, Floor | None],
+) -> Floor:
+    """No time law along the path that rests between its stretches takes less; ``floors``: known of some stretches."""
     parts = []
-    for first, last in pairwise(knots):
+    for number, (first, last) in enumerate(pairwise(knots)):
         stretch = points[first : last + DEGREE]
         moving = np.ptp(stretch, axis=0) > checks.TOLERANCE
         own = [limit for limit, moves in zip(limits, moving, strict=True) if moves]
         share = about_s * (last - first) / knots[-1]
-        parts.append(lower_bounds.of_path(stretch[:, moving], DEGREE, own, share))
+        parts.append(floors.get(number) or lower_bounds.of_path(stretch[:, moving], DEGREE, own, share))
     return Floor(sum(part.time_s for part in parts), parts[0].kind)
 
 

@@ -2,8 +2,7 @@
 
 
 def measure(record):
-    """``record``: file of the arm record."""
-
+    """``record``: file of the arm record. ``noted``: what the part before this one left."""
     active = None
     joints = []
     try:
@@ -16,4 +15,11 @@ def measure(record):
     except (OSError, ValueError):
         pass  # no arm
     output, driven, level = enable()
-    return {"active": active, "output": output, "driven": driven, "level": level, "joints": joints}
+    return {
+        "active": active,
+        "output": output,
+        "driven": driven,
+        "level": level,
+        "joints": joints,
+        "noted": noted,
+    }

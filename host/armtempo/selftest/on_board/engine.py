@@ -52,14 +52,21 @@ def make_engine(record, estop=False, rates=None, encoders=False, workspace=None)
     return engine, joints
 
 
+_PULLS = stm.GPIOE + stm.GPIO_PUPDR
+
+
+def pulls(engine, tripped):
+    """The register of port E's pull resistors with the one that draws the E-stop to a level."""
+    pull = 1 if tripped == engine.inputs._estop_level else 2
+    return mem32[_PULLS] & ~(3 << _PUPDR_SHIFT) | pull << _PUPDR_SHIFT
+
+
 def pull_inactive(engine):
     """An E-stop that is not wired would be tripped: draw it to the other level. A switch is stronger.
 
     ValueError where one is pressed.
     """
-    pull = 2 if engine.inputs._estop_level else 1
-    at = stm.GPIOE + stm.GPIO_PUPDR
-    mem32[at] = mem32[at] & ~(3 << _PUPDR_SHIFT) | pull << _PUPDR_SHIFT
+    mem32[_PULLS] = pulls(engine, 0)
     time.sleep_ms(1)
     engine.service()  # notes what tripped until now
     if not engine.clear():

@@ -5,7 +5,7 @@ def measure(root, program_crc, rates):
     """``rates``: of one joint, of all together, of how many joints they were measured."""
     import os
 
-    from armtempo_board.app.arm_state import board_id
+    from armtempo_board.app.board import board_id
     from armtempo_board.storage import measured_rates
 
     measured_rates.write(root, board_id(), program_crc, rates)

@@ -144,7 +144,6 @@ def measure(record, motion, start_steps, rates, idle_us):
     engine, joints = make_engine(record, rates=rates)
     stages = {"engine": free()}
     longest = turns = 0
-    turned = None
     try:
         load(engine, unhexlify(motion), start_steps)
         stages["loaded"] = free()
@@ -159,9 +158,8 @@ def measure(record, motion, start_steps, rates, idle_us):
             longest = max(longest, (now - then) & 0xFFFFFFFF)
             then = now
             turns += 1
-            if turned is None and captures[0].state[2] > 2:
-                turned = directions(joints)
         passed = (cycles() - begun) & 0xFFFFFFFF
+        turned = directions(joints)
         for capture in captures:
             capture.look()
         stages["moved"] = free()

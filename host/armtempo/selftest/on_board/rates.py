@@ -42,7 +42,7 @@ def measure(record, motion, rates, frames, idle_us):
     count_cycles()
     host = Host([unhexlify(frame) for frame in frames])
     app = App(host, "/none")  # no arm is stored there: no pin is touched
-    engine, _ = make_engine(record, rates=rates, workspace=app.controller.workspace)
+    engine, _ = make_engine(record, rates=rates, workspace=app.controller.board.workspace)
     hand_over(app.controller, engine, len(rates))
     engine.skip_check = True  # a rate is tried that is not allowed
     longest = 0
@@ -60,7 +60,7 @@ def measure(record, motion, rates, frames, idle_us):
         engine.freeze()
         off = enable()
         engine.close()
-    fault = app.controller.fault()
+    fault = app.controller.board.fault()
     if fault == codes.ESTOP:
         raise ValueError("the E-stop was pressed")
     return {
@@ -78,7 +78,7 @@ def hand_over(controller, engine, joints):
 
     from armtempo_board.buffers import COMMANDED
 
-    controller.engine = engine
-    controller.joints = joints
-    controller.raw = array("i", [0] * (COMMANDED + 2 * joints))
-    controller.samples.configure(joints)
+    controller.board.engine = engine
+    controller.board.joints = joints
+    controller.board.raw = array("i", [0] * (COMMANDED + 2 * joints))
+    controller.board.samples.configure(joints)

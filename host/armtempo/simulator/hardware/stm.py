@@ -20,6 +20,7 @@ _OFFSETS = {
     "DBGMCU_": "IDCODE CR APB1FZ APB2FZ",
     "PWR_": "CR CSR",
     "IWDG_": "KR PR RLR SR",
+    "RTC_": " ".join(["TR", "DR"] + ["-"] * 18 + ["BKP%dR" % number for number in range(20)]),
     "FLASH_": "ACR KEYR OPTKEYR SR CR OPTCR",
 }
 for _prefix, _names in _OFFSETS.items():

@@ -16,7 +16,7 @@ def case_repeated_command_acts_once():
     answers = host.turn()
     host.send("home", (1,), bytes(8), sequence)
     answers += host.turn()
-    assert app.controller.engine.calls.count("home") == 2  # one was the connecting
+    assert app.controller.board.engine.calls.count("home") == 2  # one was the connecting
     assert len(answers) == 3
     assert answers[0] == answers[1] == answers[2]
 
@@ -27,7 +27,7 @@ def case_same_number_other_content_is_another_command():
     host.turn()
     host.send("home", (2,), bytes(8), sequence)
     host.turn()
-    assert app.controller.engine.calls.count("home") == 3
+    assert app.controller.board.engine.calls.count("home") == 3
 
 
 def case_repeated_start_answers_again():
@@ -36,7 +36,7 @@ def case_repeated_start_answers_again():
     first = host.turn()
     host.send("start", (0, wire.record_crc(host.record)), "feed", sequence)
     second = host.turn()
-    assert app.controller.engine.calls.count("start") == 1
+    assert app.controller.board.engine.calls.count("start") == 1
     assert [frame for frame in first if frame[1] == 0x7E] == second
 
 
@@ -55,7 +55,7 @@ def case_a_new_session_hears_nothing_that_was_meant_for_the_old_one():
     app, host = connected()
     start(host)
     host.port.room = 0
-    app.controller.engine.advance(3)
+    app.controller.board.engine.advance(3)
     host.turn()
     assert not app.link.idle()  # samples wait for a host that does not read
     host.events.clear()
@@ -105,7 +105,7 @@ def case_a_frame_may_come_in_pieces():
         host.port.inbox.append(byte)
         answers = host.turn(40)
     assert [answer[0] for answer in answers] == [99]
-    assert app.controller.engine.calls.count("home") == 2  # one was the connecting
+    assert app.controller.board.engine.calls.count("home") == 2  # one was the connecting
     assert host.ask("status")[1][10] == 0
 
 
@@ -155,10 +155,10 @@ def case_start_only_when_everything_is_valid():
     three = stand_in.record(stand_in.arm(), joints=3)
     host.upload("three", three)
     assert host.ask("start", (0, wire.record_crc(three)), "three") == ("error", "wrong_joints", 255, 3)
-    app.controller.engine.refusal = (21, 1, 5)
+    app.controller.board.engine.refusal = (21, 1, 5)
     assert start(host) == ("error", "too_fast", 1, 5)
-    assert app.controller.engine.calls.count("start") == 0
-    app.controller.engine.refusal = None
+    assert app.controller.board.engine.calls.count("start") == 0
+    app.controller.board.engine.refusal = None
     assert start(host) == ("ok", (1, 84000), b"")
 
 
@@ -173,7 +173,7 @@ def case_only_a_few_commands_while_moving():
             answer = host.ask(name, [1] * len(fields), b"")
             busy = name not in ("hello", "status", "hold", "speed", "samples")
             assert (answer[:2] == ("error", "busy")) == busy, (name, answer)
-    assert app.controller.engine.calls[-1] == "start"
+    assert app.controller.board.engine.calls[-1] == "start"
 
 
 cases.run(globals())

@@ -13,8 +13,12 @@ from armtempo_shared import codes, wire
 def case_fault_stays_until_cleared():
     app, host = connected()
     start(host)
-    app.controller.engine.advance(1)
-    app.controller.engine.fault, app.controller.engine.fault_joint, app.controller.engine.moving = (
+    app.controller.board.engine.advance(1)
+    (
+        app.controller.board.engine.fault,
+        app.controller.board.engine.fault_joint,
+        app.controller.board.engine.moving,
+    ) = (
         42,
         1,
         False,
@@ -32,14 +36,14 @@ def case_fault_stays_until_cleared():
 def case_exception_becomes_a_fault():
     app, host = connected()
     start(host)
-    app.controller.engine.explode = ValueError("deliberate")
+    app.controller.board.engine.explode = ValueError("deliberate")
     host.turn()
     assert state(host) == "fault"
     kinds = [kind for kind, _ in ends_of(host)]
     assert sorted(kinds) == ["fault", "notice"]
     assert "deliberate" in next(rest for kind, _, rest in host.events if kind == "notice")
     assert host.ask("status")[1][1] == 44
-    assert app.controller.engine.calls[-1] == "freeze"
+    assert app.controller.board.engine.calls[-1] == "freeze"
 
 
 def answers(host, sequence):
@@ -60,7 +64,7 @@ def failing_command(error):
         calls.append(1)
         raise error
 
-    app.controller.store().names = explode
+    app.controller.board.store().names = explode
     sequence = host.send("list", (0,))
     first = answers(host, sequence)
     host.send("list", (0,), sequence=sequence)
@@ -87,7 +91,7 @@ class Unprintable(Exception):
 def case_a_failure_that_cannot_be_told_is_a_failure_all_the_same():
     app, host = connected()
     start(host)
-    app.controller.engine.explode = Unprintable()
+    app.controller.board.engine.explode = Unprintable()
     tell = app_module._traceback
     app_module._traceback = lambda error: str(error)
     try:
@@ -95,7 +99,7 @@ def case_a_failure_that_cannot_be_told_is_a_failure_all_the_same():
     finally:
         app_module._traceback = tell
     assert state(host) == "fault"
-    assert app.controller.engine.calls[-1] == "freeze"
+    assert app.controller.board.engine.calls[-1] == "freeze"
     assert "no memory" in next(rest for kind, _, rest in host.events if kind == "notice")
 
 
@@ -112,10 +116,10 @@ def case_endless_exceptions_end_the_program():
 def case_whatever_ends_the_loop_freezes_what_moves():
     app, host = connected()
     app.controller.halt()
-    assert "freeze" not in app.controller.engine.calls
+    assert "freeze" not in app.controller.board.engine.calls
     start(host)
     app.controller.halt()
-    assert app.controller.engine.calls[-1] == "freeze"
+    assert app.controller.board.engine.calls[-1] == "freeze"
     assert not app.controller.moving()
 
 
@@ -133,7 +137,7 @@ def case_a_failing_led_freezes_what_moves():
     try:
         program.run(Failing(), None, None)
     except ValueError:
-        assert app.controller.engine.calls[-1] == "freeze"
+        assert app.controller.board.engine.calls[-1] == "freeze"
         return
     raise AssertionError("went on")
 

@@ -39,7 +39,7 @@ def case_an_arm_that_was_stored_gets_them_at_the_start():
     stand_in.Pin.levels.update(DOWN)
     app = App(stand_in.Port(), flash())
     assert levels() == SAFE
-    assert app.controller.outputs.values[1] == 7282
+    assert app.controller.board.outputs.values[1] == 7282
 
 
 def case_set_while_moving():
@@ -74,8 +74,8 @@ def case_fault_makes_safe_until_it_is_cleared():
         app, host = wired()
         start(host)
         open_and_pump(host)
-        app.controller.engine.fault = code
-        app.controller.engine.moving = False
+        app.controller.board.engine.fault = code
+        app.controller.board.engine.moving = False
         host.turn(1)
         assert levels() == SAFE, code
         assert host.ask("output", (0, 65535)) == ("error", "fault_pending", 255, 0)
@@ -88,7 +88,7 @@ def case_fault_makes_safe_until_it_is_cleared():
 def case_exception_makes_safe():
     app, host = wired()
     open_and_pump(host)
-    app.controller.engine.explode = ValueError("deliberate")
+    app.controller.board.engine.explode = ValueError("deliberate")
     host.turn(1)
     assert levels() == SAFE
 
@@ -107,21 +107,21 @@ def case_another_arm_lets_go_of_them():
     assert "D0" not in stand_in.Pin.levels and "B8" not in stand_in.Pin.levels
     assert stand_in.Timer.made == {}
     assert host.ask("inputs") == ("error", "unknown_command", 255, 0)
-    assert app.controller.outputs is None and app.controller.inputs is None
+    assert app.controller.board.outputs is None and app.controller.board.inputs is None
     assert host.upload("/arm", stand_in.arm(outputs=(PUMP,)))[-1][0] == "ok"
     assert host.ask("inputs") == ("ok", (0,), b"\x00\x00")
 
 
 def case_the_same_arm_with_other_outputs_stays_where_it_is():
     app, host = wired()
-    app.controller.engine.steps = [5, 6]
+    app.controller.board.engine.steps = [5, 6]
     assert host.upload("/arm", stand_in.arm(outputs=(PUMP,)))[-1][0] == "ok"
-    assert (app.controller.known(), app.controller.engine.steps) == (3, [5, 6])
+    assert (app.controller.board.known(), app.controller.board.engine.steps) == (3, [5, 6])
 
 
 def case_a_level_counts_when_it_is_steady():
     app, host = wired()
-    inputs = app.controller.inputs
+    inputs = app.controller.board.inputs
     stand_in.Pin.levels.update(D1=0, D2=1)
     host.turn(1)
     for _ in range(8):
@@ -145,7 +145,7 @@ def case_debounced_while_moving():
     start(host)
     stand_in.Pin.levels["D1"] = 0
     host.turn(20)
-    assert app.controller.moving() and app.controller.inputs.level(0) == 1
+    assert app.controller.moving() and app.controller.board.inputs.level(0) == 1
 
 
 def case_the_engines_pins_and_timers_are_refused():

@@ -33,7 +33,7 @@ def case_repl_is_reached_by_ctrl_c_when_idle_only():
     host.port.inbox.extend(CTRL_C)
     host.turn(1000)
     assert not app.left()
-    app.controller.engine.finish()
+    app.controller.board.engine.finish()
     host.turn(1000)
     assert not app.left()
     leaves_by_ctrl_c(app, host)

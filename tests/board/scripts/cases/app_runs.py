@@ -16,14 +16,14 @@ def case_stop_brakes_or_freezes():
     start(host)
     assert host.ask("stop", (0,)) == ("ok", (), b"")
     assert state(host) == "braking"
-    app.controller.engine.advance(1)
+    app.controller.board.engine.advance(1)
     assert host.turn()[-1][2][24] == messages.SAMPLE_BRAKING
-    app.controller.engine.finish()
+    app.controller.board.engine.finish()
     assert state(host) == "idle"
     assert ends_of(host)[-1][0] == "done"
     start(host)
     host.ask("stop", (1,))
-    assert app.controller.engine.calls[-1] == "freeze"
+    assert app.controller.board.engine.calls[-1] == "freeze"
 
 
 def case_speed_of_what_moves_and_of_the_next_start():
@@ -34,7 +34,7 @@ def case_speed_of_what_moves_and_of_the_next_start():
     assert host.ask("speed", (500,)) == ("ok", (), b"")
     assert host.ask("status")[1][7] == 500
     start(host)
-    engine = app.controller.engine
+    engine = app.controller.board.engine
     assert engine.rates.wanted == 500
     for rate in (10, 0, messages.RESUME, 1000):
         assert host.ask("speed", (rate,)) == ("ok", (), b"")
@@ -58,13 +58,13 @@ def case_stop_freezes_what_cannot_brake():
     host.upload("stiff", stiff)
     host.ask("start", (0, wire.record_crc(stiff)), "stiff")
     host.ask("stop", (0,))
-    assert app.controller.engine.calls[-1] == "freeze"
+    assert app.controller.board.engine.calls[-1] == "freeze"
 
 
 def case_samples_are_kept_until_acknowledged():
     app, host = connected()
     start(host)
-    app.controller.engine.advance(9)
+    app.controller.board.engine.advance(9)
     host.turn()
     assert host.ask("samples", (0, 0)) == ("ok", (0, 10), b"")
     assert samples_of(host) == list(range(10))
@@ -80,24 +80,24 @@ def case_the_next_run_counts_its_samples_from_0():
     for _ in range(2):
         host.events.clear()
         start(host)
-        app.controller.engine.advance(3)
+        app.controller.board.engine.advance(3)
         host.turn()
         assert samples_of(host) == [0, 1, 2, 3]
         assert host.ask("samples", (0, 0)) == ("ok", (0, 4), b"")
-        app.controller.engine.finish()
+        app.controller.board.engine.finish()
         host.turn()
 
 
 def case_oldest_sample_gives_way_and_is_counted():
     app, host = connected()
     start(host)
-    places = app.controller.samples._capacity
+    places = app.controller.board.samples._capacity
     host.port.room = 0
-    app.controller.engine.advance(places + 20)
+    app.controller.board.engine.advance(places + 20)
     host.turn()
     host.port.room = 1 << 30
     assert host.ask("samples", (0, 0)) == ("ok", (21, places), b"")
-    app.controller.engine.finish()
+    app.controller.board.engine.finish()
     for _ in range(10):
         host.ask("status")
     got = samples_of(host)
@@ -114,12 +114,12 @@ def case_samples_of_a_run_without_host_are_kept():
     _, host = connected()
     host.ask("set_default", (), "feed")
     again = App(host.port, flash())
-    again.controller.engine.home(3, [0, 0])
-    again.controller.begin(again.controller.store().default(), 0)
+    again.controller.board.engine.home(3, [0, 0])
+    again.controller.begin(again.controller.board.store().default(), 0)
     host = stand_in.Host(again, host.port)
     host.turn()
-    again.controller.engine.advance(4)
-    again.controller.engine.finish()
+    again.controller.board.engine.advance(4)
+    again.controller.board.engine.finish()
     host.turn()
     assert not host.port.outbox
     host.hello()
@@ -136,10 +136,10 @@ def case_stalled_host_does_not_stall_the_loop():
     host.port.room = 0
     for _ in range(300):
         host.send("status")
-        app.controller.engine.advance(1)
+        app.controller.board.engine.advance(1)
         host.turn(1)
-    assert app.controller.samples.next == 301
-    assert app.controller.fault() == 0
+    assert app.controller.board.samples.next == 301
+    assert app.controller.board.fault() == 0
     host.port.inbox = bytearray()
     host.port.room = 1 << 30
     host.turn()
@@ -149,12 +149,12 @@ def case_stalled_host_does_not_stall_the_loop():
 def case_a_new_host_picks_the_run_up():
     app, host = connected()
     start(host)
-    app.controller.engine.advance(5)
+    app.controller.board.engine.advance(5)
     host.turn()
     host.ask("samples", (2, 0))
     other = stand_in.Host(app, host.port)
     assert other.hello(session=2)[1][3] == wire.STATES.index("moving")
-    app.controller.engine.advance(1)
+    app.controller.board.engine.advance(1)
     assert other.ask("status")[1][4] == 1
     first, count = other.ask("samples", (0, 0))[1]
     assert (first, count) == (2, 5)
@@ -170,9 +170,9 @@ def case_lost_host_stops_the_motion_if_the_arm_says_so():
         host.ask("samples", (0, 0))
     assert app.controller.state() == wire.STATES.index("moving")
     host.turn(300)
-    assert app.controller.engine.calls[-1] == "brake"
+    assert app.controller.board.engine.calls[-1] == "brake"
     assert app.controller.state() == wire.STATES.index("braking")
-    app.controller.engine.finish()
+    app.controller.board.engine.finish()
     assert host.ask("status")[1][:2] == (wire.STATES.index("fault"), 46)
 
 
@@ -180,7 +180,7 @@ def case_lost_host_leaves_the_motion_otherwise():
     app, host = connected()
     start(host)
     host.turn(2000)
-    assert app.controller.engine.calls[-1] == "start"
+    assert app.controller.board.engine.calls[-1] == "start"
 
 
 def case_the_heap_is_collected_often_but_while_something_moves():
@@ -193,7 +193,7 @@ def case_the_heap_is_collected_often_but_while_something_moves():
         assert gc.threshold() == -1
         host.turn(1000)
         assert gc.threshold() == -1
-        app.controller.engine.finish()
+        app.controller.board.engine.finish()
         host.turn(10)
         assert 0 < gc.threshold() < (gc.mem_alloc() + gc.mem_free()) // 60
 

@@ -24,7 +24,7 @@ def case_refused_before_anything_moves():
     ):
         app, host = ready(rows)
         assert begin(host) == ("error",) + refusal, rows
-        assert runs(app) == 0 and app.controller.outputs.log == [] and state(host) == "idle"
+        assert runs(app) == 0 and app.controller.board.outputs.log == [] and state(host) == "idle"
     app, host = ready([(OUTPUT, 0, 1, 0)], outputs=0)
     assert begin(host) == ("error", "no_such_pin", 255, 1)
 
@@ -52,7 +52,7 @@ def case_of_another_arm_it_is_refused():
 
 def case_unhomed_it_is_refused():
     app, host = ready([(WAIT, 0, 0, 1)])
-    app.controller.engine.known = 1
+    app.controller.board.engine.known = 1
     assert begin(host) == ("error", "unhomed", 1, 0)
     assert host.ask("start", (1, wire.record_crc(host.seq)), "seq")[:2] == ("error", "is_sequence")
 
@@ -117,7 +117,7 @@ def case_a_sequence_is_stored_whole_or_not_at_all():
         assert host.upload("seq", bad)[-1][:2] == ("error", "bad_record")
     assert host.ask("get", (0, 200), "seq")[2] == kept
     again = App(host.port, flash())
-    assert again.controller.store().is_sequence("seq")
+    assert again.controller.board.store().is_sequence("seq")
 
 
 def case_one_of_an_older_version_is_named():

@@ -38,13 +38,13 @@ def case_steps_come_one_after_the_other():  # emulated
     assert begin(host) == ("ok", (before, 0), b"")
     assert state(host) == "moving"
     assert stands(host) == ("running", 0, 2, 1, 0)
-    assert app.controller.outputs.log == [(0, 7)]
+    assert app.controller.board.outputs.log == [(0, 7)]
     arrive(app, host, 10)
-    assert app.controller.outputs.log == [(0, 7)] and runs(app) == 1
+    assert app.controller.board.outputs.log == [(0, 7)] and runs(app) == 1
     assert state(host) == "moving"
     stand_in.Clock.now_ms += 500
     host.turn(5)
-    assert app.controller.outputs.log == [(0, 7), (1, 65535)] and runs(app) == 2
+    assert app.controller.board.outputs.log == [(0, 7), (1, 65535)] and runs(app) == 2
     arrive(app, host, 0)
     assert state(host) == "idle"
     assert stands(host) == ("finished", 0, 5, 4, 0)
@@ -64,7 +64,7 @@ def case_repeats_within_repeats_are_counted():
     begin(host)
     host.turn(100)
     assert stands(host)[0] == "finished" and stands(host)[4] == 3
-    assert app.controller.outputs.log == [(0, 1), (1, 2), (1, 2)] * 3
+    assert app.controller.board.outputs.log == [(0, 1), (1, 2), (1, 2)] * 3
 
 
 def counters_of(host):
@@ -145,7 +145,7 @@ def case_a_motions_row_is_told_with_its_run():
 def case_a_motion_is_checked_once_in_a_run():
     """Again in the next run; one whose start was refused counts as unchecked."""
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
-    engine = app.controller.engine
+    engine = app.controller.board.engine
     for _ in range(2):
         engine.calls.clear()
         begin(host)
@@ -160,7 +160,7 @@ def case_a_motion_is_checked_once_in_a_run():
 
 def loads(app):
     """How each motion was loaded."""
-    return [call[len("load ") :] for call in app.controller.engine.calls if call.startswith("load")]
+    return [call[len("load ") :] for call in app.controller.board.engine.calls if call.startswith("load")]
 
 
 def case_what_comes_next_is_prepared_over_rows_between():
@@ -178,7 +178,7 @@ def case_what_comes_next_is_prepared_over_rows_between():
         (OUTPUT, 0, 6, 0),
     ]
     app, host = ready(rows, {"there": leg(0, 0), "on": leg(0, 3)}, counters=("many",))
-    engine, log = app.controller.engine, app.controller.outputs.log
+    engine, log = app.controller.board.engine, app.controller.board.outputs.log
     assert begin(host)[0] == "ok"
     arrive(app, host, 0)
     host.turn(30)
@@ -199,7 +199,7 @@ def case_without_room_nothing_is_prepared():
     """Not when the sequence begins; or a motion is given up in the midst, and those behind it."""
     for late in (False, True):
         app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
-        engine = app.controller.engine
+        engine = app.controller.board.engine
         engine.no_memory = not late
         engine.has_time = False
         begin(host)
@@ -214,7 +214,7 @@ def case_without_room_nothing_is_prepared():
 
 def case_where_the_arm_stands_elsewhere_what_is_prepared_is_given_up():
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
-    engine = app.controller.engine
+    engine = app.controller.board.engine
     begin(host)
     host.turn(20)
     assert engine.calls.count("prepare") == 1
@@ -228,7 +228,7 @@ def case_where_the_arm_stands_elsewhere_what_is_prepared_is_given_up():
 def case_without_time_it_is_prepared_between_two():
     """And while it waits."""
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (WAIT, 0, 0, 500), (MOVE, "there", 0, 0)])
-    engine = app.controller.engine
+    engine = app.controller.board.engine
     engine.has_time = False
     begin(host)
     assert "prepare" not in engine.calls
@@ -245,35 +245,35 @@ def case_without_time_it_is_prepared_between_two():
 
 def case_behind_a_stop_nothing_is_prepared():
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
-    app.controller.engine.has_time = False
+    app.controller.board.engine.has_time = False
     begin(host)
     host.ask("stop", (0,))
-    app.controller.engine.has_time = True
+    app.controller.board.engine.has_time = True
     host.turn(20)
-    assert "prepare" not in app.controller.engine.calls
+    assert "prepare" not in app.controller.board.engine.calls
     arrive(app, host, 4)
     assert stands(host)[0] == "stopped" and runs(app) == 1
 
 
 def case_a_motion_that_is_unfit_is_refused_before_anything_moves():
     app, host = ready([(OUTPUT, 0, 7, 0), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
-    app.controller.engine.unfit = (codes.TOO_FAST, 1, 5)
+    app.controller.board.engine.unfit = (codes.TOO_FAST, 1, 5)
     begin(host)
     assert stands(host) == ("refused", codes.TOO_FAST, 3, 2, 0), stands(host)
-    assert runs(app) == 0 and app.controller.outputs.log == [] and state(host) == "idle"
+    assert runs(app) == 0 and app.controller.board.outputs.log == [] and state(host) == "idle"
 
 
 def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
-    app.controller.engine.has_time = False
+    app.controller.board.engine.has_time = False
     arrive(app, host, 10)
     with open(flash() + "/there.atm", "r+b") as file:
         file.seek(100)
         file.write(b"\x55")
     arrive(app, host, 0)
     assert stands(host)[:2] == ("refused", codes.BAD_RECORD), stands(host)
-    assert runs(app) == 2 and not app.controller.engine.skip_check
+    assert runs(app) == 2 and not app.controller.board.engine.skip_check
 
 
 def case_for_ever_ends_only_by_a_stop():
@@ -298,7 +298,7 @@ def case_a_stop_ends_a_wait():
     assert state(host) == "moving" and stands(host)[0] == "running"
     assert host.ask("stop", (0,)) == ("ok", (), b"")
     assert stands(host) == ("stopped", 0, 1, 0, 0)
-    assert app.controller.outputs.log == [] and state(host) == "idle"
+    assert app.controller.board.outputs.log == [] and state(host) == "idle"
 
 
 def case_an_input_lets_it_go_on():
@@ -306,11 +306,11 @@ def case_an_input_lets_it_go_on():
     begin(host)
     stand_in.Clock.now_ms += 3_000_000
     assert stands(host) == ("running", 0, 1, 0, 0)
-    app.controller.inputs.levels = 1
+    app.controller.board.inputs.levels = 1
     assert stands(host) == ("running", 0, 3, 2, 0)
-    app.controller.inputs.levels = 0
+    app.controller.board.inputs.levels = 0
     assert stands(host)[0] == "finished"
-    assert app.controller.outputs.log == [(0, 1), (0, 0)]
+    assert app.controller.board.outputs.log == [(0, 1), (0, 0)]
 
 
 def _waited_in_vain(then):
@@ -326,13 +326,13 @@ def _waited_in_vain(then):
 def case_an_input_that_never_comes_stops_it():
     app, host = _waited_in_vain(sequence.STOP_THEN)
     assert stands(host) == ("timed_out", 0, 1, 0, 0)
-    assert state(host) == "idle" and app.controller.outputs.log == []
+    assert state(host) == "idle" and app.controller.board.outputs.log == []
 
 
 def case_an_input_that_never_comes_is_a_fault():
     app, host = _waited_in_vain(sequence.FAULT_THEN)
     assert stands(host) == ("fault", codes.INPUT_TIMEOUT, 1, 0, 0)
-    assert state(host) == "fault" and app.controller.outputs.log == []
+    assert state(host) == "fault" and app.controller.board.outputs.log == []
     assert begin(host)[:2] == ("error", "fault_pending")
     assert host.ask("clear") == ("ok", (), b"")
     assert begin(host)[0] == "ok"
@@ -340,40 +340,40 @@ def case_an_input_that_never_comes_is_a_fault():
 
 def case_an_input_that_never_comes_is_passed_over():
     app, host = _waited_in_vain(sequence.NEXT_THEN)
-    assert stands(host)[0] == "finished" and app.controller.outputs.log == [(0, 1)]
+    assert stands(host)[0] == "finished" and app.controller.board.outputs.log == [(0, 1)]
 
 
 def case_a_fault_ends_it_and_says_where():
     app, host = ready([(MOVE, "there", 0, 0), (OUTPUT, 0, 1, 0), (MOVE, "back", 0, 0)])
     begin(host)
-    engine = app.controller.engine
+    engine = app.controller.board.engine
     engine.fault = codes.LIMIT_SWITCH
     engine.moving = False
     host.turn(5)
     assert stands(host) == ("fault", codes.LIMIT_SWITCH, 1, 0, 0)
-    assert app.controller.outputs.log == [] and state(host) == "fault"
+    assert app.controller.board.outputs.log == [] and state(host) == "fault"
 
 
 def case_a_fault_in_a_wait_ends_it():
     app, host = ready([(WAIT, 0, 0, 100000), (OUTPUT, 0, 1, 0)])
     begin(host)
-    app.controller.engine.fault = codes.ESTOP
+    app.controller.board.engine.fault = codes.ESTOP
     assert stands(host) == ("fault", codes.ESTOP, 1, 0, 0)
-    assert app.controller.outputs.log == []
+    assert app.controller.board.outputs.log == []
 
 
 def case_a_mistake_of_the_program_ends_it():
     app, host = ready([(WAIT, 0, 0, 100000), (OUTPUT, 0, 1, 0)])
     begin(host)
-    app.controller.engine.explode = ValueError("x")
+    app.controller.board.engine.explode = ValueError("x")
     assert stands(host) == ("fault", codes.INTERNAL, 1, 0, 0)
-    assert app.controller.outputs.log == []
+    assert app.controller.board.outputs.log == []
 
 
 def case_what_cannot_go_on_is_named():
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     begin(host)
-    app.controller.engine.refusal = (codes.TOO_FAST, 1, 5)
+    app.controller.board.engine.refusal = (codes.TOO_FAST, 1, 5)
     arrive(app, host, 10)
     assert stands(host) == ("refused", codes.TOO_FAST, 2, 1, 0)
     assert state(host) == "idle"
@@ -429,7 +429,7 @@ def case_silence_of_the_host_stops_it_where_the_arm_says_so():
     assert begin(host)[0] == "ok"
     stand_in.Clock.now_ms += 1000
     host.turn(3)
-    assert app.controller.engine.calls[-1] == "brake"
+    assert app.controller.board.engine.calls[-1] == "brake"
     arrive(app, host, 5)
     assert stands(host) == ("fault", codes.LINK_LOST, 1, 0, 0)
 
@@ -440,11 +440,11 @@ def case_speed_holds_for_the_motions_that_follow():  # emulated
     assert host.ask("speed", (300,))[0] == "ok"
     host.hello(7)
     arrive(app, host, 10)
-    assert app.controller.engine.rates.wanted == 300
-    assert app.controller.engine.calls.count("load ready") == 1
+    assert app.controller.board.engine.rates.wanted == 300
+    assert app.controller.board.engine.calls.count("load ready") == 1
     arrive(app, host, 0)
     begin(host)
-    assert app.controller.engine.rates.wanted == 1000
+    assert app.controller.board.engine.rates.wanted == 1000
     arrive(app, host, 10)
     assert host.ask("speed", (0,))[0] == "ok"
 
@@ -456,13 +456,13 @@ def case_speed_between_motions_is_that_of_the_next():
     assert host.ask("speed", (200,))[0] == "ok"
     stand_in.Clock.now_ms += 5000
     host.turn(5)
-    assert app.controller.engine.rates.wanted == 200
+    assert app.controller.board.engine.rates.wanted == 200
 
 
 def case_the_button_starts_it_as_the_default():
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     assert host.ask("set_default", (), "seq")[0] == "ok"
-    app.controller.begin(app.controller.store().default(), 0)
+    app.controller.begin(app.controller.board.store().default(), 0)
     host.turn(6)
     arrive(app, host, 10)
     arrive(app, host, 0)
@@ -472,7 +472,7 @@ def case_the_button_starts_it_as_the_default():
 def case_code_stays_from_the_first_motion_to_the_end_where_memory_is_not_short():  # emulated
     for is_short in (False, True):
         app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
-        app.controller.workspace.is_short = is_short
+        app.controller.board.workspace.is_short = is_short
         try:
             begin(host)
             arrive(app, host, 10)
@@ -480,7 +480,7 @@ def case_code_stays_from_the_first_motion_to_the_end_where_memory_is_not_short()
             arrive(app, host, 0)
             assert stands(host)[0] == "finished"
         finally:
-            app.controller.workspace.is_short = False
+            app.controller.board.workspace.is_short = False
         assert not heap._keeps
 
 

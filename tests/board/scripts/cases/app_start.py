@@ -11,7 +11,7 @@ import stand_in
 from app_rig import ROOT  # isort: skip  it puts the stand-ins into place
 
 from armtempo_board import heap
-from armtempo_board.app import arm_state
+from armtempo_board.app import board
 from armtempo_board.app.app import App
 from armtempo_shared import armrecord, engine_memory, wire
 
@@ -117,23 +117,23 @@ def case_a_record_that_no_longer_fits_is_named():
 
 def case_an_engine_that_cannot_be_made_is_named():
     root = folder_with(stand_in.arm())
-    engine = arm_state.Engine
+    engine = board.Engine
     for error, problem in ((MemoryError, "no_memory"), (ValueError, "failed")):
 
         def broken(*arguments, error=error):
             raise error
 
-        arm_state.Engine = broken
+        board.Engine = broken
         try:
             _, _, hello = started(root)
         finally:
-            arm_state.Engine = engine
+            board.Engine = engine
         assert (hello[1], wire.ERRORS[hello[PROBLEM]][0]) == (0, problem)
 
 
 def case_an_engine_is_made_beside_a_piece_that_is_held_if_memory_is_short():
     """Or without it, if there is no room for both."""
-    engine = arm_state.Engine
+    engine = board.Engine
     tried = []
 
     def looked(parts):
@@ -142,17 +142,17 @@ def case_an_engine_is_made_beside_a_piece_that_is_held_if_memory_is_short():
             raise MemoryError
         return engine(parts)
 
-    arm_state.Engine = looked
+    board.Engine = looked
     try:
         for stand_in.Workspace.is_short in (True, False):
             app, _, hello = started(folder_with(stand_in.arm()))
-            assert app.controller.engine.joints == 2
+            assert app.controller.board.engine.joints == 2
             assert (hello[1], hello[PROBLEM]) == (2, 0)
             assert heap._held == [], "the motion's code finds no room"
     finally:
-        arm_state.Engine = engine
+        board.Engine = engine
         stand_in.Workspace.is_short = False
-    assert tried == [arm_state.MOTION_CODE_BYTES, 0, 0], tried
+    assert tried == [board.MOTION_CODE_BYTES, 0, 0], tried
 
 
 def case_a_damaged_motion_is_listed_and_refused():

@@ -114,10 +114,10 @@ def case_default_is_one_content_of_its_name():
     assert host.ask("set_default", (), "feed")[0] == "ok"
     assert host.upload("feed", other)[-1][0] == "ok"
     assert host.ask("list", (0,))[1][5] == 0
-    assert app.controller.store().default() == ""  # the button starts nothing
+    assert app.controller.board.store().default() == ""  # the button starts nothing
     assert host.upload("feed", host.record)[-1][0] == "ok"
     assert host.ask("list", (0,))[1][5] == 1
-    assert app.controller.store().default() == "feed"
+    assert app.controller.board.store().default() == "feed"
 
 
 def case_damaged_file_in_flash_is_not_run():
@@ -130,7 +130,7 @@ def case_damaged_file_in_flash_is_not_run():
         file.write(data)
     assert start(host) == ("error", "bad_record", 255, 0)
     assert host.ask("list", (0,)) == ("ok", (1, len(data), 0, 0, 0, 0, 0), "feed")
-    assert app.controller.engine.calls.count("load") == 0
+    assert app.controller.board.engine.calls.count("load") == 0
 
 
 def case_file_that_ends_before_its_size_is_damaged():
@@ -148,12 +148,12 @@ def case_file_that_ends_before_its_size_is_damaged():
 
 def case_other_limits_keep_the_position_another_arm_does_not():
     app, host = connected()
-    app.controller.engine.steps[:] = [5, -7]
+    app.controller.board.engine.steps[:] = [5, -7]
     assert host.upload("/arm", stand_in.arm(low=-10))[-1][0] == "ok"
-    assert app.controller.engine.calls == ["home"]
-    assert (app.controller.engine.known, app.controller.engine.steps) == (3, [5, -7])
+    assert app.controller.board.engine.calls == ["home"]
+    assert (app.controller.board.engine.known, app.controller.board.engine.steps) == (3, [5, -7])
     assert host.upload("/arm", stand_in.arm(flags=1))[-1][0] == "ok"
-    assert (app.controller.engine.known, app.controller.engine.steps) == (0, [0, 0])
+    assert (app.controller.board.engine.known, app.controller.board.engine.steps) == (0, [0, 0])
 
 
 cases.run(globals())

@@ -162,7 +162,7 @@ while given < FRAMES:
             idle += 1
             stand_in.Clock.now_ms += 1
         app.link.flush()
-    assert app.controller.engine.calls.count("start") == 0, "a motion started"
-    assert app.controller.fault() == 0
+    assert app.controller.board.engine.calls.count("start") == 0, "a motion started"
+    assert app.controller.board.fault() == 0
 print(given, acted, app.link.reader.bad)
 print(len([n for n in IDS if reached.get(n)]) == len(IDS))

@@ -114,7 +114,7 @@ for number in range(8):
 frames.append(b"noise" + frames[0][:-1] + b"x")
 frames.append(command(200, "home", 0) + command(201, "list", 0))
 app.link.stream = port = Port(frames)
-app.controller.engine = Still()
+app.controller.board.engine = Still()
 app.turn()
 stand_in.Pin.levels["D1"] = 1
 micropython.heap_lock()
@@ -125,8 +125,8 @@ for turn in range(TURNS):
     stand_in.Pin.levels["D1"] = turn // 100 % 2
     app.turn()
 micropython.heap_unlock()
-assert app.controller.fault() == 0, app.controller.fault()
-assert app.controller.samples.next > TURNS // 10 - 5
+assert app.controller.board.fault() == 0, app.controller.board.fault()
+assert app.controller.board.samples.next > TURNS // 10 - 5
 assert port.taken > TURNS
-assert app.controller.outputs.values[1] and app.controller.inputs.levels == 0
-print(app.controller.samples.next, app.controller.samples.first, port.taken)
+assert app.controller.board.outputs.values[1] and app.controller.board.inputs.levels == 0
+print(app.controller.board.samples.next, app.controller.board.samples.first, port.taken)

@@ -62,8 +62,8 @@ LEGS = {"there": leg(0, 10), "back": leg(10, 0), "on": leg(10, 20)}
 def ready(rows, legs=LEGS, outputs=2, counters=()):
     """A board with these motions and the sequence "seq", homed at 0; app and host."""
     app, host = connected()
-    app.controller.outputs = Outputs(outputs) if outputs else None
-    app.controller.inputs = Inputs() if outputs else None
+    app.controller.board.outputs = Outputs(outputs) if outputs else None
+    app.controller.board.inputs = Inputs() if outputs else None
     for name in sorted(legs):
         assert host.upload(name, legs[name])[-1][0] == "ok"
     put(host, rows, legs, counters=counters)
@@ -97,7 +97,7 @@ def stands(host):
 
 def arrive(app, host, at):
     """The leg that is under way ends at these steps."""
-    engine = app.controller.engine
+    engine = app.controller.board.engine
     assert engine.moving
     engine.steps = [at, at]
     engine.finish()
@@ -105,4 +105,4 @@ def arrive(app, host, at):
 
 
 def runs(app):
-    return app.controller.engine.calls.count("start")
+    return app.controller.board.engine.calls.count("start")

@@ -257,7 +257,7 @@ class Soak:
         """Wait: for some time, for the end of the motion under way, or the beginning of the next."""
         world, numbers = self.world, self.numbers
         what = numbers.randrange(0, 4)
-        if what == 0 or controller().engine.rates.wanted == 0:
+        if what == 0 or controller().board.engine.rates.wanted == 0:
             yield from world.wait(numbers.randrange(1, 150))
         elif what == 1:
             motions = self.watch.motions
@@ -271,7 +271,7 @@ class Soak:
 
     def left_ms(self):
         """Until the motion under way ends, as things stand."""
-        engine = controller().engine
+        engine = controller().board.engine
         if not engine.moving:
             return 1
         return (engine.rates.duration_ticks - engine.clock.ticks()) // TICKS_PER_MS

@@ -253,7 +253,7 @@ def case_level_present_at_power_up(world):
 def case_a_failing_start_is_a_fault_not_the_end(world):  # not compiled
     """The button's start raises something unforeseen: the program continues and says so."""
     yield from ready(world)
-    sys.modules["armtempo_board.app.controller"].Controller.store = None
+    sys.modules["armtempo_board.app.board"].Board.store = None
     yield from tap(world)
     status = yield from world.status()
     assert (status["fault"], world.led()) == ("internal", "fault")

@@ -262,7 +262,7 @@ def generators():
     from armtempo_board.app import program
     from armtempo_board.hardware import isr
 
-    engine = program.app.controller.engine
+    engine = program.app.controller.board.engine
     queues = [joint.ring.state[isr.QUEUE_AT : isr.QUEUE_AT + 2] for joint in engine.drives]
     return [id(joint.generator) for joint in engine.drives] + [list(words) for words in queues]
 

@@ -1,9 +1,13 @@
-"""The backup SRAM (RM0090 5.1.2): without its clock it reads as 0, without write access it keeps what it had."""
+"""The backup domain (RM0090 5.1.2): without write access SRAM and RTC keep what they had.
+
+Without its clock the SRAM reads as 0.
+"""
 
 from chip import memory
 
 _AHB1ENR, _APB1ENR = 12, 16  # words of RCC
 _BKPSRAMEN, _PWREN, _DBP = 18, 28, 8  # bits
+_RTC_BYTES = memory.BLOCK_BYTES
 
 
 class BackupSram:
@@ -27,6 +31,12 @@ class BackupSram:
         self._shown = self._kept if clocked else bytes(len(self._kept))
         self.is_open = clocked and memory.words[power] >> _DBP & 1
         self.undo()
+
+    def sync_rtc(self):
+        """The RTC was written."""
+        if not memory.words[memory.index("PWR")] >> _DBP & 1:
+            at = 4 * memory.index("RTC")
+            memory.raw[at : at + _RTC_BYTES] = memory.raw_seen[at : at + _RTC_BYTES]
 
     def undo(self):
         """What was written to it is lost."""

@@ -13,7 +13,7 @@ BLOCKS = (
     "TIM1", "TIM2", "GPIOA", "TIM3", "TIM4", "TIM6", "GPIOB", "TIM7", "TIM8", "DMA1",
     "GPIOC", "DMA2", "RCC", "TIM5", "GPIOD", "EXTI", "SYSCFG", "DBGMCU", "GPIOE", "PWR",
     "IWDG", "FLASH", "TIM9", "TIM10", "TIM11", "TIM12", "TIM13", "TIM14",
-    "DWT", "SCS", "NVIC_IPR",
+    "RTC", "DWT", "SCS", "NVIC_IPR",
 )  # fmt: skip
 # where the chip has them (RM0090 table 1), for programs that name addresses themselves
 _ON_CHIP = (
@@ -21,7 +21,7 @@ _ON_CHIP = (
     0x40026000, 0x40020800, 0x40026400, 0x40023800, 0x40000C00, 0x40020C00, 0x40013C00, 0x40013800, 0xE0042000,
     0x40021000, 0x40007000, 0x40003000, 0x40023C00,
     0x40014000, 0x40014400, 0x40014800, 0x40001800, 0x40001C00, 0x40002000,
-    0xE0001000, 0xE000ED00,
+    0x40002800, 0xE0001000, 0xE000ED00,
 )  # fmt: skip
 BLOCK_WORDS = 64
 BLOCK_BYTES = 4 * BLOCK_WORDS
@@ -112,8 +112,10 @@ def accept(block):
 
 
 def clear():
-    """Power-up: all registers zero."""
+    """A reset: all registers zero but the RTC's, whose backup registers it spares (RM0090 5.1.2)."""
+    kept = index("RTC")
     for at in range(SIZE // 4):
-        words[at] = 0
-        seen[at] = 0
+        if not kept <= at < kept + BLOCK_WORDS:
+            words[at] = 0
+            seen[at] = 0
     objects.clear()

@@ -102,6 +102,8 @@ class Chip:
         self._sync_pins(names)
         if "PWR" in names:
             self.backup.sync()
+        if "RTC" in names:
+            self.backup.sync_rtc()
         if "DWT" in names or "SCS" in names:
             self.cycles.sync()
         if "DMA1" in names or "RCC" in names:
@@ -125,6 +127,8 @@ class Chip:
         for port in self.pins.ports:
             if "GPIO" + gpio.PORTS[port.index] in names:
                 routed = port.sync(self.now) or routed
+                for extint in self.extints.values():
+                    extint.look()  # a pull resistor may have drawn its pin
         if routed:
             self.pins.route((self.timers[2], self.timers[5]))
 

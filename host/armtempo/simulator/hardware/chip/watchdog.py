@@ -18,10 +18,8 @@ class WDT:
             raise ValueError("WDT timeout must be from 1 to 32000 ms")
         machine_state.board.watchdog_ticks = timeout * TICKS_PER_MS
         memory.poke(memory.index("IWDG") + _RLR, timeout // 8)
-        watched = machine_state.board.watchdog_deadline is not None
         machine_state.board.watchdog_deadline = machine_state.board.now + machine_state.board.watchdog_ticks
-        if not watched:
-            _watch()
+        _watch()
 
     def feed(self):
         """Start the time over."""

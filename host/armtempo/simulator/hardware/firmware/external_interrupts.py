@@ -24,6 +24,7 @@ class ExtInt:
         if known is not None and callback is not None and known.wired is not pin.line:
             raise ValueError("ExtInt vector %d is already in use" % self._line)
         self.wired = pin.line
+        self._level = pin.line.read()
         self.enabled = callback is not None
         machine_state.board.extints[self._line] = self
         machine_state.board.callbacks[("exti", self._line)] = (callback, self._line)
@@ -46,9 +47,10 @@ class ExtInt:
         machine_state.board.pend("exti", self._line)
         machine_state.board.spend(CALL_TICKS)
 
-    def edge(self, rising):
-        """The pin changed."""
-        if self.enabled and self._edges & (_RISING if rising else _FALLING):
+    def look(self):
+        """The pin may have changed."""
+        before, self._level = self._level, self.wired.read()
+        if before != self._level and self.enabled and self._edges & (_RISING if self._level else _FALLING):
             machine_state.board.pend("exti", self._line)
 
 
@@ -63,4 +65,4 @@ def set_level(name, level):
         machine_state.board.input_changed(line, after)
         extint = machine_state.board.extints.get(line.number)
         if extint is not None and extint.wired is line:
-            extint.edge(after == 1)
+            extint.look()

@@ -10,7 +10,7 @@ from armtempo_shared import codes
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
-from armtempo_board import features, heap
+from armtempo_board import heap
 from armtempo_board.app.sample_buffer import SampleBuffer
 from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
 from armtempo_board.errors import Refused
@@ -28,7 +28,7 @@ MOTION_CODE_BYTES = const(14_500)
 NEVER_MS = const((1 << 30) - 1)
 
 
-class ArmState:
+class Board:
     """``root``: the folder of the store. ``fault``: what is pending from the start, 0 for none."""
 
     def __init__(self, root: str, program_crc: int, fault: int) -> None:
@@ -46,7 +46,6 @@ class ArmState:
         self.outputs: "Any" = None  # of an arm that has outputs or inputs,
         self.inputs: "Any" = None  # and these then too,
         self.rows: "dict[int, Any]" = {}  # and their commands
-        self.sequence: "Any" = None  # the one under way
         self.program_crc = program_crc
         self.board_id = board_id()
         self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
@@ -110,12 +109,6 @@ class ArmState:
             raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
         if not self.engine:
             raise Refused(codes.UNCONFIGURED)
-
-    def moving(self) -> bool:
-        """Whether steps may still come; a sequence has more to come while it waits."""
-        return self.engine is not None and (
-            self.engine.moving or (features.SEQUENCES and self.sequence is not None)
-        )
 
     def known(self) -> int:
         """One bit per joint: its position is known."""

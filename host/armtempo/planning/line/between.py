@@ -1,0 +1,74 @@
+"""The path of a stretch in which the tool is not led: the spline through its via points, or a free one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.progress import Progress
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.planning import checks
+from armtempo.planning.free import free_plan
+from armtempo.planning.line.stretches import Stretch
+from armtempo.planning.lower_bounds import Floor
+from armtempo.splines import bspline
+
+DEGREE = 5
+PIECES = 8
+"""Segments between two via points."""
+
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """The path of such a stretch."""
+
+    angle_points_deg: Array
+    """(S + 5, J)."""
+    arrivals: tuple[int, ...]
+    """Segments before each of its via points."""
+    floor: Floor | None = None
+    """Of any motion through them; None where the path is fixed."""
+
+    @property
+    def segments(self) -> int:
+        """All of them."""
+        return len(self.angle_points_deg) - DEGREE
+
+    @property
+    def at_knots(self) -> Array:
+        """Angles at the ends of the segments: (S + 1, J)."""
+        pieces = bspline.polynomials(self.angle_points_deg, DEGREE)
+        return np.concatenate([pieces[:, 0], pieces[-1:].sum(axis=1)])
+
+
+def between(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progress) -> Between:
+    """The path of a stretch of a job with via angles (n + 1, J); PlanError if no free one stays in the ranges."""
+    own = via_deg[stretch.first : stretch.last + 1]
+    if checks.is_free(job) and np.any(np.ptp(own, axis=0) > checks.TOLERANCE):
+        return _free(arm, job, stretch, own, progress)
+    points = bspline.refined(bspline.fit(own, DEGREE), PIECES, DEGREE)
+    return Between(points, tuple(PIECES * via for via in range(len(own))))
+
+
+def _free(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progress) -> Between:
+    """As by a job of its own from rest to rest, on few segments, as all stretches share the board's memory."""
+    ends = [tuple(angles.tolist()) for angles in via_deg[[0, -1]]]
+    alone = replace(
+        job,
+        via=(ends[0], *job.via[stretch.first + 1 : stretch.last], ends[1]),
+        refine=job.refine if isinstance(job.refine, int) else PIECES,
+        stops=(),
+        ways=(),
+        speed_mm_s=None,
+        acceleration_mm_s2=None,
+    )
+    planned = free_plan.motion(arm, alone, via_deg, progress)
+    joints = planned.trajectory.joints
+    points = np.stack([joint.angle_points_deg for joint in joints], axis=1)
+    search = planned.searches[0]
+    arrivals = joints[0].via_segments
+    assert arrivals is not None
+    return Between(points, arrivals, Floor(search.floor_s, search.floor_kind))

@@ -1,0 +1,56 @@
+"""Waiting at a rest between two stretches: segments put between them in which only time passes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.planning.motion_program import mean_slopes
+
+DEGREE = 5
+DWELL_SEGMENTS = DEGREE
+"""A dwell adds no more segments than these to the path."""
+_LEAST_STEP = 1e-3
+"""What a dwell that is too short adds to the time axis, as a part of the step before it."""
+
+
+@dataclass(frozen=True, eq=False)
+class TimedPath:
+    """A path of S segments on a time axis with ``refine`` segments for each of them."""
+
+    angle_points_deg: Array
+    """(S + 5, J)."""
+    differences_s: Array
+    """Of the time control points, (S * refine + 4,)."""
+    arrivals: tuple[int, ...]
+    """Segments before each via point."""
+    refine: int
+
+    def with_dwells(self, dwells_s: Mapping[int, float]) -> TimedPath:
+        """The same with waits, in seconds by via point; each is at a rest, where five control points are the same.
+
+        The time axis before and after stays the same. The four of its differences that both sides of the rest have in
+        common are needed twice, so a dwell lasts at least as long as these: hundredths to tenths of a second.
+        """
+        timed = self
+        for via in sorted(dwells_s, reverse=True):
+            timed = timed._with_dwell(via, dwells_s[via])
+        return timed
+
+    def _with_dwell(self, via: int, dwell_s: float) -> TimedPath:
+        knot, shared = self.arrivals[via], DEGREE - 1
+        segments = -(-DEGREE // self.refine)
+        first, count = knot * self.refine, segments * self.refine
+        before, after = self.differences_s[: first + shared], self.differences_s[first:]
+        twice = np.concatenate([before[-shared:], np.zeros(count - shared), after[:shared]])
+        lasts_s = float(np.convolve(np.ones(count), mean_slopes(DEGREE)) @ twice)
+        step = max((dwell_s - lasts_s) / (count - shared), _LEAST_STEP * before[-1])
+        return TimedPath(
+            np.insert(self.angle_points_deg, [knot] * segments, self.angle_points_deg[knot], axis=0),
+            np.concatenate([before, np.full(count - shared, step), after]),
+            tuple(at + segments * (number > via) for number, at in enumerate(self.arrivals)),
+            self.refine,
+        )
