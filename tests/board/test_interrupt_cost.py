@@ -6,6 +6,7 @@ import re
 from array import array
 
 import pytest
+from armtempo.selftest.board_part import EMITTED
 
 from tests import interpreters, slack
 from tests.benchmark import freeze
@@ -18,7 +19,7 @@ BOARD = interpreters.ROOT / "board" / "armtempo_board"
 SERVE = {1: (209, 382), 3: (257, 478), 6: (329, 622)}
 TAKE = {1: 198, 3: 278, 6: 398}
 REFILL = {1: (211, 258), 3: (369, 510), 6: (606, 888)}
-EMIT = {2: 700, 32: 1060, 512: 8770}
+EMIT = {**EMITTED, 32: 1060}
 ARM_CHANNEL = 228
 
 RING = 1024  # entries

@@ -163,7 +163,7 @@ BROKEN = (
         (
             "PA1, forward together: 383 steps, those of PA15 among them",
             "PB10, forward together: 0 steps",
-            "flash: write",
+            "flash: erase and write",
             "E-stop by software to frozen outputs",
             "E-stop by an edge to frozen outputs",
         ),

@@ -30,6 +30,7 @@ _SHOWN = (
     "speed_percent",
     "max_rate",
     "max_rate_sum",
+    "rates_measured",
     "free_flash",
     "free_heap",
     "frames_bad",

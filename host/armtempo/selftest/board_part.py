@@ -14,6 +14,8 @@ BOARD, CYCLES, MEMORY = "board", "cycles", "memory"
 _CORE_HZ = 2 * TICK_HZ
 _TOLERANCE = 0.002
 """Of ratios of clocks that come from one crystal: reading both takes some microseconds of 50 ms."""
+EMITTED = {2: 700, 512: 8770}
+"""Instructions of the ring interrupt's ``emit`` by edges, as ``on_board/cycles.py`` calls it; counted in the tests."""
 _WAIT_STATES = 5
 _CACHES = 0x700  # FLASH_ACR: prefetch, instruction cache, data cache (RM0090 3.9.1)
 _SLOWEST_WRITE_MS = 4000
@@ -47,6 +49,7 @@ def judge(found: dict[str, Any], board_id: str) -> Iterator[Measurement]:
         _OTHER_FIRMWARE,
     )
     yield from _flash(found["flash"])
+    yield _backup_sram(found["backup_cycles"])
     yield judged(
         MEMORY,
         "heap without the program, largest block",
@@ -86,6 +89,19 @@ def _clocks(freq: list[int], clocks: dict[str, int]) -> Iterator[Measurement]:
     )
 
 
+def _backup_sram(access: float | None) -> Measurement:
+    return judged(
+        BOARD,
+        "backup SRAM",
+        "none"
+        if access is None
+        else f"keeps what is written; a read takes {access:+.2f} cycles more than of the heap",
+        "keeps what is written",
+        access is not None,
+        "none: the engine takes its 4 KB from the heap, and less is left for motions",
+    )
+
+
 def _flash(found: dict[str, Any] | None) -> Iterator[Measurement]:
     if found is None:
         yield Measurement(
@@ -95,8 +111,9 @@ def _flash(found: dict[str, Any] | None) -> Iterator[Measurement]:
         return
     yield judged(
         BOARD,
-        "flash: write, read 4 KB",
-        f"{found['write_ms']}, {found['read_ms']} ms{'' if found['same'] else ', read back otherwise'}",
+        "flash: erase and write, read 4 KB",
+        f"{found['write_ms']}, {found['read_ms']} ms, no interrupt for {found['stall_us'] / 1000:.1f} ms"
+        f"{'' if found['same'] else ', read back otherwise'}",
         f"write below {_SLOWEST_WRITE_MS} ms, the same read back",
         found["same"] and found["write_ms"] < _SLOWEST_WRITE_MS,
         "the flash may be worn: back motions up ('armtempo show'), then format it ('armtempo help recovery')",
@@ -110,5 +127,12 @@ def judge_cycles(found: dict[str, float]) -> Iterator[Measurement]:
         ("machine_code", "the same in machine code"),
         ("collection", "a collection of the heap"),
     ):
-        took = f"{found[name]:.0f} cycles, {1e6 * found[name] / _CORE_HZ:.2f} us"
+        took = f"{found[name]:.1f} cycles, {1e6 * found[name] / _CORE_HZ:.2f} us"
         yield Measurement(CYCLES, words, took if found[name] else "takes no simulated time")
+    instructions = EMITTED[512] - EMITTED[2]
+    per = found["edges"] / instructions
+    yield Measurement(
+        CYCLES,
+        f"510 edges by the ring interrupt, {instructions} instructions",
+        f"{found['edges']} cycles, {per:.2f} an instruction" if per > 0 else "takes no simulated time",
+    )

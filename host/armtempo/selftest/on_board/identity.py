@@ -1,5 +1,7 @@
 """What the board is: firmware, clocks, flash, heap."""
 
+import micropython
+
 _FLASH_FILE = "/flash/selftest.tmp"
 _BLOCK = 4096
 
@@ -24,7 +26,62 @@ def clocks():
     }
 
 
+@micropython.viper
+def read_often(words: ptr32, times: int):
+    """Read a word again and again."""
+    for _ in range(times):
+        words[0]
+
+
+def reading(words):
+    """Cycles in which a word is read 1000 times."""
+    return cost(read_often, words, 1100) - cost(read_often, words, 100)
+
+
+def backup_access():
+    """Cycles by which reading a word of the backup SRAM takes longer than one of the heap."""
+    from array import array
+
+    from armtempo_board.hardware import backup_sram
+
+    found = backup_sram.find()
+    return (reading(found) - reading(array("i", [0]))) / 1000 if found else None
+
+
+@micropython.viper
+def note_gap(gaps: ptr32, timer: ptr32):
+    """An interrupt: keep the longest time between two, in ticks. TIM2 counts."""
+    now = timer[9]
+    passed = (now - gaps[0]) & 0x3FFFFFFF
+    gaps[0] = now
+    if passed > gaps[1]:
+        gaps[1] = passed
+
+
 def flash():
+    """``write_file``, with the longest time in which no interrupt came (one is due every 0.5 ms), in microseconds."""
+    from array import array
+
+    import pyb
+
+    gaps = array("i", [0, 0])
+    at = stm.TIM2
+    mem32[at + stm.TIM_CR1] = 1
+    watch = pyb.Timer(7, freq=2000, callback=lambda _: note_gap(gaps, at))
+    try:
+        time.sleep_ms(2)
+        gaps[1] = 0
+        found = write_file()
+        time.sleep_ms(2)
+    finally:
+        watch.deinit()
+        mem32[at + stm.TIM_CR1] = 0
+    if found:
+        found["stall_us"] = gaps[1] // 84
+    return found
+
+
+def write_file():
     """Milliseconds to write and read a file of 4 KB, None where there is no room; nothing is left of it."""
     import os
 
@@ -71,4 +128,5 @@ def measure():
         "heap": free(),
         "largest": largest(),
         "flash": flash(),
+        "backup_cycles": backup_access(),
     }
