@@ -1,8 +1,8 @@
-"""Becomes ``/flash/lib/armtempo_archive.mpy``: finds the program's modules in one file, most of them deflated.
+"""Becomes ``/flash/lib/armtempo_archive.mpy``: finds the program's modules in one file, each deflated.
 
 For MicroPython's own firmware, in whose flash they have no room otherwise; ``boot.py`` imports it. The file begins with
 the length of its index in two bytes, then the index, a line "PACKAGE/MODULE OFFSET" for each, the package without
-"armtempo_", the offset below 0 where the module is not deflated. It is written by ``deploy/archive.py`` on the host.
+"armtempo_". It is written by ``deploy/archive.py`` on the host.
 """
 
 import sys
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 _FILE = "/flash/lib/armtempo.z"
 _POINT = "/armtempo"
-_WINDOW_BITS = const(10)
 _FOLDER = const(0x4000)
 _REGULAR = const(0x8000)
 _ENOENT = const(2)
@@ -53,10 +52,8 @@ class Archive:
         if not offset:
             raise OSError(_ENOENT)
         file = open(_FILE, "rb")  # noqa: SIM115  the import closes it
-        file.seek(abs(offset))
-        if offset < 0:
-            return file
-        return deflate.DeflateIO(file, deflate.RAW, _WINDOW_BITS, True)
+        file.seek(offset)
+        return deflate.DeflateIO(file, deflate.ZLIB, 0, True)
 
     def _offset(self, path: str) -> int:
         """Where a module begins, 0: it is not there."""
