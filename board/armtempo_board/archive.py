@@ -1,8 +1,8 @@
-"""Becomes ``/flash/lib/armtempo_archive.mpy``: finds the program's modules in one file, each deflated.
+"""Becomes ``/flash/lib/armtempo_archive.mpy``: finds the program's modules in one file, most of them deflated.
 
 For MicroPython's own firmware, in whose flash they have no room otherwise; ``boot.py`` imports it. The file begins with
 the length of its index in two bytes, then the index, a line "PACKAGE/MODULE OFFSET" for each, the package without
-"armtempo_". It is written by ``deploy/archive.py`` on the host.
+"armtempo_", the offset below 0 where the module is not deflated. It is written by ``deploy/archive.py`` on the host.
 """
 
 import sys
@@ -52,7 +52,9 @@ class Archive:
         if not offset:
             raise OSError(_ENOENT)
         file = open(_FILE, "rb")  # noqa: SIM115  the import closes it
-        file.seek(offset)
+        file.seek(abs(offset))
+        if offset < 0:
+            return file
         return deflate.DeflateIO(file, deflate.ZLIB, 0, True)
 
     def _offset(self, path: str) -> int:

@@ -1,4 +1,4 @@
-"""The compiled modules of the board program as one file, each deflated: what the board's ``archive.py`` reads."""
+"""The compiled modules of the board program as one file, most deflated: what the board's ``archive.py`` reads."""
 
 from __future__ import annotations
 
@@ -11,15 +11,18 @@ _WIDE_BITS = 13
 """The same where there is plenty: 8 KB."""
 
 
-def pack(files: Mapping[str, bytes], wide: Collection[str]) -> bytes:
-    """The archive of files by their path from the library's folder on; ``wide``: imported while the heap is empty."""
-    packed = {path: _deflated(data, path in wide) for path, data in files.items()}
+def pack(files: Mapping[str, bytes], wide: Collection[str], plain: Collection[str]) -> bytes:
+    """The archive of files by their path from the library's folder on.
+
+    ``wide``: imported while the heap is empty; ``plain``: not deflated.
+    """
+    packed = {path: data if path in plain else _deflated(data, path in wide) for path, data in files.items()}
     index = ""
     while True:  # as offsets grow in length with the index
         at = 2 + len(index)
         lines = []
         for path, data in packed.items():
-            lines.append(f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {at}")
+            lines.append(f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {-at if path in plain else at}")
             at += len(data)
         made = "".join(lines) + "\n"
         if len(made) == len(index):
