@@ -42,7 +42,7 @@ _SIMULATED_TURN_US = 1000
 """What a turn of the loop takes on a virtual board, about as on the chip."""
 _SEED = 5
 _STOPS, _BATCH, _SIMULATED_STOPS = 1000, 100, 4
-"""Every second one by an edge. A batch is one call of the part."""
+"""E-stop and limit switch, by software and by an edge, take turns. A batch is one call of the part."""
 _WAITS_US = (22_000, 78_000)
 """E-stops at random moments of ``motion.make``, which begins 20 ms after its start."""
 _STARVED_S = 0.06
@@ -259,8 +259,11 @@ def _stop(prompt: Prompt, found: SelfTest, arguments: dict[str, Any], work: Prog
             return
         before = all_of
         all_of = dict(measured.values)
-        for name in ("cycles", "edge_cycles", "faults"):
-            all_of[name] = before.get(name, []) + all_of[name]
+        if before:
+            all_of["wrong_faults"] += before["wrong_faults"]
+            all_of["cycles"] = {
+                name: before["cycles"].get(name, []) + took for name, took in all_of["cycles"].items()
+            }
     found.data[pulse_part.SAFETY] = all_of
     found.add(pulse_part.judge_stops(all_of))
     found.add([_still_off(all_of, found)])
