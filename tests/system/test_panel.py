@@ -114,7 +114,9 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     wait_for(page, "in a pause", "Run")
     page.get_by_role("button", name="Resume").click()  # on along the path
     page.wait_for_function("!document.getElementById('armtempo-state').textContent.includes('in a pause')")
-    page.wait_for_function("before => document.getElementById('armtempo-where').textContent != before", arg=before)
+    page.wait_for_function(
+        "before => document.getElementById('armtempo-where').textContent != before", arg=before
+    )
     page.keyboard.press(" ")  # the button just pressed has the focus, and does not take it
     wait_for(page, "idle")
     joints = panel.state().joints
