@@ -18,7 +18,7 @@ from armtempo.selftest.result import Measurement, judged
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0
 """A sample each microsecond, the two ports half of one apart, and the rounding of a step time."""
-_LONGEST_TURN_US = 4000
+LONGEST_TURN_US = 4000
 """The capture keeps 4096 samples; after a longer turn some are lost."""
 _SLOWEST_STOP_US = 30.0
 CYCLES_PER_US = 168
@@ -61,10 +61,10 @@ def judge(
         name, meaning, cure = ERRORS[values["fault"]]
         yield judged(PULSES, f"motion {way}", f"fault {name}: {meaning}", "no fault", False, cure)
     longest_us = values["longest_turn_cycles"] / CYCLES_PER_US
-    if longest_us > _LONGEST_TURN_US:
+    if longest_us > LONGEST_TURN_US:
         measured_words = f"a turn of the loop took {longest_us:.0f} us"
         yield judged(
-            PULSES, f"capture {way}", measured_words, f"below {_LONGEST_TURN_US}", False, "run it again"
+            PULSES, f"capture {way}", measured_words, f"below {LONGEST_TURN_US}", False, "run it again"
         )
         return
     found = rises_us(measured)
