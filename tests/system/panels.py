@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import armtempo
@@ -27,6 +28,7 @@ ARM = armtempo.Arm.paper()
 OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 WAIT_S = 120.0
 """Nothing here takes longer, on however loaded a machine."""
+DESKTOP = {"width": 1280, "height": 800}
 SMALL = {"width": 640, "height": 900}
 """Size of a window that is drawn quickly by a processor."""
 _SELDOM = "{const soon = requestAnimationFrame; requestAnimationFrame = (call) => setTimeout(() => soon(call), 200);}"
@@ -80,6 +82,8 @@ class Panel:
     cables: tuple[Cable, Cable]
     process: subprocess.Popen[str]
     address: str
+    errors: list[str]
+    """Lines of its error output so far."""
 
     @property
     def running(self) -> bool:
@@ -98,12 +102,21 @@ class Panel:
         """End its program."""
         if self.running:
             self.process.send_signal(signal.SIGINT)
-        self.process.communicate(timeout=WAIT_S)
+        self.process.wait(timeout=WAIT_S)
+        assert self.process.stdout
+        self.process.stdout.close()
 
     def cut(self, cut: bool) -> None:
         """Cut the cable, or mend it."""
         for cable in self.cables:
             cable.cut = cut
+
+
+def _read(process: subprocess.Popen[str], errors: list[str]) -> None:
+    """Gather what a program says in its error output, to its end."""
+    assert process.stderr
+    with process.stderr:
+        errors.extend(process.stderr)
 
 
 class Panels:
@@ -122,18 +135,18 @@ class Panels:
             options = ("--web-port", "0", "--no-show", "--port", self._port, *self._options)
             process = commandline.start("panel", *options, folder=self._folder)
             assert process.stdout
+            errors: list[str] = []
+            Thread(target=_read, args=(process, errors), daemon=True).start()
             address = process.stdout.readline().strip()
-            assert address.startswith("http://127.0.0.1:"), (
-                address,
-                process.stderr and process.stderr.read(),
-            )
-            self._last = Panel(self._folder, self._port, self._cables, process, address)
+            assert address.startswith("http://127.0.0.1:"), (address, errors)
+            self._last = Panel(self._folder, self._port, self._cables, process, address, errors)
         return self._last
 
     def close(self) -> None:
-        """End the last one."""
+        """End the last one, in which nothing may have failed."""
         if self._last is not None:
             self._last.end()
+            assert "Traceback" not in "".join(self._last.errors), "".join(self._last.errors)
 
 
 def asked(address: str, request: bytes) -> bytes:

@@ -258,6 +258,9 @@ def test_a_held_jog_ends_with_what_holds_it(
             assert "Nothing can be moved" in page.evaluate(
                 "getComputedStyle(document.body, '::after').content"
             )
+            assert page.evaluate(_PRESSED) == 0
+            page.keyboard.press("Enter")  # on the button that has the focus
+            assert page.evaluate("clicks") == 0
         else:
             panel.cut(True)
             page.wait_for_selector("text=did not answer")
@@ -268,32 +271,82 @@ def test_a_held_jog_ends_with_what_holds_it(
     assert panel.running == (how != "server")
 
 
+_PRESSED = """() => {
+  window.clicks = 0;
+  addEventListener('click', event => window.clicks += event.target.matches('button'), true);
+  const seen = [...document.querySelectorAll('button')].filter(one => one.checkVisibility() && !one.disabled);
+  seen.find(one => one.textContent.includes('Stop')).focus();
+  return seen.filter(one => {
+    const {x, y, width, height} = one.getBoundingClientRect();
+    const on = document.elementFromPoint(x + width / 2, y + height / 2);
+    return on && one.contains(on);
+  }).length;
+}"""
+"""How many buttons a pointer finds; from then on clicks are counted, and the button that stops has the focus."""
+
+
+def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> None:
+    assert page.evaluate("armtempo.SILENT_MS + armtempo.LOOK_MS") < 1000
+    silent = """ms => {
+      armtempo.heard = performance.now() - ms;
+      armtempo.look();
+      return document.body.matches('.lost');
+    }"""
+    assert page.evaluate(silent, 1000 - page.evaluate("armtempo.LOOK_MS"))
+    page.wait_for_selector("body:not(.lost)")  # it hears again
+
+
 _SOCKET = b"/_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
 _KEY = b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
 
 
-@pytest.mark.parametrize(
-    ("request_", "status"),
-    [
-        (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", b"403"),
-        (b"GET / HTTP/1.1\r\nHost: HOST\r\nOrigin: http://evil.example\r\n\r\n", b"403"),
-        (b"GET " + _SOCKET + _KEY + b"Host: HOST\r\nOrigin: http://evil.example\r\n\r\n", b"403"),
-        (b"POST / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 1000001\r\n\r\n", b"403"),
-        (
-            b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n"
-            + 17 * (b"10000\r\n" + 0x10000 * b"x" + b"\r\n"),
-            b"413",
-        ),
-        (b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\nmany\r\n", b"400"),
-        (b"GET / HTTP/1.1\r\nHost: HOST\r\nX: " + 400_000 * b"x" + b"\r\n\r\n", b"400"),
-        (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", b"400"),
-        (b"GET /runs/..%2f..%2f/job.toml HTTP/1.1\r\nHost: HOST\r\n\r\n", b"404"),
-        (b"GET / HTTP/1.1\r\nHost: HOST\r\n\r\n", b"200"),
-    ],
-    ids=["host", "origin", "socket", "size", "chunks", "chunk", "header", "bytes", "path", "good"],
-)
-def test_what_is_no_request_of_its_pages_is_refused(panel: Panel, request_: bytes, status: bytes) -> None:
+_REFUSED = {
+    "host": (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", b"403", "this name is not the server's"),
+    "origin": (
+        b"GET / HTTP/1.1\r\nHost: HOST\r\nOrigin: http://evil.example\r\n\r\n",
+        b"403",
+        "a page of another origin",
+    ),
+    "socket": (
+        b"GET " + _SOCKET + _KEY + b"Host: HOST\r\nOrigin: http://evil.example\r\n\r\n",
+        b"403",
+        "a page of another origin",
+    ),
+    "size": (
+        b"POST / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 1000001\r\n\r\n",
+        b"403",
+        "more than 1000000",
+    ),
+    "chunks": (
+        b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n"
+        + 17 * (b"10000\r\n" + 0x10000 * b"x" + b"\r\n"),
+        b"413",
+        "more than 1000000",
+    ),
+    "chunk": (
+        b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\nmany\r\n",
+        b"400",
+        "Invalid HTTP request",
+    ),
+    "header": (
+        b"GET / HTTP/1.1\r\nHost: HOST\r\nX: " + 400_000 * b"x" + b"\r\n\r\n",
+        b"400",
+        "Invalid HTTP request",
+    ),
+    "bytes": (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", b"400", "Invalid HTTP request"),
+    "path": (b"GET /runs/..%2f..%2fjob.toml HTTP/1.1\r\nHost: HOST\r\n\r\n", b"404", "job.toml not found"),
+    "escape": (b"GET /%1b[2J HTTP/1.1\r\nHost: HOST\r\n\r\n", b"403", "'/\\x1b[2J' from"),
+}
+"""Requests that are none of the panel's own pages, the status of the answer, and what is logged."""
+
+
+@pytest.mark.parametrize(("request_", "status", "logged"), _REFUSED.values(), ids=_REFUSED)
+def test_what_is_no_request_of_its_pages_is_refused_and_logged(
+    panel: Panel, request_: bytes, status: bytes, logged: str
+) -> None:
+    before = len(panel.errors)
     assert panels.asked(panel.address, request_).split(b" ")[1:2] == [status]
+    commandline.wait_for(lambda: any(logged in line for line in panel.errors[before:]), logged)
 
 
 _FOCUS = """async () => {

@@ -45,6 +45,15 @@ def parse(text: str, file: str) -> Table:
         ) from None
 
 
+def typed(text: str) -> Any:
+    """The value that was typed: a number, true or false, or a list if it is one in TOML, else the text."""
+    try:
+        value = tomllib.loads(f"x = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return value["x"] if len(value) == 1 and isinstance(value["x"], bool | int | float | list) else text
+
+
 class Table:
     """One TOML table; each getter checks one key, ``done`` refuses keys that no getter has read."""
 

@@ -40,10 +40,13 @@ class SequenceTab:
                 (words.TO_START, self._to_start, Needs.MOVE),
                 (words.RUN, self._run, Needs.MOVE),
             ):
-                page.control(ui.button(text, on_click=call).props("outline no-caps"), needs)
+                page.control(ui.button(text, on_click=call).props("outline no-caps"), needs, self._why_not)
         self._where = ui.label("").props('role="status"')
         self._table()
         page.on_look(self._look)
+
+    def _why_not(self) -> str:
+        return words.NO_SEQUENCE_OPEN if self._desk.file is None else ""
 
     @ui.refreshable_method
     def _table(self) -> None:
