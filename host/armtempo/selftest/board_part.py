@@ -17,7 +17,7 @@ _TOLERANCE = 0.002
 EMITTED = {2: 700, 512: 8770}
 """Instructions of the ring interrupt's ``emit`` by edges, as ``on_board/cycles.py`` calls it; counted in the tests."""
 TURN = {"byte_code": 252, "machine_code": 22}
-"""Instructions of a turn of the small loops of ``on_board/cycles.py``, which MicroPython compiles on the board: 1.29.
+"""Instructions of a turn of the small loops of ``on_board/cycles.py``, as MicroPython 1.29 compiles them.
 
 Counted by ``python -m tests.benchmark.selftest_heap``.
 """
