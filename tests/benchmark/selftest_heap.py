@@ -72,7 +72,7 @@ def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
         tried = {**common, **tried, "frames": rate_part.frames()}
         found[f"rates, {count}"] = (["engine", "rates"], tried)
         found[f"counted, {count}"] = (["engine", "capture", "rates"], {**tried, "port": "A"})
-    return {**found, "cycles": (["cycles"], {})}
+    return {**found, "cycles": (["cycles"], {"motion": motion.evaluated().hex()})}
 
 
 def main(micropython: Path, folder: Path) -> None:
