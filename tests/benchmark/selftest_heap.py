@@ -42,6 +42,8 @@ sys.modules["machine"] = Beyond(machine, unique_id=lambda: bytes(12))
 backup_sram.find = lambda: 0x20020000
 def feed():
     pass
+def ways(engine):
+    return {"": (stm.EXTI, 0, 0, 0)}
 def cycles():
     return time.ticks_us()
 def enable():
@@ -50,6 +52,8 @@ def idle(engine, *_):
     raise OSError("{'free': %d, 'largest': %d}" % (free(), largest()))
 from armtempo_board.motion.engine import Engine
 Engine.start = idle
+from armtempo_board.hardware.inputs import Inputs
+Inputs.estop_active = lambda _: False
 """
 
 
@@ -59,12 +63,18 @@ def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
     moved, gentle = motion.back_in_turn(joints), motion.gentle(joints)
     common: dict[str, object] = {"record": RECORD, "idle_us": 0}
     starts = {"motion": moved.record.hex(), "start_steps": moved.start_steps, "rates": moved.rates}
+    stops: dict[str, object] = {**starts, "motions": [starts["motion"]] * 2, "waits_us": [0]}
+    del stops["motion"]
     found: dict[str, tuple[list[str], dict[str, object]]] = {
         "encoders": (
             ["engine", "encoders"],
             {**common, "motion": gentle.record.hex(), "start_steps": gentle.start_steps},
         ),
         "pulses": (["engine", "capture", "pulses"], {**common, **starts}),
+        "stops": (
+            ["engine", "estop"],
+            {**common, **stops},
+        ),
     }
     for count in (1, 3):
         rates = [round(rate_part.stated(count) / rate_part.KEPT)] * count
@@ -72,7 +82,7 @@ def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
         tried = {**common, **tried, "frames": rate_part.frames()}
         found[f"rates, {count}"] = (["engine", "rates"], tried)
         found[f"counted, {count}"] = (["engine", "capture", "rates"], {**tried, "port": "A"})
-    return {**found, "cycles": (["cycles"], {})}
+    return {**found, "cycles": (["cycles"], {"motion": motion.evaluated().hex()})}
 
 
 def main(micropython: Path, folder: Path) -> None:
@@ -109,7 +119,7 @@ def main(micropython: Path, folder: Path) -> None:
 def _said(there: prompt.Prompt, files: list[str], arguments: dict[str, object]) -> str:
     folder = Path(prompt.__file__).with_name("on_board")
     texts = [(folder / f"{name}.py").read_text() for name in ("common", *files)]
-    texts[1:1] = [STAND_INS]
+    texts.append(STAND_INS)
     try:
         took = there._run(files[-1], f"{''.join(texts)}\ntell(measure(**{arguments!r}))\n").values
         return (

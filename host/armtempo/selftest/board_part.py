@@ -21,6 +21,8 @@ TURN = {"byte_code": 252, "machine_code": 22}
 
 Counted by ``python -m tests.benchmark.selftest_heap``.
 """
+EVALUATED = 2_590_000
+"""Instructions of the evaluator, byte code and machine code, in ``motion.evaluated``. Counted there too."""
 _WAIT_STATES = 5
 _CACHES = 0x700  # FLASH_ACR: prefetch, instruction cache, data cache (RM0090 3.9.1)
 _SLOWEST_WRITE_MS = 4000
@@ -137,9 +139,10 @@ def judge_cycles(found: dict[str, float]) -> Iterator[Measurement]:
             took += f", {found[name] / instructions:.2f} an instruction of {instructions}"
         yield Measurement(CYCLES, words, took if found[name] else "takes no simulated time")
     emitted = EMITTED[512] - EMITTED[2]
-    per = found["edges"] / emitted
-    yield Measurement(
-        CYCLES,
-        f"510 edges by the ring interrupt, {emitted} instructions",
-        f"{found['edges']} cycles, {per:.2f} an instruction" if per > 0 else "takes no simulated time",
-    )
+    for name, words, instructions in (
+        ("edges", f"510 edges by the ring interrupt, {emitted} instructions", emitted),
+        ("evaluator", f"1067 steps by the evaluator, {EVALUATED} instructions", EVALUATED),
+    ):
+        per = found[name] / instructions
+        took = f"{found[name]} cycles, {per:.2f} an instruction"
+        yield Measurement(CYCLES, words, took if per > 0.01 else "takes no simulated time")

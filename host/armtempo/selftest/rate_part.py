@@ -17,7 +17,7 @@ PART = "rates"
 JOINTS = (1, 2, 3, 6)
 DURATION_S = 0.4
 SIMULATED_DURATION_S = 0.05
-COUNTED_S = 4.0
+COUNTED_S = 2.0
 """Of the motion whose edges are counted."""
 KEPT = 0.8
 """Part of the rate that was found which the board states; it never states more than one that was not measured."""

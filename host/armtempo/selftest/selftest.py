@@ -177,7 +177,7 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         if measured := _part(prompt, found, board_part.BOARD, "identity"):
             found.add(board_part.judge(measured.values, found.board_id))
         work(0.2, 1)
-        if measured := _part(prompt, found, board_part.CYCLES, "cycles"):
+        if measured := _part(prompt, found, board_part.CYCLES, "cycles", motion=motion.evaluated().hex()):
             found.add(board_part.judge_cycles(measured.values))
         work(0.3, 1)
         stage(link_part.PART)
