@@ -236,6 +236,7 @@ def hold(page: Any, by_key: bool = False) -> None:
     """Hold a jog button until the arm moves; again if a busy browser was silent for too long, as then it lets go."""
     button = page.locator('[aria-label$=" +"]').first
     for _ in range(20):
+        button.click(trial=True)  # once it is enabled: Enter would press what has the focus else
         (button.focus if by_key else button.hover)()
         before = page.inner_text("#armtempo-where")
         page.keyboard.down("Enter") if by_key else page.mouse.down()
