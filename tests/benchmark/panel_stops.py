@@ -1,9 +1,11 @@
-"""What the panel takes to stop the arm, and what many watching pages cost: ``python -m tests.benchmark.panel_stops``.
+"""How soon the panel shows and stops the arm, and what watchers cost: ``python -m tests.benchmark.panel_stops``.
 
 A held jog is ended twenty times each by its button, by closing its tab, by killing the browser, by killing the panel's
 program and by cutting the cable: from then until the arm rests, by the board's clock. Then ten more pages watch an arm
 of six joints: processor time of the panel's program while the arm moves, samples that were lost, and a hundred times
-the time from the key press in a browser until the board has answered the stop. The board is a virtual one in real time.
+the time from the key press in a browser until the board has answered the stop. First view: from the begin of the
+navigation, with an empty cache, until the page says where the arm is, and until it has drawn it. The board is a virtual
+one in real time.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import re
 import tempfile
 import time
 import urllib.request
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -120,6 +123,24 @@ def _ended(window: Any, panel: Panel, ear: Ear, how: Any) -> float:
     return found
 
 
+_VIEW = """setInterval(() => {
+  const place = document.getElementById('armtempo-where'), panel = window.armtempo;
+  if (!window.seen && place?.textContent) window.seen = performance.now();
+  if (!window.drawn && panel?.renderer && panel.to && panel.turned) window.drawn = performance.now();
+}, 10)"""
+
+
+def first_view(browser: Any, address: str) -> tuple[float, float]:
+    """Seconds until a page says where the arm is, and until the arm is drawn."""
+    with browser.new_context(viewport=panels.DESKTOP) as window:
+        page = window.new_page()
+        page.add_init_script(_VIEW)
+        page.goto(address)
+        page.wait_for_function("window.drawn")
+        seen, drawn = page.evaluate("[seen / 1000, drawn / 1000]")
+        return seen, drawn
+
+
 # pages that watch
 
 
@@ -196,7 +217,7 @@ def watched(browser: Any, times: int) -> None:
         watching.join()
 
 
-def show(name: str, seconds: list[float]) -> None:
+def show(name: str, seconds: Sequence[float]) -> None:
     """A line: median and worst in ms, of how many, and how busy the machine was."""
     ordered = sorted(1000 * value for value in seconds)
     print(
@@ -213,9 +234,9 @@ def main() -> None:
     )
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--stops", type=int, default=100)
-    parser.add_argument("--only", choices=[*HOWS, "watched"], action="append")
+    parser.add_argument("--only", choices=[*HOWS, "view", "watched"], action="append")
     options = parser.parse_args()
-    wanted = options.only or [*HOWS, "watched"]
+    wanted = options.only or [*HOWS, "view", "watched"]
     with panels.playwright() as play:
         browser = panels.chromium(play)
         ear = Ear()
@@ -226,6 +247,11 @@ def main() -> None:
             for how in [how for how in HOWS if how in wanted]:
                 found = [held_jog(play, browser, running, ear, how) for _ in range(options.times)]
                 show(f"jog, {how}", found)
+            if "view" in wanted:
+                address = running().address
+                seen, drawn = zip(*(first_view(browser, address) for _ in range(options.times)), strict=True)
+                show("the page says where the arm is", seen)
+                show("the arm is drawn", drawn)
         if "watched" in wanted:
             watched(browser, options.stops)
         browser.close()

@@ -1,4 +1,4 @@
-"""The heap that every arm leaves on MicroPython's own STM32F407 firmware: the tables of board/docs/memory.md.
+"""The heap that every arm leaves on MicroPython's own STM32F407 firmware: the tables of host/docs/measurements.md.
 
     python -m tests.benchmark.room MICROPYTHON [CHANGES]
 

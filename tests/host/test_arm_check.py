@@ -29,6 +29,7 @@ def test_nothing_looks_wrong_about_the_arms_that_ship(name: str) -> None:
     result = run_check("--arm", name)
     assert result.exit_code == 0, result.output
     assert result.output.rstrip().endswith("nothing looks wrong")
+    assert "steps/s, the board does 240000 (estimated; 'armtempo selftest'" in result.output
     assert all(finding.level is Level.NOTE for finding in check_arm(Arm.load(name)))
 
 
@@ -52,7 +53,7 @@ FOUND = [
         "all together",
         [("speed_deg_s = 40.0", "speed_deg_s = 2690.0")],
         "warning",
-        "all joints: all at their speed",
+        "all joints: the joints together need up to",
     ),
     (
         "pulses",

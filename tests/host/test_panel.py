@@ -232,13 +232,14 @@ def test_saving_keeps_the_comments_of_the_job_file(tmp_path: Path) -> None:
     )
     desk = Desk(ARM, tmp_path, file)
     rows = [[0.0, -60.0, 40.0], [10.5, -70.0, 45.0], [20.0, -75.0, 50.0]]
-    desk.save(rows, "free")
+    desk.save(rows, {"path": "free", "timing": "shared", "corridor_mm": "5"})
     text = file.read_text()
     assert "# my job" in text
     assert "# its name" in text
     again = Job.load(file, ARM)
     assert [list(row) for row in again.via] == rows  # type: ignore[arg-type]
-    assert (again.path, again.seed, again.name) == ("free", 7, "feed")
+    assert (again.path, again.seed, again.name, again.corridor_mm) == ("free", 7, "feed", 5.0)
+    assert "timing" not in text  # it is the default
 
 
 def test_the_picture_has_the_radii_and_the_room_of_the_arm_file() -> None:
@@ -264,14 +265,14 @@ def test_nothing_is_written_outside_of_the_folder(tmp_path: Path) -> None:
     file.write_text(text := 'name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n')
     desk = Desk(ARM, tmp_path / "other", file)
     with pytest.raises(InputError, match="outside of the project folder"):
-        desk.save(desk.rows(), "through")
+        desk.save(desk.rows(), {})
     assert file.read_text() == text
 
 
 @pytest.mark.parametrize("rows", [[], [[0.0, -60.0, 40.0]], [[0.0, -60.0, 40.0], [999.0, 0.0, 0.0]]])
 def test_rows_that_are_no_motion_are_refused(tmp_path: Path, rows: list[list[float]]) -> None:
     with pytest.raises(InputError):
-        Desk(ARM, tmp_path, None).job_with(rows, "through")
+        Desk(ARM, tmp_path, None).job_with(rows, {})
 
 
 SEQUENCE = """# all day

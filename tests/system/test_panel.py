@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+import tomlkit
+from armtempo.formats import toml_table
+from armtempo.panel import words
 
 from tests import browser
 from tests.system import commandline, panels
@@ -105,16 +110,17 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     wait_for(page, "repeat = 0 is not allowed", place="armtempo-said")
     page.get_by_label("Repetitions").fill("1")
     page.get_by_label("Speed, %").click(
-        position={"x": 6, "y": 10}
-    )  # of 128: two minutes, so that the stop is in time
+        position={"x": 12, "y": 10}
+    )  # of 128: a minute, so that the stop is in time
     page.get_by_role("button", name="Run", exact=True).click()
-    before = page.inner_text("#armtempo-where")
     wait_for(page, "moving", "at ", "Run")
     page.get_by_role("button", name="Pause").click()
     wait_for(page, "in a pause", "Run")
     page.get_by_role("button", name="Resume").click()  # on along the path
     page.wait_for_function("!document.getElementById('armtempo-state').textContent.includes('in a pause')")
-    page.wait_for_function("before => document.getElementById('armtempo-where').textContent != before", arg=before)
+    page.wait_for_function(
+        "parseFloat(document.getElementById('armtempo-where').textContent.split('·')[1]) > 0"
+    )  # joint 1
     page.keyboard.press(" ")  # the button just pressed has the focus, and does not take it
     wait_for(page, "idle")
     joints = panel.state().joints
@@ -176,15 +182,49 @@ def test_a_via_point_is_clicked_and_dragged_in_the_picture(page: Any) -> None:
     page.wait_for_function(moved, arg=before)
 
 
-_JOB = 'name = "feed"\nvia_deg = [[%s, -60.0, 40.0], [0.0, -60.0, 40.0]]'
-_WRONG = [
-    ("", "P0 joint 1", "999", "Plan", "plan --arm paper --job", "job.toml", _JOB % "999.0"),
-    ("Paste", "Rows of angles", "1;2\n3;4", "Paste", "import --arm paper", "the pasted rows", "1;2\n3;4"),
-]
-"""What opens the field, the field, what is wrong in it, what takes it, and a command with a file of the same."""
+_SEQUENCE = """name = "all"
+[[step]]
+repeat = 2
+[[step]]
+goto = "home"
+[[step]]
+run = "job.toml"
+[[step]]
+output = "gripper"
+to = "open"
+wait_s = 0.5
+[[step]]
+wait_s = 1
+[[step]]
+wait_input = "part"
+active = true
+timeout_s = 3
+on_timeout = "next"
+[[step]]
+count = "parts"
+[[step]]
+call = "other.toml"
+[[step]]
+end = "repeat"
+"""
+"""Each kind of step, with each of its keys."""
+_MARKUP = "<img src=x onerror=window.hurt=1>"
+_FIELDS = """() => [...document.querySelectorAll('.q-tab-panel input:not([role=combobox])')]
+  .filter(one => one.checkVisibility() && one.ariaLabel).map(one => [one.ariaLabel, one.type])"""
 
 
-def refusal(folder: Path, command: str, name: str, text: str) -> str:
+def put(content: Any, label: str, text: str) -> None:
+    """Write into the content of a file what is typed in the field of this label."""
+    value = toml_table.typed(text)
+    if via := re.fullmatch(r"P(\d+) joint (\d+)", label):
+        content["via_deg"][int(via[1])][int(via[2]) - 1] = float(text or "nan")
+    elif step := re.fullmatch(r"step (\d+): (.*)", label):
+        content["step"][int(step[1]) - 1][step[2]] = value
+    else:
+        content[{name: key for key, name in words.OPTIONS.items()}[label]] = value
+
+
+def refusal(folder: Path, name: str, text: str, command: str = "plan --arm arm.toml") -> str:
     """What the command line says of a file."""
     (folder / name).write_text(text)
     ended = commandline.run(*command.split(), name, folder=folder)
@@ -192,31 +232,67 @@ def refusal(folder: Path, command: str, name: str, text: str) -> str:
     return ended.errors.splitlines()[0].removeprefix("armtempo: ")
 
 
-def test_wrong_input_is_refused_in_the_words_of_the_command_line(page: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("tab", "file", "button", "count"),
+    [("Plan", "job.toml", "Plan", 9), ("Sequence", "all.toml", "Save the sequence", 14)],
+)
+def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
+    page: Any, panel: Panel, tmp_path: Path, tab: str, file: str, button: str, count: int
+) -> None:
+    folder = panel.folder  # of a wrong job there the panel would take the rest
+    if tab == "Plan":
+        folder = tmp_path
+        show(page, tab)
+        shutil.copy(panel.folder / "arm.toml", folder)
+        paste(page, "0;-60;40\n20;-75;50")
+        good = 'name = "feed"\ntiming = "shared"\nvia_deg = [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]]\n'
+    else:
+        (folder / "other.toml").write_text('name = "other"\n[[step]]\nwait_s = 1\n')
+        (folder / file).write_text(good := _SEQUENCE)
+        show(page, tab)
+        open_sequence(page, file)
+    fields = page.evaluate(_FIELDS)
+    assert len(fields) == count
+    for number, (label, kind) in enumerate(fields):
+        field = page.get_by_label(label, exact=True)
+        before, wrong = field.input_value(), _MARKUP if kind == "text" else ("999999", "")[number % 2]
+        content = tomlkit.parse(good)
+        put(content, label, wrong)
+        field.fill(wrong)
+        page.get_by_role("button", name=button, exact=True).press("Enter")
+        said = refusal(folder, file, tomlkit.dumps(content))
+        page.locator(".q-notification", has_text=said).first.wait_for()
+        field.fill(before)
+    assert page.evaluate("window.hurt") is None
+
+
+def paste(page: Any, text: str) -> None:
+    """Paste rows of via points."""
+    page.get_by_role("button", name="Paste").click()
+    page.get_by_label("Rows of angles").fill(text)
+    panels.answer(page, "Paste")
+
+
+def open_sequence(page: Any, file: str) -> None:
+    """Open the file of a sequence."""
+    page.get_by_role("combobox", name="Sequence").press("ArrowDown")  # which no notification covers
+    page.get_by_role("option", name=file).dispatch_event("click")
+    page.get_by_label("step 1", exact=True).wait_for()
+
+
+def test_rows_that_are_no_postures_are_not_pasted(page: Any, tmp_path: Path) -> None:
     show(page, "Plan")
-    for opens, field, text, takes, *same in _WRONG:
-        if opens:
-            page.get_by_role("button", name=opens).click()
-        page.get_by_label(field).fill(text)
-        if opens:
-            panels.answer(page, takes)
-        else:
-            page.get_by_role("button", name=takes, exact=True).click()
-        page.locator(".q-notification", has_text=refusal(tmp_path, *same)).first.wait_for()
+    paste(page, "1;2\n3;4")
+    said = refusal(tmp_path, "the pasted rows", "1;2\n3;4", "import --arm paper")
+    page.locator(".q-notification", has_text=said).wait_for()
 
 
-def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel, tmp_path: Path) -> None:
+def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel) -> None:
     file = panel.folder / "day.toml"
     file.write_text('name = "day"  # my name\n[[step]]\ngoto = "home"\n[[step]]\nwait_s = 9  # it settles\n')
     home(page)
     show(page, "Sequence")
-    page.get_by_role("combobox", name="Sequence").click()
-    page.get_by_role("option", name="day.toml").click()
-    wrong = refusal(tmp_path, "plan --arm paper", "day.toml", file.read_text().replace("9", "'soon'"))
-    page.get_by_label("step 2: wait_s").fill("soon")
-    page.get_by_label("step 2: wait_s").press("Tab")
-    page.get_by_role("button", name="Save the sequence").click()
-    page.locator(".q-notification", has_text=wrong).wait_for()
+    open_sequence(page, "day.toml")
     page.get_by_label("step 2: wait_s").fill("600")
     page.get_by_label("step 2: wait_s").press("Tab")
     page.get_by_role("button", name="Save the sequence").click()
@@ -257,6 +333,9 @@ def test_a_held_jog_ends_with_what_holds_it(
             assert "Nothing can be moved" in page.evaluate(
                 "getComputedStyle(document.body, '::after').content"
             )
+            assert page.evaluate(_PRESSED) == 0
+            page.keyboard.press("Enter")  # on the button that has the focus
+            assert page.evaluate("clicks") == 0
         else:
             panel.cut(True)
             page.wait_for_selector("text=did not answer")
@@ -267,32 +346,82 @@ def test_a_held_jog_ends_with_what_holds_it(
     assert panel.running == (how != "server")
 
 
+_PRESSED = """() => {
+  window.clicks = 0;
+  addEventListener('click', event => window.clicks += event.target.matches('button'), true);
+  const seen = [...document.querySelectorAll('button')].filter(one => one.checkVisibility() && !one.disabled);
+  seen.find(one => one.textContent.includes('Stop')).focus();
+  return seen.filter(one => {
+    const {x, y, width, height} = one.getBoundingClientRect();
+    const on = document.elementFromPoint(x + width / 2, y + height / 2);
+    return on && one.contains(on);
+  }).length;
+}"""
+"""How many buttons a pointer finds; from then on clicks are counted, and the button that stops has the focus."""
+
+
+def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> None:
+    assert page.evaluate("armtempo.SILENT_MS + armtempo.LOOK_MS") < 1000
+    silent = """ms => {
+      armtempo.heard = performance.now() - ms;
+      armtempo.look();
+      return document.body.matches('.lost');
+    }"""
+    assert page.evaluate(silent, 1000 - page.evaluate("armtempo.LOOK_MS"))
+    page.wait_for_selector("body:not(.lost)")  # it hears again
+
+
 _SOCKET = b"/_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
 _KEY = b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
 
 
-@pytest.mark.parametrize(
-    ("request_", "status"),
-    [
-        (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", b"403"),
-        (b"GET / HTTP/1.1\r\nHost: HOST\r\nOrigin: http://evil.example\r\n\r\n", b"403"),
-        (b"GET " + _SOCKET + _KEY + b"Host: HOST\r\nOrigin: http://evil.example\r\n\r\n", b"403"),
-        (b"POST / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 1000001\r\n\r\n", b"403"),
-        (
-            b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n"
-            + 17 * (b"10000\r\n" + 0x10000 * b"x" + b"\r\n"),
-            b"413",
-        ),
-        (b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\nmany\r\n", b"400"),
-        (b"GET / HTTP/1.1\r\nHost: HOST\r\nX: " + 400_000 * b"x" + b"\r\n\r\n", b"400"),
-        (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", b"400"),
-        (b"GET /runs/..%2f..%2f/job.toml HTTP/1.1\r\nHost: HOST\r\n\r\n", b"404"),
-        (b"GET / HTTP/1.1\r\nHost: HOST\r\n\r\n", b"200"),
-    ],
-    ids=["host", "origin", "socket", "size", "chunks", "chunk", "header", "bytes", "path", "good"],
-)
-def test_what_is_no_request_of_its_pages_is_refused(panel: Panel, request_: bytes, status: bytes) -> None:
+_REFUSED = {
+    "host": (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", b"403", "this name is not the server's"),
+    "origin": (
+        b"GET / HTTP/1.1\r\nHost: HOST\r\nOrigin: http://evil.example\r\n\r\n",
+        b"403",
+        "a page of another origin",
+    ),
+    "socket": (
+        b"GET " + _SOCKET + _KEY + b"Host: HOST\r\nOrigin: http://evil.example\r\n\r\n",
+        b"403",
+        "a page of another origin",
+    ),
+    "size": (
+        b"POST / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 1000001\r\n\r\n",
+        b"403",
+        "more than 1000000",
+    ),
+    "chunks": (
+        b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n"
+        + 17 * (b"10000\r\n" + 0x10000 * b"x" + b"\r\n"),
+        b"413",
+        "more than 1000000",
+    ),
+    "chunk": (
+        b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\nmany\r\n",
+        b"400",
+        "Invalid HTTP request",
+    ),
+    "header": (
+        b"GET / HTTP/1.1\r\nHost: HOST\r\nX: " + 400_000 * b"x" + b"\r\n\r\n",
+        b"400",
+        "Invalid HTTP request",
+    ),
+    "bytes": (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", b"400", "Invalid HTTP request"),
+    "path": (b"GET /runs/..%2f..%2fjob.toml HTTP/1.1\r\nHost: HOST\r\n\r\n", b"404", "job.toml not found"),
+    "escape": (b"GET /%1b[2J HTTP/1.1\r\nHost: HOST\r\n\r\n", b"403", "'/\\x1b[2J' from"),
+}
+"""Requests that are none of the panel's own pages, the status of the answer, and what is logged."""
+
+
+@pytest.mark.parametrize(("request_", "status", "logged"), _REFUSED.values(), ids=_REFUSED)
+def test_what_is_no_request_of_its_pages_is_refused_and_logged(
+    panel: Panel, request_: bytes, status: bytes, logged: str
+) -> None:
+    before = len(panel.errors)
     assert panels.asked(panel.address, request_).split(b" ")[1:2] == [status]
+    commandline.wait_for(lambda: any(logged in line for line in panel.errors[before:]), logged)
 
 
 _FOCUS = """async () => {
@@ -310,8 +439,12 @@ _FOCUS = """async () => {
   return found;
 }"""
 """Controls that the tabulator does not reach, or that do not show it."""
-_FITS = "document.documentElement.scrollWidth <= document.documentElement.clientWidth"
-"""Nothing is wider than the window; charts follow a change of it a frame later."""
+_FITS = """() => {
+  const {scrollWidth, clientWidth} = document.documentElement;
+  return scrollWidth <= clientWidth && [...document.querySelectorAll('button, input, svg')].every(one =>
+    !one.checkVisibility() || one.closest('.armtempo-grid') || one.getBoundingClientRect().right <= clientWidth);
+}"""
+"""Nothing is wider than the window, or cut off by it; charts follow a change of it a frame later."""
 
 
 def test_each_tab_is_for_the_keyboard_and_fits_desktop_tablet_and_phone(page: Any) -> None:

@@ -8,9 +8,10 @@ import math
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, wraps
+from itertools import chain, repeat
 from numbers import Integral, Real
 from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -53,24 +54,36 @@ def _wrapped(function: Callable[..., Any], owner: str = "") -> Callable[..., Any
 
     @wraps(function)
     def call(*arguments: Any, **named: Any) -> Any:
-        signature, kinds = _annotated(function)
-        for argument, value in signature.bind(*arguments, **named).arguments.items():
-            several = signature.parameters[argument].kind is inspect.Parameter.VAR_POSITIONAL
-            for one in value if several else (value,):
-                if not fits(one, kinds.get(argument, Any)):
-                    raise InputError(
-                        f"{name}: {argument} is {reprlib.repr(one)}", f"give {words(kinds[argument])}"
-                    )
+        places, rest, kinds = _annotated(function)
+        for argument, value in zip(chain(places, repeat(rest)) if rest else places, arguments, strict=False):
+            if not _check(kinds[argument])(value):
+                raise _wrong(name, argument, value, kinds[argument])
+        for argument, value in named.items():
+            if argument in kinds and not _check(kinds[argument])(value):
+                raise _wrong(name, argument, value, kinds[argument])
         return function(*arguments, **named)
 
     return call
 
 
+def _wrong(name: str, argument: str, value: object, kind: Any) -> InputError:
+    return InputError(f"{name}: {argument} is {reprlib.repr(value)}", f"give {words(kind)}")
+
+
 @cache
-def _annotated(function: Callable[..., Any]) -> tuple[inspect.Signature, dict[str, Any]]:
-    """Signature and types of a function, with ``Numbers`` for arrays."""
+def _annotated(function: Callable[..., Any]) -> tuple[list[str], str, dict[str, Any]]:
+    """Names of the arguments that may be given by their places, of one that takes the rest, and types of all.
+
+    ``Numbers`` stands for arrays.
+    """
     arrays: dict[str, Any] = {"ArrayLike": Numbers, "Array": Numbers, "Where": Any}
-    return inspect.signature(function), get_type_hints(function, localns=arrays)
+    code = function.__code__
+    rest = code.co_varnames[code.co_argcount + code.co_kwonlyargcount] if code.co_flags & _TAKES_MORE else ""
+    kinds = dict.fromkeys((*code.co_varnames[: code.co_argcount], rest), Any)
+    return [*code.co_varnames[: code.co_argcount]], rest, kinds | get_type_hints(function, localns=arrays)
+
+
+_TAKES_MORE = inspect.CO_VARARGS
 
 
 class Numbers:
@@ -79,20 +92,26 @@ class Numbers:
 
 def fits(value: object, kind: Any) -> bool:
     """Whether a value is of a type, as an annotation says it."""
-    origin = get_origin(kind) or kind
+    return _check(kind)(value)
+
+
+@cache
+def _check(kind: Any) -> Callable[[object], bool]:
+    origin, inner = get_origin(kind) or kind, get_args(kind)
     if kind in _PLAIN:
-        return _PLAIN[kind](value)
+        return _PLAIN[kind]
     if origin in (Union, UnionType):
-        return any(fits(value, one) for one in get_args(kind))
+        checks = [_check(one) for one in inner]
+        return lambda value: any(check(value) for check in checks)
     if isinstance(kind, dataclasses.InitVar):
-        return fits(value, kind.type)
+        return _check(cast(Any, kind.type))
     if origin is Callable:
-        return callable(value)
+        return callable
     if origin in (tuple, Sequence):
-        return _entries_fit(value, origin, get_args(kind))
+        return lambda value: _entries_fit(value, origin, inner)
     if origin is Mapping:
-        return isinstance(value, Mapping) and all(fits(entry, get_args(kind)[1]) for entry in value.values())
-    return isinstance(value, origin)
+        return lambda value: isinstance(value, Mapping) and all(map(_check(inner[1]), value.values()))
+    return lambda value: isinstance(value, origin)
 
 
 def _is_whole(value: object) -> bool:
@@ -115,7 +134,7 @@ def _is_text(value: object) -> bool:
 def _are_numbers(value: object) -> bool:
     try:
         array = np.asarray(value)
-        return array.dtype.kind in "iuf" and bool(np.all(np.isfinite(array)))
+        return array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
     except (ValueError, TypeError, OverflowError):
         return False
 
@@ -138,7 +157,7 @@ def _entries_fit(value: object, origin: Any, kinds: Sequence[Any]) -> bool:
         return False
     if origin is tuple and kinds[-1] is not Ellipsis:
         return len(entries) == len(kinds) and all(map(fits, entries, kinds))
-    return all(fits(entry, kinds[0]) for entry in entries)
+    return all(map(_check(kinds[0]), entries))
 
 
 def words(kind: Any) -> str:

@@ -14,6 +14,7 @@ from armtempo.diagnosis import arm_check, figures
 from armtempo.diagnosis.figures import JointFigures, table
 from armtempo.diagnosis.finding import Finding, Level
 from armtempo.model.arm import Arm
+from armtempo.planning.checks import rate_words
 from armtempo.project.settings import JOB, ProjectSettings
 from armtempo.report import arm_picture, drawing
 
@@ -65,6 +66,8 @@ def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], f
     click.echo(f"arm: {arm.name if arm else '(not readable)'} ({path})")
     for line in table(joints):
         click.echo(line)
+    if joints:
+        click.echo(rate_words(sum(joint.top_steps_s for joint in joints)))
     for finding in found:
         click.echo(f"{finding.level.value + ':':<9}{finding.where}: {finding.what}")
         click.echo(f"{'':9}-> {finding.next_step}")

@@ -8,7 +8,7 @@ from armtempo.basics.errors import ArmtempoError
 from armtempo.diagnosis.finding import Finding, error, warning
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Driver
-from armtempo.planning.checks import ESTIMATED
+from armtempo.planning.checks import ESTIMATED, rate_words
 from armtempo.records import encode
 
 _MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}
@@ -39,8 +39,7 @@ def findings(arm: Arm) -> list[Finding]:
         found.append(
             warning(
                 "all joints",
-                f"all at their speed limits together need {rates:.0f} steps/s, the board makes {MAX_STEP_RATE_SUM} "
-                f"{ESTIMATED}",
+                rate_words(rates),
                 "use fewer microsteps or lower speed limits; else a plan that needs more is refused",
             )
         )

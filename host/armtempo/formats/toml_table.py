@@ -41,8 +41,19 @@ def parse(text: str, file: str) -> Table:
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
         raise InputError(
             f"{file}: not valid TOML: {error}",
-            "correct that place; strings are written in quotes, tables in [brackets]",
+            "'armtempo import' makes a job file of a table"
+            if file.lower().endswith((".csv", ".tsv"))
+            else "correct that place; strings are written in quotes, tables in [brackets]",
         ) from None
+
+
+def typed(text: str) -> Any:
+    """The value that was typed: a number, true or false, or a list if it is one in TOML, else the text."""
+    try:
+        value = tomllib.loads(f"x = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return value["x"] if len(value) == 1 and isinstance(value["x"], bool | int | float | list) else text
 
 
 class Table:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,48 +12,125 @@ from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
 from armtempo.kinematics.branches import BRANCHES, Branch
-from armtempo.kinematics.folding import folded
+from armtempo.kinematics.folding import folded, spread
+from armtempo.kinematics.formulas import wrist_centre
 from armtempo.kinematics.geometry import Geometry
-from armtempo.kinematics.inverse import inverse_of_pose, wrist_centre
+from armtempo.kinematics.inverse import inverse_of_pose
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.regions import Regions, classify
 from armtempo.kinematics.rejection import Rejection, WristCentre, reasons
 from armtempo.kinematics.shape import Shape
+from armtempo.kinematics.solutions import OK, OUT_OF_REACH, PoseSolutions
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, slots=True)
 class Candidate:
     """One of the eight solutions of a pose."""
 
-    number: int
-    """1 to 8."""
-    branch: Branch
-    angles_rad: Array
+    of: Choice = field(repr=False)
+    index: int
+    placed_rad: list[float]
     """(joints,): whole turns added to lie in the ranges, nearest to the previous posture; NaN if unreachable."""
-    rejections: tuple[Rejection, ...]
-    """Why not; empty for a solution that can be used."""
-    singular: int
-    """Bits as in ``Solutions.singular``."""
+    usable: bool
+    """Whether the arm can take these angles."""
     distance_rad: float
     """Root of the sum of squares of the joints' ways from the previous posture."""
+    outside_rad: float
+    """How far the joint that is farthest out of its range is so; inf if unreachable."""
+
+    @property
+    def number(self) -> int:
+        """1 to 8."""
+        return self.index + 1
+
+    @property
+    def branch(self) -> Branch:
+        """Which of the arm's configurations it is."""
+        return BRANCHES[self.index]
+
+    @property
+    def angles_rad(self) -> Array:
+        """``placed_rad`` as an array."""
+        return np.array(self.placed_rad)
+
+    @property
+    def rejections(self) -> tuple[Rejection, ...]:
+        """Why not; empty for a solution that can be used."""
+        if self.usable:
+            return ()
+        return reasons(self.of.wrist, self.of.solutions, self.index, self.of.ranges, self.placed_rad)
+
+    @property
+    def singular(self) -> int:
+        """Bits as in ``Solutions.singular``."""
+        return self.of.solutions.singular[self.index]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Choice:
-    """All solutions of a pose and the one chosen."""
+    """All solutions of a pose and the one chosen; words are made only when they are asked for."""
 
-    candidates: tuple[Candidate, ...]
-    wrist: WristCentre
+    geometry: Geometry
+    pose: Sequence[float]
+    """Its 12 or 16 elements in row order."""
+    ranges: Ranges
+    unit: str
+    """Of lengths, for the reasons."""
+    solutions: PoseSolutions
+    candidates: list[Candidate] = field(default_factory=list)
 
     @cached_property
     def chosen(self) -> Candidate | None:
         """The nearest that can be used; None: none can."""
-        usable = [candidate for candidate in self.candidates if not candidate.rejections]
+        usable = [candidate for candidate in self.candidates if candidate.usable]
         return min(usable, key=lambda candidate: candidate.distance_rad, default=None)
 
     @cached_property
+    def shape(self) -> Shape:
+        """Constants of the closed form."""
+        return Shape.of(self.geometry)
+
+    @cached_property
+    def _of_core(self) -> Sequence[float]:
+        """What the pose asks of the rows that turn, in row order."""
+        if self.geometry.moving is self.geometry:
+            return self.pose
+        pose = np.append(self.pose[:12], (0.0, 0.0, 0.0, 1.0)).reshape(4, 4)
+        rows: list[float] = folded(self.geometry, pose).ravel().tolist()
+        return rows
+
+    @cached_property
+    def wrist(self) -> WristCentre:
+        """Where the pose asks the wrist centre to be."""
+        rows = self._of_core
+        x, y, z = (wrist_centre(self.shape, *rows[start : start + 4]) for start in (0, 4, 8))
+        return WristCentre(self.shape, (x, y, z), self.unit)
+
+    @property
+    def beyond(self) -> float:
+        """By how much the branch that is least out of reach is so; inf where none is."""
+        if not any(math.isinf(each.outside_rad) for each in self.candidates):
+            return math.inf
+        return self.wrist.beyond
+
+    def of_nearer_poses(self, previous: Sequence[float], by: float) -> list[list[float]]:
+        """Postures, (joints,) each, with the tool moved a little outwards or inwards: where the pose is on a border."""
+        x, y, z = self.wrist.position
+        z -= self.shape.height
+        found = []
+        for way in np.array(((x, y, z), (-x, -y, -z), (x, y, 0.0))):
+            pose = np.array(self._of_core[:12]).reshape(3, 4)
+            pose[:, 3] += 2.0 * by * way / (np.linalg.norm(way) or 1.0)
+            core = [*previous][self.geometry.core]
+            solved = inverse_of_pose(self.geometry.moving, pose.ravel().tolist(), core)
+            for angles, outcome in zip(*solved[:2], strict=True):
+                if outcome == OK:
+                    found.append(self.ranges.placed(spread(self.geometry, angles), previous))
+        return found
+
+    @cached_property
     def _region(self) -> Regions:
-        return classify(self.wrist.shape, self.wrist.position)
+        return classify(self.shape, self.wrist.position)
 
     @property
     def region(self) -> str:
@@ -78,15 +156,24 @@ def choose(
     ``unit`` names the geometry's unit of length in the reasons. Raises InputError for an arm outside the
     class.
     """
-    shape = Shape.of(geometry)
-    matrix = np.asarray(pose, dtype=np.float64)
+    rows = np.asarray(pose, dtype=np.float64).ravel().tolist()
     previous = np.asarray(previous_rad, dtype=np.float64).tolist()
-    solutions = inverse_of_pose(geometry, matrix.ravel().tolist(), previous)
-    wrist = WristCentre(shape, wrist_centre(shape, folded(geometry, matrix).reshape(16, 1))[:, 0], unit)
-    candidates = []
-    for i, branch in enumerate(BRANCHES):
-        placed = ranges.placed(solutions.angles_rad[i], previous)
-        why = reasons(wrist, solutions, i, ranges, placed)
-        distance = math.dist(placed, previous)
-        candidates.append(Candidate(i + 1, branch, np.array(placed), why, solutions.singular[i], distance))
-    return Choice(tuple(candidates), wrist)
+    return choose_of_rows(geometry, rows, ranges, previous, unit)
+
+
+def choose_of_rows(
+    geometry: Geometry, pose: Sequence[float], ranges: Ranges, previous: Sequence[float], unit: str = "mm"
+) -> Choice:
+    """The same for the pose's 12 or 16 elements in row order, with plain numbers alone."""
+    solutions = inverse_of_pose(geometry, pose, previous)
+    choice = Choice(geometry, pose, ranges, unit, solutions)
+    for index, (angles, outcome) in enumerate(zip(solutions.angles_rad, solutions.outcome, strict=True)):
+        if outcome in OUT_OF_REACH:
+            choice.candidates.append(Candidate(choice, index, [*angles], False, math.nan, math.inf))
+            continue
+        placed, outside = ranges.fitted(angles, previous)
+        usable = outcome == OK and not outside
+        choice.candidates.append(
+            Candidate(choice, index, placed, usable, math.dist(placed, previous), outside)
+        )
+    return choice

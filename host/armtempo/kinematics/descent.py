@@ -11,6 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+import numpy as np
+
+from armtempo.basics.arrays import Array
 from armtempo.kinematics.constraint import Constraint, Turned, Vector, cross, dot
 from armtempo.kinematics.forward import Frame, frames
 from armtempo.kinematics.geometry import Geometry
@@ -83,6 +86,21 @@ def descend(problem: PoseProblem, start_rad: Sequence[float]) -> Posture:
         if step and max(map(abs, step)) < STILL_RAD:
             break
     return at
+
+
+def most_swing(problem: PoseProblem, angles_rad: Sequence[float], cost: float) -> Array:
+    """Largest change of each moving joint that costs at most ``cost``, to first order: (moving,), in rad.
+
+    At a posture that meets the target; inf where that is singular.
+    """
+    rows, _ = _system(problem, _posture(problem, list(angles_rad)))
+    size = len(rows)
+    full = [[rows[max(i, j)][min(i, j)] for j in range(size)] for i in range(size)]
+    try:
+        inverse = np.diagonal(np.linalg.inv(full))
+    except np.linalg.LinAlgError:
+        inverse = np.full(size, np.inf)
+    return np.sqrt(cost * np.where(inverse > 0.0, inverse, np.inf))
 
 
 def _posture(problem: PoseProblem, angles: list[float]) -> Posture:

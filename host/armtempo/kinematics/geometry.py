@@ -50,6 +50,14 @@ class Geometry:
     still: tuple[tuple[int, float], ...] = ()
     """Indices and angles of rows that never turn: a pedestal under the arm, a tool on it."""
 
+    def __hash__(self) -> int:
+        """Counted once: what is known of a geometry is looked up for every pose."""
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.d, self.a, self.alpha, self.offset, self.linked, self.still))
+
     @classmethod
     def of(cls, arm: Arm) -> Geometry:
         """Take the geometry of ``arm``: lengths in mm."""

@@ -82,6 +82,11 @@ class NumericalSolution:
     distance_rad: float
     """Root of the sum of squares of the joints' ways from the previous posture."""
 
+    @property
+    def usable(self) -> bool:
+        """Whether the arm can take these angles."""
+        return not self.rejections
+
 
 @dataclass(frozen=True)
 class NumericalSolutions:
@@ -139,6 +144,19 @@ def search(arm: MovingArm, target: Pose, previous_rad: Sequence[float], seed: in
     if problem.constraint.reached(nearest.miss) and nearest not in ordered:
         ordered.insert(0, nearest)
     return NumericalSolutions(arm, target, tuple(ordered[:MOST_SOLUTIONS]), nearest, starts)
+
+
+def descents(
+    arm: MovingArm, target: Pose, previous_rad: Sequence[float], starts_rad: Sequence[Sequence[float]]
+) -> list[NumericalSolution]:
+    """The postures within the ranges that meet ``target``, of those that descents from the starts lead to."""
+    problem, previous = arm.problem(Constraint.of(target), within=True), list(previous_rad)
+    found: list[NumericalSolution] = []
+    for start in starts_rad:
+        solution = _solution(arm, problem, descend(problem, start), previous)
+        if problem.constraint.reached(solution.miss) and not any(_same(solution, other) for other in found):
+            found.append(solution)
+    return found
 
 
 def _starts(arm: MovingArm, previous: list[float], seed: int) -> Iterator[list[float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,41 +13,72 @@ from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import spread_deg
-from armtempo.kinematics.choice import Candidate, choose
-from armtempo.kinematics.constraint import Miss
+from armtempo.kinematics.choice import Candidate, Choice, choose_of_rows
+from armtempo.kinematics.constraint import Constraint
+from armtempo.kinematics.descent import most_swing
 from armtempo.kinematics.forward import forward as forward_rad
 from armtempo.kinematics.geometry import Geometry
-from armtempo.kinematics.numerical import NumericalSolution
-from armtempo.kinematics.solver import Answer, PoseSolver
+from armtempo.kinematics.numerical import NumericalSolution, descents
+from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.pose import checked as checked_pose
-from armtempo.model.tool_pose import WHOLE, Pose
+from armtempo.model.pose import checked_rows
+from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 
 _FAR_DEG, _FAR = 5.0, 50.0
 """No tolerance brings a joint back that is outside its range by more than that, or by this many times the tolerance."""
+_SWINGS = 3.0
+"""A joint that is outside its range by this many times what the tolerance lets it turn, to first order, stays out."""
+_BEHIND_RAD = 1e6
+"""Farther than any usable posture is."""
+_COST = 2.0
+"""Of a posture at the edge of both tolerances, as ``descent`` counts it."""
 
 
-@dataclass(frozen=True, eq=False)
 class Solution:
     """Joint angles that bring the tool to a pose."""
 
-    angles_deg: Array
-    """(joints,): of all joints of the arm; NaN if the pose is out of reach of this branch."""
-    branch: str
-    """Which of the arm's configurations it is; empty for one that was found numerically."""
-    rejections: tuple[str, ...]
-    """Why it cannot be used: out of reach, out of a joint's range; empty for one that can."""
-    distance_deg: float
-    """From the posture to stay near to: root of the sum of squares over the joints."""
-    miss_mm: float
-    """How far the tool then is from the pose, within its tolerance; 0 with the closed form."""
-    miss_deg: float
-    """The same for what the pose asks of the orientation."""
+    __slots__ = ("_found", "usable")
+
+    usable: bool
+    """Whether the arm can take these angles."""
+
+    def __init__(self, found: Candidate | NumericalSolution) -> None:
+        self._found = found
+        self.usable = found.usable
+
+    def __repr__(self) -> str:
+        where = f"angles_deg={self.angles_deg.round(4).tolist()}, branch={self.branch!r}"
+        return f"Solution({where}, rejections={self.rejections!r}, distance_deg={self.distance_deg:.4g})"
 
     @property
-    def usable(self) -> bool:
-        """Whether the arm can take these angles."""
-        return not self.rejections
+    def angles_deg(self) -> Array:
+        """(joints,): of all joints of the arm; NaN if the pose is out of reach of this branch."""
+        return np.degrees(self._found.angles_rad)
+
+    @property
+    def branch(self) -> str:
+        """Which of the arm's configurations it is; empty for one that was found numerically."""
+        return str(self._found.branch) if isinstance(self._found, Candidate) else ""
+
+    @property
+    def rejections(self) -> tuple[str, ...]:
+        """Why it cannot be used: out of reach, out of a joint's range; empty for one that can."""
+        return tuple(reason.text for reason in self._found.rejections)
+
+    @property
+    def distance_deg(self) -> float:
+        """From the posture to stay near to: root of the sum of squares over the joints."""
+        return math.degrees(self._found.distance_rad)
+
+    @property
+    def miss_mm(self) -> float:
+        """How far the tool then is from the pose, within its tolerance; 0 with the closed form."""
+        return 0.0 if isinstance(self._found, Candidate) else self._found.miss.position_mm
+
+    @property
+    def miss_deg(self) -> float:
+        """The same for what the pose asks of the orientation."""
+        return 0.0 if isinstance(self._found, Candidate) else self._found.miss.rotation_deg
 
 
 @checked
@@ -74,31 +105,71 @@ def inverse(
     move the one that the search comes to first, else all, but at most 16 where one turns into the next, as at a
     singular pose. Raises InputError for a matrix that is not a pose.
     """
-    solver = PoseSolver(Arm.shape(arm))
+    solver = _solver(arm)
     near = solver.home_rad if near_deg is None else tuple(_posture(solver.arm, near_deg).tolist())
-    target = pose.exact() if isinstance(pose, Pose) else Pose.of_matrix(checked_pose(pose))
-    solutions = _exact(solver, target, near) or _solutions(solver.solve(target, near))
-    return tuple(
-        sorted(solutions, key=lambda one: (not one.usable, math.isnan(one.distance_deg), one.distance_deg))
+    given, rows = (pose.exact(), []) if isinstance(pose, Pose) else (None, checked_rows(pose))
+    if given:
+        rows = [number for row in given.matrix for number in row]
+    if solver.refusals or (given and given.fixed != WHOLE):
+        answer = solver.solve(given or _whole(rows), near)
+        return _listed(answer.search.solutions if answer.search else ())
+    choice = choose_of_rows(solver.geometry, rows, solver.ranges, near)
+    found = _listed(choice.candidates)
+    return found if found[0].usable else _listed(_within_tolerance(solver, choice, given, near)) or found
+
+
+def _listed(found: Sequence[Candidate | NumericalSolution]) -> tuple[Solution, ...]:
+    return tuple(map(Solution, sorted(found, key=_order)))
+
+
+def _order(one: Candidate | NumericalSolution) -> float:
+    """Usable ones first, nearest first; last those that are out of reach."""
+    distance = one.distance_rad
+    if one.usable:
+        return distance
+    return math.inf if math.isnan(distance) else _BEHIND_RAD + distance
+
+
+_kept: tuple[Arm, PoseSolver] | None = None
+
+
+def _solver(arm: Arm | Path | str) -> PoseSolver:
+    """That of an arm, kept for its next pose."""
+    global _kept
+    if _kept and _kept[0] is arm:
+        return _kept[1]
+    shape = Arm.shape(arm)
+    solver = PoseSolver(shape)
+    _kept = (arm if isinstance(arm, Arm) else shape), solver
+    return solver
+
+
+def _within_tolerance(
+    solver: PoseSolver, choice: Choice, given: Pose | None, near: Sequence[float]
+) -> list[NumericalSolution]:
+    """Postures in range near to the exact ones, where a joint is so little out of range, or the pose out of reach,
+    that the tolerance may make up for it."""
+    tolerance_mm, tolerance_deg = (
+        (given.tolerance_mm, given.tolerance_deg) if given else (TOLERANCE_MM, TOLERANCE_DEG)
     )
-
-
-def _exact(solver: PoseSolver, target: Pose, near: tuple[float, ...]) -> list[Solution]:
-    """The eight of the closed form; empty if it does not serve, or a posture within the tolerance may be usable."""
-    if target.fixed != WHOLE or solver.refusals:
+    slack = math.radians(max(_FAR_DEG, _FAR * tolerance_deg))
+    beside = [each.placed_rad for each in choice.candidates if each.outside_rad <= slack]
+    lever = math.hypot(*choice.shape.flange)
+    reach = tolerance_mm + 2.0 * math.sin(0.5 * math.radians(tolerance_deg)) * lever
+    starts = choice.of_nearer_poses(near, reach) if choice.beyond < reach else []
+    if not beside and not starts:
         return []
-    choice = choose(solver.geometry, target.matrix, solver.ranges, near)
-    turn = math.radians(target.tolerance_deg)
-    slack_mm, slack_deg = (
-        target.tolerance_mm + turn * solver.geometry.reach,
-        max(_FAR_DEG, _FAR * target.tolerance_deg),
-    )
-    for each in choice.candidates:
-        slack = [slack_mm if reason.kind == "unreachable" else slack_deg for reason in each.rejections]
-        small = all(abs(reason.amount) < most for reason, most in zip(each.rejections, slack, strict=True))
-        if each.rejections and small and not choice.chosen:
-            return []
-    return [_solution(each, str(each.branch), Miss(0.0, 0.0)) for each in choice.candidates]
+    target = given or _whole(choice.pose)
+    problem = solver.moving.with_all.problem(Constraint.of(target), within=False)
+    for angles in beside:
+        swing = _SWINGS * most_swing(problem, angles, _COST)
+        if np.all(np.abs(solver.ranges.excess(angles)) <= swing):
+            starts.append(angles)
+    return descents(solver.moving.with_all, target, near, starts)
+
+
+def _whole(rows: Sequence[float]) -> Pose:
+    return Pose.of_matrix(np.reshape(rows, (4, 4)))
 
 
 def _posture(arm: Arm, near_deg: ArrayLike) -> Array:
@@ -107,21 +178,3 @@ def _posture(arm: Arm, near_deg: ArrayLike) -> Array:
     if near.ndim != 1:
         raise InputError("near_deg must be one posture", "give an angle for each joint")
     return np.radians(spread_deg(arm, near, "near_deg: "))
-
-
-def _solutions(answer: Answer) -> list[Solution]:
-    """Those of the search where it found one that can be used, else the eight of the closed form."""
-    if answer.choice and not answer.success:
-        return [_solution(each, str(each.branch), Miss(0.0, 0.0)) for each in answer.choice.candidates]
-    return [_solution(each, "", each.miss) for each in answer.search.solutions] if answer.search else []
-
-
-def _solution(found: Candidate | NumericalSolution, branch: str, miss: Miss) -> Solution:
-    return Solution(
-        np.degrees(found.angles_rad),
-        branch,
-        tuple(reason.text for reason in found.rejections),
-        float(np.degrees(found.distance_rad)),
-        miss.position_mm,
-        miss.rotation_deg,
-    )

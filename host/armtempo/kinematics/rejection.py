@@ -7,14 +7,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from armtempo.basics.arrays import Array
+from armtempo.kinematics import formulas
 from armtempo.kinematics.ranges import Ranges
-from armtempo.kinematics.regions import radii
 from armtempo.kinematics.shape import Shape
 from armtempo.kinematics.solutions import (
     DUPLICATE,
     ELBOW_STRETCHED,
     IN_OFFSET,
+    OUT_OF_REACH,
     TOO_FAR,
     TOO_NEAR,
     PoseSolutions,
@@ -43,15 +43,31 @@ class WristCentre:
     """The wrist centre that a pose asks for, as the regions of Fig. 3 see it."""
 
     shape: Shape
-    position: Array
-    """(3,): x, y, z from the base."""
+    position: tuple[float, float, float]
+    """x, y, z from the base."""
     unit: str
     """Of the lengths, for the texts."""
 
     @cached_property
     def _from_shoulder(self) -> list[float]:
         """Distance from the shoulder's axis, with the base turned either way."""
-        return [float(each[0]) for each in radii(self.shape, *self.position[:, None]).shoulder]
+        x, y, z = self.position
+        planar = math.sqrt(x * x + y * y)
+        square = (
+            0.0 if formulas.on_axis(self.shape, planar) else formulas.square_of_forward(self.shape, planar)
+        )
+        if square < 0.0:
+            return [math.nan] * 2
+        forward = math.sqrt(square)
+        return [math.hypot(*formulas.to_shoulder(self.shape, way * forward, z)) for way in (1.0, -1.0)]
+
+    @property
+    def beyond(self) -> float:
+        """By how much the way of turning the base that is least out of reach is so; inf where none is."""
+        if math.isnan(self._from_shoulder[0]):
+            return abs(self.shape.offset) - math.hypot(*self.position[:2])
+        gaps = [max(r - self.shape.farthest, self.shape.nearest - r) for r in self._from_shoulder]
+        return min((gap for gap in gaps if gap > 0.0), default=math.inf)
 
     def unreachable(self, index: int, outcome: int) -> Rejection:
         """Say which inequality of Eq. (3) it violates for solution ``index``."""
@@ -120,7 +136,7 @@ def reasons(
 ) -> tuple[Rejection, ...]:
     """Collect everything against solution ``index``, 0 to 7, with angles (6,) from ``Ranges.placed``."""
     outcome = solutions.outcome[index]
-    if outcome in (TOO_FAR, TOO_NEAR, IN_OFFSET):
+    if outcome in OUT_OF_REACH:
         return (wrist.unreachable(index, outcome),)
     outside = out_of_range(ranges, placed)
     return (duplicate(index, solutions.singular[index]), *outside) if outcome == DUPLICATE else outside

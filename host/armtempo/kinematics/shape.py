@@ -92,6 +92,11 @@ class Shape:
         return -1.0 if self.turn2 else 1.0
 
     @cached_property
+    def wrist_offset(self) -> bool:
+        """Whether joints 4 to 6 count from other than the angles of the formulas."""
+        return any(self.joint_offset[3:])
+
+    @cached_property
     def hand(self) -> float:
         """sign1 * sign2 * sign3."""
         return self.sign1 * self.sign2 * self.sign3

@@ -132,7 +132,7 @@ def _both_wrists(
     theta6 = formulas.theta6(FLOATS, shape, a, n, o)
     flipped4, flipped6 = theta4 - math.copysign(math.pi, theta4), theta6 - math.copysign(math.pi, theta6)
     plain, flipped = (theta4, theta5, theta6), (flipped4, -theta5, flipped6)
-    if any(shape.joint_offset[3:]):
+    if shape.wrist_offset:
         plain, flipped = _wrist_joints(shape, plain), _wrist_joints(shape, flipped)
     found.angles_rad.extend(((*arm, *plain), (*arm, *flipped)))
     found.outcome.extend((OK, OK))

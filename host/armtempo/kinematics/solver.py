@@ -83,7 +83,7 @@ class Answer:
         found: list[Candidate | NumericalSolution] = []
         found += self.choice.candidates if self.choice else ()
         found += self.search.solutions if self.search else ()
-        usable = sorted((one for one in found if not one.rejections), key=lambda one: one.distance_rad)
+        usable = sorted((one for one in found if one.usable), key=lambda one: one.distance_rad)
         return [tuple(map(math.degrees, one.angles_rad)) for one in usable]
 
     @property
@@ -186,9 +186,9 @@ class PoseSolver:
         for angles, outcome in zip(*inverse_of_pose(self.geometry, rows, start)[:2], strict=True):
             if outcome != OK:
                 continue
-            placed = self.ranges.placed(angles, start)
+            placed, outside = self.ranges.fitted(angles, start)
             distance = math.dist(placed, start)
-            if distance < least and not any(self.ranges.excess(placed)):
+            if not outside and distance < least:
                 best, least = placed, distance
         return best
 

@@ -24,6 +24,12 @@ def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardErro
     return BoardError(f"{what}: {meaning}{where}{detail}", cure, code)
 
 
+def fault_words(name: str) -> str:
+    """What a fault means and its cure, by its name in the table; the name if this version does not know it."""
+    found = (f"{meaning}: {cure}" for known, meaning, cure in wire.ERRORS.values() if known == name)
+    return next(found, name)
+
+
 def _words(name: str, where: str, value: int) -> str:
     if name == "too_long" and where:
         return f"its numbers reach {value}"

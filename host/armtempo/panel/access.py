@@ -60,6 +60,8 @@ class Access:
 
     def _refusal(self, scope: Scope) -> str:
         """Why the request is refused; "" if it is not."""
+        if not str(scope.get("path", "")).isprintable():
+            return "the path has characters that cannot be printed"
         headers = {name.lower(): value for name, value in scope["headers"]}
         host = headers.get(b"host", b"").decode("latin-1")
         if _name(host) not in self._hosts:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from armtempo.formats.atomic_file import replace_text
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner
 
 _NEW = "panel_job"
@@ -27,25 +28,36 @@ class Desk:
         self.file = job_file
         self.job = Job.load(job_file, arm) if job_file else Job(_NEW, via_deg=[arm.home_deg, arm.home_deg])
         self.plan: Plan | None = None
+        self.rows()  # what is wrong with poses is said at the start rather than in a page
 
     def rows(self) -> list[list[float]]:
-        """The job's via points as angles, (n, J): poses through the inverse kinematics."""
-        return [list(map(float, row)) for row in planner.via_angles(self.arm, self.job)[0]]
+        """The job's via points as angles, (n, J); PlanError if no posture reaches a pose among them."""
+        angles = [via for via in self.job.via if not isinstance(via, Pose)]
+        found = angles if len(angles) == len(self.job.via) else planner.via_angles(self.arm, self.job)[0]
+        return [list(map(float, row)) for row in found]
 
-    def job_with(self, rows: Sequence[Sequence[float]], path: str) -> Job:
-        """The job through other via points; InputError as for the file that ``save`` would write."""
-        job = Job.of_table(toml_table.parse(self._text(rows, path), str(self._target)), self.arm)
+    def job_with(self, rows: Sequence[Sequence[float]], options: Mapping[str, str]) -> Job:
+        """The job through other via points, with ``options`` as they are typed, "" for none.
+
+        InputError as for the file that ``save`` would write.
+        """
+        job = Job.of_table(toml_table.parse(self._text(rows, options), str(self._target)), self.arm)
         last = len(rows) - 1
         stops = tuple(stop for stop in self.job.stops if stop.via < last)
         return replace(job, stops=stops, ways=tuple(way for way in self.job.ways if way.via <= last))
+
+    def option(self, key: str) -> str:
+        """What the job says under a key, as it is typed."""
+        value = getattr(self.job, key)
+        return "" if value is None else str(value)
 
     @property
     def _target(self) -> Path:
         """The job's file; one in the folder for a job without."""
         return self.file or self.folder / f"{self.job.name}.toml"
 
-    def _text(self, rows: Sequence[Sequence[float]], path: str) -> str:
-        """The job's file with other via points and path; its other lines and comments stay."""
+    def _text(self, rows: Sequence[Sequence[float]], options: Mapping[str, str]) -> str:
+        """The job's file with other via points and options; its other lines and comments stay."""
         file = self._target
         text = file.read_text(encoding="utf-8") if file.is_file() else f'name = "{self.job.name}"\n'
         content = tomlkit.parse(text)
@@ -54,13 +66,16 @@ class Desk:
         for row in rows:
             via.append([round(float(angle), 6) for angle in row])
         content["via_deg"] = via.multiline(True)
-        if path != Job.path or "path" in content:
-            content["path"] = path
+        for key, value in options.items():
+            if value and value != self.option(key):
+                content[key] = toml_table.typed(value)
+            elif not value:
+                content.pop(key, None)
         return tomlkit.dumps(content)
 
-    def save(self, rows: Sequence[Sequence[float]], path: str) -> Path:
-        """Write the via points and the path into the job's file; InputError, and nothing written, if it cannot be."""
-        job, file = self.job_with(rows, path), self._target
+    def save(self, rows: Sequence[Sequence[float]], options: Mapping[str, str]) -> Path:
+        """Write via points and options into the job's file; InputError, and nothing written, if it cannot be."""
+        job, file = self.job_with(rows, options), self._target
         if job.ways or job.stops:
             raise InputError(
                 "the panel writes via points as angles alone: lines, speeds and stops of the job would be lost",
@@ -70,6 +85,6 @@ class Desk:
             raise InputError(
                 f"{file} is outside of the project folder", "copy it there; the panel writes nothing else"
             )
-        replace_text(file, self._text(rows, path))
+        replace_text(file, self._text(rows, options))
         self.file, self.job = file, job
         return file

@@ -162,7 +162,7 @@ def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
     with suppress(InputError):
         x, y, z = forward(operator.arm, angles)[:3, 3]
         where = f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  {where}"
-    said = operator.log[-1] if operator.log else ""
+    said = operator.fault or (operator.log[-1] if operator.log else "")
     texts = {"armtempo-state": state_line(operator), "armtempo-where": where, "armtempo-said": said}
     for number, angle in enumerate(angles, 1):
         texts[f"armtempo-angle-{number}"] = f"{angle:.2f}°"
@@ -187,5 +187,5 @@ def state_line(operator: Operator) -> str:
             words.AT_SPEED.format(percent=state.speed_percent) if state.speed_percent else words.IN_A_PAUSE
         )
         doing = f" {speed}{doing}"
-    fault = f" · {words.FAULT.format(fault=state.fault)}" if state.fault else ""
+    fault = f" · {state.fault}" if state.fault else ""
     return f"{state.state}{doing} · {state.port}{kind}{fault}"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
 
 AXES = ("x", "y", "z")
+_CLEAR = Needs.COMMAND | Needs.FAULT
 
 
 def build(page: PanelPage) -> None:
@@ -29,7 +30,8 @@ def build(page: PanelPage) -> None:
 def _hold_button(page: PanelPage, move: JogMove, sign: str, name: str) -> None:
     """A button that moves the arm while it is held; the page's script finds it by its number."""
     made = ui.button(sign).classes("armtempo-touch")
-    page.control(made.props(f'unelevated aria-label="{name} {sign}" data-jog={len(page.jogs)}'), jog=move)
+    made.props(f'unelevated aria-label="{name} {sign}" data-jog={len(page.jogs)}')
+    page.control(made, more=lambda: page.operator.why_no_jog(move), is_held=True)
     page.jogs.append(move)
 
 
@@ -53,7 +55,7 @@ def _jog(page: PanelPage) -> None:
         with ui.column():
             ui.label(words.TOOL).classes("text-subtitle2")
             for axis in AXES:
-                with ui.row().classes("no-wrap"):
+                with ui.row().classes("no-wrap armtempo-tool"):
                     _pair(page, axis, JogMove(math.inf, axis=axis))
                     _pair(page, f"⟳ {axis}", JogMove(math.inf, axis=axis, about=True))
     ui.label(words.HOLD_HINT).classes("armtempo-note")
@@ -88,8 +90,8 @@ def _home(page: PanelPage) -> None:
     with ui.row():
         page.control(ui.button(words.HOME, on_click=home).props("outline no-caps"), Needs.COMMAND)
         clear = ui.button(words.CLEAR).props("outline no-caps")
-        clear.on_click(lambda: page.do(words.CLEAR, lambda: operator.board.clear(), Needs.COMMAND))
-        page.control(clear, Needs.COMMAND)
+        clear.on_click(lambda: page.do(words.CLEAR, lambda: operator.board.clear(), _CLEAR))
+        page.control(clear, _CLEAR)
 
 
 def _outputs(page: PanelPage) -> None:

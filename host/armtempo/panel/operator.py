@@ -19,6 +19,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError, PortInUseError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Event, Sample, SequenceState
+from armtempo.link.refusal import fault_words
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.plan import Plan
 from armtempo.panel import words
@@ -56,6 +57,12 @@ class Needs(Flag):
     MOTION = auto()
     """Something moves."""
     COMMAND = IDLE | BOARD
+    PLAN = auto()
+    """A motion is planned."""
+    FAULT = auto()
+    """A fault is pending."""
+    CONTROL = 0
+    """Nothing else."""
     PAUSE = BOARD | MOTION
     MOVE = IDLE | BOARD | REST
 
@@ -230,15 +237,24 @@ class Operator:
             return words.OTHER_IN_CONTROL if self.holder else words.NOBODY_IN_CONTROL
         if self.busy and Needs.IDLE in needs:
             return words.BUSY.format(what=self.busy)
+        if Needs.PLAN in needs and self.desk.plan is None:
+            return words.NO_PLAN
         if Needs.MOTION in needs and (self.state is None or not self.state.moving):
             return words.AT_REST
+        if Needs.FAULT in needs and not self.fault:
+            return words.NO_FAULT
         if Needs.REST not in needs or self.state is None:
             return ""
-        if self.state.fault:
-            return words.FAULT.format(fault=self.state.fault)
+        if self.fault:
+            return self.fault
         if not all(joint.known for joint in self.state.joints):
             return words.NOT_HOMED
         return words.MOVING if self.state.moving else ""
+
+    @property
+    def fault(self) -> str:
+        """The pending fault and its cure, in words; "" for none."""
+        return fault_words(self.state.fault) if self.state is not None and self.state.fault else ""
 
     def why_no_jog(self, move: JogMove) -> str:
         """Why the arm cannot jog that way from where it is, in words; "" if it can."""
@@ -285,9 +301,13 @@ class Operator:
             self.busy = ""
             self.ended += 1
 
+    def upload(self, plan: Plan) -> None:
+        """Store a plan on the board, in the place of another one of its name."""
+        self.board.upload(plan, replace=True, progress=self.part)
+
     def run(self, plan: Plan, times: int) -> None:
         """Load a plan, run it and write the report."""
-        self.board.upload(plan, replace=True)
+        self.upload(plan)
         self.plan_run = plan
         self.board.run(plan, times, self.runs, self.part).report()
 

@@ -15,7 +15,8 @@ window.armtempo = {
   follow: false,
   THREE: null,
   SMOOTH_MS: 100,
-  SILENT_MS: 900,
+  LOOK_MS: 100,
+  SILENT_MS: 850, // with LOOK_MS and a busy browser within a second
 
   // the scene is there, some time after the page
   show(parts) {
@@ -25,7 +26,7 @@ window.armtempo = {
   },
 
   begin() {
-    setInterval(() => this.look(), 100);
+    setInterval(() => this.look(), this.LOOK_MS);
     addEventListener("keydown", (event) => this.key(event), true); // before a button takes the space bar for itself
     addEventListener("keyup", (event) => event.key === "Enter" && this.release(), true);
     addEventListener("pointerdown", (event) => event.button === 0 && this.press(event), true);
@@ -38,7 +39,7 @@ window.armtempo = {
   // a message of the server, about ten a second
   hear(message) {
     this.heard = performance.now();
-    document.body.classList.remove("lost");
+    document.body.classList.remove("lost"); // which covers the page
     this.target = message.ghost;
     if (JSON.stringify(message.dials) !== JSON.stringify(this.angles)) this.angles = message.dials;
     if (JSON.stringify(message.links) !== JSON.stringify(this.to)) {
@@ -150,6 +151,11 @@ window.armtempo = {
 
   // The space bar stops from everywhere but where it writes a space; Enter holds a jog button as a finger does.
   key(event) {
+    if (document.body.matches(".lost") && [" ", "Enter"].includes(event.key)) {
+      event.preventDefault(); // what is covered is not pressed by keys either
+      event.stopPropagation();
+      return;
+    }
     const typing = event.target.matches("textarea, input[type=text]:not([readonly])");
     if (event.key === "Escape" || (event.key === " " && !typing)) {
       event.preventDefault();

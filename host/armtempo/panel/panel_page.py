@@ -28,9 +28,9 @@ class _Control:
     """Something that can be pressed, and what that needs."""
 
     element: Element
-    needs: Needs
-    jog: JogMove | None
-    """What it moves while it is held."""
+    why_not: Callable[[], str]
+    is_held: bool
+    """Whether it acts while it is held."""
     reason: str = "-"
     """Why it cannot be pressed."""
 
@@ -74,18 +74,28 @@ class PanelPage:
             ui.run_javascript(f"armtempo.show({scene.parts})")
         return scene
 
-    def control(self, element: Element, needs: Needs = Needs.MOVE, jog: JogMove | None = None) -> Any:
-        """An element that is greyed, with the reason as its hint, while it cannot be used."""
+    def control(
+        self,
+        element: Element,
+        needs: Needs | None = Needs.MOVE,
+        more: Callable[[], str] = str,
+        is_held: bool = False,
+    ) -> Any:
+        """An element that is greyed, with the reason as its hint, while it cannot be used.
+
+        ``needs``: None if a page that only watches can use it too. ``more``: why it cannot be used although all
+        that it needs is there, in words; "" if it can.
+        """
         with element:
             ui.tooltip("")
-        control = _Control(element, needs, jog)
-        control.grey(self._why_not(control))
+
+        def why_not() -> str:
+            return (self.operator.why_not(self.client, needs) if needs is not None else "") or more()
+
+        control = _Control(element, why_not, is_held)
+        control.grey(control.why_not())
         self.controls.append(control)
         return element
-
-    def _why_not(self, control: _Control) -> str:
-        reason = self.operator.why_not(self.client, control.needs)
-        return reason or (self.operator.why_no_jog(control.jog) if control.jog else "")
 
     def on_look(self, listener: Callable[[], None]) -> None:
         """Let what is built now, in the tab that is shown, look at what has changed."""
@@ -121,10 +131,9 @@ class PanelPage:
         """Grey what cannot be used now, with the reason."""
         self.controls = [control for control in self.controls if not control.element.is_deleted]
         for control in self.controls:
-            if control.jog is None or not self.hold.held_by(
-                self.client
-            ):  # what is held keeps the keyboard's focus
-                control.grey(self._why_not(control))
+            # what is held keeps the keyboard's focus
+            if not (control.is_held and self.hold.held_by(self.client)):
+                control.grey(control.why_not())
         for tab, listener in self.listeners:
             if tab in ("", self.shown):
                 listener()

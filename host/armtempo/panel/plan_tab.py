@@ -16,8 +16,10 @@ from armtempo.formats import number_table
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.moved_tool import moved_tool_deg
 from armtempo.model import via_table
+from armtempo.model.job import DEGREES, PATHS, TIMINGS
 from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
+from armtempo.panel.operator import Needs
 
 if TYPE_CHECKING:
     from armtempo.model.plan import Plan
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
 _POINTS = 200
 _PLAY_S = 0.05
+_CHOICES = {"path": PATHS, "timing": TIMINGS, "degree": DEGREES}
 
 
 class PlanTab:
@@ -34,7 +37,7 @@ class PlanTab:
         self._page = page
         self._operator = page.operator
         self._rows: list[list[float]] = page.operator.desk.rows()
-        self._cancelled = False
+        self._planning = self._cancelled = False
         self._played: Plan | None = None
         page.scene.picked, page.scene.dragged = self._pick, self._drag
         self._table()
@@ -45,25 +48,38 @@ class PlanTab:
             ui.button(words.NEW_VIA, on_click=self._add_via).props("outline no-caps")
             ui.button(words.FROM_ARM, on_click=self._take_posture).props("outline no-caps")
             ui.button(words.PASTE, on_click=self._paste).props("outline no-caps")
-            ui.button(words.SAVE, on_click=self._save).props("outline no-caps")
+            page.control(ui.button(words.SAVE, on_click=self._save).props("outline no-caps"), Needs.CONTROL)
         with ui.row():
-            self._path = ui.select(words.PATHS, value=page.operator.desk.job.path, label=words.PATH).classes(
-                "min-w-[14rem]"
-            )
-            self._go = ui.button(words.PLAN, on_click=self._plan)
+            self._options = {key: self._option(key, label) for key, label in words.OPTIONS.items()}
+        with ui.row():
+            page.control(ui.button(words.PLAN, on_click=self._plan), Needs.CONTROL, self._why_no_plan)
             self._stop = ui.button(words.CANCEL, on_click=self._cancel).props("flat")
             self._stop.set_visibility(False)
         self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
         self._bar.set_visibility(False)
         self._result = ui.label("")
-        self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time).props("label")
+        self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time)
+        page.control(self._slider.props(f'label aria-label="{words.PLAY_TIME}"'), None, self._why_no_play)
         with ui.row():
-            ui.button(words.PLAY, icon="play_arrow", on_click=self._play).props("outline no-caps")
+            play = ui.button(words.PLAY, icon="play_arrow", on_click=self._play).props("outline no-caps")
+            page.control(play, None, self._why_no_play)
         self._charts = [
             CurveChart(page.operator.arm, title, order)
             for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
         ]
         page.on_look(self._look)
+
+    def _option(self, key: str, label: str) -> ui.select | ui.input:
+        """The field of a key of the job."""
+        value, choices = self._operator.desk.option(key), _CHOICES.get(key)
+        if choices is None:
+            return ui.input(label, value=value).props("dense outlined").classes("armtempo-value")
+        named = {choice: words.CHOICES.get(choice, choice) for choice in map(str, choices)}
+        return ui.select(named, value=value, label=label).props("dense outlined").classes("armtempo-option")
+
+    def _given(self) -> dict[str, str]:
+        """The options as they are in their fields."""
+        return {key: str(one.value or "").strip() for key, one in self._options.items()}
 
     # the table
 
@@ -71,7 +87,7 @@ class PlanTab:
     def _table(self) -> None:
         joints = self._operator.arm.driven
         with ui.grid(columns=f"auto repeat({len(joints)}, minmax(4.5rem, 7rem)) auto").classes(
-            "gap-1 items-center"
+            "armtempo-grid"
         ):
             ui.label("")
             for joint in joints:
@@ -168,13 +184,16 @@ class PlanTab:
 
     # the plan
 
+    def _why_no_plan(self) -> str:
+        return words.BUSY.format(what=words.PLAN) if self._planning else ""
+
+    def _why_no_play(self) -> str:
+        return "" if self._played else words.NO_PLAN
+
     async def _plan(self) -> None:
-        self._cancelled = False
-        self._bar.set_visibility(True)
-        self._stop.set_visibility(True)
-        self._go.set_enabled(False)
         try:
-            job = self._operator.desk.job_with(self._rows, str(self._path.value))
+            job = self._operator.desk.job_with(self._rows, self._given())
+            self._show_planning(True)
             self._operator.desk.plan = await run.io_bound(
                 pipeline.plan, self._operator.arm, job, self._progress
             )
@@ -183,9 +202,13 @@ class PlanTab:
         except asyncio.CancelledError:
             pass
         finally:
-            self._bar.set_visibility(False)
-            self._stop.set_visibility(False)
-            self._go.set_enabled(True)
+            self._show_planning(False)
+
+    def _show_planning(self, planning: bool) -> None:
+        self._planning, self._cancelled = planning, False
+        self._bar.set_visibility(planning)
+        self._stop.set_visibility(planning)
+        self._page.refresh()
 
     def _progress(self, done: float, whole: float) -> None:
         if self._cancelled:
@@ -197,7 +220,7 @@ class PlanTab:
 
     def _save(self) -> None:
         def save() -> None:
-            ui.notify(words.SAVED.format(path=self._operator.desk.save(self._rows, str(self._path.value))))
+            ui.notify(words.SAVED.format(path=self._operator.desk.save(self._rows, self._given())))
 
         self._page.attempt(save)
 
@@ -219,9 +242,7 @@ class PlanTab:
             self._page.show_ghost(angles)
 
     async def _play(self) -> None:
-        plan = self._played
-        if plan is None:
-            ui.notify(words.NO_PLAN)
+        if (plan := self._played) is None:
             return
         for time_s in np.arange(0.0, plan.total_s, _PLAY_S):
             self._slider.set_value(round(1000 * float(time_s) / plan.total_s))

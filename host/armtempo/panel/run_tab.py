@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,8 +13,10 @@ from nicegui import ui
 from armtempo import pipeline
 from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
+from armtempo.panel.operator import Needs
 
 if TYPE_CHECKING:
+    from armtempo.model.plan import Plan
     from armtempo.panel.panel_page import PanelPage
 
 REPORT_PAGE = "report.html"
@@ -25,12 +29,17 @@ class RunTab:
 
     def __init__(self, page: PanelPage) -> None:
         self._page = page
-        self._operator = page.operator
+        self._operator = operator = page.operator
         self._shown = (-1, 0)
         self._ended = page.operator.ended
         with ui.row():
-            page.control(ui.button(words.TO_START, on_click=self._to_start))
-            page.control(ui.button(words.RUN, icon="play_arrow", on_click=self._run))
+            for text, call, needs in (
+                (words.TO_START, operator.go, Needs.MOVE),
+                (words.RUN, self._run, Needs.MOVE),
+                (words.UPLOAD, operator.upload, Needs.COMMAND),
+            ):
+                button = ui.button(text).on_click(partial(self._do, text, call, needs))
+                page.control(button, needs | Needs.PLAN)
             self._repeat = ui.number(words.REPEAT, value=1, max=99, precision=0).props("dense outlined")
         ui.label(words.DOTTED).classes("armtempo-note")
         self._angles = CurveChart(self._operator.arm, words.ANGLE, 0)
@@ -40,21 +49,13 @@ class RunTab:
         self._past()
         page.on_look(self._look)
 
-    def _to_start(self) -> None:
-        plan = self._operator.desk.plan
-        if plan is None:
-            ui.notify(words.NO_PLAN)
-            return
-        operator = self._operator
-        self._page.do(words.TO_START, lambda: operator.go(plan))
+    def _do(self, text: str, call: Callable[[Plan], object], needs: Needs) -> None:
+        """Do something with the plan, in its turn."""
+        if (plan := self._operator.desk.plan) is not None:
+            self._page.do(text, lambda: call(plan), needs)
 
-    def _run(self) -> None:
-        plan = self._operator.desk.plan
-        if plan is None:
-            ui.notify(words.NO_PLAN)
-            return
-        operator, times = self._operator, int(self._repeat.value or 0)
-        self._page.do(words.RUN, lambda: operator.run(plan, times))
+    def _run(self, plan: Plan) -> None:
+        self._operator.run(plan, int(self._repeat.value or 0))
 
     def _look(self) -> None:
         operator = self._operator

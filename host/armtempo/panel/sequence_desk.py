@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +80,7 @@ class SequenceDesk:
         """Change what a step says under a key; "" takes the key out."""
         table = self._tables[index]
         if text:
-            table[key] = _value(text)
+            table[key] = toml_table.typed(text)
         elif key in table:
             del table[key]
         self._changed()
@@ -91,7 +90,7 @@ class SequenceDesk:
         table = self._tables[index]
         for key in list(table):
             del table[key]
-        table[kind] = _value(_FIRST.get(kind, "name"))
+        table[kind] = toml_table.typed(_FIRST.get(kind, "name"))
         self._changed()
 
     def add(self, index: int) -> None:
@@ -152,12 +151,3 @@ def _text(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return str(value)
-
-
-def _value(text: str) -> Any:
-    """What was typed: a number, yes or no, or a list if it is one in TOML, else a text."""
-    try:
-        value = tomllib.loads(f"x = {text}")
-    except ValueError:
-        return text
-    return value["x"] if len(value) == 1 and isinstance(value["x"], bool | int | float | list) else text

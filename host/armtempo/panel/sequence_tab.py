@@ -34,16 +34,20 @@ class SequenceTab:
         name = self._desk.file.name if self._desk.file else None
         with ui.row():
             choice = ui.select(files, value=name, label=words.SEQUENCE_FILE, on_change=self._open)
+            choice.on("focus", lambda: choice.set_options(self._desk.files()))  # there may be new ones
             page.control(choice.style("min-width: 12rem"), Needs.IDLE)
             for text, call, needs in (
                 (words.SAVE_SEQUENCE, self._save, Needs.IDLE),
                 (words.TO_START, self._to_start, Needs.MOVE),
                 (words.RUN, self._run, Needs.MOVE),
             ):
-                page.control(ui.button(text, on_click=call).props("outline no-caps"), needs)
+                page.control(ui.button(text, on_click=call).props("outline no-caps"), needs, self._why_not)
         self._where = ui.label("").props('role="status"')
         self._table()
         page.on_look(self._look)
+
+    def _why_not(self) -> str:
+        return words.NO_SEQUENCE_OPEN if self._desk.file is None else ""
 
     @ui.refreshable_method
     def _table(self) -> None:

@@ -6,7 +6,7 @@ PANEL = "the panel"
 OTHER_IN_CONTROL = "Another page has control; take it to move the arm."
 NOBODY_IN_CONTROL = "Take control to move the arm."
 BUSY = "Wait: {what} is under way."
-FAULT = "A fault is pending ({fault}): remove its cause, then clear it."
+NO_FAULT = "No fault is pending."
 NOT_HOMED = "The arm's position is unknown: home it first."
 MOVING = "The arm is moving."
 AT_REST = "Nothing moves."
@@ -42,9 +42,22 @@ NEW_VIA, FROM_ARM, DELETE = "Add a via point", "Take the arm's posture", "Delete
 PASTE, PASTE_HINT = "Paste", "Rows of angles from a spreadsheet, one row a via point"
 PASTED = "the pasted rows"
 PLAN, CANCEL, SAVE = "Plan", "Cancel", "Save the job"
-PATH, PATHS = "Path", {"through": "spline through the via points", "free": "free between the via points"}
+OPTIONS = {
+    "path": "Path",
+    "corridor_deg": "Corridor, deg",
+    "corridor_mm": "Corridor, mm",
+    "timing": "Timing",
+    "degree": "Degree",
+    "refine": "Segments",
+}
+CHOICES = {
+    "through": "spline through the via points",
+    "free": "free between the via points",
+    "shared": "shared by all joints",
+    "per-joint": "one for each joint",
+}
 MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {floor:.3f} s."
-PLAY = "Play on the model"
+PLAY, PLAY_TIME = "Play on the model", "Time on the model"
 TIME_S, ANGLE, SPEED, ACCELERATION, JERK = (
     "s",
     "angle, deg",
@@ -56,10 +69,11 @@ SAVED = "Saved: {path}"
 CANCELLED, PLAN_AGAIN = "The planning was cancelled.", "plan again when you like"
 NO_PLAN = "Plan a motion first."
 
-TO_START, RUN, REPEAT = "Go to the start", "Run", "Repetitions"
+TO_START, RUN, UPLOAD, REPEAT = "Go to the start", "Run", "Upload", "Repetitions"
 ERROR = "following error, deg"
 DOTTED = "Lines: measured, or commanded for a joint without an encoder. Dotted: planned."
 STORED, PAST_RUNS, REPORT, COMPARE = "Stored motions", "Past runs", "Report", "Compare two"
+NO_SEQUENCE_OPEN = "Choose a sequence first."
 NO_SEQUENCE = "The project folder has no sequence: a TOML file with [[step]]."
 SEQUENCE_FILE, SAVE_SEQUENCE = "Sequence", "Save the sequence"
 STEP, ADD_STEP, UP, DOWN = "step", "Add a step", "Up", "Down"

@@ -242,7 +242,6 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
 
 def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
     """The check that every plan passes: PlanError if a limit or the board's step rate is exceeded."""
-    rates = 0.0
     for joint, extreme in zip(arm.driven, reached, strict=True):
         if not np.all(extreme.values <= np.array(joint.limits.values) * (1 + TOLERANCE)):
             raise PlanError(
@@ -250,13 +249,23 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
                 f"reaches {extreme.values}",
                 "angles and limits are too different in magnitude to compute with",
             )
-        rates += extreme.speed_deg_s * joint.steps_per_deg
+    rates = step_rates(arm, reached)
     if rates > MAX_STEP_RATE_SUM:
-        raise PlanError(
-            f"the joints together could need {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} at most "
-            f"{ESTIMATED}",
-            "lower the speed limits or use fewer microsteps",
-        )
+        raise PlanError(rate_words(rates), "lower the speed limits or use fewer microsteps")
+
+
+def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
+    """Sum of the highest step rates of all joints, steps/s."""
+    return sum(
+        extreme.speed_deg_s * joint.steps_per_deg for joint, extreme in zip(arm.driven, reached, strict=True)
+    )
+
+
+def rate_words(rates: float) -> str:
+    """A sum of step rates next to what a board does."""
+    return (
+        f"the joints together need up to {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} {ESTIMATED}"
+    )
 
 
 def check_time(trajectory: Trajectory) -> None:

@@ -187,7 +187,7 @@ def _solve(
     if not setup.closed_form or target.fixed != WHOLE:
         return _searched(setup, target, previous, where), None
     choice = choose(setup.solver.geometry, target.matrix, setup.ranges, previous)
-    usable = [candidate for candidate in choice.candidates if not candidate.rejections]
+    usable = [candidate for candidate in choice.candidates if candidate.usable]
     if not usable:
         return _searched(setup, target, previous, where, choice), None
     if home_first:
@@ -257,7 +257,7 @@ def _branch_note(old: Branch, new: Branch, choice: Choice | None, number: int) -
         f"{old} to {new}, so the joints pass through a singular posture on the way"
     )
     for candidate in choice.candidates if choice else ():
-        if not old.differs(candidate.branch) and candidate.rejections:
+        if not old.differs(candidate.branch) and not candidate.usable:
             text += f". Staying in {candidate.branch} is not possible: {candidate.rejections[0].text}"
             break
     return [Note("branch", number, text)]

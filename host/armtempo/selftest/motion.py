@@ -130,6 +130,16 @@ def at_rates(rates: Sequence[int], duration_s: float) -> bytes:
     return motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.NO_RAMPS, 0)
 
 
+def evaluated() -> bytes:
+    """The record of the motion of ``on_board/cycles.py``: about 1000 steps of one joint."""
+    return at_rates([20_000], 0.1)
+
+
+def steps_at(rate: int, duration_s: float) -> int:
+    """How many steps a joint makes in the motion of ``at_rates``."""
+    return int(rate * duration_s / _PEAK + 0.5)
+
+
 def _fixed(points: Array, bits: int) -> list[int]:
     return [int(value) for value in np.rint(points * 2.0**bits)]
 

@@ -18,9 +18,11 @@ from armtempo.selftest.result import Measurement, judged
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0
 """A sample each microsecond, the two ports half of one apart, and the rounding of a step time."""
-_LONGEST_TURN_US = 4000
+LONGEST_TURN_US = 4000
 """The capture keeps 4096 samples; after a longer turn some are lost."""
 _SLOWEST_STOP_US = 30.0
+STOPS = tuple(f"{pin} by {way}" for pin in ("E-stop", "limit switch") for way in ("software", "an edge"))
+"""As ``on_board/estop.py`` has them."""
 CYCLES_PER_US = 168
 _SHORTED = "look for a short between the two pins, and take what is connected off one after the other"
 
@@ -61,10 +63,10 @@ def judge(
         name, meaning, cure = ERRORS[values["fault"]]
         yield judged(PULSES, f"motion {way}", f"fault {name}: {meaning}", "no fault", False, cure)
     longest_us = values["longest_turn_cycles"] / CYCLES_PER_US
-    if longest_us > _LONGEST_TURN_US:
+    if longest_us > LONGEST_TURN_US:
         measured_words = f"a turn of the loop took {longest_us:.0f} us"
         yield judged(
-            PULSES, f"capture {way}", measured_words, f"below {_LONGEST_TURN_US}", False, "run it again"
+            PULSES, f"capture {way}", measured_words, f"below {LONGEST_TURN_US}", False, "run it again"
         )
         return
     found = rises_us(measured)
@@ -141,15 +143,15 @@ def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
 
 def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
     """Lines about what ``on_board/estop.py`` measured."""
-    wrong = sum(fault != codes.ESTOP for fault in values["faults"])
-    yield _stops("by software", values["cycles"])
-    if values["edge_cycles"]:
-        yield _stops("by an edge", values["edge_cycles"])
-    else:
-        yield Measurement(
-            SAFETY, "E-stop by an edge", "left out: what is wired to PE15 holds it", "", Level.NOTE,
-            "press it in 'armtempo selftest --with-motors'",
-        )  # fmt: skip
+    for way in STOPS:
+        if took := values["cycles"].get(way):
+            yield _stops(way, took)
+        else:
+            yield Measurement(
+                SAFETY, way, "left out: what is wired to its pin holds it", "", Level.NOTE,
+                "press it in 'armtempo selftest --with-motors'",
+            )  # fmt: skip
+    wrong, count = values["wrong_faults"], sum(map(len, values["cycles"].values()))
     end = values["starved"]
     name, _, _ = ERRORS.get(end["fault"], ("none", "", ""))
     yield judged(
@@ -162,9 +164,9 @@ def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
     )
     yield judged(
         SAFETY,
-        "fault after each E-stop",
-        f"{len(values['faults']) - wrong} of {len(values['faults'])} estop",
-        "estop each time",
+        "fault after each stop",
+        f"{count - wrong} of {count} as is due",
+        "estop or limit_switch each time",
         not wrong,
         "do not connect drivers; please report it with the output",
     )
@@ -175,9 +177,9 @@ def _stops(way: str, cycles: Sequence[int]) -> Measurement:
     gone_on = int(np.sum(took_us < 0))
     return judged(
         SAFETY,
-        f"E-stop {way} to frozen outputs, {len(took_us)} times",
+        f"{way} to frozen outputs, {len(took_us)} times",
         f"worst {took_us.max():.1f} us" + (f", {gone_on} times they went on" if gone_on else ""),
         f"below {_SLOWEST_STOP_US:g} us each time",
         not gone_on and float(took_us.max()) < _SLOWEST_STOP_US,
-        "do not connect drivers: the E-stop does not stop the pulses; please report it with the output",
+        "do not connect drivers: it does not stop the pulses; please report it with the output",
     )

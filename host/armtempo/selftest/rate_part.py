@@ -10,15 +10,20 @@ from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.diagnosis.finding import Level
 from armtempo.link.board_messages import Hello
+from armtempo.selftest.pulse_part import CYCLES_PER_US, LONGEST_TURN_US
 from armtempo.selftest.result import Measurement, judged
 
 PART = "rates"
 JOINTS = (1, 2, 3, 6)
 DURATION_S = 0.4
 SIMULATED_DURATION_S = 0.05
+COUNTED_S = 2.0
+"""Of the motion whose edges are counted."""
 KEPT = 0.8
 """Part of the rate that was found which the board states; it never states more than one that was not measured."""
 _ROUNDS = 5
+_SHORTEST_S = 0.01
+"""A shorter motion is not halved again."""
 
 
 def frames() -> list[str]:
@@ -50,6 +55,15 @@ def highest(keeps_up: Callable[[int], bool | None], count: int) -> int | None:
     return None if answer is None else good
 
 
+def shortest_s(keeps_up: Callable[[float], bool | None], duration_s: float) -> tuple[float, bool]:
+    """The shortest motion of ``duration_s`` halved again and again that ends well; whether it is the shortest tried."""
+    while duration_s > _SHORTEST_S:
+        if not keeps_up(duration_s / 2):
+            return duration_s, False
+        duration_s /= 2
+    return duration_s, True
+
+
 def to_state(found: Mapping[int, int | None]) -> tuple[int, int] | None:
     """Steps/s of one joint and of all together, from the rates found by number of joints; None where one is missing."""
     rates = {count: KEPT * rate for count, rate in found.items() if rate is not None}
@@ -67,12 +81,47 @@ def judge(rate: int | None, count: int) -> Iterator[Measurement]:
     is_enough = round(KEPT * rate) >= expected
     yield Measurement(
         PART,
-        f"highest step rate without an underrun, {'1 joint' if count == 1 else f'{count} joints, each'}",
+        f"highest step rate without an underrun, {_joints(count)}",
         f"{rate} steps/s",
         f"{round(expected / KEPT)}: what is stated, {expected}, and a quarter",
         Level.GOOD if is_enough else Level.ERROR if rate < expected else Level.NOTE,
         "" if is_enough else "lower max_speed or microsteps until 'armtempo run' is not refused as too fast",
     )
+
+
+def judge_ramp(found: tuple[float, bool], rate: int, count: int) -> Measurement:
+    """The line about ``shortest_s``: a motion speeds up in its first half."""
+    duration_s, is_least = found
+    return Measurement(
+        PART,
+        f"shortest ramp from rest to {rate} steps/s, {_joints(count)}",
+        f"{500 * duration_s:.3g} ms{', the shortest that was tried' if is_least else ''}",
+    )
+
+
+def judge_counted(values: Mapping[str, Any], port: str, count: int, steps: int) -> Measurement:
+    """The line about the edges that were counted on a port while its joints made so many ``steps`` together."""
+    what = f"steps on port {port} at the rate to state, {count} joint{'s' if count > 1 else ''} moving"
+    if values["fault"] or values["longest_turn_cycles"] > LONGEST_TURN_US * CYCLES_PER_US:
+        return Measurement(PART, what, "left out: with the capture the loop comes round too late")
+    return judged(
+        PART,
+        what,
+        f"{values['edges'] / 2:g}",
+        str(steps),
+        values["edges"] == 2 * steps,
+        "look at the lines about pulses; if nothing is wrong there, please report it with the output",
+    )
+
+
+def judge_load(longest_cycles: int) -> Measurement:
+    """The line about the longest turn of the loop in all motions that ended well."""
+    took = f"{longest_cycles / CYCLES_PER_US:.0f} us"
+    return Measurement(PART, "worst turn of the program's loop under load, with commands and samples", took)
+
+
+def _joints(count: int) -> str:
+    return "1 joint" if count == 1 else f"{count} joints, each"
 
 
 def judge_stated(found: Mapping[str, Any] | None, info: Hello) -> Iterator[Measurement]:

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 from armtempo_shared import codes
-from armtempo_shared.limits import MAX_STEP_RATE_SUM
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_STEP_RATE_SUM
 from armtempo_shared.meanings import ERRORS
 
 from armtempo.basics.errors import BoardError, LinkError
 from armtempo.basics.progress import Progress, stage, watched
 from armtempo.diagnosis.finding import Level
 from armtempo.link import Client
+from armtempo.link.board_messages import Hello
+from armtempo.model import engine_pins
 from armtempo.selftest import board_part, drivers_part, link_part, motion, pulse_part, rate_part
 from armtempo.selftest.drivers_part import DRIVERS
 from armtempo.selftest.prompt import (
@@ -40,7 +42,7 @@ _SIMULATED_TURN_US = 1000
 """What a turn of the loop takes on a virtual board, about as on the chip."""
 _SEED = 5
 _STOPS, _BATCH, _SIMULATED_STOPS = 1000, 100, 4
-"""Every second one by an edge. A batch is one call of the part."""
+"""E-stop and limit switch, by software and by an edge, take turns. A batch is one call of the part."""
 _WAITS_US = (22_000, 78_000)
 """E-stops at random moments of ``motion.make``, which begins 20 ms after its start."""
 _STARVED_S = 0.06
@@ -63,7 +65,7 @@ def run(client: Client, progress: Progress | None = None) -> SelfTest:
         work(0, 1)
         found.data[link_part.PART] = link_part.trips(client)
         _leave(client, found, lambda prompt: _at_prompt(prompt, found, work))
-        found.add([_same_room(info.engine_room, client.info.engine_room)])
+        found.add([_same_room(info.engine_room, client.info.engine_room), _largest_motion(client.info)])
         found.add(_watchdog(client, found))
         found.add(rate_part.judge_stated(found.data.get(rate_part.PART), client.info))
         work(1, 1)
@@ -79,6 +81,16 @@ def _same_room(before: int, after: int) -> Measurement:
         before == after,
         "reset the board; where it is so each time, please report it",
     )
+
+
+def _largest_motion(info: Hello) -> Measurement:
+    """It stays in the flash and is read from there in pieces."""
+    size = min(info.free_flash, MAX_MOTION_BYTES)
+    is_full = size < MAX_MOTION_BYTES
+    return Measurement(
+        board_part.MEMORY, "largest motion that fits", f"{size} bytes", f"{MAX_MOTION_BYTES} bytes",
+        Level.NOTE if is_full else Level.GOOD, "remove motions: 'armtempo remove'" if is_full else "",
+    )  # fmt: skip
 
 
 def _watchdog(client: Client, found: SelfTest) -> Iterator[Measurement]:
@@ -165,7 +177,7 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         if measured := _part(prompt, found, board_part.BOARD, "identity"):
             found.add(board_part.judge(measured.values, found.board_id))
         work(0.2, 1)
-        if measured := _part(prompt, found, board_part.CYCLES, "cycles"):
+        if measured := _part(prompt, found, board_part.CYCLES, "cycles", motion=motion.evaluated().hex()):
             found.add(board_part.judge_cycles(measured.values))
         work(0.3, 1)
         stage(link_part.PART)
@@ -222,7 +234,7 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         work(done, 1)
         moved = motion.make(joints) if forward else motion.back_in_turn(joints)
         arguments = {**_arguments(moved, found), "rates": moved.rates}
-        if measured := _part(prompt, found, pulse_part.PULSES, "engine", "pulses", **arguments):
+        if measured := _part(prompt, found, pulse_part.PULSES, "engine", "capture", "pulses", **arguments):
             found.add(pulse_part.judge(measured, moved, joints, forward))
             found.add([_still_off(measured.values, found)])
             if forward:
@@ -247,8 +259,11 @@ def _stop(prompt: Prompt, found: SelfTest, arguments: dict[str, Any], work: Prog
             return
         before = all_of
         all_of = dict(measured.values)
-        for name in ("cycles", "edge_cycles", "faults"):
-            all_of[name] = before.get(name, []) + all_of[name]
+        if before:
+            all_of["wrong_faults"] += before["wrong_faults"]
+            all_of["cycles"] = {
+                name: before["cycles"].get(name, []) + took for name, took in all_of["cycles"].items()
+            }
     found.data[pulse_part.SAFETY] = all_of
     found.add(pulse_part.judge_stops(all_of))
     found.add([_still_off(all_of, found)])
@@ -261,14 +276,24 @@ def _own(joints: Sequence[dict[str, Any]]) -> list[int]:
 
 
 def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
-    """The highest step rate of the arm's first 1, 2, … joints; on a virtual board of one and of all of them."""
-    most = len(found.data[DRIVERS]["joints"])
+    """The highest step rate of the arm's first 1, 2, … joints; on a virtual board of one and of all of them.
+
+    Then, for each, the steps of a longer motion at four fifths of it; and the shortest ramp of all joints.
+    """
+    joints = found.data[DRIVERS]["joints"]
+    most = len(joints)
+    trials = _Trials(prompt, found)
     counts = [count for count in rate_part.JOINTS if count <= most]
     highest: dict[int, int | None] = {}
     for number, count in enumerate(counts[:1] + counts[-1:] if found.simulated else counts):
         work(0.7 + 0.25 * number / len(counts), 1)
-        highest[count] = rate_part.highest(lambda rate: _keeps_up(prompt, found, [rate] * count), count)  # noqa: B023
+        highest[count] = rate_part.highest(lambda rate: trials.keeps_up([rate] * count), count)  # noqa: B023
         found.add(rate_part.judge(highest[count], count))
+        if rate := round(rate_part.KEPT * (highest[count] or 0)):
+            found.add(trials.counted(joints[:count], rate))
+            if count == counts[-1]:
+                found.add([trials.ramp(rate, count)])
+    found.add([rate_part.judge_load(trials.longest_cycles)])
     states = rate_part.to_state(highest)
     found.data[rate_part.PART] = {"highest": highest, "states": states}
     if states and not found.failed_in(DRIVERS, pulse_part.SAFETY):
@@ -276,18 +301,51 @@ def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         _part(prompt, found, "keep", "keep", **arguments)
 
 
-def _keeps_up(prompt: Prompt, found: SelfTest, rates: Sequence[int]) -> bool | None:
-    """Whether so many joints make these rates; None where it could not be tried."""
-    duration_s = rate_part.SIMULATED_DURATION_S if found.simulated else rate_part.DURATION_S
-    arguments = {
-        "record": _ARM_RECORD,
-        "motion": motion.at_rates(rates, duration_s).hex(),
-        "rates": [motion.limit(rate) for rate in rates],
-        "frames": rate_part.frames(),
-        "idle_us": _SIMULATED_TURN_US if found.simulated else 0,
-    }
-    measured = _part(prompt, found, rate_part.PART, "engine", "rates", **arguments)
-    return None if measured is None else not measured.values["fault"]
+class _Trials:
+    """Motions of the arm's first joints in the program's own loop."""
+
+    def __init__(self, prompt: Prompt, found: SelfTest) -> None:
+        self._prompt, self._found = prompt, found
+        self._duration_s = rate_part.SIMULATED_DURATION_S if found.simulated else rate_part.DURATION_S
+        self.longest_cycles = 0
+
+    def keeps_up(self, rates: Sequence[int], duration_s: float = 0.0) -> bool | None:
+        """Whether so many joints make these rates; None where it could not be tried."""
+        values = self._tried(rates, duration_s or self._duration_s, "")
+        if values is None or values["fault"]:
+            return None if values is None else False
+        self.longest_cycles = max(self.longest_cycles, values["longest_turn_cycles"])
+        return True
+
+    def counted(self, joints: Sequence[dict[str, Any]], rate: int) -> Iterator[Measurement]:
+        """The steps that are seen on the pins of a longer motion, port by port: to look costs the processor time."""
+        duration_s = self._duration_s if self._found.simulated else rate_part.COUNTED_S
+        steps = motion.steps_at(rate, duration_s)
+        ports = [engine_pins.table()["STEP"][joint["channel"]][0][0] for joint in joints]
+        for port in sorted(set(ports)):
+            values = self._tried([rate] * len(joints), duration_s, port)
+            if values is not None:
+                yield rate_part.judge_counted(values, port, len(joints), ports.count(port) * steps)
+
+    def ramp(self, rate: int, count: int) -> Measurement:
+        """The shortest one to a rate."""
+        shortest = rate_part.shortest_s(
+            lambda size_s: self.keeps_up([rate] * count, size_s), self._duration_s
+        )
+        return rate_part.judge_ramp(shortest, rate, count)
+
+    def _tried(self, rates: Sequence[int], duration_s: float, port: str) -> dict[str, Any] | None:
+        arguments = {
+            "record": _ARM_RECORD,
+            "motion": motion.at_rates(rates, duration_s).hex(),
+            "rates": [motion.limit(rate) for rate in rates],
+            "frames": rate_part.frames(),
+            "idle_us": _SIMULATED_TURN_US if self._found.simulated else 0,
+            "port": port,
+        }
+        files = ("engine", *(("capture",) if port else ()), "rates")
+        measured = _part(self._prompt, self._found, rate_part.PART, *files, **arguments)
+        return None if measured is None else measured.values
 
 
 def _arguments(moved: motion.TestMotion, found: SelfTest) -> dict[str, Any]:

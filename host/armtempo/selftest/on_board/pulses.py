@@ -1,107 +1,8 @@
-"""One motion, captured on the STEP pins: DMA2 copies ports A and B at 1 MHz, by TIM1 (RM0090 10.3.3, table 43)."""
+"""One motion, captured on the STEP pins: when each edge came."""
 
-from array import array
 from binascii import hexlify
 
-import micropython
-import uctypes
-
-_SAMPLES = 4096  # 4 ms; the loop comes round in less
 _MOST_EDGES = 2000
-_PERIOD = 167  # of TIM1 at 168 MHz: 1 us
-_DMA2EN, _TIM1EN = 1 << 22, 1
-_TIM1 = stm.TIM1
-_HALF_WORDS = (
-    3 << 16 | 1 << 13 | 1 << 11 | 1 << 10 | 1 << 8
-)  # very high priority, memory incremented, circular
-_CHANNEL = 6 << 25
-_STREAMS = (("A", 5), ("B", 1))  # TIM1's update asks stream 5, its compare channel 1 stream 1
-_REQUESTS = 1 << 8 | 1 << 9
-_MASK, _LAST, _COUNT, _TIME = 0, 1, 2, 3
-
-
-@micropython.viper
-def scan(samples: ptr16, begin: int, end: int, state: ptr32, edges: ptr32, most: int):
-    """Note the edges between two places: (microsecond << 8) + (pin << 1) + level."""
-    mask = state[0]
-    last = state[1]
-    count = state[2]
-    time = state[3]
-    for place in range(begin, end):
-        level = samples[place] & mask
-        if level != last:
-            changed = level ^ last
-            pin = 0
-            while changed:
-                if changed & 1:
-                    if count < most:
-                        edges[count] = time << 8 | pin << 1 | (level >> pin & 1)
-                    count += 1
-                changed = changed >> 1
-                pin += 1
-            last = level
-        time += 1
-    state[1] = last
-    state[2] = count
-    state[3] = time
-
-
-class Capture:
-    """The samples of one port; edges of the pins in ``mask``."""
-
-    def __init__(self, port, stream, mask):
-        self.samples = array("H", bytes(2 * _SAMPLES))
-        self.edges = array("i", bytes(4 * _MOST_EDGES))
-        self.state = array("i", [mask, 0, 0, 0])
-        self.port = getattr(stm, "GPIO" + port)
-        self.at = stm.DMA2 + 0x10 + 0x18 * stream
-        self.place = 0
-
-    def arm(self):
-        """Point the stream at port and memory, and switch it on."""
-        mem32[self.at] = 0
-        mem32[self.at + 4] = _SAMPLES
-        mem32[self.at + 8] = self.port + stm.GPIO_IDR
-        mem32[self.at + 12] = uctypes.addressof(self.samples)
-        mem32[self.at + 20] = 0
-        self.state[1] = mem32[self.port + stm.GPIO_IDR] & self.state[0]
-        mem32[self.at] = _CHANNEL | _HALF_WORDS
-        mem32[self.at] = _CHANNEL | _HALF_WORDS | 1
-
-    def look(self):
-        """Take what has come since the last call."""
-        place = (_SAMPLES - mem32[self.at + 4]) % _SAMPLES
-        if place < self.place:
-            scan(self.samples, self.place, _SAMPLES, self.state, self.edges, _MOST_EDGES)
-            self.place = 0
-        scan(self.samples, self.place, place, self.state, self.edges, _MOST_EDGES)
-        self.place = place
-
-
-def begin(captures):
-    """TIM1 asks for a sample each microsecond."""
-    mem32[stm.RCC + stm.RCC_AHB1ENR] = mem32[stm.RCC + stm.RCC_AHB1ENR] | _DMA2EN
-    mem32[stm.RCC + stm.RCC_APB2ENR] = mem32[stm.RCC + stm.RCC_APB2ENR] | _TIM1EN
-    for register in (stm.TIM_CR1, stm.TIM_DIER, stm.TIM_SMCR, stm.TIM_CCER, stm.TIM_CCMR1, stm.TIM_PSC):
-        mem32[_TIM1 + register] = 0
-    mem32[_TIM1 + stm.TIM_ARR] = _PERIOD
-    mem32[_TIM1 + stm.TIM_CCR1] = _PERIOD // 2
-    mem32[_TIM1 + stm.TIM_EGR] = 1
-    mem32[_TIM1 + stm.TIM_SR] = 0
-    mem32[stm.DMA2 + 8] = 0x0F7D0F7D
-    mem32[stm.DMA2 + 12] = 0x0F7D0F7D
-    for capture in captures:
-        capture.arm()
-    mem32[_TIM1 + stm.TIM_DIER] = _REQUESTS
-    mem32[_TIM1 + stm.TIM_CR1] = 1
-
-
-def end(captures):
-    """It asks no more."""
-    mem32[_TIM1 + stm.TIM_CR1] = 0
-    mem32[_TIM1 + stm.TIM_DIER] = 0
-    for capture in captures:
-        mem32[capture.at] = 0
 
 
 def directions(joints):
@@ -115,32 +16,13 @@ def directions(joints):
     return found
 
 
-def captured(joints):
-    """A capture for each port that has a STEP pin of these joints."""
-    from armtempo_board.hardware import pins
-
-    steps = [pins.STEP[joint["channel"]][0] for joint in joints]
-    found = []
-    for port, stream in _STREAMS:
-        if [pin for pin in steps if pins.port(pin) == port]:
-            mask = 0
-            for pin in steps:
-                if pins.port(pin) == port:
-                    mask |= 1 << pins.line(pin)
-            found.append((port, Capture(port, stream, mask)))
-    return found, steps
-
-
 def measure(record, motion, start_steps, rates, idle_us):
     """Run the motion (a record in hex) once; the edges go out as bulk data, 4 bytes each, port by port."""
     from binascii import unhexlify
 
     feed()
     count_cycles()
-    with open(record, "rb") as file:
-        _, joints, _ = armrecord.unpack(file.read())
-    found, steps = captured(joints)  # first: the engine leaves no room in one piece for it
-    captures = [capture for _, capture in found]
+    captures, steps = captured(record, len(start_steps), _MOST_EDGES)
     engine, joints = make_engine(record, rates=rates)
     stages = {"engine": free()}
     longest = turns = 0
@@ -169,13 +51,13 @@ def measure(record, motion, start_steps, rates, idle_us):
         off = enable()
         engine.close()
     for capture in captures:
-        data = memoryview(capture.edges)[: min(capture.state[2], _MOST_EDGES)]
+        data = memoryview(capture.edges)[: min(capture.state[_COUNT], _MOST_EDGES)]
         for at in range(0, len(data), 32):
             print("#" + hexlify(data[at : at + 32]).decode())
     return {
         "fault": engine.fault,
-        "ports": [port for port, _ in found],
-        "counts": [capture.state[2] for capture in captures],
+        "ports": [capture.name for capture in captures],
+        "counts": [capture.state[_COUNT] for capture in captures],
         "steps": steps,
         "directions": turned,
         "turns": turns,

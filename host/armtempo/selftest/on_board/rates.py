@@ -28,10 +28,10 @@ class Host:
         return size
 
 
-def measure(record, motion, rates, frames, idle_us):
+def measure(record, motion, rates, frames, idle_us, port=""):
     """The first joints of the arm, one for each of ``rates``, from step 0 on: fault, turns of the loop, the longest.
 
-    ``frames``: hello, then two commands that take turns.
+    ``frames``: hello, then two commands that take turns. ``port``: its edges are counted, on these joints' STEP pins.
     """
     from binascii import unhexlify
 
@@ -40,6 +40,7 @@ def measure(record, motion, rates, frames, idle_us):
 
     feed()
     count_cycles()
+    captures = captured(record, len(rates), 0, port)[0] if port else []
     host = Host([unhexlify(frame) for frame in frames])
     app = App(host, "/none")  # no arm is stored there: no pin is touched
     engine, _ = make_engine(record, rates=rates, workspace=app.controller.board.workspace)
@@ -47,17 +48,27 @@ def measure(record, motion, rates, frames, idle_us):
     engine.skip_check = True  # a rate is tried that is not allowed
     longest = 0
     try:
-        app.controller.start_loaded(load(engine, unhexlify(motion), [0] * len(rates)), 0)
+        motion = load(engine, unhexlify(motion), [0] * len(rates))
+        if captures:
+            begin(captures)
+        app.controller.start_loaded(motion, 0)
         then = cycles()
         while app.controller.running:
             app.turn()
+            for capture in captures:
+                capture.look()
             if idle_us:
                 time.sleep_us(idle_us)
             now = cycles()
-            longest = max(longest, (now - then) & 0xFFFFFFFF)
+            if app.controller.running:  # else it is the end, which nothing waits for
+                longest = max(longest, (now - then) & 0xFFFFFFFF)
             then = now
+        for capture in captures:
+            capture.look()
     finally:
         engine.freeze()
+        if captures:
+            end(captures)
         off = enable()
         engine.close()
     fault = app.controller.board.fault()
@@ -68,6 +79,7 @@ def measure(record, motion, rates, frames, idle_us):
         "turns": app.turns,
         "longest_turn_cycles": longest,
         "commands": host.sent,
+        "edges": sum([capture.state[_COUNT] for capture in captures]),
         "enable": off,
     }
 

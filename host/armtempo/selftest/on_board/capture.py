@@ -1,0 +1,124 @@
+"""Goes in front of parts that capture STEP pins: DMA2 copies ports A, B at 1 MHz, by TIM1 (RM0090 10.3.3, table 43)."""
+
+from array import array
+
+import micropython
+import uctypes
+
+_SAMPLES = 4096  # 4 ms; the loop comes round in less
+_PERIOD = 167  # of TIM1 at 168 MHz: 1 us
+_DMA2EN, _TIM1EN = 1 << 22, 1
+_TIM1 = stm.TIM1
+_HALF_WORDS = (
+    3 << 16 | 1 << 13 | 1 << 11 | 1 << 10 | 1 << 8
+)  # very high priority, memory incremented, circular
+_CHANNEL = 6 << 25
+_STREAMS = (("A", 5), ("B", 1))  # TIM1's update asks stream 5, its compare channel 1 stream 1
+_REQUESTS = 1 << 8 | 1 << 9
+_MASK, _LAST, _COUNT, _TIME = 0, 1, 2, 3
+
+
+@micropython.viper
+def scan(samples: ptr16, begin: int, end: int, state: ptr32, edges: ptr32, most: int):
+    """Note the edges between two places: (microsecond << 8) + (pin << 1) + level."""
+    mask = state[0]
+    last = state[1]
+    count = state[2]
+    time = state[3]
+    for place in range(begin, end):
+        level = samples[place] & mask
+        if level != last:
+            changed = level ^ last
+            pin = 0
+            while changed:
+                if changed & 1:
+                    if count < most:
+                        edges[count] = time << 8 | pin << 1 | (level >> pin & 1)
+                    count += 1
+                changed = changed >> 1
+                pin += 1
+            last = level
+        time += 1
+    state[1] = last
+    state[2] = count
+    state[3] = time
+
+
+class Capture:
+    """The samples of one port; edges of the pins in ``mask``: ``most`` are kept, all are counted."""
+
+    def __init__(self, port, stream, mask, most):
+        self.name = port
+        self.samples = array("H", bytes(2 * _SAMPLES))
+        self.edges = array("i", bytes(4 * most))
+        self.state = array("i", [mask, 0, 0, 0])
+        self.port = getattr(stm, "GPIO" + port)
+        self.at = stm.DMA2 + 0x10 + 0x18 * stream
+        self.place = 0
+
+    def arm(self):
+        """Point the stream at port and memory, and switch it on."""
+        mem32[self.at] = 0
+        mem32[self.at + 4] = _SAMPLES
+        mem32[self.at + 8] = self.port + stm.GPIO_IDR
+        mem32[self.at + 12] = uctypes.addressof(self.samples)
+        mem32[self.at + 20] = 0
+        self.state[1] = mem32[self.port + stm.GPIO_IDR] & self.state[0]
+        mem32[self.at] = _CHANNEL | _HALF_WORDS
+        mem32[self.at] = _CHANNEL | _HALF_WORDS | 1
+
+    def look(self):
+        """Take what has come since the last call."""
+        place = (_SAMPLES - mem32[self.at + 4]) % _SAMPLES
+        if place < self.place:
+            scan(self.samples, self.place, _SAMPLES, self.state, self.edges, len(self.edges))
+            self.place = 0
+        scan(self.samples, self.place, place, self.state, self.edges, len(self.edges))
+        self.place = place
+
+
+def begin(captures):
+    """TIM1 asks for a sample each microsecond."""
+    mem32[stm.RCC + stm.RCC_AHB1ENR] = mem32[stm.RCC + stm.RCC_AHB1ENR] | _DMA2EN
+    mem32[stm.RCC + stm.RCC_APB2ENR] = mem32[stm.RCC + stm.RCC_APB2ENR] | _TIM1EN
+    for register in (stm.TIM_CR1, stm.TIM_DIER, stm.TIM_SMCR, stm.TIM_CCER, stm.TIM_CCMR1, stm.TIM_PSC):
+        mem32[_TIM1 + register] = 0
+    mem32[_TIM1 + stm.TIM_ARR] = _PERIOD
+    mem32[_TIM1 + stm.TIM_CCR1] = _PERIOD // 2
+    mem32[_TIM1 + stm.TIM_EGR] = 1
+    mem32[_TIM1 + stm.TIM_SR] = 0
+    mem32[stm.DMA2 + 8] = 0x0F7D0F7D
+    mem32[stm.DMA2 + 12] = 0x0F7D0F7D
+    for capture in captures:
+        capture.arm()
+    mem32[_TIM1 + stm.TIM_DIER] = _REQUESTS
+    mem32[_TIM1 + stm.TIM_CR1] = 1
+
+
+def end(captures):
+    """It asks no more."""
+    mem32[_TIM1 + stm.TIM_CR1] = 0
+    mem32[_TIM1 + stm.TIM_DIER] = 0
+    for capture in captures:
+        mem32[capture.at] = 0
+
+
+def captured(record, joints, most, wanted="AB"):
+    """A capture for each of the ``wanted`` ports that has a STEP pin of the arm's first joints; those pins.
+
+    Before the engine is made, which leaves no room in one piece for it.
+    """
+    from armtempo_board.hardware import pins
+
+    with open(record, "rb") as file:
+        _, rows, _ = armrecord.unpack(file.read())
+    steps = [pins.STEP[row["channel"]][0] for row in rows[:joints]]
+    found = []
+    for port, stream in _STREAMS:
+        mask = 0
+        for pin in steps:
+            if pins.port(pin) == port and port in wanted:
+                mask |= 1 << pins.line(pin)
+        if mask:
+            found.append(Capture(port, stream, mask, most))
+    return found, steps
