@@ -22,7 +22,9 @@ def pack(files: Mapping[str, bytes], wide: Collection[str], plain: Collection[st
         at = 2 + len(index)
         lines = []
         for path, data in packed.items():
-            lines.append(f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {-at if path in plain else at}")
+            lines.append(
+                f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {-at if path in plain else at}"
+            )
             at += len(data)
         made = "".join(lines) + "\n"
         if len(made) == len(index):
