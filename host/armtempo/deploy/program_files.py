@@ -18,7 +18,8 @@ from armtempo_shared import table
 from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import archive, compiled_cache, plain_frames
-from armtempo.deploy.compact import CORE, Compact, compact, frames
+from armtempo.deploy.compact import Compact, compact, frames
+from armtempo.deploy.compact.merge import CORE
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo.simulator import launcher
 
