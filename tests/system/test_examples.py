@@ -32,7 +32,8 @@ from tests.system import commandline
 from tests.system.boards import small_plan
 from tests.system.conftest import FASTEST
 
-PAGES = (ROOT / "README.md", *sorted((ROOT / "host" / "docs").glob("*.md")))
+README = ROOT / "README.md"
+PAGES = (README, *sorted((ROOT / "host" / "docs").glob("*.md")))
 PORT = "/dev/ttyACM0"
 SOURCES_BLOCKS = 1200
 """A flash that has room for a firmware's program too."""
@@ -78,7 +79,9 @@ def on_stock(block: list[list[str]]) -> list[list[str]]:
 
 
 BLOCKS = [(page.name, block) for page in PAGES if page.name in COMMANDS for block in command_lines(page)]
-BLOCKS += [(page, on_stock(block)) for page, block in BLOCKS if page == "README.md" and on_stock(block) != block]
+BLOCKS += [
+    (page, on_stock(block)) for page, block in BLOCKS if page == "README.md" and on_stock(block) != block
+]
 
 
 @pytest.fixture(scope="module")
