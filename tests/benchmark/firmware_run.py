@@ -4,8 +4,8 @@
 
 MICROPYTHON: a checkout as ``armtempo firmware`` takes it. That command builds the firmware with the program; one
 without is built next to it, and gets the compiled files that ``armtempo deploy`` copies. QEMU (7.2 or newer) runs each;
-the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board; then by README's
-commands, as they stand, but for those that write the flash, with encoders that are not watched. What stands
+the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board; then README's
+commands for one are run, but for those that write the flash, with encoders that are not watched. What stands
 in for timers, DMA, USB, encoders and backup SRAM (loop_board.c, firmware_loop.py, firmware_host.py of
 tests/board/scripts) is a part of both firmwares, so that it takes little of the heap; what it takes is given next to
 the chip's. FOLDER keeps what was built.
