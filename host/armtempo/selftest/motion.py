@@ -135,11 +135,6 @@ def evaluated() -> bytes:
     return at_rates([20_000], 0.1)
 
 
-def steps_at(rate: int, duration_s: float) -> int:
-    """How many steps a joint makes in the motion of ``at_rates``."""
-    return int(rate * duration_s / _PEAK + 0.5)
-
-
 def _fixed(points: Array, bits: int) -> list[int]:
     return [int(value) for value in np.rint(points * 2.0**bits)]
 

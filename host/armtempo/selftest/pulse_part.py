@@ -18,7 +18,7 @@ from armtempo.selftest.result import Measurement, judged
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0
 """A sample each microsecond, the two ports half of one apart, and the rounding of a step time."""
-LONGEST_TURN_US = 4000
+_LONGEST_TURN_US = 4000
 """The capture keeps 4096 samples; after a longer turn some are lost."""
 _SLOWEST_STOP_US = 30.0
 STOPS = tuple(f"{pin} by {way}" for pin in ("E-stop", "limit switch") for way in ("software", "an edge"))
@@ -63,10 +63,10 @@ def judge(
         name, meaning, cure = ERRORS[values["fault"]]
         yield judged(PULSES, f"motion {way}", f"fault {name}: {meaning}", "no fault", False, cure)
     longest_us = values["longest_turn_cycles"] / CYCLES_PER_US
-    if longest_us > LONGEST_TURN_US:
+    if longest_us > _LONGEST_TURN_US:
         measured_words = f"a turn of the loop took {longest_us:.0f} us"
         yield judged(
-            PULSES, f"capture {way}", measured_words, f"below {LONGEST_TURN_US}", False, "run it again"
+            PULSES, f"capture {way}", measured_words, f"below {_LONGEST_TURN_US}", False, "run it again"
         )
         return
     found = rises_us(measured)
@@ -181,5 +181,5 @@ def _stops(way: str, cycles: Sequence[int]) -> Measurement:
         f"worst {took_us.max():.1f} us" + (f", {gone_on} times they went on" if gone_on else ""),
         f"below {_SLOWEST_STOP_US:g} us each time",
         not gone_on and float(took_us.max()) < _SLOWEST_STOP_US,
-        "do not connect drivers: it does not stop the pulses; please report it with the output",
+        "do not connect drivers: interrupts come late, or do not stop the pulses; please report it with the output",
     )
