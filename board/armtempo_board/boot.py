@@ -1,4 +1,4 @@
-"""Becomes ``/flash/boot.py``: USB shows a serial port only, so that no host writes the flash behind us."""
+"""Becomes ``/flash/boot.py``: USB shows a serial port only, so that no host writes the flash while the program runs."""
 
 import pyb
 

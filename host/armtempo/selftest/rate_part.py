@@ -100,7 +100,7 @@ def judge_ramp(found: tuple[float, bool], rate: int, count: int) -> Measurement:
 
 
 def judge_counted(values: Mapping[str, Any], port: str, count: int, steps: int) -> Measurement:
-    """The line about the edges that were counted on a port while its joints made so many ``steps`` together."""
+    """The line about the edges that were counted on a port while its joints made ``steps`` together."""
     what = f"steps on port {port} at the rate to state, {count} joint{'s' if count > 1 else ''} moving"
     if values["fault"] or values["longest_turn_cycles"] > LONGEST_TURN_US * CYCLES_PER_US:
         return Measurement(PART, what, "left out: with the capture the loop comes round too late")
