@@ -34,6 +34,7 @@ class SequenceTab:
         name = self._desk.file.name if self._desk.file else None
         with ui.row():
             choice = ui.select(files, value=name, label=words.SEQUENCE_FILE, on_change=self._open)
+            choice.on("focus", lambda: choice.set_options(self._desk.files()))  # there may be new ones
             page.control(choice.style("min-width: 12rem"), Needs.IDLE)
             for text, call, needs in (
                 (words.SAVE_SEQUENCE, self._save, Needs.IDLE),
