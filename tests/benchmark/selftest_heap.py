@@ -1,4 +1,4 @@
-"""What the self-test's parts leave of the heap, and instructions of what they time: host/docs/first-power-on.md.
+"""What the self-test's parts leave of the heap, and instructions of what they time: host/docs/measurements.md.
 
     python -m tests.benchmark.selftest_heap MICROPYTHON FOLDER
 

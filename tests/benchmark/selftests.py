@@ -1,4 +1,4 @@
-"""Whether a board is as before after many self-tests, as the figures in host/docs/first-power-on.md.
+"""Whether a board is as before after many self-tests, as the figures in host/docs/measurements.md.
 
     python -m tests.benchmark.selftests [TIMES]
 

@@ -34,6 +34,7 @@ class SequenceTab:
         name = self._desk.file.name if self._desk.file else None
         with ui.row():
             choice = ui.select(files, value=name, label=words.SEQUENCE_FILE, on_change=self._open)
+            choice.on("focus", lambda: choice.set_options(self._desk.files()))  # there may be new ones
             page.control(choice.style("min-width: 12rem"), Needs.IDLE)
             for text, call, needs in (
                 (words.SAVE_SEQUENCE, self._save, Needs.IDLE),
@@ -85,7 +86,7 @@ class SequenceTab:
         return row
 
     def _set(self, index: int, key: str, text: str) -> None:
-        """Take what was typed; the table stays as it is, for who types on in the next box."""
+        """Take what was typed; the table stays unchanged, for a user who types on in the next box."""
         others = self._desk.version - self._shown
         self._desk.set(index, key, text)
         self._shown = self._desk.version - others

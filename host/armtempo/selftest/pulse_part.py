@@ -109,7 +109,7 @@ def _channel(
     expected = f"{len(steps)} steps, within {_RESOLUTION_US:g} us"
     if len(rises) == len(steps):
         worst = float(np.max(np.abs(rises - steps), initial=0.0))
-        cure = "TIM2 or TIM5 is disturbed: use no timer, SPI, I2C or DAC beside the program"
+        cure = "TIM2 or TIM5 is disturbed: use no timer, SPI, I2C or DAC next to the program"
         measured = f"{len(rises)} steps, the worst {worst:.1f} us off"
         return judged(PULSES, what, measured, expected, worst <= _RESOLUTION_US, cure)
     cure = f"take what is connected off P{pin}, look for a short; if it stays so, the pin or its DMA stream is broken"
@@ -138,7 +138,7 @@ def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
         f"{mean:.0f} us, the longest {longest:.0f}",
     )
     stages = ", ".join(f"{name} {values['free'][name]}" for name in ("engine", "loaded", "moved"))
-    yield Measurement("memory", "free heap beside engine and capture", f"{stages} bytes")
+    yield Measurement("memory", "free heap next to engine and capture", f"{stages} bytes")
 
 
 def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:

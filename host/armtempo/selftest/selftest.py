@@ -52,7 +52,7 @@ SILENT = "silence"
 
 
 def run(client: Client, progress: Progress | None = None) -> SelfTest:
-    """Test the board behind ``client``, which runs the program again afterwards; its positions are unknown then.
+    """Test the board of ``client``, which runs the program again afterwards; its positions are unknown then.
 
     Raises LinkError, with nothing done, where something moves, a fault is pending, the drivers are on, or the program
     is not a part of the firmware; LinkError also where the board falls silent in a part, which it names.
@@ -168,7 +168,7 @@ def _drivers(prompt: Prompt) -> dict[str, Any]:
 
 
 def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
-    """All parts, each whatever became of the others, until the board falls silent in one."""
+    """All parts, each whether the others passed or failed, until the board falls silent in one."""
     try:
         prompt.enter(soft_reset=True)
         drivers = found.data[DRIVERS] = _drivers(prompt)
@@ -310,7 +310,7 @@ class _Trials:
         self.longest_cycles = 0
 
     def keeps_up(self, rates: Sequence[int], duration_s: float = 0.0) -> bool | None:
-        """Whether so many joints make these rates; None where it could not be tried."""
+        """Whether that many joints make these rates; None if it could not be tried."""
         values = self._tried(rates, duration_s or self._duration_s, "")
         if values is None or values["fault"]:
             return None if values is None else False

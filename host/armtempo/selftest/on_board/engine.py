@@ -88,7 +88,7 @@ def serve(engine, idle_us):
 
 
 def load(engine, motion, start_steps):
-    """Stand at its start and load it; the motion. ValueError where the drivers are not off."""
+    """Put the joints at its start and load it; the motion. ValueError where the drivers are not off."""
     from armtempo_shared.motion import Motion
 
     output, driven, level = enable()
