@@ -144,17 +144,20 @@ def test_the_highest_rate_is_found_judged_and_stated(most: int, verdict: Level, 
 
 
 @pytest.mark.parametrize(
-    ("changes", "verdict"),
+    ("steps", "fault", "verdict"),
     [
-        ({}, Level.GOOD),
-        ({"edges": 3998}, Level.ERROR),
-        ({"fault": codes.UNDERRUN}, Level.NOTE),  # by the capture: without it there was none
-        ({"longest_turn_cycles": 700_000}, Level.NOTE),  # samples were lost
+        ((326, 12, 13), 0, Level.GOOD),
+        ((326, 12, 25), 0, Level.ERROR),  # one is missing
+        ((326, 3, 13), 0, Level.ERROR),  # one is too many
+        ((0, 4096, 0), 0, Level.ERROR),
+        ((326, 12, 13), codes.UNDERRUN, Level.ERROR),
     ],
 )
-def test_steps_are_counted_where_the_capture_keeps_up(changes: dict[str, int], verdict: Level) -> None:
-    values = {"fault": 0, "longest_turn_cycles": 400_000, "edges": 4000, **changes}
-    assert rate_part.judge_counted(values, "A", 3, 2000).verdict is verdict
+def test_steps_at_the_rate_to_state_are_judged(
+    steps: tuple[int, int, int], fault: int, verdict: Level
+) -> None:
+    values = {"fault": fault, "steps": {"A15": (326, 12, 13), "A1": steps}}
+    assert rate_part.judge_steps(values, "A", 80_000, 3).verdict is verdict
 
 
 @pytest.mark.parametrize(

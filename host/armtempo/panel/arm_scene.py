@@ -30,7 +30,7 @@ _OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25
 _ROOM_OPACITY = 0.3
 _SHOWN = 1.2
-"""Walls are shown so far from the arm's base, as a share of its reach."""
+"""Walls are shown this far from the arm's base, as a share of its reach."""
 _VIA_NAME = "via "
 FOLLOW = "follow"
 """The view that keeps the tool in the middle."""

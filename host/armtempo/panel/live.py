@@ -60,7 +60,7 @@ class LiveCurves:
             getattr(self, name).append(sample[name])
 
     def thinned(self, most: int) -> LiveArrays:
-        """At most so many samples, evenly chosen."""
+        """At most ``most`` samples, evenly spaced."""
         count = len(self.time_s)
         chosen = slice(0, count, max(1, -(-count // most)))
         commanded = np.array(self.commanded_deg[chosen])

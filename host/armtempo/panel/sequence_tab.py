@@ -83,7 +83,7 @@ class SequenceTab:
         return row
 
     def _set(self, index: int, key: str, text: str) -> None:
-        """Take what was typed; the table stays as it is, for who types on in the next box."""
+        """Take what was typed; the table stays unchanged, for a user who types on in the next box."""
         others = self._desk.version - self._shown
         self._desk.set(index, key, text)
         self._shown = self._desk.version - others
