@@ -100,6 +100,8 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     show(page, "Board")
     confirm(page, "Self-test")  # before the drivers are on
     page.wait_for_selector("td:has-text('cycles a tick of TIM2')")
+    confirm(page, "Deploy")
+    wait_for(page, "Deploy: the board's flash is too small", place="armtempo-said")  # and nothing is changed
     home(page)
     page.get_by_label("⟳ x +").hover(force=True)
     page.wait_for_selector("text=the arm cannot turn the tool about x from here")
