@@ -185,7 +185,7 @@ def test_a_rate_that_could_not_be_tried_is_not_found() -> None:
     assert rate_part.highest(lambda rate: next(answers), 3) is None
 
 
-CABLE_OUT = 4
+CABLE_OUT = 5
 """The motion, counted from power-up, at which the cable is out: the first E-stop."""
 HANGS = 2
 """The same of the first one whose pulses are captured."""
@@ -214,6 +214,7 @@ BROKEN = (
         (
             "fault internal",
             "PB10, forward together: 1 steps",
+            "steps of a longer motion, 0.3 s:",
             "the whole part: the board fell silent in 'estop'",
         ),
     ),
