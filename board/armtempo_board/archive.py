@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 _FILE = "/flash/lib/armtempo.z"
 _POINT = "/armtempo"
-_WINDOW_BITS = const(10)
 _FOLDER = const(0x4000)
 _REGULAR = const(0x8000)
 _ENOENT = const(2)
@@ -56,7 +55,7 @@ class Archive:
         file.seek(abs(offset))
         if offset < 0:
             return file
-        return deflate.DeflateIO(file, deflate.RAW, _WINDOW_BITS, True)
+        return deflate.DeflateIO(file, deflate.ZLIB, 0, True)
 
     def _offset(self, path: str) -> int:
         """Where a module begins, 0: it is not there."""

@@ -1,17 +1,17 @@
-"""Becomes ``/flash/boot.py``: USB shows a serial port only, so that no host writes the flash behind us."""
+"""Becomes ``/flash/boot.py``: USB shows a serial port only, so that no host writes the flash."""
 
 import pyb
 
-pyb.Pin("A15", pyb.Pin.OUT_PP, value=0)  # STEP 1, low before all else: a JTAG pin, which a reset pulls up
+pyb.Pin("A15", pyb.Pin.OUT_PP, value=0)  # STEP 1 low at once: a reset pulls the JTAG pin up
 pyb.usb_mode("VCP")
 
 try:
-    import armtempo_archive  # noqa: F401  finds the program where it is no part of the firmware
-except Exception:  # it is, or its archive is not, or not wholly, deployed
+    import armtempo_archive  # noqa: F401  where the program is not in the firmware
+except Exception:
     pass
 try:
     from armtempo_board import keep_watchdog_fed
 
     keep_watchdog_fed()
-except Exception:  # the same of the program
+except Exception:  # not, or not wholly, deployed
     pass

@@ -57,7 +57,7 @@ NATIVE_LINE = 12
 code of the first over its lines. A call in them takes CALL more."""
 
 CALL = 250
-"""Instructions of calling one compiled function from another (see board/docs/hardware.md)."""
+"""Instructions of calling one compiled function from another (see host/docs/measurements.md)."""
 
 COMPILED = (bezier, control_points, subdivision, newton, cubics, step_queue, time_law)
 ALL = (*COMPILED, subintervals, interval_steps, step_generator)

@@ -1,4 +1,4 @@
-"""The heap that the program needs on MicroPython's own STM32F407 firmware: the figures of board/docs/firmware.md.
+"""The heap that the program needs on MicroPython's own STM32F407 firmware: host/docs/measurements.md.
 
     python -m tests.benchmark.firmware MICROPYTHON [ARM.toml]
 

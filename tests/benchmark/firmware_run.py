@@ -1,4 +1,4 @@
-"""The shipped motion on MicroPython's own stm32 firmware, driven by this host: the figures of board/docs/firmware.md.
+"""The shipped motion on MicroPython's own stm32 firmware, driven by this host: host/docs/measurements.md.
 
     python -m tests.benchmark.firmware_run MICROPYTHON [FOLDER]
 

@@ -1,4 +1,4 @@
-"""What it takes from the edge of E-stop or limit switch to outputs that stand still: board/docs/hardware.md.
+"""What it takes from the edge of E-stop or limit switch to outputs that stand still: host/docs/measurements.md.
 
     python -m tests.benchmark.freeze MICROPYTHON [store]
 

@@ -1,4 +1,4 @@
-"""What a turn of the program's loop costs on the chip, and up to which rates it keeps up: board/docs/evaluator.md.
+"""What a turn of the program's loop costs on the chip, and up to which rates it keeps up: host/docs/measurements.md.
 
     python -m tests.benchmark.loop MICROPYTHON [files]
 
@@ -38,7 +38,7 @@ from tests.board.scripts.rigs.arm_rows import HEAD, row
 
 CORE_HZ = 168_000_000
 CYCLES = (1.3, 2.0, 2.5)
-"""Cycles an instruction: see board/docs/evaluator.md."""
+"""Cycles an instruction: see host/docs/measurements.md."""
 RATES = (5_000, 10_000, 20_000, 33_000, 50_000, 70_000, 100_000, 130_000, 160_000, 200_000, 250_000, 333_000)
 JOINTS = (1, 3)
 AT_LIMITS = ((240_000, 1), (120_000, 2), (80_000, 3), (25_000, 3), (2_000, 6), (8_000, 6), (20_000, 6))

@@ -1,9 +1,10 @@
-"""The heap that the self-test's parts leave on the chip: the figures of host/docs/first-power-on.md.
+"""What the self-test's parts leave of the heap, and instructions of what they time: host/docs/measurements.md.
 
     python -m tests.benchmark.selftest_heap MICROPYTHON FOLDER
 
 MICROPYTHON as for tests/benchmark/firmware.py. The firmware with the program is built in FOLDER (new), and run by QEMU;
-the parts are sent to its prompt and loaded up to the start of their motion. QEMU has no watchdog, DWT, random numbers,
+the parts are sent to its prompt and loaded up to the start of their motion; of what they time, QEMU counts the
+instructions (``selftest.board_part`` has them). QEMU has no watchdog, DWT, random numbers,
 backup SRAM, nor DMA for these timers, and cannot write the flash, so what goes beyond that runs on no emulator.
 """
 
@@ -24,6 +25,10 @@ from tests.benchmark import firmware
 
 RECORD = "/flash/armtempo/arm.ata"
 BOOT_S = 10
+_SHIFT = 3
+_INSTRUCTIONS_A_US = 1000 / 2**_SHIFT * 16 / 168
+"""An instruction takes 2 ** _SHIFT ns of QEMU's time, in which SysTick counts 168 MHz; MicroPython takes it for the 16
+MHz of a chip whose clock is not set up. SysTick's interrupts are in the counts: half a percent."""
 STAND_INS = """
 import sys, os, machine
 from armtempo_board.hardware import backup_sram
@@ -37,30 +42,47 @@ sys.modules["machine"] = Beyond(machine, unique_id=lambda: bytes(12))
 backup_sram.find = lambda: 0x20020000
 def feed():
     pass
+def ways(engine):
+    return {"": (stm.EXTI, 0, 0, 0)}
+def cycles():
+    return time.ticks_us()
 def enable():
     return 1, 1, 1
 def idle(engine, *_):
     raise OSError("{'free': %d, 'largest': %d}" % (free(), largest()))
 from armtempo_board.motion.engine import Engine
 Engine.start = idle
+from armtempo_board.hardware.inputs import Inputs
+Inputs.estop_active = lambda _: False
 """
 
 
-def parts(record: bytes) -> dict[str, tuple[str, dict[str, object]]]:
-    """By title: the part and its arguments."""
+def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
+    """By title: the files of the part, and its arguments."""
     _, joints, _ = armrecord.unpack(record)
     moved, gentle = motion.back_in_turn(joints), motion.gentle(joints)
     common: dict[str, object] = {"record": RECORD, "idle_us": 0}
     starts = {"motion": moved.record.hex(), "start_steps": moved.start_steps, "rates": moved.rates}
-    found: dict[str, tuple[str, dict[str, object]]] = {
-        "encoders": ("encoders", {"motion": gentle.record.hex(), "start_steps": gentle.start_steps}),
-        "pulses": ("pulses", starts),
+    stops: dict[str, object] = {**starts, "motions": [starts["motion"]] * 2, "waits_us": [0]}
+    del stops["motion"]
+    found: dict[str, tuple[list[str], dict[str, object]]] = {
+        "encoders": (
+            ["engine", "encoders"],
+            {**common, "motion": gentle.record.hex(), "start_steps": gentle.start_steps},
+        ),
+        "pulses": (["engine", "capture", "pulses"], {**common, **starts, "most": 2000}),
+        "stops": (
+            ["engine", "estop"],
+            {**common, **stops},
+        ),
     }
     for count in (1, 3):
         rates = [round(rate_part.stated(count) / rate_part.KEPT)] * count
         tried = {"motion": motion.at_rates(rates, 0.4).hex(), "rates": [motion.limit(rate) for rate in rates]}
-        found[f"rates, {count}"] = ("rates", {**tried, "frames": rate_part.frames()})
-    return {title: (part, {**common, **own}) for title, (part, own) in found.items()}
+        tried = {**common, **tried, "frames": rate_part.frames()}
+        found[f"rates, {count}"] = (["engine", "rates"], tried)
+        found[f"watched, {count}"] = (["engine", "capture", "rates"], {**tried, "watch": ("A", 0)})
+    return {**found, "cycles": (["cycles"], {"motion": motion.evaluated().hex()})}
 
 
 def main(micropython: Path, folder: Path) -> None:
@@ -79,6 +101,7 @@ def main(micropython: Path, folder: Path) -> None:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     command = firmware.emulator(elf, firmware.make_image(tree), cut)
+    command += ["-icount", f"shift={_SHIFT}"]
     command[command.index("stdio")] = f"tcp:127.0.0.1:{port},server=on,wait=on,nodelay=on"
     with subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         try:
@@ -86,19 +109,23 @@ def main(micropython: Path, folder: Path) -> None:
             with prompt.at_prompt(f"socket://127.0.0.1:{port}") as there:
                 there.at_end = "pass"
                 time.sleep(BOOT_S)
-                for title, (part, arguments) in parts(record).items():
+                for title, (files, arguments) in parts(record).items():
                     there.enter(soft_reset=title != "encoders")
-                    print(f"{title:<10}", _said(there, part, arguments))
+                    print(f"{title:<10}", _said(there, files, arguments))
         finally:
             process.kill()
 
 
-def _said(there: prompt.Prompt, part: str, arguments: dict[str, object]) -> str:
+def _said(there: prompt.Prompt, files: list[str], arguments: dict[str, object]) -> str:
     folder = Path(prompt.__file__).with_name("on_board")
-    texts = [(folder / f"{name}.py").read_text() for name in ("common", "engine", part)]
-    texts[1:1] = [STAND_INS]
+    texts = [(folder / f"{name}.py").read_text() for name in ("common", *files)]
+    texts.append(STAND_INS)
     try:
-        return str(there._run(part, f"{''.join(texts)}\nmeasure(**{arguments!r})\n"))
+        took = there._run(files[-1], f"{''.join(texts)}\ntell(measure(**{arguments!r}))\n").values
+        return (
+            str({what: round(_INSTRUCTIONS_A_US * took_us, 1) for what, took_us in took.items()})
+            + " instructions"
+        )
     except prompt.PartError as error:
         return error.problem.partition("OSError: ")[2] or error.problem
 

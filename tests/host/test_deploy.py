@@ -63,7 +63,7 @@ def test_compiled_files_fit_the_smallest_board() -> None:
     blocks = sum(-(-len(data) // 512) for data in (*library.values(), *program_files.start_files().values()))
     largest, usual, arm_and_folders = 33, 3 * 4, 4
     assert blocks + largest + usual + arm_and_folders <= BOARD.free_blocks
-    assert blocks <= 126, "board/docs/memory.md"
+    assert blocks <= 116, "board/docs/memory.md"
 
 
 @pytest.mark.slow

@@ -158,3 +158,11 @@ def test_a_name_the_board_cannot_store(tmp_path: Path) -> None:
     path.write_text('name = "a/b"\n' + TWO)
     with pytest.raises(InputError, match="a-z A-Z 0-9"):
         Job.load(path, ARM)
+
+
+def test_a_table_as_a_job_is_referred_to_import(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("0,-60,40\n20,-75,50\n")
+    with pytest.raises(InputError) as error:
+        Job.load(path, ARM)
+    assert "armtempo import" in error.value.hint

@@ -278,7 +278,7 @@ def fitness_of(joint: int) -> Fitness:
 @pytest.mark.slow
 @pytest.mark.parametrize("joint", range(3))
 def test_is_near_the_best_known_with_every_seed(joint: int) -> None:
-    """A part of host/docs/acs.md: median within 0.05 %, worst within 0.3 %, at most 2 N 500 evaluations."""
+    """A part of host/docs/measurements.md: median within 0.05 %, worst within 0.3 %, at most 2 N 500 evaluations."""
     function = fitness_of(joint).stretched
     excess = []
     for seed in range(6):

@@ -14,6 +14,7 @@ from threading import Thread
 from typing import Any
 
 import armtempo
+from armtempo.formats import toml_table
 from armtempo.model import shipped
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState
@@ -24,7 +25,20 @@ from tests.system import commandline
 from tests.system.held_jogs import Cable
 from tests.system.relay import Relay
 
-ARM = armtempo.Arm.paper()
+_ARM_TEXT = f"""{shipped.arm_path().read_text(encoding="utf-8")}
+[output.gripper]
+kind = "servo"
+pin = "PB8"
+pulse_us = [500, 2500]
+angles_deg = [0, 180]
+states = {{ open = 20.0, closed = 95.0 }}
+safe = "open"
+
+[input.part]
+pin = "PD0"
+"""
+ARM = armtempo.Arm.of_table(toml_table.parse(_ARM_TEXT, "arm.toml"))
+"""The paper's arm with an output and an input."""
 OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 WAIT_S = 120.0
 """Nothing here takes longer, on however loaded a machine."""
@@ -159,15 +173,17 @@ def asked(address: str, request: bytes) -> bytes:
 
 
 @contextmanager
-def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "paper") -> Iterator[Panels]:
-    """For an arm that ships, and the paper's job if it is the paper's."""
+def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "") -> Iterator[Panels]:
+    """For an arm that ships, or for ``ARM`` with the paper's job."""
     (folder / "job.toml").write_text(shipped.job_path().read_text(encoding="utf-8"), encoding="utf-8")
+    (folder / "arm.toml").write_text(_ARM_TEXT, encoding="utf-8")
     ways = cables or (Cable(), Cable())
-    job = ("--job", "job.toml") if arm == "paper" else ()
+    job = () if arm else ("--job", "job.toml")
     with ExitStack() as stack:
-        virtual = stack.enter_context(launch(LaunchOptions(virtual_time=False, arm=armtempo.Arm.of(arm))))
+        moved = armtempo.Arm.of(arm) if arm else ARM
+        virtual = stack.enter_context(launch(LaunchOptions(virtual_time=False, arm=moved)))
         relay = stack.enter_context(Relay(virtual.port, folder / "port", *ways))
-        made = Panels(folder, relay.port, ways, ("--arm", arm, *job))
+        made = Panels(folder, relay.port, ways, ("--arm", arm or "arm.toml", *job))
         stack.callback(made.close)
         yield made
 
@@ -220,6 +236,7 @@ def hold(page: Any, by_key: bool = False) -> None:
     """Hold a jog button until the arm moves; again if a busy browser was silent for too long, as then it lets go."""
     button = page.locator('[aria-label$=" +"]').first
     for _ in range(20):
+        button.click(trial=True)  # once it is enabled: Enter would press what has the focus else
         (button.focus if by_key else button.hover)()
         before = page.inner_text("#armtempo-where")
         page.keyboard.down("Enter") if by_key else page.mouse.down()

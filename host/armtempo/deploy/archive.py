@@ -1,4 +1,4 @@
-"""The compiled modules of the board program as one file, each deflated: what the board's ``archive.py`` reads."""
+"""The compiled modules of the board program as one file, most deflated: what the board's ``archive.py`` reads."""
 
 from __future__ import annotations
 
@@ -7,18 +7,24 @@ from collections.abc import Collection, Mapping
 
 _WINDOW_BITS = 10
 """Memory that the board needs while it imports a module: 1 KB and 1.4 KB for the decoder."""
+_WIDE_BITS = 13
+"""The same where there is plenty: 8 KB."""
 
 
-def pack(files: Mapping[str, bytes], plain: Collection[str]) -> bytes:
-    """The archive of files by their path from the library's folder on; those of ``plain`` are not deflated."""
-    packed = {path: data if path in plain else _deflated(data) for path, data in files.items()}
+def pack(files: Mapping[str, bytes], wide: Collection[str], plain: Collection[str]) -> bytes:
+    """The archive of files by their path from the library's folder on.
+
+    ``wide``: imported while the heap is empty; ``plain``: not deflated.
+    """
+    packed = {path: data if path in plain else _deflated(data, path in wide) for path, data in files.items()}
     index = ""
     while True:  # as offsets grow in length with the index
         at = 2 + len(index)
         lines = []
         for path, data in packed.items():
-            name = path.removeprefix("armtempo_").removesuffix(".mpy")
-            lines.append(f"\n{name} {-at if path in plain else at}")
+            lines.append(
+                f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {-at if path in plain else at}"
+            )
             at += len(data)
         made = "".join(lines) + "\n"
         if len(made) == len(index):
@@ -26,6 +32,7 @@ def pack(files: Mapping[str, bytes], plain: Collection[str]) -> bytes:
         index = made
 
 
-def _deflated(data: bytes) -> bytes:
-    compressor = zlib.compressobj(9, zlib.DEFLATED, -_WINDOW_BITS, 9)
+def _deflated(data: bytes, is_wide: bool) -> bytes:
+    """With zlib's header, which tells the board the window."""
+    compressor = zlib.compressobj(9, zlib.DEFLATED, _WIDE_BITS if is_wide else _WINDOW_BITS, 9)
     return compressor.compress(data) + compressor.flush()

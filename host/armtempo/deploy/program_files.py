@@ -19,6 +19,7 @@ from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import archive, compiled_cache, plain_frames
 from armtempo.deploy.compact import Compact, compact, frames
+from armtempo.deploy.compact.merge import CORE
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo.simulator import launcher
 
@@ -30,10 +31,9 @@ ARCHIVE = "armtempo.z"
 _READER = "archive.py"
 """File of the board package that finds modules in the archive."""
 _READER_NAME = "armtempo_archive"
-_AT_START = [
-    f"{PACKAGES[0]}/{name}.mpy" for name in ("override", "motion_check", "endpoints", "motion_file", "store")
-]
-"""Modules that are imported when a motion starts; not deflated, as inflating takes 2.4 KB and memory is shortest."""
+_WIDE = [f"{PACKAGES[0]}/{CORE}.mpy"]
+_PLAIN = [f"{PACKAGES[0]}/override.mpy"]
+"""What is imported last when a motion starts; not deflated, as inflating takes 2.4 KB and memory is shortest."""
 _HASH = f"{PACKAGES[1]}/program_hash.py"
 _MAIN = f"{PACKAGES[0]}.app.program"
 _STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
@@ -136,7 +136,7 @@ def library(mpy: int | None) -> dict[str, bytes]:
         return {f"{LIBRARY}/{name}": data for name, data in sources.items()}
     packed = dict(compiled(mpy))
     reader = f"{_READER_NAME}.mpy"
-    files = {reader: packed.pop(reader), ARCHIVE: archive.pack(packed, _AT_START)}
+    files = {reader: packed.pop(reader), ARCHIVE: archive.pack(packed, _WIDE, _PLAIN)}
     return {f"{LIBRARY}/{name}": data for name, data in files.items()}
 
 

@@ -41,7 +41,9 @@ def parse(text: str, file: str) -> Table:
     except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
         raise InputError(
             f"{file}: not valid TOML: {error}",
-            "correct that place; strings are written in quotes, tables in [brackets]",
+            "'armtempo import' makes a job file of a table"
+            if file.lower().endswith((".csv", ".tsv"))
+            else "correct that place; strings are written in quotes, tables in [brackets]",
         ) from None
 
 

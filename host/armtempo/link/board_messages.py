@@ -74,7 +74,7 @@ class Status:
     run: int
     ticks: int
     path_ticks: int
-    """The motion's own time, behind the clock where the speed was below 100 %."""
+    """The motion's own time, less than the clock's where the speed was below 100 %."""
     rate: int
     """Of the motion's own time, in thousandths: the one that is wanted; 0 in a pause."""
     samples_kept: int
@@ -94,7 +94,7 @@ class Status:
         return bool(self.known >> joint & 1)
 
     def as_fault(self) -> Fault:
-        """The event that told of the pending fault, where it did not arrive."""
+        """The event that reported the pending fault, where it did not arrive."""
         return Fault(self.run, self.fault, self.fault_joint, self.ticks, self.path_ticks, self.positions)
 
 

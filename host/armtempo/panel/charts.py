@@ -24,7 +24,7 @@ class CurveChart:
         options = {
             "animation": False,
             "grid": {"left": 55, "right": 15, "top": 30, "bottom": 25},
-            "legend": {"top": 2, "right": 5},
+            "legend": {"top": 2, "right": 5, "left": 55, "type": "scroll", "align": "left"},
             "tooltip": {"trigger": "axis"},
             "xAxis": {
                 "type": "value",

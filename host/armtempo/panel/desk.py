@@ -14,6 +14,7 @@ from armtempo.formats.atomic_file import replace_text
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner
 
 _NEW = "panel_job"
@@ -27,10 +28,13 @@ class Desk:
         self.file = job_file
         self.job = Job.load(job_file, arm) if job_file else Job(_NEW, via_deg=[arm.home_deg, arm.home_deg])
         self.plan: Plan | None = None
+        self.rows()  # what is wrong with poses is said at the start rather than in a page
 
     def rows(self) -> list[list[float]]:
-        """The job's via points as angles, (n, J): poses through the inverse kinematics."""
-        return [list(map(float, row)) for row in planner.via_angles(self.arm, self.job)[0]]
+        """The job's via points as angles, (n, J); PlanError if no posture reaches a pose among them."""
+        angles = [via for via in self.job.via if not isinstance(via, Pose)]
+        found = angles if len(angles) == len(self.job.via) else planner.via_angles(self.arm, self.job)[0]
+        return [list(map(float, row)) for row in found]
 
     def job_with(self, rows: Sequence[Sequence[float]], options: Mapping[str, str]) -> Job:
         """The job through other via points, with ``options`` as they are typed, "" for none.

@@ -73,9 +73,9 @@ class PlanTab:
         """The field of a key of the job."""
         value, choices = self._operator.desk.option(key), _CHOICES.get(key)
         if choices is None:
-            return ui.input(label, value=value).classes("armtempo-value")
+            return ui.input(label, value=value).props("dense outlined").classes("armtempo-value")
         named = {choice: words.CHOICES.get(choice, choice) for choice in map(str, choices)}
-        return ui.select(named, value=value, label=label)
+        return ui.select(named, value=value, label=label).props("dense outlined").classes("armtempo-option")
 
     def _given(self) -> dict[str, str]:
         """The options as they are in their fields."""
@@ -114,7 +114,7 @@ class PlanTab:
         self._changed()
 
     def _take_posture(self) -> None:
-        self._rows.append([round(float(angle), 4) for angle in self._operator.angles_deg])
+        self._rows.append([round(float(angle), 4) for angle in self._operator.live.angles_deg])
         self._changed()
 
     def _delete(self, number: int) -> None:
@@ -191,12 +191,9 @@ class PlanTab:
         return "" if self._played else words.NO_PLAN
 
     async def _plan(self) -> None:
-        self._planning, self._cancelled = True, False
-        self._bar.set_visibility(True)
-        self._stop.set_visibility(True)
-        self._page.refresh()
         try:
             job = self._operator.desk.job_with(self._rows, self._given())
+            self._show_planning(True)
             self._operator.desk.plan = await run.io_bound(
                 pipeline.plan, self._operator.arm, job, self._progress
             )
@@ -205,9 +202,13 @@ class PlanTab:
         except asyncio.CancelledError:
             pass
         finally:
-            self._bar.set_visibility(False)
-            self._stop.set_visibility(False)
-            self._planning = False
+            self._show_planning(False)
+
+    def _show_planning(self, planning: bool) -> None:
+        self._planning, self._cancelled = planning, False
+        self._bar.set_visibility(planning)
+        self._stop.set_visibility(planning)
+        self._page.refresh()
 
     def _progress(self, done: float, whole: float) -> None:
         if self._cancelled:

@@ -31,7 +31,7 @@ class StartPosition:
     def take(self, arm: Arm, start_deg: Array | None, name: str, advice: str, stop: StopRequest) -> None:
         """Move a virtual arm to ``start_deg``, degrees (J,); None: it may begin anywhere.
 
-        LinkError with ``advice`` where a real arm does not stand there.
+        LinkError with ``advice`` if a real arm is not there.
         """
         if is_sim(self.port):
             self.home_virtual_arm(arm)

@@ -16,6 +16,13 @@ _TOLERANCE = 0.002
 """Of ratios of clocks that come from one crystal: reading both takes some microseconds of 50 ms."""
 EMITTED = {2: 700, 512: 8770}
 """Instructions of the ring interrupt's ``emit`` by edges, as ``on_board/cycles.py`` calls it; counted in the tests."""
+TURN = {"byte_code": 252, "machine_code": 22}
+"""Instructions of a turn of the small loops of ``on_board/cycles.py``, as MicroPython 1.29 compiles them.
+
+Counted by ``python -m tests.benchmark.selftest_heap``.
+"""
+EVALUATED = 2_590_000
+"""Instructions of the evaluator, byte code and machine code, in ``motion.evaluated``. Counted there too."""
 _WAIT_STATES = 5
 _CACHES = 0x700  # FLASH_ACR: prefetch, instruction cache, data cache (RM0090 3.9.1)
 _SLOWEST_WRITE_MS = 4000
@@ -128,11 +135,14 @@ def judge_cycles(found: dict[str, float]) -> Iterator[Measurement]:
         ("collection", "a collection of the heap"),
     ):
         took = f"{found[name]:.1f} cycles, {1e6 * found[name] / _CORE_HZ:.2f} us"
+        if instructions := TURN.get(name):
+            took += f", {found[name] / instructions:.2f} an instruction of {instructions}"
         yield Measurement(CYCLES, words, took if found[name] else "takes no simulated time")
-    instructions = EMITTED[512] - EMITTED[2]
-    per = found["edges"] / instructions
-    yield Measurement(
-        CYCLES,
-        f"510 edges by the ring interrupt, {instructions} instructions",
-        f"{found['edges']} cycles, {per:.2f} an instruction" if per > 0 else "takes no simulated time",
-    )
+    emitted = EMITTED[512] - EMITTED[2]
+    for name, words, instructions in (
+        ("edges", f"510 edges by the ring interrupt, {emitted} instructions", emitted),
+        ("evaluator", f"1067 steps by the evaluator, {EVALUATED} instructions", EVALUATED),
+    ):
+        per = found[name] / instructions
+        took = f"{found[name]} cycles, {per:.2f} an instruction"
+        yield Measurement(CYCLES, words, took if per > 0.01 else "takes no simulated time")

@@ -71,13 +71,13 @@ def _figures(data: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
         axis.set(xlabel="time of the step, ms", ylabel="captured − planned, µs")
         axis.legend()
         yield "Step times", _svg(figure, "steps"), "Each step of the motion there, captured on its pin."
-    stops = data.get(SAFETY, {})
-    if took := stops.get("cycles", []) + stops.get("edge_cycles", []):
+    stops = data.get(SAFETY, {}).get("cycles", {})
+    if took := [cycles for way in stops.values() for cycles in way]:
         figure = Figure(figsize=(7, 2.2), layout="constrained")
         axis = figure.add_subplot()
         axis.hist([cycles / CYCLES_PER_US for cycles in took], bins=20, color="tab:blue")
-        axis.set(xlabel="E-stop to frozen outputs, µs", ylabel="times")
-        yield "E-stops", _svg(figure, "stops"), "At random moments of the motion."
+        axis.set(xlabel="switch to frozen outputs, µs", ylabel="times")
+        yield "E-stop and limit switch", _svg(figure, "stops"), "At random moments of the motion."
 
 
 def _svg(figure: Any, name: str) -> str:

@@ -1,4 +1,4 @@
-"""A package without packages in it: its modules stand side by side, as they need fewer names and files so."""
+"""A package without packages in it: its modules are side by side, which needs fewer names and files."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ _AWAY = 1.01
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
 """Weight of steps between time differences in the first solve, for one segment and via point; part of it later."""
 _LEAST_STEP = 1e-3
-"""Least difference of time control points, as a part of their mean: where time all but stands still, what rounding does
+"""Least difference of time control points, as a part of their mean: where time nearly stands still, what rounding does
 to the angles is divided by its cube."""
 _FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
 _AGAIN = Schedule(first_barrier=1e-3, last_barrier=1e-4, curvature=False)

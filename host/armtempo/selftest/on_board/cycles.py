@@ -21,7 +21,7 @@ def plain(turns):
 
 
 def emitted(entries):
-    """Cycles in which the ring interrupt's ``emit`` writes so many edges of a long cubic to a ring."""
+    """Cycles in which the ring interrupt's ``emit`` writes that many edges of a long cubic to a ring."""
     from array import array
 
     from armtempo_board.hardware import isr
@@ -39,12 +39,39 @@ def emitted(entries):
     return cost(step_queue.emit, 1, state, array("i", [0] * 18), times=1)
 
 
+def evaluated(motion):
+    """(cycles, edges): the evaluator finds all steps of a motion from step 0 on, and a ring takes them."""
+    from array import array
+
+    from armtempo_board.hardware import isr
+    from armtempo_board.memory import Memory
+    from armtempo_board.stepgen.step_generator import StepGenerator
+    from armtempo_shared import engine_memory
+    from armtempo_shared.motion import Motion
+
+    generator = StepGenerator(Memory(list(engine_memory.GENERATOR_PARTS)))
+    state = array("i", [0] * isr.STATE_WORDS)
+    state[isr.MASK] = 1023
+    isr.set_places(state, array("i", [0] * 1025), generator.queue)
+    motion = Motion(motion)
+    gc.collect()
+    before = cycles()
+    generator.load(motion, 0, 0, 168, 20000)
+    edges = 0
+    while generator.waits() or not generator.ended:
+        generator.prepare(1 << 28)
+        edges += generator.write(state, edges & 1023, 1000, state)
+    return (cycles() - before) & 0xFFFFFFFF, edges
+
+
 def nothing():
     """What reading the counter costs."""
 
 
-def measure():
+def measure(motion):
     """Cycles of each; the reading of the counter is taken off."""
+    from binascii import unhexlify
+
     feed()
     count_cycles()
     gc.collect()
@@ -53,5 +80,6 @@ def measure():
     found["byte_code"] = (cost(plain, 1100) - cost(plain, 100)) / 1000
     found["machine_code"] = (cost(counting, 1100) - cost(counting, 100)) / 1000
     found["edges"] = min([emitted(512) for _ in range(3)]) - min([emitted(2) for _ in range(3)])
+    found["evaluator"], found["evaluator_edges"] = evaluated(unhexlify(motion))
     found["collection"] = cost(gc.collect, times=3) - empty
     return found

@@ -2,9 +2,6 @@
 
 from armtempo_shared import armrecord
 
-_ESTOP_LINE = 15
-_PUPDR_SHIFT = 2 * _ESTOP_LINE
-
 
 class NoPin:
     """In the place of ENABLE: the engine cannot switch the drivers on."""
@@ -14,14 +11,15 @@ class NoPin:
         return 0
 
 
+_SEEN_TICKS = 168  # 2 us: a capture at 1 MHz has each pulse twice
 _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 
 
-def make_engine(record, estop=False, rates=None, encoders=False, workspace=None):
+def make_engine(record, switches=False, rates=None, encoders=False, workspace=None):
     """(engine, rows of its joints); it steps the pins of this arm and no others, and the arm's E-stop stops it.
 
-    ``estop``: one is fitted, whatever the arm has. ``rates``: of that many joints, instead of the arm's;
-    they can go anywhere then.
+    ``switches``: E-stop and a limit switch 1 for the first joint are fitted, whatever the arm has. ``rates``: of that
+    many joints, instead of the arm's; they can go anywhere then.
     ``encoders``: they are read, but no joint is checked against them. ``workspace``: of a program that has one already.
     """
     from armtempo_board.app import room
@@ -31,12 +29,15 @@ def make_engine(record, estop=False, rates=None, encoders=False, workspace=None)
     with open(record, "rb") as file:
         head, joints, _ = armrecord.unpack(file.read())
     kept = armrecord.FLAG_ENABLE_HIGH | armrecord.FLAG_ESTOP_ACTIVE_HIGH | armrecord.FLAG_ESTOP_FITTED
-    head["flags"] = head["flags"] & kept | (armrecord.FLAG_ESTOP_FITTED if estop else 0)
+    head["flags"] = head["flags"] & kept | (armrecord.FLAG_ESTOP_FITTED if switches else 0)
+    head["pulse_ticks"] = max(head["pulse_ticks"], _SEEN_TICKS)
     for joint in joints:
         joint["limit_low"] = joint["limit_high"] = armrecord.NONE
         joint["following_counts"] = 0
         if not encoders:
             joint["encoder"] = armrecord.NONE
+    if switches:
+        joints[0]["limit_high"] = 0
     if rates:
         joints = joints[: len(rates)]
         for joint, rate in zip(joints, rates):
@@ -52,13 +53,15 @@ def make_engine(record, estop=False, rates=None, encoders=False, workspace=None)
     return engine, joints
 
 
-_PULLS = stm.GPIOE + stm.GPIO_PUPDR
+def pulls(pin, level):
+    """(register, its value to draw an input to a level, to the other one) of its pull resistor."""
+    from armtempo_board.hardware import pins
 
-
-def pulls(engine, tripped):
-    """The register of port E's pull resistors with the one that draws the E-stop to a level."""
-    pull = 1 if tripped == engine.inputs._estop_level else 2
-    return mem32[_PULLS] & ~(3 << _PUPDR_SHIFT) | pull << _PUPDR_SHIFT
+    at = getattr(stm, "GPIO" + pins.port(pin)) + stm.GPIO_PUPDR
+    shift = 2 * pins.line(pin)
+    others = mem32[at] & ~(3 << shift)
+    down_up = others | 2 << shift, others | 1 << shift
+    return at, down_up[level], down_up[1 - level]
 
 
 def pull_inactive(engine):
@@ -66,7 +69,10 @@ def pull_inactive(engine):
 
     ValueError where one is pressed.
     """
-    mem32[_PULLS] = pulls(engine, 0)
+    from armtempo_board.hardware import pins
+
+    at, _, rest = pulls(pins.ESTOP, engine.inputs._estop_level)
+    mem32[at] = rest
     time.sleep_ms(1)
     engine.service()  # notes what tripped until now
     if not engine.clear():
@@ -82,7 +88,7 @@ def serve(engine, idle_us):
 
 
 def load(engine, motion, start_steps):
-    """Stand at its start and load it; the motion. ValueError where the drivers are not off."""
+    """Put the joints at its start and load it; the motion. ValueError where the drivers are not off."""
     from armtempo_shared.motion import Motion
 
     output, driven, level = enable()

@@ -1,11 +1,11 @@
-"""How long the outputs go on after an E-stop: by its software trigger (EXTI_SWIER, RM0090 12.3.5), by a real edge."""
+"""How long outputs continue after E-stop and limit switch: by software (EXTI_SWIER, RM0090 12.3.5), by a real edge."""
 
 _STARVE_US = 40_000
 _MOST_LOOKS = 100
 
 
 def stopped(engine, at, value):
-    """Cycles from writing a register until the E-stop's interrupt has ended; -1 where the outputs go on."""
+    """Cycles from writing a register until the input's interrupt has ended; -1 if the outputs continue."""
     from armtempo_board.hardware.isr import FROZEN
 
     block = engine.block
@@ -39,13 +39,35 @@ def serve_for(engine, wait_us, idle_us):
         serve(engine, idle_us)
 
 
-def is_drawn(engine):
-    """Whether the pull resistor moves the input: nothing is wired to it, so an edge can be made."""
-    mem32[_PULLS] = pulls(engine, 1)
-    time.sleep_ms(1)
-    drawn = engine.inputs.estop_active()
+def ways(engine):
+    """By name, what stops the outputs: (register, value that trips, value afterwards, fault that is due).
+
+    An edge only where the pull resistor moves the input, as nothing is wired to it; a limit switch that is pressed is
+    left out.
+    """
+    from armtempo_board.hardware import pins
+    from armtempo_shared import codes
+
+    inputs = engine.inputs
+    found = {}
+    for name, pin, switch, level, fault in (
+        ("E-stop", pins.ESTOP, inputs._estop, inputs._estop_level, codes.ESTOP),
+        ("limit switch", pins.LIMIT[0], inputs._limits[0][0], inputs._limits[0][1], codes.LIMIT_SWITCH),
+    ):
+        at, trip, rest = pulls(pin, level)
+        levels = []
+        for value in (trip, rest):
+            mem32[at] = value
+            time.sleep_ms(1)
+            levels.append(switch.value())
+        if levels[1] == level:
+            inputs._limits = []
+            continue
+        found[name + " by software"] = stm.EXTI + stm.EXTI_SWIER, 1 << pins.line(pin), 0, fault
+        if levels[0] == level:
+            found[name + " by an edge"] = at, trip, rest, fault
     pull_inactive(engine)
-    return drawn
+    return found
 
 
 def starve(engine, joints, motion, start_steps, idle_us):
@@ -68,37 +90,35 @@ def starve(engine, joints, motion, start_steps, idle_us):
 
 
 def measure(record, motions, start_steps, rates, waits_us, idle_us):
-    """Cycles of each trial, the reading of the counter taken off; the fault of each.
+    """Cycles of each trial by its way, the reading of the counter taken off; how often another fault came than is due.
 
-    Every second one is by an edge, where the input is free. ``motions``: that of the trials, and the one in which the
-    rings run dry, from step 0.
+    The ways take turns. ``motions``: that of the trials, and the one in which the rings run dry, from step 0.
     """
     from binascii import unhexlify
 
     feed()
     count_cycles()
     engine, joints = make_engine(record, True, rates)
-    triggers = [(stm.EXTI + stm.EXTI_SWIER, 1 << _ESTOP_LINE, 0)]
-    took = [[], []]
-    faults = []
     motion, starved = [unhexlify(one) for one in motions]
+    wrong = 0
     try:
-        if is_drawn(engine):
-            triggers.append((_PULLS, pulls(engine, 1), pulls(engine, 0)))
-        nothing = [cost_of_looking(engine, at, rest) for at, _, rest in triggers]
+        triggers = ways(engine)
+        names = sorted(triggers)
+        nothing = {name: cost_of_looking(engine, triggers[name][0], triggers[name][2]) for name in names}
+        took = {name: [] for name in names}
         for number, wait_us in enumerate(waits_us):
-            way = number % len(triggers)
-            at, trip, rest = triggers[way]
+            name = names[number % len(names)]
+            at, trip, rest, due = triggers[name]
             load(engine, motion, start_steps)
             engine.skip_check = True  # the next ones are the same motion
             engine.start()
             serve_for(engine, wait_us, idle_us)
             cycles_taken = stopped(engine, at, trip)
             mem32[at] = rest
-            took[way].append(max(cycles_taken - nothing[way], -1))
+            took[name].append(max(cycles_taken - nothing[name], -1))
             while engine.moving:
                 serve(engine, idle_us)
-            faults.append(engine.fault)
+            wrong += engine.fault != due
             engine.clear()
             feed()
         engine.skip_check = False
@@ -107,4 +127,4 @@ def measure(record, motions, start_steps, rates, waits_us, idle_us):
         engine.freeze()
         off = enable()
         engine.close()
-    return {"cycles": took[0], "edge_cycles": took[1], "faults": faults, "starved": end, "enable": off}
+    return {"cycles": took, "wrong_faults": wrong, "starved": end, "enable": off}

@@ -112,7 +112,7 @@ class FlashFolder:
         self.mounts[point] = self.root
 
     def umount(self, point):
-        """Unmount what is there."""
+        """Unmount what is mounted."""
         if point not in self.mounts:
             raise OSError(_EINVAL)
         del self.mounts[point]
