@@ -70,7 +70,7 @@ def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
             ["engine", "encoders"],
             {**common, "motion": gentle.record.hex(), "start_steps": gentle.start_steps},
         ),
-        "pulses": (["engine", "capture", "pulses"], {**common, **starts}),
+        "pulses": (["engine", "capture", "pulses"], {**common, **starts, "most": 2000}),
         "stops": (
             ["engine", "estop"],
             {**common, **stops},

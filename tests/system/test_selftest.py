@@ -62,13 +62,17 @@ def starts(folder: Path) -> int:
 
 
 def impatient(monkeypatch: pytest.MonkeyPatch, part: str) -> None:
-    """The host waits for a part that never answers no longer than it must."""
-    measure = prompt.Prompt.measure
+    """The host waits for a part that never answers no longer than it must, nor does the board's watchdog."""
+    measure, run = prompt.Prompt.measure, prompt.Prompt._run
+
+    def soon(self: prompt.Prompt, name: str, code: str) -> prompt.Measured:
+        return run(self, name, code.replace("timeout=10000", "timeout=1000"))
 
     def measured(self: prompt.Prompt, *parts: str, **arguments: Any) -> prompt.Measured:
         with monkeypatch.context() as patch:
             if parts[-1] == part:
                 patch.setattr(prompt, "_SILENCE_S", 0.3)
+                patch.setattr(prompt.Prompt, "_run", soon)
                 patch.setattr(self._port.serial, "timeout", 0.3)
             return measure(self, *parts, **arguments)
 
@@ -185,7 +189,7 @@ def test_a_rate_that_could_not_be_tried_is_not_found() -> None:
     assert rate_part.highest(lambda rate: next(answers), 3) is None
 
 
-CABLE_OUT = 4
+CABLE_OUT = 5
 """The motion, counted from power-up, at which the cable is out: the first E-stop."""
 HANGS = 2
 """The same of the first one whose pulses are captured."""
@@ -214,6 +218,7 @@ BROKEN = (
         (
             "fault internal",
             "PB10, forward together: 1 steps",
+            "steps of a longer motion, 0.3 s:",
             "the whole part: the board fell silent in 'estop'",
         ),
     ),

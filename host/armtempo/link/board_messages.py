@@ -11,8 +11,8 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
-from armtempo.basics.virtual_id import is_virtual
 from armtempo.formats.text import visible
+from armtempo.ports.names import is_virtual
 
 
 @dataclass(frozen=True)

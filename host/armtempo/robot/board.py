@@ -46,7 +46,6 @@ from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
-from armtempo.robot.start_position import StartPosition
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.where import Where, posture_deg
 from armtempo.runs.sequence_reader import SequenceRun
@@ -74,7 +73,7 @@ class Board:
         self.last_jog_ends = ""
         """Why the last jog ended before it was to, in words; "" if it did not."""
         self._stack = stack or ExitStack()
-        self._start = StartPosition(client, port)
+        self._start = goto.StartPosition(client, port)
         self._last_folder: Path | None = None
         self._last_sequence: Path | None = None
 

@@ -25,6 +25,7 @@ _PEAK = 1.875
 _ABOVE = 1.01
 """A joint's limit is this much above the rate that is wanted, so that rounding does not exceed it."""
 _GENTLE = 0.5
+_LONG_RATE = 5000
 _SLOT = _DEGREE + 1
 """Segments for each joint that moves alone: as many as one control point acts on, and one at rest."""
 _LOOKS = 1000
@@ -133,6 +134,18 @@ def at_rates(rates: Sequence[int], duration_s: float) -> bytes:
 def evaluated() -> bytes:
     """The record of the motion of ``on_board/cycles.py``: about 1000 steps of one joint."""
     return at_rates([20_000], 0.1)
+
+
+def long(joints: Sequence[dict[str, Any]], duration_s: float) -> TestMotion:
+    """From step 0, slowly enough that a capture can follow all of it; when it steps is not computed."""
+    rates = [_LONG_RATE] * len(joints)
+    limits = [max(joint["max_rate"], limit(_LONG_RATE)) for joint in joints]
+    return TestMotion([0] * len(joints), at_rates(rates, duration_s), [], limits)
+
+
+def long_steps(duration_s: float) -> int:
+    """How many steps each joint makes in it."""
+    return int(_LONG_RATE * duration_s / _PEAK + 0.5)
 
 
 def _fixed(points: Array, bits: int) -> list[int]:

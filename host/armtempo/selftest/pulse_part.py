@@ -13,7 +13,7 @@ from armtempo.basics.arrays import Array
 from armtempo.diagnosis.finding import Level
 from armtempo.selftest.motion import TestMotion
 from armtempo.selftest.prompt import Measured
-from armtempo.selftest.result import Measurement, judged
+from armtempo.selftest.result import Measurement, judged, left_out
 
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0
@@ -127,6 +127,23 @@ def _channel(
     if other:
         words, cure = f"{words}, those of P{other[0]} among them", _SHORTED
     return judged(PULSES, what, words, expected, False, cure)
+
+
+def judge_long(values: dict[str, Any], steps: int, duration_s: float) -> Measurement:
+    """The line about a motion in which each joint makes so many ``steps``: the edges that were counted, by port."""
+    what = f"steps of a longer motion, {duration_s:g} s"
+    if values["longest_turn_cycles"] / CYCLES_PER_US > _LONGEST_TURN_US:
+        return left_out(PULSES, f"{what}: a turn of the loop took too long to capture all", "run it again")
+    counted = {port: count / 2 for port, count in zip(values["ports"], values["counts"], strict=True)}
+    due = {port: steps * sum(pin[0] == port for pin in values["steps"]) for port in values["ports"]}
+    return judged(
+        PULSES,
+        what,
+        ", ".join(f"{count:g} on port {port}" for port, count in counted.items()),
+        ", ".join(f"{count} on port {port}" for port, count in due.items()),
+        counted == due and not values["fault"],
+        "look at the lines about the single channels",
+    )
 
 
 def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:

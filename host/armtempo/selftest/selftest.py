@@ -46,6 +46,9 @@ _STOPS, _BATCH, _SIMULATED_STOPS = 1000, 50, 4
 _WAITS_US = (22_000, 78_000)
 """E-stops at random moments of ``motion.make``, which begins 20 ms after its start."""
 _STARVED_S = 0.06
+_LONG_S, _SIMULATED_LONG_S = 4.0, 0.3
+_MOST_EDGES = 2000
+"""On one port, of the motions of which each edge is looked at."""
 _LOOK_S = 0.3
 SILENT = "silence"
 """In the data: the part in which the board fell silent."""
@@ -233,17 +236,28 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     for done, forward in ((0.4, True), (0.5, False)):
         work(done, 1)
         moved = motion.make(joints) if forward else motion.back_in_turn(joints)
-        arguments = {**_arguments(moved, found), "rates": moved.rates}
+        arguments = {**_arguments(moved, found), "rates": moved.rates, "most": _MOST_EDGES}
         if measured := _part(prompt, found, pulse_part.PULSES, "engine", "capture", "pulses", **arguments):
             found.add(pulse_part.judge(measured, moved, joints, forward))
             found.add([_still_off(measured.values, found)])
             if forward:
                 found.data[pulse_part.PULSES]["error_us"] = pulse_part.errors_us(measured, moved)
                 found.add(pulse_part.judge_turns(measured.values))
+    _move_long(prompt, found)
     moved = motion.make(joints)
     arguments = {**_arguments(moved, found), "rates": moved.rates}
     motions = [arguments.pop("motion"), motion.at_rates(_own(joints), _STARVED_S).hex()]
     _stop(prompt, found, {**arguments, "motions": motions}, work)
+
+
+def _move_long(prompt: Prompt, found: SelfTest) -> None:
+    """A motion of some seconds, whose edges are counted only."""
+    duration_s = _SIMULATED_LONG_S if found.simulated else _LONG_S
+    moved = motion.long(found.data[DRIVERS]["joints"], duration_s)
+    arguments = {**_arguments(moved, found), "rates": moved.rates, "most": 0}
+    if measured := _part(prompt, found, pulse_part.PULSES, "engine", "capture", "pulses", **arguments):
+        found.add([pulse_part.judge_long(measured.values, motion.long_steps(duration_s), duration_s)])
+        found.add([_still_off(measured.values, found)])
 
 
 def _stop(prompt: Prompt, found: SelfTest, arguments: dict[str, Any], work: Progress) -> None:

@@ -11,7 +11,7 @@ board starts again. The chip writes through a cache: only ``sync`` makes what wa
 
 import os
 
-from chip.reset import Reset
+from machine_state import Reset
 
 BLOCK = 512
 BLOCKS = 190
