@@ -9,7 +9,7 @@
     stepgen/   from splines to the times of steps; integers only, no hardware
     hardware/  timers, DMA, pins, interrupts
 
-Each imports only from those below it, and from the modules beside the packages. The functions here are for
+Each imports only from those below it, and from the modules next to the packages. The functions here are for
 ``boot.py``, ``main.py`` and the prompt; nothing in the packages uses them.
 """
 

@@ -13,7 +13,7 @@ _OFFSET_MASK = const((1 << 15) - 1)
 _CRC_INIT = const(16)  # index in the table: what a crc begins with, and is inverted with
 _CRC_BYTES = const(4)
 _NIBBLE = const(15)
-_RESIDUE = const(0x2144DF1C)  # the crc32 of anything with its crc32 behind it
+_RESIDUE = const(0x2144DF1C)  # the crc32 of anything with its crc32 after it
 _BYTES_OF_TICKS = const(16)
 _BYTES_OF_STEPS = const(4)
 _BYTES_OF_U32 = const(4)
@@ -26,9 +26,9 @@ COMMANDED = const(4)
 their counts."""
 
 APPEND = const(0)
-"""Last argument of ``apply_crc``: write the crc behind the data."""
+"""Last argument of ``apply_crc``: write the crc after the data."""
 CHECK = const(4)
-"""The same: compare with the crc behind the data."""
+"""The same: compare with the crc after the data."""
 
 
 def _crc_table() -> array:
@@ -55,7 +55,7 @@ def pack_offsets(first: int, second: int) -> int:
 def apply_crc(table: ptr32, data: ptr8, offsets: int, present: int) -> int:
     """Compute the crc32 of data[start:end]; ``offsets``: start and end.
 
-    APPEND: write it behind the data, little endian. CHECK: 1 where the four bytes behind the data are it, else 0.
+    APPEND: write it after the data, little endian. CHECK: 1 where the four bytes after the data are it, else 0.
     """
     at = offsets & _OFFSET_MASK
     end = (offsets >> _OFFSET_BITS) + present

@@ -13,7 +13,7 @@ _PIECE_WORDS = const(64)
 
 
 class Memory:
-    """``blocks``: so many words of 32 bits each. MemoryError where the heap has one of them not in one piece.
+    """``blocks``: words of 32 bits in each. MemoryError where the heap has one of them not in one piece.
 
     ``address``: where other memory is, of ``words``, that the processor alone reaches.
     """

@@ -31,7 +31,7 @@ class PromptRequest:
     def comes(self, byte: int, now_ms: "Any") -> bool:
         """Whether the prompt is asked for. ``byte``: one that came; -1: none did.
 
-        After quiet only CR and Ctrl-C came; three in a row count at once, also right behind a frame. mpremote sends
+        After quiet only CR and Ctrl-C came; three in a row count at once, also right after a frame. mpremote sends
         Ctrl-A after them, once, and the prompt is to get it.
         """
         quiet = time.ticks_diff(now_ms, self._control_ms) >= _QUIET_MS

@@ -3,7 +3,7 @@
 The host makes it from the arm file; the board keeps it in its flash. A motion record names its arm by this
 record's crc32.
 Little endian: the header, then one entry a joint, then the crc32 over all before it. An arm with outputs or inputs has
-another version, and behind its joints the number of outputs and of inputs (a byte each), then an entry for each.
+another version, and after its joints the number of outputs and of inputs (a byte each), then an entry for each.
 """
 
 import struct
@@ -87,7 +87,7 @@ VERSION_WITH_OUTPUTS = 3
 """Of a record that has outputs or inputs."""
 _VERSION_AT, _JOINTS_AT = 4, 5
 _LIMITS = ("min_steps", "max_steps", "max_rate", "following_counts", "link_timeout_ms")
-"""Fields that may change without any doubt about where the joints are; beside them FLAG_STOP_ON_LINK_LOSS."""
+"""Fields that may change without any doubt about where the joints are; besides them FLAG_STOP_ON_LINK_LOSS."""
 
 
 class ArmRecordError(ValueError):

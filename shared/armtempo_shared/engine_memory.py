@@ -63,7 +63,7 @@ def needed_bytes(rates: "list[int]") -> int:
 
 
 def room_words(joints: int, room_bytes: int) -> int:
-    """Words that a room leaves for an engine's memory beside the objects of that many joints."""
+    """Words that a room leaves for an engine's memory besides the objects of that many joints."""
     return min(max((room_bytes - object_bytes(joints)) // 4, 0), LARGEST_WORDS)
 
 

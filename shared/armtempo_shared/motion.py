@@ -18,7 +18,7 @@ angles in steps / 2**28, times in ticks / 2**16.
                    its start to its end, in 16384 ticks, linear in between; all 0: it cannot
     80      H[32]  the same for any other change of the speed
     144     q[]    per joint: n + k angle control points; its n * R + k time control points,
-                   or, with a shared axis, those once behind the last joint
+                   or, with a shared axis, those once after the last joint
     end     I      crc32 over all before it
 """
 
@@ -146,7 +146,7 @@ class MotionHead:
         return self.angle_offset(last) + 8 * int(self.segments + self.degree)
 
     def stream(self, offset: int) -> "BinaryIO":
-        """A file that stands at a byte offset of the record; who asks for it closes it."""
+        """A file at a byte offset of the record; who asks for it closes it."""
         raise NotImplementedError
 
     def points(self, offset: int, count: int) -> "tuple[int, ...]":

@@ -25,7 +25,7 @@ op                 number              value                            amount
 2     OUTPUT       of the output       what it is set to, 0 to 65535    0
 3     WAIT         0                   0                                ms
 4     WAIT_INPUT   of the input        level | what a time-out does     ms until the time-out, 0: for ever
-5     REPEAT       0                   1: a pass stands before it      how many times, 0: for ever
+5     REPEAT       0                   1: a pass is before it      how many times, 0: for ever
 6     END          0                   1: its passes count as cycles    0
 7     COUNT        of the counter      0                                0
 ====  ===========  ==================  ===============================  ================================
@@ -47,7 +47,7 @@ ACTIVE = 1
 STOP_THEN, FAULT_THEN, NEXT_THEN = 0, 2, 4
 
 ENDINGS = ("none", "running", "finished", "stopped", "timed_out", "fault", "refused")
-"""How a sequence stands or ended, by its number on the wire; none: there was none since the start."""
+"""The state of a sequence, or how it ended, by its number on the wire; none: there was none since the start."""
 NONE, RUNNING, FINISHED, STOPPED, TIMED_OUT, FAULTED, REFUSED = 0, 1, 2, 3, 4, 5, 6
 
 MAX_ROWS, MAX_MOTIONS, MAX_NESTING, MAX_COUNTERS = 500, 64, 4, 8
@@ -115,7 +115,7 @@ class SequenceRecord:
             raise SequenceError("more of something than the board takes")
 
     def part(self, offset: int, size: int) -> bytes:
-        """So many bytes of the record from ``offset`` on."""
+        """That many bytes of the record from ``offset`` on."""
         raise NotImplementedError
 
     def row(self, index: int) -> "tuple[int, ...]":

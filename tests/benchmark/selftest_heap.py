@@ -70,7 +70,7 @@ def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
             ["engine", "encoders"],
             {**common, "motion": gentle.record.hex(), "start_steps": gentle.start_steps},
         ),
-        "pulses": (["engine", "capture", "pulses"], {**common, **starts}),
+        "pulses": (["engine", "capture", "pulses"], {**common, **starts, "most": 2000}),
         "stops": (
             ["engine", "estop"],
             {**common, **stops},
@@ -81,7 +81,7 @@ def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
         tried = {"motion": motion.at_rates(rates, 0.4).hex(), "rates": [motion.limit(rate) for rate in rates]}
         tried = {**common, **tried, "frames": rate_part.frames()}
         found[f"rates, {count}"] = (["engine", "rates"], tried)
-        found[f"counted, {count}"] = (["engine", "capture", "rates"], {**tried, "port": "A"})
+        found[f"watched, {count}"] = (["engine", "capture", "rates"], {**tried, "watch": ("A", 0)})
     return {**found, "cycles": (["cycles"], {"motion": motion.evaluated().hex()})}
 
 

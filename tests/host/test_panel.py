@@ -14,6 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError, LinkError
+from armtempo.kinematics import Geometry, all_frames
+from armtempo.kinematics.chain import all_angles_deg
+from armtempo.model import mesh_files, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.room import FAR_MM, ArmRoom, KeepOut
@@ -198,7 +201,7 @@ def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: Operator) ->
 
     operator.do("run", ME, fail)
     wait(lambda: not operator.busy)
-    assert "bring it there" in operator.log[-1]
+    assert "bring it there" in operator.log.last[-1]
     operator.do("again", ME, lambda: None)
 
 
@@ -257,6 +260,21 @@ def test_the_picture_has_the_radii_and_the_room_of_the_arm_file() -> None:
     assert np.array(tray) * shape.reach_mm == pytest.approx(np.array([[100, -50, 0], [200, 50, 30]]))
     assert floor_low[2] == floor_high[2] == pytest.approx(-20.0 / shape.reach_mm)
     assert all(floor_high[:2] - floor_low[:2] > 1.0)
+
+
+def test_meshes_next_to_the_arm_file_are_shown_in_the_frames_of_their_rows(tmp_path: Path) -> None:
+    file = tmp_path / "arm.toml"
+    file.write_text(shipped.arm_path().read_text())
+    arm, corners = Arm.read(file), np.eye(3)[None]
+    assert not ArmShape(arm).meshes
+    mesh_files.write(file, {0: corners, 3: corners})
+    shape = ArmShape(arm)
+    angles = np.array([90.0, -60.0, 40.0])
+    base, third = shape.poses(angles)[len(shape.pieces) :]
+    assert base == [0, 0, 0, 0, 0, 0, 1]
+    wanted = all_frames(Geometry.of(arm), np.radians(all_angles_deg(arm, angles)).tolist())[3, :3, 3]
+    assert np.array(third[:3]) * shape.reach_mm == pytest.approx(wanted, abs=0.1)
+    assert abs(np.linalg.norm(third[3:]) - 1.0) < 1e-4
 
 
 def test_nothing_is_written_outside_of_the_folder(tmp_path: Path) -> None:

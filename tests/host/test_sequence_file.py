@@ -236,7 +236,7 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (["to = 1"], r"step\[1\]\.: says nothing"),
         (['goto = "a"\nrun = "job.toml"'], "says goto and run"),
         (['goto = "a"\nwait_s = 1'], "says goto and wait_s"),
-        (['goto = "a"\ntimeout_s = 1'], "timeout_s = 1 is not allowed; give left out beside goto"),
+        (['goto = "a"\ntimeout_s = 1'], "timeout_s = 1 is not allowed; give none next to goto"),
         (['run = "none.toml"'], "none.toml: no such file"),
         (['output = "griper"\nto = 1'], r"step\[1\].*no output 'griper'.*gripper"),
         (['output = "gripper"'], "to is missing"),

@@ -11,11 +11,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import trimesh
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
-from armtempo.kinematics import Geometry, forward, of_arm
+from armtempo.kinematics import Geometry, all_frames, forward, of_arm
 from armtempo.kinematics.dynamics import joint_torques
 from armtempo.kinematics.shape import refusals
+from armtempo.model import mesh_files
 from armtempo.model.arm import Arm
 from armtempo.new_arm import urdf_fitting as fitting
 from armtempo.new_arm import urdf_reader as reader
@@ -94,6 +96,40 @@ def test_the_written_arm_stands_where_the_urdf_does(tmp_path: Path, name: str, j
     found = forward(Geometry.of(arm), angles)
     np.testing.assert_allclose(found[:3, 3], wanted[:3, 3], atol=0.02)
     np.testing.assert_allclose(found[:3, :3], wanted[:3, :3], atol=2e-4)
+
+
+def test_the_links_shapes_move_with_their_rows(tmp_path: Path) -> None:
+    """A box of the last link and a mesh of the base, wherever the arm is."""
+    visual = '<visual><origin xyz="0.01 0.02 0.03" rpy="0 0 0"/><geometry>{}</geometry></visual></link>'
+    text = (FOLDER / "four_skew.urdf").read_text()
+    box = visual.format('<box size="0.02 0.04 0.06"/>')
+    urdf, out = tmp_path / "shapes.urdf", tmp_path / "arm.toml"
+    text = text.replace('<link name="tool"/>', f'<link name="tool">{box}')
+    foot = visual.format('<mesh filename="{}" scale="2 2 2"/>')
+    text = text.replace('<link name="world"/>', f'<link name="world">{foot}')
+    trimesh.creation.box((1.0, 1.0, 1.0)).export(tmp_path / "foot.stl")
+    command = ["import-urdf", str(urdf), "-o", str(out), "--meshes"]
+    urdf.write_text(text.format("gone.stl"))
+    assert "mesh 'gone.stl' cannot be read" in CliRunner().invoke(main, command).output
+    assert not out.exists()
+    urdf.write_text(text.format("package://arm/foot.stl"))
+    done = CliRunner().invoke(main, command)
+    assert "wrote 2 meshes" in done.output
+    assert "already exists" in CliRunner().invoke(main, command).output
+    arm = Arm.read(out)
+    files = mesh_files.of_arm(arm)
+    last = max(number for number, joint in enumerate(arm.joints, 1) if joint.name == "j4")
+    assert sorted(files) == [0, last]
+    rng = np.random.default_rng(SEED)
+    angles = np.array([0.0 if joint.name in ("base", "tool") else rng.uniform(-3, 3) for joint in arm.joints])
+    frame = all_frames(Geometry.of(arm), angles.tolist())[last]
+    tool = tool_pose(urdf, {joint.name: angle for joint, angle in zip(arm.joints, angles, strict=True)})
+    found = mesh_files.read(files[last]) @ frame[:3, :3].T + frame[:3, 3]
+    at_tool = (found - tool[:3, 3]) @ tool[:3, :3]
+    np.testing.assert_allclose(
+        np.abs(at_tool - (10, 20, 30)).reshape(-1, 3), np.tile((10, 20, 30), (36, 1)), atol=0.1
+    )
+    np.testing.assert_allclose(mesh_files.read(files[0]).max(axis=(0, 1)), (1010, 1020, 1030), atol=1e-3)
 
 
 def test_ranges_are_the_urdfs_and_never_wider(tmp_path: Path) -> None:

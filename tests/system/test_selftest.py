@@ -62,13 +62,17 @@ def starts(folder: Path) -> int:
 
 
 def impatient(monkeypatch: pytest.MonkeyPatch, part: str) -> None:
-    """The host waits for a part that never answers no longer than it must."""
-    measure = prompt.Prompt.measure
+    """The host waits for a part that never answers no longer than it must, nor does the board's watchdog."""
+    measure, run = prompt.Prompt.measure, prompt.Prompt._run
+
+    def soon(self: prompt.Prompt, name: str, code: str) -> prompt.Measured:
+        return run(self, name, code.replace("timeout=10000", "timeout=1000"))
 
     def measured(self: prompt.Prompt, *parts: str, **arguments: Any) -> prompt.Measured:
         with monkeypatch.context() as patch:
             if parts[-1] == part:
                 patch.setattr(prompt, "_SILENCE_S", 0.3)
+                patch.setattr(prompt.Prompt, "_run", soon)
                 patch.setattr(self._port.serial, "timeout", 0.3)
             return measure(self, *parts, **arguments)
 
@@ -144,17 +148,20 @@ def test_the_highest_rate_is_found_judged_and_stated(most: int, verdict: Level, 
 
 
 @pytest.mark.parametrize(
-    ("changes", "verdict"),
+    ("steps", "fault", "verdict"),
     [
-        ({}, Level.GOOD),
-        ({"edges": 3998}, Level.ERROR),
-        ({"fault": codes.UNDERRUN}, Level.NOTE),  # by the capture: without it there was none
-        ({"longest_turn_cycles": 700_000}, Level.NOTE),  # samples were lost
+        ((326, 12, 13), 0, Level.GOOD),
+        ((326, 12, 25), 0, Level.ERROR),  # one is missing
+        ((326, 3, 13), 0, Level.ERROR),  # one is too many
+        ((0, 4096, 0), 0, Level.ERROR),
+        ((326, 12, 13), codes.UNDERRUN, Level.ERROR),
     ],
 )
-def test_steps_are_counted_where_the_capture_keeps_up(changes: dict[str, int], verdict: Level) -> None:
-    values = {"fault": 0, "longest_turn_cycles": 400_000, "edges": 4000, **changes}
-    assert rate_part.judge_counted(values, "A", 3, 2000).verdict is verdict
+def test_steps_at_the_rate_to_state_are_judged(
+    steps: tuple[int, int, int], fault: int, verdict: Level
+) -> None:
+    values = {"fault": fault, "steps": {"A15": (326, 12, 13), "A1": steps}}
+    assert rate_part.judge_steps(values, "A", 80_000, 3).verdict is verdict
 
 
 @pytest.mark.parametrize(
@@ -182,7 +189,7 @@ def test_a_rate_that_could_not_be_tried_is_not_found() -> None:
     assert rate_part.highest(lambda rate: next(answers), 3) is None
 
 
-CABLE_OUT = 4
+CABLE_OUT = 5
 """The motion, counted from power-up, at which the cable is out: the first E-stop."""
 HANGS = 2
 """The same of the first one whose pulses are captured."""
@@ -211,6 +218,7 @@ BROKEN = (
         (
             "fault internal",
             "PB10, forward together: 1 steps",
+            "steps of a longer motion, 0.3 s:",
             "the whole part: the board fell silent in 'estop'",
         ),
     ),

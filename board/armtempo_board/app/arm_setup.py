@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def take_stored(board: "Board") -> None:
     """Take the stored arm record; without one, or where it cannot be used, the board stays unconfigured.
 
-    What stands in the flash never keeps the program from starting: ``arm_problem`` says what is wrong with it.
+    What is in the flash never keeps the program from starting: ``arm_problem`` says what is wrong with it.
     """
     board.arm_waits = False
     board.arm_problem = board.arm_value = 0
@@ -100,7 +100,7 @@ def _take(board: "Board", record: "Record") -> None:
         return
     all_but_limits, stops = _facts(record)
     known, steps = 0, []
-    if board.engine and all_but_limits == board.all_but_limits:  # the same arm: it stands where it stood
+    if board.engine and all_but_limits == board.all_but_limits:  # the same arm: it is where it was
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
     _drop_engine(board)

@@ -38,7 +38,7 @@ class Board:
 
         flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
         heap.forget()
-        self.workspace = room.workspace()  # before anything can stand in the way of the largest pieces
+        self.workspace = room.workspace()  # before anything fragments the heap
         self.samples = SampleBuffer(room.sample_bytes(), flags_at)
         self.root = root
         self._store: "Any" = None
@@ -77,13 +77,13 @@ class Board:
             self.drop_store()
 
     def drop_store(self) -> None:
-        """What stands in the flash of an upload stays."""
+        """What is in the flash of an upload stays."""
         self._store = None
 
     def make_engine(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
         """For an arm, as ``armrecord.unpack`` gives it.
 
-        Where memory is short, what stays lies beside pieces that a motion's code needs.
+        Where memory is short, what stays lies next to pieces that a motion's code needs.
         """
         gc.collect()
         if self.workspace.is_short:

@@ -136,11 +136,11 @@ class Commands:
     # for those who act on a command
 
     def fields(self, row: tuple) -> tuple:
-        """The fields of the command that stands in the reader."""
+        """The fields of the command in the reader."""
         return unpack_from(row[_FIELDS], self.link.reader.data, PAYLOAD_AT)
 
     def tail(self, row: tuple, length: int) -> bytes:
-        """What comes behind its fields."""
+        """What comes after its fields."""
         return bytes(self.link.reader.data[PAYLOAD_AT + calcsize(row[_FIELDS]) : PAYLOAD_AT + length])
 
     def text(self, row: tuple, length: int) -> str:
@@ -156,7 +156,7 @@ class Commands:
         return calcsize(row[_ANSWER])
 
     def reply_tail(self, size: int, tail: bytes) -> int:
-        """Put the tail of the answer behind fields of ``size`` bytes; the size of all."""
+        """Put the tail of the answer after fields of ``size`` bytes; the size of all."""
         self.link.reply[_ANSWER_AT + size : _ANSWER_AT + size + len(tail)] = tail
         return size + len(tail)
 

@@ -10,7 +10,7 @@ from armtempo_shared import codes
 from armtempo_shared.messages import PAYLOAD_AT
 from micropython import const
 
-_VALUE_AT = const(6)  # in the command: behind its number, a byte
+_VALUE_AT = const(6)  # in the command: after its number, a byte
 _VALUE_HIGH_AT = const(7)
 _ANSWER_AT = const(6)  # in a reply
 _LEVELS_BYTES = const(1)

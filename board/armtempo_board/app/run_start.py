@@ -49,7 +49,7 @@ def assume(board: "Board", motion: "MotionFile", unknown: int) -> int:
 
 
 def moving(motion: "MotionFile") -> int:
-    """A bit for each joint that stands elsewhere at the end of a motion than at its start."""
+    """One bit per joint that is elsewhere at the end of a motion than at its start."""
     found = 0
     for joint in range(motion.joints):
         if endpoints.at_start(motion, joint) != endpoints.at_end(motion, joint):

@@ -1,6 +1,6 @@
 """Samples of the current or last run, kept in one fixed buffer until the host has them.
 
-A sample is kept as the ``sample`` event carries it behind run and index: ticks and path (8 bytes each), flags (1), then
+A sample is kept as the ``sample`` event carries it after run and index: ticks and path (8 bytes each), flags (1), then
 commanded steps and encoder counts of each joint (4 and 4).
 """
 

@@ -1,7 +1,7 @@
 """A sequence that prepares its next motion while one moves, so that it begins as soon as that has ended.
 
 Only where the heap has room for it, which is decided when the sequence begins; else the next motion is opened and
-loaded between the two. Not among the compiled files that ``armtempo deploy`` makes: beside them there is no room for
+loaded between the two. Not among the compiled files that ``armtempo deploy`` makes: next to them there is no room for
 sequences.
 """
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _OP, _NUMBER = const(0), const(1)  # of a row
 _NONE = const(-1)
 _BESIDE_BYTES = const(16_500)
-"""Of heap: 5 700 for what else the motions need, the rest for what is left behind between two collections."""
+"""Of heap: 5 700 for what else the motions need, the rest for what piles up between two collections."""
 
 
 class AheadSequencer(Sequencer):
@@ -62,7 +62,7 @@ class AheadSequencer(Sequencer):
             self._prepared = None
 
     def prepare(self) -> None:
-        """Called while a motion moves: go on with the next one, as far as there is time."""
+        """Called while a motion moves: continue with the next one, as far as there is time."""
         self._replan_if_rate_changed()
         if self._work and self._prepared and not self.stopping and self._prepared.has_time():
             self._do_slice()

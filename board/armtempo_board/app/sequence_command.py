@@ -31,7 +31,7 @@ ENDING, CODE, STEP, ROW, CYCLE, PASSED, RUN, VALUE = (
 
 
 class SequenceCommand:
-    """``told``: how the sequence stands or ended; ``name``: which it is; ``counters``: their names."""
+    """``told``: state of the sequence, or how it ended; ``name``: which it is; ``counters``: their names."""
 
     def __init__(self, told: "array[int]", name: bytes, counters: "list[bytes]") -> None:
         from armtempo_shared.table import rows  # here, so that it can be forgotten
@@ -60,7 +60,7 @@ class SequenceCommand:
         return self._counts[number]
 
     def sequence(self, commands: "Any", row: tuple, length: int) -> int:
-        """How it stands: bytes of the answer."""
+        """Its state: bytes of the answer."""
         told = self._told
         reply = commands.link.reply
         pack_into(
@@ -69,7 +69,7 @@ class SequenceCommand:
         return self._named(reply, row, self._name)
 
     def counter(self, commands: "Any", row: tuple, length: int) -> int:
-        """What a counter stands at: bytes of the answer."""
+        """The value of a counter: bytes of the answer."""
         index = commands.link.reader.data[PAYLOAD_AT]
         count = len(self._counts)
         is_one = index < count

@@ -90,7 +90,7 @@ def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[_Ends]
         if op == sequence.MOVE:
             if last == _NONE:
                 for joint, away in enumerate(ends[number].away):
-                    if away:  # the arm stands elsewhere
+                    if away:  # the arm is elsewhere
                         raise Refused(codes.WRONG_START, joint, away)
             else:
                 ends[number].check_follows(ends[last], step)

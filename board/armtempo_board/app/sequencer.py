@@ -54,7 +54,7 @@ _MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take 
 
 
 class Place:
-    """A place in the rows: ``next`` is the row that comes, behind repeats that have begun."""
+    """A place in the rows: ``next`` is the row that comes, after repeats that have begun."""
 
     def __init__(self) -> None:
         self.next = 0
@@ -71,7 +71,7 @@ class Place:
             self._left[depth] = other._left[depth]
 
     def go_on(self, row: "tuple[int, ...]") -> None:
-        """Behind the row that came."""
+        """After the row that came."""
         self.next += 1
         op = row[_OP]
         if op == sequence.REPEAT:
@@ -89,14 +89,14 @@ class Place:
 
 
 class Sequencer:
-    """``told`` says how it stands, also after its end; its places are in ``sequence_command``."""
+    """``told`` is its state, also after its end; its places are in ``sequence_command``."""
 
     def __init__(self, controller: "Runner", record: "SequenceFile", name: bytes, rate: int) -> None:
         self._controller = controller
         self._record = record
         self._rate = rate  # of the motions' own time, in thousandths
         self._row: "tuple[int, ...]" = (0, 0, 0, 0, 0)  # the one under way
-        self._place = Place()  # behind it
+        self._place = Place()  # after it
         self._checked = 0  # motions whose splines were checked in this run
         self.told = array("i", [sequence.RUNNING] + [0] * VALUE)
         self.stopping = False
@@ -106,7 +106,7 @@ class Sequencer:
         self.tell = self._command.tell
 
     def begin(self) -> None:
-        """From the next turn on; Refused where the heap has no room for a motion beside this."""
+        """From the next turn on; Refused where the heap has no room for a motion as well."""
         controller = self._controller
         controller.tidy()
         free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES

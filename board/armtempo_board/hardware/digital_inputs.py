@@ -22,7 +22,7 @@ class DigitalInputs:
 
     def __init__(self, pins: "list[Pin]", numbers: "array[int]") -> None:
         self.levels = 0
-        """Bit an input: it is active."""
+        """One bit per input: it is active."""
         self.count = len(pins)
         self._pins = pins
         self._numbers = numbers

@@ -37,13 +37,13 @@ class EncoderInput:
         self.counts += -moved if self._inverted else moved
 
     def declare(self, counts: int) -> None:
-        """The encoder stands at ``counts``."""
+        """The encoder is at ``counts``."""
         self.update()
         self.counts = counts
 
 
 class NoEncoder:
-    """A joint without one: stands at 0."""
+    """A joint without one: always 0."""
 
     counts = 0
 

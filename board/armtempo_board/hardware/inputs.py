@@ -173,7 +173,7 @@ class Inputs:
 
     def _joint_towards(self, line: int) -> int:
         """The first joint that moves towards a switch."""
-        levels = isr.output_levels(self._port)  # DIR is not turned behind a freeze
+        levels = isr.output_levels(self._port)  # DIR is not turned after a freeze
         for pair_line, bit, level, joint in self._towards:
             if pair_line == line and (levels & bit != 0) == level:
                 return joint

@@ -52,7 +52,7 @@ RAW_IN = const(4)  # raw samples taken
 RAW_OUT = const(5)  # raw samples converted
 RAW_LOST = const(6)  # raw samples that found no room
 NOW = const(7)  # counter when the interrupt came
-FROZEN = const(8)  # outputs are frozen; here stands why, bits as in LINE_MASK
+FROZEN = const(8)  # outputs are frozen; why, as bits as in LINE_MASK
 FAULT = const(9)
 FAULT_JOINT = const(10)
 HIGH_A = const(11)  # port A when frozen: a STEP pin that was high finishes its pulse;
@@ -67,7 +67,7 @@ TIM2_AT = const(19)  # its address: the low 30 bits, and in the next word the re
 PORT_A_BEHIND = const(21)  # bytes from TIM2 to port A
 BLOCK_HEAD = const(22)
 ALWAYS = const(1 << 16)  # in LINE_LEVELS and LINE_MASK, where no pin is: whatever DIR says
-# words of a joint in the block, behind the head
+# words of a joint in the block, after the head
 DIR_BIT = const(0)  # in the DIR port
 TURNS_IN = const(1)  # turns of DIR that were queued,
 TURNS_OUT = const(2)  # and made
@@ -80,7 +80,7 @@ TURN_TIMES = const(8)  # when the queued turns are due
 TURN_ROOM = const(8)  # this many
 RING = const(16)  # the state of its ring
 JOINT_WORDS = const(29)
-# words of a line behind six joints: of an external interrupt, 8 to 15, or of the program itself
+# words of a line after six joints: of an external interrupt, 8 to 15, or of the program itself
 FIRST_LINE = const(196)
 SOFTWARE_LINE = const(7)
 LINE_LEVELS = const(0)  # DIR pins that freeze where they are low,
@@ -91,10 +91,10 @@ LINE_WORDS = const(4)
 BLOCK_WORDS = const(232)
 # words of a ring's state
 WRITTEN = const(0)  # entries written since the stream was started
-MATCHED = const(1)  # words that the stream has handed on since; so many matches have been
+MATCHED = const(1)  # words that the stream has handed on since; as many matches have been
 NDTR_AT_START = const(2)  # NDTR right after the start
 LAST_TIME = const(3)  # time of the last entry written
-FAR_TIME = const(4)  # of the entry behind it, half a round of the counter away
+FAR_TIME = const(4)  # of the entry after it, half a round of the counter away
 MASK = const(5)  # entries of the ring, a power of two, less 1
 NDTR_AT = const(6)  # word offset of its stream's NDTR in DMA1
 FED = const(7)  # the interrupt writes to the ring; it stops that when the ring has run out of entries
@@ -114,12 +114,12 @@ RAW_ROOM = const(4)  # raw samples: 0.4 s; the main loop comes every few millise
 _SAMPLE_TICKS = const(8400000)
 
 _FIRST_ENTRY = const(0)
-_HERE = const(0)  # the word at which a pointer stands
+_HERE = const(0)  # the word that a pointer points to
 _LEAST_AHEAD_TICKS = const(84)  # 1 us: a compare value nearer than that may be missed
 _CALL_TICKS = const(336)  # 4 us
 _LOW_BITS = const(0x3FFFFFFF)
 SPARE_ENTRIES = const(8)  # of a ring, that are not overwritten: those matched last, and the far-away entry
-_GUARD_TICKS = const(32768)  # 390 us: entries are only added behind a rising edge that is further away,
+_GUARD_TICKS = const(32768)  # 390 us: entries are only added after a rising edge that is further away,
 _FAR_AHEAD_TICKS = const(3145728)  # but not 37 ms away,
 _MOST_ENTRIES = const(512)  # and at most this many, which takes less than the 390 us
 # modes of an output (RM0090 18.4.7), by what is subtracted from all three bits set
@@ -127,8 +127,8 @@ _MODE_BITS = const(7)
 _TO_TOGGLE = const(4)  # 3: toggle on match
 _TO_FORCED_LOW = const(3)  # 4: forced inactive
 # what the freeze reaches by constant distances (RM0090 2.3), in words
-_TIM5 = const(768)  # behind TIM2
-_PORT_B = const(256)  # behind port A
+_TIM5 = const(768)  # after TIM2
+_PORT_B = const(256)  # after port A
 _PORT_E = const(1024)
 _CCMR2 = const(7)
 _LINE_0 = const(168)  # FIRST_LINE - SOFTWARE_LINE * LINE_WORDS
@@ -158,7 +158,7 @@ def counters_agree(timer2: ptr32, timer5: ptr32) -> int:
 
 @micropython.viper
 def word_kiticks(words: ptr32, at: int) -> int:
-    """A counter value that stands in an array, in Ki ticks, 22 bits."""
+    """A counter value in an array, in Ki ticks, 22 bits."""
     return (words[at] >> 10) & 0x3FFFFF
 
 
@@ -280,7 +280,7 @@ def push_away(timer: ptr32, compare: int, state: ptr32) -> object:
 
 @micropython.viper
 def add_turn(block: ptr32, state: ptr32, at: int, delay: int) -> int:
-    """Queue a turn of DIR, ``delay`` ticks behind the last entry; 0 when the queue is full."""
+    """Queue a turn of DIR, ``delay`` ticks after the last entry; 0 when the queue is full."""
     block = ptr32(int(block) + 4 * at)
     queued = block[TURNS_IN]
     if ((queued - block[TURNS_OUT]) & 0xFF) >= TURN_ROOM:
@@ -389,12 +389,12 @@ def take_sample(raw: ptr32, block: ptr32, dma: ptr32, encoders: object) -> objec
 def freezer(shared: "array[int]") -> "Callable[[int], object]":
     """What stops all STEP outputs: the callback of E-stop and limit switches. ``shared``: the block.
 
-    Looking up a name takes 110 to 150 instructions of an interrupt, so nothing is looked up: all that it needs stands
+    Looking up a name takes 110 to 150 instructions of an interrupt, so nothing is looked up: all that it needs is
     in the block. It takes the same time whatever the joints do (docs/hardware.md).
 
     The counters stand meanwhile: no edge comes, and what it reads belongs together. DMA has long brought each compare
     register its next edge when its requests are switched off. Pins that are low are held low. One that is high has its
-    falling edge in its compare register, which comes when the counters go on.
+    falling edge in its compare register, which comes when the counters continue.
     """
     address = uctypes.addressof(shared)
 

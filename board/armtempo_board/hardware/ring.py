@@ -1,7 +1,7 @@
 """One STEP output: its pin, its ring of edge times and the DMA stream that feeds its compare register.
 
 The stream fetches one word ahead of the match that asks for it (RM0090 10.3.12). So the entry in the compare register
-and the one behind it can no longer be changed. Therefore new entries are added while the last rising edge is still well
+and the one after it can no longer be changed. Therefore new entries are added while the last rising edge is still well
 ahead (see ``isr.rings_to_refill``), and a ring that has run out of entries is started anew.
 """
 

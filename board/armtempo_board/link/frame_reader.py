@@ -22,20 +22,20 @@ _FIRST = const(0)
 
 
 class FrameReader:
-    """``poll`` until it says True; then the frame stands in ``data``."""
+    """``poll`` until it says True; then the frame is in ``data``."""
 
     def __init__(self) -> None:
         self.data = bytearray(MAX_PAYLOAD + OVERHEAD)
         self.bad = 0  # runs of bytes that were passed over
         self.outside = -1  # last byte that came outside of any frame; -1: none in this poll
         self._filled = 0
-        self._whole = 0  # length of the whole frame that stands in data, 0: none
+        self._whole = 0  # length of the whole frame in data, 0: none
         self._skipping = False
         self._piece = bytearray(_PIECE)
         self._heard_ms = 0
 
     def length(self) -> int:
-        """Payload bytes of the frame that stands in ``data``."""
+        """Payload bytes of the frame in ``data``."""
         return self._whole - OVERHEAD
 
     def empty(self) -> bool:
@@ -43,7 +43,7 @@ class FrameReader:
         return self._filled == 0
 
     def poll(self, stream: "Any", now_ms: "Any") -> bool:
-        """Whether a whole frame with the right check stands in ``data``, until the next poll."""
+        """Whether a whole frame with the right check is in ``data``, until the next poll."""
         self.outside = -1
         if self._whole:
             self._drop(self._whole)
@@ -105,7 +105,7 @@ class FrameReader:
             self.bad += 1
 
     def _reject(self) -> None:
-        """What begins at data[0] is no frame: go on at the next SYNC behind it."""
+        """What begins at data[0] is no frame: continue at the next SYNC after it."""
         self._skip()
         at = 1
         while at < self._filled and self.data[at] != SYNC:

@@ -42,7 +42,7 @@ class SerialLink:
         self._prompt = PromptRequest()
 
     def poll(self) -> bool:
-        """Whether a command that has not been acted on stands in ``reader.data``."""
+        """Whether a command that has not been acted on is in ``reader.data``."""
         now_ms = time.ticks_ms()
         reader = self.reader
         if not reader.poll(self.stream, now_ms):
@@ -57,7 +57,7 @@ class SerialLink:
         return not self._reply_waits  # an answer still waits for room: the host repeats its command
 
     def answer(self, number: int, size: int) -> None:
-        """Send the reply whose payload of ``size`` bytes stands in ``reply``."""
+        """Send the reply whose payload of ``size`` bytes is in ``reply``."""
         self._reply_size = 0  # should this fail, the host's repeat is acted on
         self._remember()
         sequence = self.reader.data[SEQUENCE_AT]

@@ -1,4 +1,4 @@
-"""The motion clock: TIM2 in 64 bits. TIM5, which counts the other rings' edges, starts, stands and stops with it."""
+"""The motion clock: TIM2 in 64 bits. TIM5, which counts the other rings' edges, starts and stops with it."""
 
 import time
 

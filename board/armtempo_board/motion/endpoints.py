@@ -29,7 +29,7 @@ def duration_ticks(motion: "MotionHead") -> int:
 
 
 def start_offset(motion: "MotionHead", joint: int, position_steps: int) -> int:
-    """0 where the joint stands at the motion's start, else how many steps the start is away (not 0).
+    """0 if the joint is at the motion's start, else how many steps the start is away (not 0).
 
     Within half a step and 1/64 counts as standing there: the step generator takes it from that.
     """

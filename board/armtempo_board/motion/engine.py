@@ -46,7 +46,7 @@ _PERMILLE = const(1000)
 _KITICKS_PER_32_MS = const(2625)
 _MOST_KITICKS = const(5_000_000)  # a minute
 _ALL_JOINTS = const(0xFF)
-# work beside the filling of queues: one of these in each call of ``service``
+# work besides the filling of queues: one of these in each call of ``service``
 _POLL_SWITCHES = const(0)
 _CHECK_FOLLOWING = const(1)
 _CHECK_INTERRUPT = const(2)
@@ -297,8 +297,8 @@ class Engine:
     def brake(self) -> None:
         """Come to rest along the path; freeze where the motion's record has no time for it, or at rest in a pause.
 
-        Over that time acceleration and jerk stay within 1.25 times the arm's limits. Braking begins behind what is
-        in the rings, about 75 ms from now; where the rate is changing, behind that. A motion that ends by itself before
+        Over that time acceleration and jerk stay within 1.25 times the arm's limits. Braking begins after what is
+        in the rings, about 75 ms from now; where the rate is changing, after that. A motion that ends by itself before
         it would have come to rest does that.
         """
         rates = self.rates
@@ -330,7 +330,7 @@ class Engine:
     if features.SPEED:
 
         def change_rate(self, rate: int) -> None:
-            """Let the motion's own time go on at another rate, in thousandths; 0: pause, RESUME: as before it.
+            """Let the motion's own time continue at another rate, in thousandths; 0: pause, RESUME: as before it.
 
             Each change takes as long as the record says, with acceleration and jerk as in ``brake``. It begins as
             braking does; one that comes while the rate is changing waits until that has ended, and only the last
@@ -342,7 +342,7 @@ class Engine:
             self._change_rate()
 
     def _change_rate(self) -> None:
-        """Begin the ramp to the rate that is wanted, or wait until the last one lies behind."""
+        """Begin the ramp to the rate that is wanted, or wait until the last one has ended."""
         rates = self.rates
         if not rates.is_due():
             return

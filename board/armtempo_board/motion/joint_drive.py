@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from armtempo_shared.motion import MotionHead
 
 LOOKAHEAD_KITICKS = const(4096)
-"""How far ahead steps are computed: 50 ms. A change of rate begins behind what is computed."""
+"""How far ahead steps are computed: 50 ms. A change of rate begins after what is computed."""
 
-_GUARD_KITICKS = const(16)  # 195 us: a turn of DIR is queued only behind an edge that is further away
+_GUARD_KITICKS = const(16)  # 195 us: a turn of DIR is queued only after an edge that is further away
 _OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings comes no more
 _REFILL_KITICKS = const(512)  # at most 6 ms between two looks at a queue that is full or long enough
 _NEVER_KITICKS = const(1 << 29)
@@ -83,7 +83,7 @@ class JointDrive:
         self._turns_in = self._turns_out = 0
 
     def load(self, motion: "MotionHead", number: int) -> None:
-        """Stand before a motion; the clock stands before 0."""
+        """Prepare for a motion; the clock is before 0."""
         self.generator.load(motion, number, self._base, self._sampler.block[isr.PULSE_TICKS], self.gap_ticks)
         self.stand()
 
@@ -141,7 +141,7 @@ class JointDrive:
         return codes.INTERNAL if ahead_kiticks < _OVERDUE_KITICKS else 0
 
     def _turn(self) -> bool:
-        """Queue the turn of DIR that the generator stands at; False while the queue is full."""
+        """Queue the turn of DIR that the generator is at; False while the queue is full."""
         if self._turns_in - self._turns_out >= _TURNS:
             return False
         if not isr.add_turn(self._sampler.block, self.ring.state, self._words_at, self._turn_delay):
@@ -198,7 +198,7 @@ class JointDrive:
     def settle(self) -> None:
         """The outputs were frozen: count the last step.
 
-        A rising edge behind which DMA was too late is not in the ring's count, but the pin was high.
+        A rising edge after which DMA was too late is not in the ring's count, but the pin was high.
         """
         block, at = self._sampler.block, self._words_at
         port = block[isr.HIGH_B] if block[at + isr.ON_PORT_B] else block[isr.HIGH_A]
@@ -215,5 +215,5 @@ class JointDrive:
         self.ring.stop()
 
     def declare(self, steps: int) -> None:
-        """The joint stands at ``steps``; nothing moves."""
+        """The joint is at ``steps``; nothing moves."""
         self._base = steps

@@ -137,7 +137,7 @@ class NextMotion:
         return max(_LEAD_TICKS, max([joint.gap_ticks for joint in self._engine.drives]))
 
     def hand_over(self, number: int, joint: "JointDrive") -> None:
-        """Give a joint the generator that stands before the motion, for the one that it had; nothing moves."""
+        """Give a joint the generator that is ready for the motion, instead of the one that it had; nothing moves."""
         generator = self._generators[number]
         self._generators[number] = joint.generator
         self._put(number, joint, generator)

@@ -23,7 +23,7 @@ _PERMILLE = const(1000)
 class RateControl:
     """``wanted``: the rate, in thousandths. ``override``: the law of time (stepgen/override.py) of a motion.
 
-    ``duration_ticks``: when the motion ends, as things stand. ``waits``: a change is wanted that has not begun.
+    ``duration_ticks``: when the motion ends unless the rate changes. ``waits``: a change is wanted that has not begun.
     ``end_moves``: the last sample is to be taken at another time than planned. ``braked``: it is to come to rest.
     """
 
@@ -36,7 +36,7 @@ class RateControl:
         self.braked = self.end_moves = self.waits = False
 
     def begin(self, override: "Any", motion: "MotionHead") -> None:
-        """Of a motion that is loaded; ``override`` stands at its time 0."""
+        """Of a motion that is loaded; ``override`` is at its time 0."""
         self.override = override
         self.wanted = self._before_pause = override.rate
         self.duration_ticks = override.end_ticks()
@@ -45,7 +45,7 @@ class RateControl:
         self.braked = self.end_moves = self.waits = False
 
     def brake(self) -> bool:
-        """Want rest; False where there is no way to it, or it stands in a pause and needs none."""
+        """Want rest; False where there is no way to it, or it is paused and needs none."""
         if not self._can_brake or (self.stands() and self._is_steady()):
             return False
         self.braked = True
@@ -56,7 +56,7 @@ class RateControl:
         return True
 
     def stands(self) -> bool:
-        """Whether its own time stands still behind the ramp that began last."""
+        """Whether its own time stands still after the ramp that began last."""
         return bool(self.override.rate == 0)
 
     if features.SPEED:
@@ -75,7 +75,7 @@ class RateControl:
             self._before_pause = rate or self._before_pause
 
     def is_due(self) -> bool:
-        """Whether the change that is wanted can begin; else it waits until the one before lies behind."""
+        """Whether the change that is wanted can begin; else it waits until the one before has ended."""
         self.waits = self.override.rate != self.wanted
         return self.waits and self._is_steady()
 
@@ -83,7 +83,7 @@ class RateControl:
         return bool(self._clock.kiticks() > self.override.steady_kiticks)
 
     def ramp(self, ahead_kiticks: int) -> "array[int] | None":
-        """Begin the change, behind what is in the rings: the law that all joints are to follow; None: it ends before.
+        """Begin the change, after what is in the rings: the law that all joints are to follow; None: it ends before.
 
         ``ahead_kiticks``: how far ahead steps are in them. Where it would come to rest later than it ends by itself,
         it does that.

@@ -50,9 +50,9 @@ def from_control_points(data: ptr32, offset: int, weights: ptr8, piece: ptr32) -
     """Bezier points of the segment whose control points (int64, little endian) begin at word ``offset`` of the record.
 
     Rounded to the nearest unit. The high words of the control points may differ by 2**24 (16 million steps; 818 s).
-    The twelve words behind the piece are overwritten.
+    The twelve words after the piece are overwritten.
     """
-    # Split the control points into high and low words, behind the piece
+    # Split the control points into high and low words, after the piece
     points = ptr32(int(piece) + 4 * WORDS)
     point = points
     i = int(weights[_COUNT])

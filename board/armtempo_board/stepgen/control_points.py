@@ -43,7 +43,7 @@ class ControlPoints:
         self._degree = 0
 
     def open(self, stream: "Any", degree: int) -> None:
-        """Stand before the first segment; ``stream`` is read from where it stands, and closed by ``close``."""
+        """Begin before the first segment; ``stream`` is read from its position, and closed by ``close``."""
         self.close()
         self._stream = stream
         self._end = 0  # points read so far

@@ -120,7 +120,7 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
 
 @micropython.viper
 def queue_steps(solver: object, queue: object, law: object) -> int:
-    """Queue the subinterval's steps behind REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
+    """Queue the subinterval's steps after REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
 
     _NODES are solved at most, or a few more; each takes about 2000 instructions. A last step that is
     slow is not put in, but HELD_BACK is set. HALTED is set where by the law the next step never comes. Returns one of

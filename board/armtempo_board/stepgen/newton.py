@@ -1,6 +1,6 @@
 """Newton's method: where a monotone subinterval passes its half steps, and the slope of time over angle there.
 
-All that belongs to a subinterval stands in one array, array('i'), the solver: the polynomials of angle and time, the
+All that belongs to a subinterval is in one array, array('i'), the solver: the polynomials of angle and time, the
 words named here, and nodes. A node is one of its steps, solved: its time, and the ticks per step at it.
 """
 
@@ -47,7 +47,7 @@ SOLVER_SIZE = const(49)
 NODE_TIME = const(0)
 NODE_MANTISSA = const(1)  # ticks per step = mantissa / 2**exponent; the mantissa has 29 or 30 bits
 NODE_EXPONENT = const(2)
-NODE_DELAY = const(3)  # by the law of real time: whole ticks of it beside the time,
+NODE_DELAY = const(3)  # by the law of real time: whole ticks of it next to the time,
 NODE_RATE = const(4)  # and the rate of the motion's time
 _NODE_WORDS = const(5)
 
@@ -125,7 +125,7 @@ def set_interval(solver: ptr32, angle: ptr32, angle_measures: ptr32, time_measur
 @micropython.viper
 def solve(solver: ptr32, high: int, length: int) -> object:
     """Set FIRST_NODE to the subinterval's step ``high``, or, with a ``length``, MIDDLE_NODE and END_NODE to those
-    ``length`` and twice ``length`` behind it.
+    ``length`` and twice ``length`` after it.
 
     Each Newton step leaves at most the square of the relative error; the last one starts below 2**-14, from a
     residual that was evaluated, so errors do not add up from one step to the next. Products

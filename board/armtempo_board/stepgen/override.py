@@ -34,7 +34,7 @@ _MOST_PARTS = const(8190)  # of a motion's time, to look up its ramps
 
 
 class Override:
-    """``law`` is what the joints follow; ``rate`` that behind its ramp, steady from ``steady_kiticks`` on."""
+    """``law`` is what the joints follow; ``rate`` that after its ramp, steady from ``steady_kiticks`` on."""
 
     def __init__(self) -> None:
         self.law = array("i", bytes(4 * time_law.LAW_WORDS))
@@ -57,7 +57,7 @@ class Override:
         self.steady_kiticks = -1 << 20
 
     def ramp_end_ticks(self, from_ticks: int, rate: int) -> int:
-        """Real time at which a ramp to another rate would end that begins at a real time, behind the last ramp."""
+        """Real time at which a ramp to another rate would end that begins at a real time, after the last ramp."""
         thousands = self._thousands(from_ticks)
         return (
             self._real_ticks
@@ -83,7 +83,7 @@ class Override:
         return min(-(-(units << _UNIT_BITS) // grid), time_law.LONGEST_RAMP_TICKS // grid) * grid
 
     def ramp(self, from_ticks: int, rate: int) -> None:
-        """Go to another rate, from a real time on that lies behind the last ramp."""
+        """Go to another rate, from a real time on that is after the last ramp."""
         thousands = self._thousands(from_ticks)
         self._real_ticks += PERMILLE * thousands
         self._motion_ticks += self.rate * thousands
@@ -162,7 +162,7 @@ class JointLaw:
         return real
 
     def is_past(self, high: int) -> bool:
-        """Whether a time of the motion lies behind a ramp's end, at which it stands still."""
+        """Whether a time of the motion is after a ramp's end, at which it stands still."""
         return not self._words[AFTER] and high > self._words[END_HIGH]
 
 

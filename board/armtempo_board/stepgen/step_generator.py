@@ -162,7 +162,7 @@ class StepGenerator:
         self._found = _NOT_YET
 
     def seek(self) -> bool:
-        """Go on from the start towards the first step, for a limited time; False where it waits, or there is none."""
+        """Continue from the start towards the first step, for a limited time; False if it waits, or there is none."""
         if self.ended or self.waits():
             return False
         if self.at_turn:
@@ -180,7 +180,7 @@ class StepGenerator:
     def prepare(self, until_kiticks: int) -> bool:
         """Put the next steps into the queue, unless it is full or continues beyond a time already.
 
-        What comes after that time is not written to the ring, and waits. True where it could go on: each call takes a
+        What comes after that time is not written to the ring, and waits. True if it could continue: each call takes a
         limited time. At a turn it ends.
         """
         queue = self.queue
@@ -231,8 +231,8 @@ class StepGenerator:
 
         Nothing may be written meanwhile. That time must not lie before any ``until_kiticks`` that ``prepare`` was
         given. Only what was put into the queue last lies beyond that: steps of one subinterval, or one that was held
-        back. The ramp of the law before must lie behind what was written. ``is_last``: where the motion's time stands
-        still behind the ramp, it is the end.
+        back. The ramp of the law before must be after what was written. ``is_last``: where the motion's time stands
+        still after the ramp, it is the end.
         """
         queue = self.queue
         high = self._high()
@@ -252,7 +252,7 @@ class StepGenerator:
         if reached < 0:
             reached = 0
             self._pending = _FIRST
-            self._first_direction = self.direction  # it was in the queue, or is LAST behind what was
+            self._first_direction = self.direction  # it was in the queue, or is LAST after what was
         queue[_REACHED] = reached
         # what was written last may have followed the law before, so no cubic begins there
         queue[_SINGLE_STEPS] = max(queue[_SINGLE_STEPS], 1)

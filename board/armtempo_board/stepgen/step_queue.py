@@ -19,11 +19,9 @@ POWER = const(4)
 SHIFT = const(5)
 _BASE = const(6)  # ticks, modulo 2**32
 _REMAINDER = const(7)  # what the steps of a group have left over of its time, as FIRST
-_LEFT = const(
-    8
-)  # steps left in the group that ``emit`` is in; single steps: where the next one's time stands
+_LEFT = const(8)  # steps left in the group that ``emit`` is in; single steps: where the next one's time is
 # log2 of the steps in a group, + 1, and SQUARE more where these steps' lengths change evenly; else they are all the
-# same. 0: single steps, whose times stand in words 0 to 7
+# same. 0: single steps, whose times are in words 0 to 7
 GROUP = const(9)
 _BASE_KITICKS = const(10)
 STEPS = const(11)  # steps not written yet
@@ -103,7 +101,7 @@ def emit(now: int, ring: ptr32, timer: ptr32) -> int:
     more. The compiler keeps the first two arguments in registers: ``now`` becomes the running time, and ``ring`` moves.
 
     The program itself puts entry 0 of a ring into the compare register. So the stream begins with entry 1 and continues
-    to one word behind the ring: entry 0 is repeated there. Behind the last entry stands one that is far away.
+    to one word after the ring: entry 0 is repeated there. After the last entry is one that is far away.
     """
     wanted = now
     state = ring
@@ -313,7 +311,7 @@ def put_single(queue: ptr32, high: int, ticks: int) -> object:
 
 @micropython.viper
 def has_room(queue: ptr32, until_kiticks: int) -> int:
-    """1 where the queue has room for two items and does not go on beyond a time, the new UNTIL_KITICKS; else 0."""
+    """1 where the queue has room for two items and does not continue beyond a time, the new UNTIL_KITICKS; else 0."""
     queue[UNTIL_KITICKS] = until_kiticks
     if (queue[IN] - queue[OUT]) & _COUNT_MASK >= _FULL:
         return 0

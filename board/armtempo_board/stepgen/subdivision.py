@@ -32,17 +32,17 @@ DIFFERENCE_BIAS = 1 << 29
 
 # words of an array of pieces
 PLACE_WORDS = const(13)
-_PLACE_NODE = const(12)  # behind the piece
+_PLACE_NODE = const(12)  # after the piece
 ROOT = const(65)
 PIECES_SIZE = const(78)
 
 # moves
 STAY = const(0)
-SKIP = const(1)  # go on behind the subinterval, with one twice as long where the grid allows it
-SPLIT = const(2)  # go on with its first half
+SKIP = const(1)  # continue after the subinterval, with one twice as long where the grid allows it
+SPLIT = const(2)  # continue with its first half
 
 # results of a search
-NOT_YET = const(0)  # no step so far: go on
+NOT_YET = const(0)  # no step so far: continue
 MONOTONE = const(1)  # steps in it, all in one direction
 AT_START = const(2)  # steps, all of them at its start
 END = const(3)
@@ -101,7 +101,7 @@ def search(
         work -= 2
         # The next subinterval in the tree, and the nearest one above it whose piece is kept
         halvings = move >> 1  # from that piece down to the subinterval
-        source = 0  # where the piece stands, in bytes
+        source = 0  # where the piece is, in bytes
         if halvings:  # split: it is the one that was looked at
             node <<= 1
             level += 1
@@ -214,7 +214,7 @@ def search(
                 low = _BIAS
                 high = 0 - _BIAS
                 i = 6
-                while i:  # from the last point on, where the pointer stands
+                while i:  # from the last point on, where the pointer is
                     i -= 1
                     point = ptr32(int(point) - 4)
                     span = ((point[_HIGH] - least) << scale) + (point[_LOW] >> bits)

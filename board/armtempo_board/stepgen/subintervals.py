@@ -109,5 +109,5 @@ class Subintervals:
         return found
 
     def go_on(self, move: int) -> None:
-        """With its first half (subdivision.SPLIT), or behind it (SKIP)."""
+        """With its first half (subdivision.SPLIT), or after it (SKIP)."""
         self.time_measures[subdivision.MOVE] = move

@@ -4,7 +4,7 @@ The rate is constant but for ramps: over a length L of real time it goes from on
 15 x**4 + 6 x**5, x = (real time - start) / L. Braking is a ramp to 0. Counted by r from that end of the ramp at which
 the rate is least, the rate is b + h S(r), and the motion's time from there on is b r + h e(r) of L, with the convex
 e(r) = r**4 (2.5 - 3 r + r**2). This law moves the nodes, time and slope; all steps between them follow. Rates
-are in thousandths and times at the ends of a ramp in whole ticks, so beside the ramps real time is exact, however
+are in thousandths and times at the ends of a ramp in whole ticks, so outside the ramps real time is exact, however
 long the motion is. Fractions here have 30 bits.
 """
 
@@ -74,7 +74,7 @@ _MOST_ROUNDS = const(60)
 
 
 def set_times(law: "array[int]", at: int, ticks: int) -> None:
-    """Put a time into the words ``at`` and behind it."""
+    """Put a time into the words ``at`` and after it."""
     law[at] = (ticks >> 12) + _BIAS
     law[at + 1] = ticks & 4095
 

@@ -135,7 +135,7 @@ class Store:
         return self._received
 
     def commit(self, crc: int) -> str:
-        """Check the upload as it stands in the flash and put it in place; returns the record's name.
+        """Check the upload in the flash and put it in place; returns the record's name.
 
         An arm record is not put in place before it is judged: see ``take_arm``.
         """
@@ -252,7 +252,7 @@ class Store:
         self._write_default(name)
 
     def _crc(self, name: str) -> str:
-        """A motion's checksum as it stands in its last bytes, behind a blank."""
+        """A motion's checksum as its last bytes have it, after a blank."""
         size = self._size_of(_motion_file(name))
         _, crc = self.part(name, max(0, size - 4), 4)
         return " " + hexlify(crc).decode()

@@ -11,12 +11,12 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
 from armtempo.formats import number_table, toml_table
 from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
-from armtempo.model import via_table
+from armtempo.model import mesh_files, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.via_table import ImportedPath
-from armtempo.new_arm import arm_text
+from armtempo.new_arm import arm_text, urdf_meshes
 from armtempo.new_arm import urdf_fitting as fitting
 from armtempo.new_arm import urdf_reader as reader
 
@@ -153,9 +153,12 @@ def export(
     metavar="LINK",
     help="Link whose frame is the tool's; default: the parent of the fingers, or the end.",
 )
-@click.option("--force", is_flag=True, help="Replace FILE if it exists.")
+@click.option("--meshes", is_flag=True, help="Write the links' shapes too, which 'armtempo panel' shows.")
+@click.option("--force", is_flag=True, help="Replace FILE if it exists, and the meshes next to it.")
 @options.as_json
-def import_urdf(urdf: Path, out: Path, base: str | None, tip: str | None, force: bool, as_json: bool) -> None:
+def import_urdf(
+    urdf: Path, out: Path, base: str | None, tip: str | None, meshes: bool, force: bool, as_json: bool
+) -> None:
     """Make an arm file from a URDF's chain of revolute joints: Denavit-Hartenberg rows and ranges.
 
     URDF: the robot's description, a .urdf or .xacro file.
@@ -165,15 +168,21 @@ def import_urdf(urdf: Path, out: Path, base: str | None, tip: str | None, force:
     """
     if out.exists() and not force:
         raise InputError(f"{out}: already exists", "choose another name, or --force to replace it")
+    if meshes and mesh_files.folder_of(out).exists() and not force:
+        raise InputError(
+            f"{mesh_files.folder_of(out)}: already exists", "remove it, or --force to replace its meshes"
+        )
     if out.exists() and urdf.exists() and out.samefile(urdf):
         raise InputError(f"{out}: is the URDF itself", "choose another name")
     chain = reader.read(urdf, base, tip)
     fit = fitting.fit(chain)
     text = arm_text.arm_text(chain, fit, urdf.name)
     Arm.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
+    written = urdf_meshes.write(chain, fit, urdf, out) if meshes else []
     replace_text(out, text)
     values = {
         "file": str(out),
+        "meshes": [str(file) for file in written],
         "robot": chain.robot,
         "base": chain.base,
         "tip": chain.tip,
@@ -187,6 +196,8 @@ def import_urdf(urdf: Path, out: Path, base: str | None, tip: str | None, force:
         f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees",
         f"wrote {out}; now put its motors in, then: armtempo check --arm {out}",
     ]
+    if meshes:
+        lines.append(f"wrote {len(written)} meshes into {mesh_files.folder_of(out)}")
     if len(chain.joints) > MAX_JOINTS:
         lines.append(
             f"the board drives {MAX_JOINTS} joints, this chain has {len(chain.joints)}: lock some of them by "

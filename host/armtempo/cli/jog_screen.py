@@ -26,7 +26,7 @@ SPEEDS = (1, 5, 10, 25, 50, 75, 100)
 FIRST_REPEAT_S = 0.8
 """A key that is held down repeats after less than this in any usual terminal."""
 RELEASE_S = 0.3
-"""A key that has not repeated for so long was released."""
+"""A key that has not repeated for this long was released."""
 _POLL_S = 0.03
 _IDLE_S = 0.5
 _FORWARD, _BACKWARD = ("+", "=", "right", "up"), ("-", "_", "left", "down")

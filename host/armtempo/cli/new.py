@@ -107,7 +107,7 @@ def draft_path(folder: Path) -> Path:
 
 
 def hold(folder: Path, resume: bool) -> Answers:
-    """Ask until all is answered. KeyboardInterrupt says how to go on, where answers were kept."""
+    """Ask until all is answered. KeyboardInterrupt says how to continue, if answers were kept."""
     draft = draft_path(folder)
     answers = _kept(draft) if resume else {}
     click.echo("'?' explains a question, '<' goes back to the previous one; Ctrl-C keeps the answers.")

@@ -84,7 +84,7 @@ def _sequence(stand: SequenceStand) -> str:
 
 
 def counted(counters: Mapping[str, int]) -> str:
-    """What counters stand at, to go on with; "" without any."""
+    """Values of counters, as the end of a line; "" without any."""
     return "".join(f"; {name} {value}" for name, value in counters.items())
 
 

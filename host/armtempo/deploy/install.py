@@ -194,7 +194,7 @@ def _write(remote: Remote, files: Mapping[str, bytes], progress: Progress) -> No
 
 
 def _folders(files: Iterable[str]) -> list[str]:
-    """The packages that the files stand in, inner ones first; those that are not empty are not removed."""
+    """The packages that the files are in, inner ones first; those that are not empty are not removed."""
     folders = {part for path in files for part in _parents(path) if part != program_files.LIBRARY}
     return sorted(folders, reverse=True)
 

@@ -11,11 +11,11 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.shape import Shape
 
 BORDER = 1e-9
-"""Sine, or length relative to the reach, below which an arm stands between two branches."""
+"""Sine, or length relative to the reach, below which an arm is between two branches."""
 
 
 class Branch(NamedTuple):
-    """How the arm stands; "" if it stands between the two."""
+    """Which of the two branches the arm is in; "" if between them."""
 
     base: str
     """"front": the arm reaches forwards over its shoulder; "rear": backwards."""

@@ -14,7 +14,7 @@ from armtempo.splines.trajectory import Trajectory
 
 
 def all_angles_deg(arm: Arm, driven_deg: Array) -> Array:
-    """Angles of all joints (..., joints) from those of the driven ones (..., J); the others stand at home."""
+    """Angles of all joints (..., joints) from those of the driven ones (..., J); the others are at home."""
     angles = np.broadcast_to(arm.all_home_deg, (*driven_deg.shape[:-1], len(arm.joints))).copy()
     angles[..., list(arm.driven_indices)] = driven_deg
     return angles

@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 UPRIGHT = 1e-9
-"""Cosine of the pitch below which the tool's x axis stands upright: then its whole direction is known."""
+"""Cosine of the pitch below which the tool's x axis is upright: then its whole direction is known."""
 
 STIFFEST = 1e4
 """Largest ratio of the two tolerances, each by its natural size (reach, 1 rad), that the search takes up."""
@@ -90,7 +90,7 @@ class Constraint:
         return Turned(off * off, torque, 0.0, 1.0, across)
 
     def miss(self, tool: Frame[float]) -> Miss:
-        """How far the tool stands off."""
+        """How far the tool is off."""
         return Miss(math.sqrt(_apart(tool.origin, self.position)), math.degrees(self._turn_rad(tool)))
 
     def _turn_rad(self, tool: Frame[float]) -> float:

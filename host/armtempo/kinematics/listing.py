@@ -45,7 +45,7 @@ def listings(
 
 
 def lines(answer: Answer) -> Iterator[str]:
-    """Write the table, the chosen solution marked by ``*``, angles in degrees, and where the tool comes to stand."""
+    """Write the table, the chosen solution marked by ``*``, angles in degrees, and where the tool then is."""
     if answer.choice:
         yield from _closed_form_lines(answer.choice)
     if answer.search and (answer.success or not answer.choice):
@@ -84,7 +84,7 @@ def _numerical_lines(search: NumericalSolutions) -> Iterator[str]:
 
 
 def _tool_lines(answer: Answer) -> Iterator[str]:
-    """Where the tool comes to stand, and how far from the pose."""
+    """Where the tool then is, and how far from the pose."""
     if not answer.success:
         yield f"nearest posture found, deg:{_row(answer.angles_rad)}"
     position = " ".join(_short(value, 4) for value in answer.tool[:3, 3])

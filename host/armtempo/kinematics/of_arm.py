@@ -25,7 +25,7 @@ from armtempo.model.pose import checked_rows
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 
 _FAR_DEG, _FAR = 5.0, 50.0
-"""No tolerance brings a joint back that is outside its range by more than that, or by this many times the tolerance."""
+"""No tolerance makes up for a joint outside its range by more than that, or by this many times the tolerance."""
 _SWINGS = 3.0
 """A joint that is outside its range by this many times what the tolerance lets it turn, to first order, stays out."""
 _BEHIND_RAD = 1e6

@@ -11,8 +11,8 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
-from armtempo.basics.virtual_id import is_virtual
 from armtempo.formats.text import visible
+from armtempo.ports.names import is_virtual
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Status:
     run: int
     ticks: int
     path_ticks: int
-    """The motion's own time, behind the clock where the speed was below 100 %."""
+    """The motion's own time, less than the clock's where the speed was below 100 %."""
     rate: int
     """Of the motion's own time, in thousandths: the one that is wanted; 0 in a pause."""
     samples_kept: int
@@ -94,7 +94,7 @@ class Status:
         return bool(self.known >> joint & 1)
 
     def as_fault(self) -> Fault:
-        """The event that told of the pending fault, where it did not arrive."""
+        """The event that reported the pending fault, where it did not arrive."""
         return Fault(self.run, self.fault, self.fault_joint, self.ticks, self.path_ticks, self.positions)
 
 

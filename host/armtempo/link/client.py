@@ -219,7 +219,7 @@ class Client:
         return board_messages.SequenceState(board_messages.ending_name(ending), code, step, row, cycle, name)
 
     def counters(self) -> dict[str, int]:
-        """What the counters of the sequence stand at, or those of the last one since the board's start, by name."""
+        """Values of the sequence's counters, or those of the last one since the board's start, by name."""
         found: dict[str, int] = {}
         try:
             while True:
@@ -256,7 +256,7 @@ class Client:
         self.session.command("stop", (int(now),))
 
     def speed(self, rate: int) -> None:
-        """Let what moves go on at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
+        """Let what moves continue at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
         if rate == PERMILLE and not self.info.can("speed"):
             return
         self.need("speed", "another speed than planned")

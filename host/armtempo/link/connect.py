@@ -115,7 +115,7 @@ def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
 
 
 def _greeted(stack: ExitStack, transport: Transport) -> Client:
-    """The board behind a transport; the transport in use at the end is closed with the stack."""
+    """The board at a transport; the transport in use at the end is closed with the stack."""
     first = stack.enter_context(closing(transport))
     board = greet(first)
     stack.callback(lambda: board.session.transport.close())

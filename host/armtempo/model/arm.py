@@ -146,7 +146,7 @@ class Arm:
 
     @cached_property
     def driven_indices(self) -> tuple[int, ...]:
-        """Where the joints with a motor stand among all joints, from 0."""
+        """Indices of the joints with a motor among all joints, from 0."""
         return tuple(index for index, joint in enumerate(self.joints) if joint.motor is not None)
 
     def output(self, name: str) -> int:
@@ -187,7 +187,7 @@ class Arm:
         return found[0]
 
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
-        """Why the driven joints cannot stand at these angles, in words; "" if they can."""
+        """Why the driven joints cannot be at these angles, in words; "" if they can."""
         angles = tuple(angles_deg)
         if len(angles) != len(self.driven):
             return f"{len(angles)} angles, but {len(self.driven)} joints have a motor"

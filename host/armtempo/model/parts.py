@@ -182,7 +182,7 @@ class Joint:
     switches: LimitSwitches = field(default_factory=LimitSwitches)
     model: JointModel = field(default_factory=JointModel)
     parallel_linkage: bool = field(default=False, metadata=json_codec.ADDED)
-    """The drive stands on the link before the previous one and turns this link by a parallelogram: the angle
+    """The drive is on the link before the previous one and turns this link by a parallelogram: the angle
     is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
     radius_mm: float = field(default=0.0, metadata=json_codec.ADDED)
     """Of the link about its d and its a; what it holds included."""

@@ -136,7 +136,7 @@ class Plan:
         expected = {"format", "version", "plan"} | ({"sha256"} if version == VERSION else set())
         if content.keys() != expected:
             raise InputError(
-                f"{path}: unknown or missing key beside {', '.join(sorted(expected))}", "plan it again"
+                f"{path}: unknown or missing key besides {', '.join(sorted(expected))}", "plan it again"
             )
         _check_unaltered(content, path, altered)
         plan: Plan = json_codec.decode(cls, content["plan"], f"{path}: plan")

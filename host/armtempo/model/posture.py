@@ -1,4 +1,4 @@
-"""Postures by name: where an arm is to stand, as its file says it."""
+"""Postures by name, as an arm file has them."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _MARK = "\ufeff"
 def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool) -> None:
     """Write ``[posture.NAME]`` into the file of ``arm``, whole or not at all, with its comments and layout kept.
 
-    InputError if the name is none, the arm cannot stand so, the file has this posture and ``replace`` is false,
+    InputError if the name is none, the arm cannot take it, the file has this posture and ``replace`` is false,
     or it cannot be read, written, or changed in this one place.
     """
     if problem := named.name_problem(name):

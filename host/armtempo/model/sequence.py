@@ -128,7 +128,7 @@ class _Reader:
     motions: dict[Path, SourceMotion] = field(default_factory=dict)
 
     def steps(self, top: Table) -> tuple[Step, ...]:
-        """All steps of a file; repeats hold what stands between them and their end."""
+        """All steps of a file; repeats hold what is between them and their end."""
         top.known("name", "arm", "start", "posture")
         tables = top.tables("step")
         found: list[list[Step]] = [[]]
@@ -144,7 +144,7 @@ class _Reader:
             elif kind == "end":
                 table.choice("end", ("repeat",))
                 if not begun:
-                    raise table.fail("end", "given behind a step with repeat")
+                    raise table.fail("end", "given after a step with repeat")
                 row, number, times = begun.pop()
                 inner = tuple(found.pop())
                 found[-1].append(Repeat(inner, times, where=_place(row), step=number))
@@ -154,7 +154,7 @@ class _Reader:
         if begun:
             raise InputError(
                 f"{_place(begun[-1][0])}: repeat has no end",
-                'write a step with end = "repeat" behind its last step',
+                'write a step with end = "repeat" after its last step',
             )
         return tuple(found[0])
 
@@ -284,7 +284,7 @@ def only(table: Table, *keys: str) -> None:
     """Raise InputError for a key that belongs to another kind of step."""
     for key in (*_KINDS, "to", "active", "timeout_s", "on_timeout"):
         if table.has(key) and key not in keys:
-            raise table.fail(key, f"left out beside {keys[0]}")
+            raise table.fail(key, f"none next to {keys[0]}")
 
 
 def _place(table: Table) -> str:

@@ -34,7 +34,7 @@ class ToolWay:
     tolerance_deg: float = LINE_TOLERANCE_DEG
     """How far the tool may leave it."""
     blend_mm: float = 0.0
-    """So far before and after the via point the corner to the next line is cut; 0: the motion rests there."""
+    """How far before and after the via point the corner to the next line is cut; 0: the motion rests there."""
     speed_mm_s: float | None = None
     acceleration_mm_s2: float | None = None
     """The tool's limits on the way; None: those of the job."""

@@ -55,7 +55,7 @@ _PAGE = """\
     armtempo check --picture arm.png    # what looks wrong about arm.toml
     armtempo plan                       # the motion in first.toml, as short as the limits allow
     armtempo deploy                     # once, for a real board: the board program
-    armtempo home --arm arm.toml        # "the arm stands in its home posture"; nothing moves
+    armtempo home --arm arm.toml        # "the arm is in its home posture"; nothing moves
     armtempo run first.json             # replay and record it
     armtempo report runs/first-001      # how well the arm followed
     armtempo plan sequence.toml         # a sequence: the motion, back home, again and again

@@ -27,7 +27,7 @@ CONVENTIONS = """\
     row i: turn theta, go d along axis i;   row i: go a, turn alpha from axis i-1;
            go a, turn alpha to axis i+1            turn theta, go d along axis i
 """
-"""Where the frame of a row stands, and which axis its four figures belong to."""
+"""Where the frame of a row is, and which axis its four figures belong to."""
 
 Answers = dict[str, str]
 """What was answered, by the question's key, in the order of the questions."""
@@ -136,7 +136,7 @@ class _Joint:
         modified = self._answers["convention"] == MODIFIED
         link = "the axis before to this one" if modified else "this axis to the next one"
         length = _number(-MAX_LENGTH_MM, MAX_LENGTH_MM, "120.5")
-        offset = "theta where the joint stands at 0, degrees"
+        offset = "theta where the joint is at 0, degrees"
         return [
             self._ask("name", "name", "Any words; reports and messages use them.", _new_name(names)),
             self._ask(

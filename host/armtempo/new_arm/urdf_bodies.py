@@ -40,7 +40,7 @@ def of_joint(model: Any, base: str, joint: Any, after: Any) -> Body | None:
 
     None if the URDF gives nothing of it a mass. Raises InputError for figures that no body has.
     """
-    parts = [*_parts(model, base, _links(model, joint, after))]
+    parts = [*_parts(model, base, links(model, joint.child, after))]
     if not parts:
         return None
     mass = sum(part[0] for part in parts)
@@ -64,9 +64,9 @@ def of_joint(model: Any, base: str, joint: Any, after: Any) -> Body | None:
     return Body(mass, _MM * centre, inertia, friction, viscous)
 
 
-def _links(model: Any, joint: Any, after: Any) -> set[str]:
-    """Names of all links below a joint, but for those below ``after``."""
-    found, names = set(), [joint.child]
+def links(model: Any, first: str, after: Any) -> set[str]:
+    """Names of a link and of all below it, but for those below joint ``after``."""
+    found, names = set(), [first]
     while names:
         name = names.pop()
         found.add(name)

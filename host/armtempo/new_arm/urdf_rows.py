@@ -49,7 +49,7 @@ def derive(axes: Sequence[AxisLine], tool: Array, near: Near) -> list[DhRow]:
     """Rows from the base frame over all axes to the frame ``tool`` (4, 4), all joints at 0.
 
     The base's z axis is taken for an axis before the first one, the tool's z axis for one after the last: a
-    constant row stands before joint 1 if its axis is not the base's, and one after the last joint where
+    constant row comes before joint 1 if its axis is not the base's, and one after the last joint where
     the tool is turned or shifted along its own z axis and no row before it can take that up.
     """
     frame = _Frame(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))

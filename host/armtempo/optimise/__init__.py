@@ -1,4 +1,4 @@
-"""Population searches behind one interface: ``minimise``. Nothing in here knows of robots or time.
+"""Population searches with one interface: ``minimise``. Nothing in here knows of robots or time.
 
 Each algorithm is a module of this package with
 

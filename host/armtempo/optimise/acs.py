@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.optimise.levy import BETA, levy_scale
+from armtempo.optimise.cs import BETA, levy_scale
 from armtempo.optimise.parameters import Number, OneOf, Parameter
 from armtempo.optimise.tracker import Result, Task, Tracker
 

@@ -7,12 +7,17 @@ with the nest it came from, and abandoned coordinates move along the difference 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.optimise.levy import BETA, levy_steps
 from armtempo.optimise.parameters import Number, Parameter
 from armtempo.optimise.tracker import Result, Task, Tracker
+
+BETA = Number(1.5, 0.3, 1.99, "index of the Lévy distribution, Eq. (23)")
+"""The index of the distribution, in the range that Mantegna gives for his method (Physical Review E 49 (5),
+1994, pp. 4677-4683)."""
 
 PARAMETERS: dict[str, Parameter] = {
     "alpha": Number(0.01, 0.0, 100.0, "scale of the flights"),
@@ -58,3 +63,17 @@ def _keep_better(nests: Array, values: Array, eggs: Array, egg_values: Array, in
     better = egg_values < values[index]
     nests[index[better]] = eggs[better]
     values[index[better]] = egg_values[better]
+
+
+def levy_steps(rng: np.random.Generator, shape: tuple[int, ...], beta: float) -> Array:
+    """Symmetric Lévy-stable steps of index ``beta``, within BETA, by Mantegna's method, Eq. (23)."""
+    steps: Array = levy_scale(beta) * rng.standard_normal(shape)
+    steps /= np.abs(rng.standard_normal(shape)) ** (1.0 / beta)
+    return steps
+
+
+def levy_scale(beta: float) -> float:
+    """The factor of Gamma functions in Eq. (23), with its brackets set as in its source (Mantegna)."""
+    top = math.gamma(1.0 + beta) * math.sin(math.pi * beta / 2.0)
+    bottom = math.gamma((1.0 + beta) / 2.0) * beta * 2.0 ** ((beta - 1.0) / 2.0)
+    return float((top / bottom) ** (1.0 / beta))

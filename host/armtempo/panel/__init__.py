@@ -3,6 +3,7 @@
 ::
 
     operator.py    the board that the panel has: one command at a time, one client in control, states for all
+    live.py        what the board says: state, samples, inputs, sequence
     held_jog.py    a jog that lasts as long as a browser says that its button is held
     access.py      who may ask the server for anything
     arm_scene.py   the arm in 3-D

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from nicegui import ui
@@ -15,6 +16,7 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics.chain import all_angles_deg, outline_mm
 from armtempo.kinematics.forward import all_frames
 from armtempo.kinematics.geometry import Geometry
+from armtempo.model import mesh_files
 from armtempo.model.arm import Arm
 from armtempo.model.room import FAR_MM
 from armtempo.planning.room_check import Bodies
@@ -28,7 +30,7 @@ _OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25
 _ROOM_OPACITY = 0.3
 _SHOWN = 1.2
-"""Walls are shown so far from the arm's base, as a share of its reach."""
+"""Walls are shown this far from the arm's base, as a share of its reach."""
 _VIA_NAME = "via "
 FOLLOW = "follow"
 """The view that keeps the tool in the middle."""
@@ -44,6 +46,11 @@ class ArmShape:
     def outline(self, angles_deg: Array) -> Array:
         """Points of the arm's line, (K, 3), for driven angles (J,)."""
         return outline_mm(self.arm, all_angles_deg(self.arm, np.asarray(angles_deg))) / self.reach_mm
+
+    @cached_property
+    def meshes(self) -> dict[int, Path]:
+        """STL files in mm by the number of the row that they move with, 0 for the base."""
+        return mesh_files.of_arm(self.arm)
 
     @cached_property
     def _geometry(self) -> Geometry:
@@ -86,7 +93,7 @@ class ArmShape:
         return found
 
     def poses(self, angles_deg: Array) -> list[list[float]]:
-        """x, y, z and the quaternion x, y, z, w of each piece's middle: its y axis points along it."""
+        """x, y, z and the quaternion x, y, z, w of each piece's middle, its y axis along it, then of each mesh."""
         points, first = self.outline(angles_deg), [index for index, *_ in self.pieces]
         begin, end = points[first], points[np.array(first) + 1]
         along = (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
@@ -95,6 +102,18 @@ class ArmShape:
         turns[turns[:, 3] < _OPPOSITE] = (1.0, 0.0, 0.0, 0.0)
         turns /= np.linalg.norm(turns, axis=1, keepdims=True)
         found: list[list[float]] = np.hstack(((begin + end) / 2, turns)).round(5).tolist()
+        return found + self._mesh_poses(np.asarray(angles_deg))
+
+    def _mesh_poses(self, angles_deg: Array) -> list[list[float]]:
+        """The same of each mesh."""
+        if not self.meshes:
+            return []
+        from scipy.spatial.transform import Rotation  # here, as most arms have no meshes
+
+        frames = all_frames(self._geometry, np.radians(all_angles_deg(self.arm, angles_deg)).tolist())
+        chosen = frames[list(self.meshes)]
+        turns = Rotation.from_matrix(chosen[:, :3, :3]).as_quat()
+        found: list[list[float]] = np.hstack((chosen[:, :3, 3] / self.reach_mm, turns)).round(5).tolist()
         return found
 
 
@@ -115,7 +134,10 @@ class ArmScene:
             on_click=self._clicked,
             on_drag_end=lambda event: self._moved(event.object_name, [event.x, event.y, event.z]),
         ) as self.scene:
-            self._links = self._capsules(COLOUR, 1.0)
+            # as capsules, or as the meshes that the arm has, whose poses come after those of the capsules
+            self._links = (
+                [""] * len(shape.pieces) + self._meshes() if shape.meshes else self._capsules(COLOUR, 1.0)
+            )
             self._ghost = self._capsules(GHOST, _GHOST_OPACITY)
             self._room()
         self._dots: list[Object3D] = []
@@ -130,6 +152,15 @@ class ArmScene:
                 for end in (-length / 2, length / 2):
                     self.scene.sphere(radius, 16, 12).material(colour, opacity).move(0, end, 0)
             found.append(str(capsule.id))
+        return found
+
+    def _meshes(self) -> list[str]:
+        """The meshes; their numbers in the scene."""
+        found = []
+        for number in self._shape.meshes:
+            with self.scene.group() as mesh:
+                self.scene.stl(f"/mesh/{number}").material(COLOUR).scale(1.0 / self._shape.reach_mm)
+            found.append(str(mesh.id))
         return found
 
     def _room(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -14,6 +13,7 @@ from armtempo.deploy import deploy
 from armtempo.deploy.firmware import image, write
 from armtempo.link.board_messages import StoredMotion
 from armtempo.panel import words
+from armtempo.panel.live import Lines
 from armtempo.panel.operator import Needs
 
 if TYPE_CHECKING:
@@ -65,13 +65,13 @@ class BoardTab:
                 button.on_click(lambda text=text, sure=sure, call=call: self._if_sure(text, sure, call))
                 page.control(button, needs)
         ui.label(words.LOG).classes("text-subtitle2")
-        self._log = _Lines(lambda: (operator.log, operator.lines))
+        self._log = _Shown(operator.log)
         with ui.row():
             ui.label(words.TRAFFIC).classes("text-subtitle2")
             ui.switch(on_change=lambda event: self._monitor(event.value)).props(
                 f'aria-label="{words.TRAFFIC}"'
             )
-        self._traffic = _Lines(lambda: (operator.traffic, operator.messages))
+        self._traffic = _Shown(operator.traffic)
         self._traffic.log.set_visibility(False)
         columns = [{"name": key, "label": key, "field": key, "align": "left"} for key in words.VERDICT_KEYS]
         self._verdicts = ui.table(columns=columns, rows=[]).props("dense flat wrap-cells hide-bottom")
@@ -79,7 +79,7 @@ class BoardTab:
         page.on_look(self._look)
 
     def _look(self) -> None:
-        state = self._operator.state
+        state = self._operator.live.state
         if state is not None:
             values = asdict(state)
             rows = [
@@ -122,7 +122,7 @@ class BoardTab:
 
         def run() -> None:
             if motion.sequence:
-                operator.board.run_sequence(name, operator.take_sequence, out=operator.runs)
+                operator.board.run_sequence(name, operator.live.take_sequence, out=operator.runs)
             else:
                 operator.board.run(name, 1, operator.runs, operator.part)
 
@@ -189,21 +189,20 @@ class BoardTab:
         self._page.do(words.FLASH, work, Needs.IDLE)
 
 
-class _Lines:
+class _Shown:
     """Lines that grow; only the new ones are sent."""
 
-    def __init__(self, source: Callable[[], tuple[deque[str], int]]) -> None:
+    def __init__(self, lines: Lines) -> None:
         self.log = ui.log(max_lines=200).classes("armtempo-chart")
-        self._source = source
-        self._shown = 0
+        self._lines, self._count = lines, 0
 
     def look(self) -> None:
         """Show those that are new."""
-        lines, count = self._source()
-        new = min(count - self._shown, self.log.max_lines or 0)
-        for line in list(lines)[-new:] if new else ():
+        count = self._lines.count
+        new = min(count - self._count, self.log.max_lines or 0)
+        for line in list(self._lines.last)[-new:] if new else ():
             self.log.push(line)
-        self._shown = count
+        self._count = count
 
 
 def build(page: PanelPage) -> None:

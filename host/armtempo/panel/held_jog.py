@@ -52,4 +52,4 @@ class ButtonHold:
         way = int(math.copysign(1, move.by))
         with self._operator.board.held_jog(joint, move.axis or None, way, move.about, speed) as jog:
             while self._held(client) and jog.hold(_STEP_S):
-                self._operator.angles_deg = jog.angles_deg
+                self._operator.live.angles_deg = jog.angles_deg

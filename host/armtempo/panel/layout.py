@@ -84,7 +84,7 @@ class Paths:
             self._plan = plan
             times = np.linspace(0.0, plan.total_s, _POINTS)
             scene.draw("plan", tool_path_mm(plan.arm, plan.trajectory, times), arm_scene.PATH)
-        path = operator.run_path_mm
+        path = operator.live.run_path_mm
         if path is not self._run:
             self._run = path
             scene.draw("run", path, arm_scene.RUN)
@@ -157,16 +157,16 @@ def _events(page: PanelPage) -> None:
 
 def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
     """What all pages are told: where the arm is, and the numbers that change while it moves."""
-    angles = operator.angles_deg
+    angles = operator.live.angles_deg
     where = "  ".join(f"{angle:.2f}°" for angle in angles)
     with suppress(InputError):
         x, y, z = forward(operator.arm, angles)[:3, 3]
         where = f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  {where}"
-    said = operator.fault or (operator.log[-1] if operator.log else "")
+    said = operator.live.fault or (operator.log.last[-1] if operator.log.last else "")
     texts = {"armtempo-state": state_line(operator), "armtempo-where": where, "armtempo-said": said}
     for number, angle in enumerate(angles, 1):
         texts[f"armtempo-angle-{number}"] = f"{angle:.2f}°"
-    target = operator.target_deg
+    target = operator.live.target_deg
     ghost = None if target is None else shape.poses(target)
     return {"links": shape.poses(angles), "dials": shape.dials(angles), "ghost": ghost, "texts": texts}
 
@@ -175,13 +175,13 @@ def state_line(operator: Operator) -> str:
     """The board's state in a line."""
     if operator.trouble:
         return operator.trouble
-    state = operator.state
-    if state is None:
-        return ""
-    kind = f" ({words.VIRTUAL})" if state.virtual else ""
     doing = f" · {operator.busy}" if operator.busy else ""
     if operator.busy and operator.progress:
         doing += f" {operator.progress:.0%}"
+    state = operator.live.state
+    if state is None:  # its program is put on it
+        return f"{operator.port}{doing}"
+    kind = f" ({words.VIRTUAL})" if state.virtual else ""
     if state.moving and state.speed_percent != 100:
         speed = (
             words.AT_SPEED.format(percent=state.speed_percent) if state.speed_percent else words.IN_A_PAUSE

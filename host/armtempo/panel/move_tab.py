@@ -31,7 +31,7 @@ def _hold_button(page: PanelPage, move: JogMove, sign: str, name: str) -> None:
     """A button that moves the arm while it is held; the page's script finds it by its number."""
     made = ui.button(sign).classes("armtempo-touch")
     made.props(f'unelevated aria-label="{name} {sign}" data-jog={len(page.jogs)}')
-    page.control(made, more=lambda: page.operator.why_no_jog(move), is_held=True)
+    page.control(made, more=lambda: page.operator.live.why_no_jog(move), is_held=True)
     page.jogs.append(move)
 
 
@@ -117,7 +117,7 @@ def _outputs(page: PanelPage) -> None:
 
         def look() -> None:
             for name, lamp in lamps.items():
-                active = operator.inputs.get(name)
+                active = operator.live.inputs.get(name)
                 lamp.props(f"color={'green' if active else 'grey'}")
 
         page.on_look(look)

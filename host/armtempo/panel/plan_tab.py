@@ -114,7 +114,7 @@ class PlanTab:
         self._changed()
 
     def _take_posture(self) -> None:
-        self._rows.append([round(float(angle), 4) for angle in self._operator.angles_deg])
+        self._rows.append([round(float(angle), 4) for angle in self._operator.live.angles_deg])
         self._changed()
 
     def _delete(self, number: int) -> None:

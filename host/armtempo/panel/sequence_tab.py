@@ -28,14 +28,11 @@ class SequenceTab:
         self._shown = self._desk.version
         self._lit = 0
         self._rows: list[ui.row] = []
-        files = self._desk.files()
-        if not files:
-            ui.label(words.NO_SEQUENCE)
-        name = self._desk.file.name if self._desk.file else None
+        self._folder_ns = 0
+        self._none = ui.label(words.NO_SEQUENCE)
         with ui.row():
-            choice = ui.select(files, value=name, label=words.SEQUENCE_FILE, on_change=self._open)
-            choice.on("focus", lambda: choice.set_options(self._desk.files()))  # there may be new ones
-            page.control(choice.style("min-width: 12rem"), Needs.IDLE)
+            self._files = ui.select([], label=words.SEQUENCE_FILE, on_change=self._open)
+            page.control(self._files.style("min-width: 12rem"), Needs.IDLE)
             for text, call, needs in (
                 (words.SAVE_SEQUENCE, self._save, Needs.IDLE),
                 (words.TO_START, self._to_start, Needs.MOVE),
@@ -86,17 +83,28 @@ class SequenceTab:
         return row
 
     def _set(self, index: int, key: str, text: str) -> None:
-        """Take what was typed; the table stays as it is, for who types on in the next box."""
+        """Take what was typed; the table stays unchanged, for a user who types on in the next box."""
         others = self._desk.version - self._shown
         self._desk.set(index, key, text)
         self._shown = self._desk.version - others
 
+    def _look_for_files(self) -> None:
+        """Offer the files of the folder, if that has changed."""
+        now_ns = self._desk.folder.stat().st_mtime_ns
+        if now_ns == self._folder_ns:
+            return
+        self._folder_ns, files = now_ns, self._desk.files()
+        self._none.set_visibility(not files)
+        if files != self._files.options:
+            self._files.set_options(files, value=self._desk.file.name if self._desk.file else None)
+
     def _look(self) -> None:
+        self._look_for_files()
         if self._desk.version != self._shown:
             self._shown = self._desk.version
             self._table.refresh()
             self._lit = 0
-        state = self._operator.sequence
+        state = self._operator.live.sequence
         running = state is not None and state.ending == "running"
         step = state.step if state is not None and running else 0
         if step != self._lit:
@@ -133,8 +141,8 @@ class SequenceTab:
         def run() -> None:
             plan = self._planned()
             board = operator.board
-            operator.take_sequence(
-                board.run_sequence(plan, operator.take_sequence, replace=True, out=operator.runs)
+            operator.live.take_sequence(
+                board.run_sequence(plan, operator.live.take_sequence, replace=True, out=operator.runs)
             )
             if (recorded := board.last_sequence) is not None:
                 pipeline.report(recorded)

@@ -35,6 +35,7 @@ class Panel:
         self._hold = ButtonHold(operator)
         self._api = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         self._api.get("/runs/{name}/{file}")(self._run_file)
+        self._api.get("/mesh/{number}")(self._mesh)
         ui.page("/")(self._page)
         app.on_startup(self._tell)
         ui.run_with(
@@ -88,6 +89,11 @@ class Panel:
             for client in list(Client.instances.values()):
                 if client.has_socket_connection:
                     client.run_javascript(code)
+
+    async def _mesh(self, number: int) -> Any:
+        """The mesh of a row of the arm, 0 for the base."""
+        file = self._shape.meshes.get(number)
+        return FileResponse(file) if file else PlainTextResponse("no such mesh", 404)
 
     async def _run_file(self, name: str, file: str) -> Any:
         """A file of a run folder, to read; nothing else of the disk."""

@@ -140,7 +140,7 @@ class _Ramps:
         self._allowed = allowed
         time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
         # speeds, accelerations and jerks over their limits' units; rest after the end
-        # (3, J, T): what is computed for each time stands together, which NumPy goes through quickest
+        # (3, J, T): what is computed for each time is together, which NumPy goes through quickest
         self._motion = np.stack([trajectory(time, order).T for order in (1, 2, 3)])
         self.worst_of_motion = float(np.max(np.abs(self._motion[1:]) / allowed.T[1:, :, None]))
 

@@ -95,7 +95,7 @@ class LinearisedLimits:
         return self._rows.gradient(np.einsum("kopj,kpj->opj", self._gradient, lower - upper))
 
     def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
-        """See there; the entries stand at ``LimitRows.rows`` and ``columns``."""
+        """See there; the entries are at ``LimitRows.rows`` and ``columns``."""
         rows = self._rows
         shape = (2, 3, *self._angle.shape[1:])
         both = weights.reshape(shape).sum(axis=0)

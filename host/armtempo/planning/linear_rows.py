@@ -46,7 +46,7 @@ class LinearRows:
         return np.asarray(self._matrix.T @ self._per_row(weights, -1.0))
 
     def hessian(self, weights: Array, _: Array, __: bool) -> Array:
-        """See there; the entries stand at ``rows`` and ``columns``."""
+        """See there; the entries are at ``rows`` and ``columns``."""
         return np.asarray((self._per_row(weights, 1.0)[:, None] * self._outer).ravel())
 
     def _sums(self, x: Array) -> Array:

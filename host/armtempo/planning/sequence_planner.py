@@ -52,7 +52,7 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
 
 @dataclass(frozen=True)
 class _Place:
-    """Where the arm stands, and what the user calls that."""
+    """Where the arm is, and what the user calls that."""
 
     angles_deg: Angles
     name: str
@@ -94,7 +94,7 @@ class _Compiler:
         return found, end
 
     def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
-        """The first pass stands before the others where it begins elsewhere than they do."""
+        """The first pass comes before the others if it begins elsewhere than they do."""
         outermost = not self._depth
         self._depth += 1
         first, end = self.rows(step.steps, before.angles_deg, before.name)

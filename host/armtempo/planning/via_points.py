@@ -143,7 +143,7 @@ def _led(arm: Arm, job: Job, number: int, before_deg: Array, setup: _Setup) -> A
 def posture_deg(arm: Arm, posture: ArmPosture) -> Array:
     """The driven joints' angles of a named posture, degrees (J,); of the solutions of a pose the one nearest to home.
 
-    They are the ones that ``resolve`` takes. Raises PlanError if the arm cannot stand so.
+    They are the ones that ``resolve`` takes. Raises PlanError if the arm cannot take it.
     """
     if not isinstance(posture.where, Pose):
         return np.array(posture.where, dtype=float)

@@ -16,7 +16,7 @@ from armtempo.ports.claim import VERSION, PortClaim
 from armtempo.ports.lines import LineReader, Message, to_line
 
 HUNG_S = 2.0
-"""A program that has not answered ``hello`` for so long counts as hanging."""
+"""A program that has not answered ``hello`` for this long counts as hanging."""
 _REMEMBERED_S = 5.0
 """That it hangs is not tried again for so long."""
 _END = "end that process, or let a command that needs the port take it over"

@@ -1,7 +1,7 @@
 """Who has a port: one file for each port, in a folder that only this user can read.
 
 The folder is ``armtempo`` below ``$XDG_RUNTIME_DIR``, else a private one for temporary files (``claim_file``). A
-program that was killed leaves its file behind; nobody answers at its address then.
+program that was killed leaves its file; nobody answers at its address then.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class PortClaim(NamedTuple):
         return path.with_name(f"{self.number}.taken")
 
     def taken_by(self) -> PortClaim | None:
-        """The claim of another program that stands, or stood, in the place of this one."""
+        """The claim of another program that is, or was, in the place of this one."""
         files = self._files()
         found = [_read(path) for path in (*files, *(self._marker(file) for file in files))]
         return next((claim for claim in found if claim is not None and claim.number != self.number), None)
@@ -86,7 +86,7 @@ class PortClaim(NamedTuple):
                 Path(self.address).unlink()
 
     def _files(self) -> list[Path]:
-        """Where the claim to this port stands: in the folder for new ones, and wherever an earlier one does."""
+        """Where the claim to this port is: in the folder for new ones, and wherever an earlier one does."""
         import hashlib
 
         name = hashlib.sha256(self.name.encode()).hexdigest()[:16] + claim_file.SUFFIX

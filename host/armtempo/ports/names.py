@@ -1,4 +1,4 @@
-"""What the name of a port means: a serial device, a URL, or a virtual board."""
+"""What the name of a port means: a serial device, a URL, or a virtual board; and which boards are virtual."""
 
 from __future__ import annotations
 
@@ -12,6 +12,16 @@ if TYPE_CHECKING:
 
 SIM = "sim"
 """The port name that stands for a virtual board; ``sim:FOLDER`` for one whose flash is that folder."""
+
+
+VIRTUAL_ID = b"virt".hex()
+"""First digits of a virtual board's unique id. On an STM32 these 32 bits are wafer coordinates (RM0090 39.1), which
+are never as large as these letters."""
+
+
+def is_virtual(board_id: str) -> bool:
+    """Whether a board with this id in its answer to ``hello`` is a virtual one."""
+    return board_id.startswith(VIRTUAL_ID)
 
 
 def is_sim(port: str) -> bool:

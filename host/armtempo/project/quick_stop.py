@@ -36,7 +36,7 @@ _answers: dict[tuple[str, bool], StopAnswer] = {}
 
 
 def send(arguments: Sequence[str]) -> None:
-    """Pass a stop on to the program that has the port, where the arguments behind ``stop`` are plain ones."""
+    """Pass a stop on to the program that has the port, if the arguments after ``stop`` are plain ones."""
     now, port = "--now" in arguments, os.environ.get("ARMTEMPO_PORT", "")
     rest = [word for word in arguments if word not in ("--now", "--json")]
     if len(rest) == 2 and rest[0] == "--port":

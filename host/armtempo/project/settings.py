@@ -68,7 +68,7 @@ class ProjectSettings:
     def _default_runs(self) -> Setting:
         if self.file is None:
             return Setting(RUNS, _DEFAULT_RUNS, "default")
-        return Setting(RUNS, _beside(self.file, _DEFAULT_RUNS), f"default beside {_near(self.file)}")
+        return Setting(RUNS, _beside(self.file, _DEFAULT_RUNS), f"default next to {_near(self.file)}")
 
     @cached_property
     def _in_file(self) -> dict[str, str]:

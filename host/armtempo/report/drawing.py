@@ -20,7 +20,7 @@ _HIDDEN = '<svg class="sheet" aria-hidden="true" '
 _LARGEST = 1.4
 """How much larger than drawn a figure may become on a page."""
 _MARGIN_PT = 10.0
-"""To the right of axes, for the half of a label that stands out there."""
+"""To the right of axes, for the half of a label that extends there."""
 _QUICK = 3
 """Of zlib's levels: a third of the time of the usual 6, files a tenth larger."""
 

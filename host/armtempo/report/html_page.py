@@ -15,7 +15,7 @@ GOOD, BAD, OPEN = "good", "bad", "open"
 """Kinds of text by what it says: as it should be, not so, cannot be told."""
 _MARKS = {GOOD: "✓", BAD: "✗", OPEN: "?"}
 _FEW_COLUMNS = 2
-"""A table of that many fits on a phone as it is; the rows of a wider one become blocks there."""
+"""A table of that many columns fits on a phone unchanged; the rows of a wider one become blocks there."""
 
 
 class Page:

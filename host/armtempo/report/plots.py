@@ -29,7 +29,7 @@ LIMIT_COLOUR = "#c0392b"
 _LABELS = ("angle (°)", "speed (°/s)", "acceleration (°/s²)", "jerk (°/s³)")
 _POINTS = 600
 _LEFT, _RIGHT, _BOTTOM, _TOP, _BETWEEN = 0.85, 0.15, 0.5, 0.3, 0.35
-"""Inches beside a joint's axes, for labels of up to six digits, and between two rows."""
+"""Inches next to a joint's axes, for labels of up to six digits, and between two rows."""
 
 
 def new_figure(

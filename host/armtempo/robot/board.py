@@ -46,7 +46,6 @@ from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
-from armtempo.robot.start_position import StartPosition
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.where import Where, posture_deg
 from armtempo.runs.sequence_reader import SequenceRun
@@ -74,7 +73,7 @@ class Board:
         self.last_jog_ends = ""
         """Why the last jog ended before it was to, in words; "" if it did not."""
         self._stack = stack or ExitStack()
-        self._start = StartPosition(client, port)
+        self._start = goto.StartPosition(client, port)
         self._last_folder: Path | None = None
         self._last_sequence: Path | None = None
 
@@ -271,7 +270,7 @@ class Board:
 
         ``joint``: number, from 1, or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y", "tool-z", along
         which the tool moves by ``by_mm``, or about which it turns by ``by_deg``; ``speed``: part of the speed limits,
-        0.01 to 1. The jog ends at the end of a range, or where the tool cannot go on along the line, at the latest.
+        0.01 to 1. The jog ends at the end of a range, or where the tool cannot continue along the line, at the latest.
         Gives the posture in degrees, (J,); ``last_jog_ends`` says why it ended early. Raises LinkError if the
         position is unknown, InputError if nothing can move that way.
         """
@@ -371,7 +370,7 @@ class Board:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What the counters of the sequence that runs stand at, or those of the last one, by name.
+        """Values of the counters of the sequence that runs, or of the last one, by name.
 
         They begin at 0 whenever a sequence starts; the board keeps them until then, or until its power goes.
         """
@@ -443,11 +442,11 @@ class Board:
         change_speed(self.client, permille(fraction))
 
     def pause(self) -> None:
-        """Let what moves come to rest on its path, to go on with ``resume``; BoardError if nothing moves."""
+        """Let what moves come to rest on its path, to continue with ``resume``; BoardError if nothing moves."""
         change_speed(self.client, 0)
 
     def resume(self) -> None:
-        """Go on along the path at the speed before the pause; BoardError if nothing moves."""
+        """Continue along the path at the speed before the pause; BoardError if nothing moves."""
         change_speed(self.client, RESUME)
 
     def selftest(self, progress: Progress | None = None) -> SelfTest:

@@ -1,4 +1,4 @@
-"""What a board says of itself, judged."""
+"""Checks of what a board reports of itself."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from armtempo.records import encode
 class Room:
     """Heap for an engine and its objects: ``size`` bytes.
 
-    Beside it the board has memory for step generators, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
+    Besides it the board has memory for step generators, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
     """
 
     size: int

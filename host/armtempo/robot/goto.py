@@ -1,4 +1,4 @@
-"""Motions that are not kept on the board: to a posture, and backwards between repetitions."""
+"""Motions that are not kept on the board: to a posture, to a start, and backwards between repetitions."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point, room_check
+from armtempo.ports.names import is_sim
 from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state
@@ -91,3 +92,31 @@ def shown(progress: Progress | None) -> SampleSink:
             progress(sample.path_ticks / limits.TICK_HZ, duration_s)
 
     return show
+
+
+@dataclass
+class StartPosition:
+    """What is done about an arm's position before anything starts, on one board."""
+
+    client: Client
+    port: str
+    moved: bool = False
+    """Whether this arm has been moved or homed through this object, so that nothing is assumed of its position."""
+
+    def home_virtual_arm(self, arm: Arm) -> None:
+        """A virtual arm that has not moved yet is at home: nobody needs to look."""
+        if is_sim(self.port) and not self.moved:
+            arm_state.home_unknown(self.client, arm)
+        self.moved = True
+
+    def take(self, arm: Arm, start_deg: Array | None, name: str, advice: str, stop: StopRequest) -> None:
+        """Move a virtual arm to ``start_deg``, degrees (J,); None: it may begin anywhere.
+
+        LinkError with ``advice`` if a real arm is not there.
+        """
+        if is_sim(self.port):
+            self.home_virtual_arm(arm)
+            if start_deg is not None:
+                go_to(self.client, arm, start_deg, stop)
+        elif start_deg is not None and not arm_state.is_at(self.client, arm, start_deg):
+            raise LinkError(f"the arm is not at the start of {name}", advice)

@@ -2,7 +2,7 @@
 
 The board takes these motions while a joint's position is unknown: it assumes that the joint is where the motion
 begins, and calls the position unknown again at the end. So the position is never wrong, only unknown, until it is
-declared. A switch that trips ends the motion for all joints that move in it; the others then go on by another one.
+declared. A switch that trips ends the motion for all joints that move in it; the others then continue in another one.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ class _GroupHoming:
         self._move(ways, FAST)
 
     def _declare(self, away_deg: dict[int, float]) -> None:
-        """The joints stand this far from their switches."""
+        """The joints are this far from their switches."""
         steps: list[int | None] = [None] * len(self.arm.driven)
         for index, way_deg in away_deg.items():
             switch, joint = self.switches[index], self.arm.driven[index]

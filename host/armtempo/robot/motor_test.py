@@ -137,7 +137,7 @@ class MotorTest:
         seen = 0
         for by_deg in (-side * size_deg, side * size_deg) * _TRIES:
             try:
-                with suppress(InputError):  # it stands at the end of its range
+                with suppress(InputError):  # it is at the end of its range
                     self._jog(joint, by_deg, SLOWEST)
             except BoardError as error:
                 seen = error.code

@@ -106,7 +106,7 @@ def run(
     if end.ending == "fault":
         raise refusal(f"the sequence ended by a fault {where(end)}", end.code, client.status().fault_joint)
     if end.ending == "refused":
-        raise refusal(f"the sequence could not go on {where(end)}", end.code)
+        raise refusal(f"the sequence could not continue {where(end)}", end.code)
     return end
 
 

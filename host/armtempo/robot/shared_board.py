@@ -55,11 +55,11 @@ class SharedBoard:
         self._caller.ask("speed", ANSWER_S, rate=permille(fraction))
 
     def pause(self) -> None:
-        """Let what moves come to rest on its path, to go on with ``resume``; BoardError if nothing moves."""
+        """Let what moves come to rest on its path, to continue with ``resume``; BoardError if nothing moves."""
         self._caller.ask("speed", ANSWER_S, rate=0)
 
     def resume(self) -> None:
-        """Go on along the path at the speed before the pause; BoardError if nothing moves."""
+        """Continue along the path at the speed before the pause; BoardError if nothing moves."""
         self._caller.ask("speed", ANSWER_S, rate=RESUME)
 
     def set_output(self, number: int, value: int) -> None:

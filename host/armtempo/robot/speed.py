@@ -1,4 +1,4 @@
-"""How fast motions run: in parts of their planned speed, from the start or while they go on."""
+"""How fast motions run: in parts of their planned speed, from the start or while they move."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def permille(fraction: float) -> int:
 
 
 def change_speed(client: Client, rate: int) -> None:
-    """Let what moves go on at ``rate`` (0: pause, RESUME: as before it), and what this program starts later too.
+    """Let what moves continue at ``rate`` (0: pause, RESUME: as before it), and what this program starts later too.
 
     Raises BoardError if nothing moves, and where the board refuses.
     """

@@ -38,7 +38,7 @@ def store(
     """Upload a motion record under ``name``, unless the board has just this one already.
 
     Raises LinkError if the board keeps another motion under this name, unless ``replace``, or the name or what
-    stands there is worth nothing: temporary or damaged.
+    is there is worth nothing: temporary or damaged.
     """
     key = MotionKey(name, wire.record_crc(data))
     found = client.find(name)

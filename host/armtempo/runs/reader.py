@@ -36,7 +36,7 @@ class RepetitionData:
     time_s: Array
     """(N,)"""
     path_s: Array
-    """(N,), the motion's own time; behind ``time_s`` where the speed was below 100 %."""
+    """(N,), the motion's own time; less than ``time_s`` where the speed was below 100 %."""
     commanded_steps: NDArray[np.int64]
     """(N, J)"""
     commanded_deg: Array

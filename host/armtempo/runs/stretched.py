@@ -16,7 +16,7 @@ NOTE = "of the planned speed"
 
 
 def is_stretched(repetition: RepetitionData) -> bool:
-    """Whether the motion's own time ever was behind the clock."""
+    """Whether the motion's own time ever was slower than the clock."""
     return bool(np.any(np.abs(repetition.time_s - repetition.path_s) > _EQUAL_S))
 
 

@@ -47,7 +47,7 @@ def trips(client: Client) -> dict[str, Any]:
 
 
 def _damaged(random: np.random.Generator) -> bytes:
-    """A whole frame of ``status`` with one byte behind its length changed, so that its checksum fails."""
+    """A whole frame of ``status`` with one byte after its length changed, so that its checksum fails."""
     frame = bytearray(wire.frame(200, wire.COMMAND["status"][1], b""))
     frame[int(random.integers(3, len(frame)))] ^= 0x10
     return bytes(frame)

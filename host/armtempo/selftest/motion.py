@@ -25,12 +25,13 @@ _PEAK = 1.875
 _ABOVE = 1.01
 """A joint's limit is this much above the rate that is wanted, so that rounding does not exceed it."""
 _GENTLE = 0.5
+_LONG_RATE = 5000
 _SLOT = _DEGREE + 1
 """Segments for each joint that moves alone: as many as one control point acts on, and one at rest."""
 _LOOKS = 1000
 """Moments of a motion at which its speed is looked at."""
 _COUNTS, _LEAST_STEPS = 8, 20
-"""A gentle motion turns an encoder by so much, or a joint by so many steps."""
+"""A gentle motion turns an encoder by this much, or a joint by this many steps."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def make(joints: Sequence[dict[str, Any]]) -> TestMotion:
 
 
 def back_in_turn(joints: Sequence[dict[str, Any]]) -> TestMotion:
-    """Back, so that each channel is alone on its pin: a joint stands while another one moves."""
+    """Back, so that each channel is alone on its pin: a joint rests while another one moves."""
     ends = [(end, start) for start, end in _about_middle(joints, _quick(joints))]
     size = _SLOT * len(joints) + _DEGREE
     points = []
@@ -91,7 +92,7 @@ def _steps_to_see(joint: dict[str, Any]) -> int:
 
 
 def _about_middle(joints: Sequence[dict[str, Any]], counts: Sequence[int]) -> list[tuple[int, int]]:
-    """Start and end of each joint, so many steps apart, about the middle of its range."""
+    """Start and end of each joint, that many steps apart, about the middle of its range."""
     lows = [
         (joint["max_steps"] + joint["min_steps"] - count) // 2
         for joint, count in zip(joints, counts, strict=True)
@@ -135,9 +136,16 @@ def evaluated() -> bytes:
     return at_rates([20_000], 0.1)
 
 
-def steps_at(rate: int, duration_s: float) -> int:
-    """How many steps a joint makes in the motion of ``at_rates``."""
-    return int(rate * duration_s / _PEAK + 0.5)
+def long(joints: Sequence[dict[str, Any]], duration_s: float) -> TestMotion:
+    """From step 0, slowly enough that a capture can follow all of it; when it steps is not computed."""
+    rates = [_LONG_RATE] * len(joints)
+    limits = [max(joint["max_rate"], limit(_LONG_RATE)) for joint in joints]
+    return TestMotion([0] * len(joints), at_rates(rates, duration_s), [], limits)
+
+
+def long_steps(duration_s: float) -> int:
+    """How many steps each joint makes in it."""
+    return int(_LONG_RATE * duration_s / _PEAK + 0.5)
 
 
 def _fixed(points: Array, bits: int) -> list[int]:

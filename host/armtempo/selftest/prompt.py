@@ -60,7 +60,7 @@ class Measured:
 
 
 class Prompt:
-    """The raw prompt behind a port; raises LinkError, which names the part, if it does not answer."""
+    """The raw prompt at a port; raises LinkError, which names the part, if it does not answer."""
 
     def __init__(self, port: Any) -> None:
         self._port = port

@@ -13,12 +13,12 @@ from armtempo.basics.arrays import Array
 from armtempo.diagnosis.finding import Level
 from armtempo.selftest.motion import TestMotion
 from armtempo.selftest.prompt import Measured
-from armtempo.selftest.result import Measurement, judged
+from armtempo.selftest.result import Measurement, judged, left_out
 
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0
 """A sample each microsecond, the two ports half of one apart, and the rounding of a step time."""
-LONGEST_TURN_US = 4000
+_LONGEST_TURN_US = 4000
 """The capture keeps 4096 samples; after a longer turn some are lost."""
 _SLOWEST_STOP_US = 30.0
 STOPS = tuple(f"{pin} by {way}" for pin in ("E-stop", "limit switch") for way in ("software", "an edge"))
@@ -63,10 +63,10 @@ def judge(
         name, meaning, cure = ERRORS[values["fault"]]
         yield judged(PULSES, f"motion {way}", f"fault {name}: {meaning}", "no fault", False, cure)
     longest_us = values["longest_turn_cycles"] / CYCLES_PER_US
-    if longest_us > LONGEST_TURN_US:
+    if longest_us > _LONGEST_TURN_US:
         measured_words = f"a turn of the loop took {longest_us:.0f} us"
         yield judged(
-            PULSES, f"capture {way}", measured_words, f"below {LONGEST_TURN_US}", False, "run it again"
+            PULSES, f"capture {way}", measured_words, f"below {_LONGEST_TURN_US}", False, "run it again"
         )
         return
     found = rises_us(measured)
@@ -109,7 +109,7 @@ def _channel(
     expected = f"{len(steps)} steps, within {_RESOLUTION_US:g} us"
     if len(rises) == len(steps):
         worst = float(np.max(np.abs(rises - steps), initial=0.0))
-        cure = "TIM2 or TIM5 is disturbed: use no timer, SPI, I2C or DAC beside the program"
+        cure = "TIM2 or TIM5 is disturbed: use no timer, SPI, I2C or DAC next to the program"
         measured = f"{len(rises)} steps, the worst {worst:.1f} us off"
         return judged(PULSES, what, measured, expected, worst <= _RESOLUTION_US, cure)
     cure = f"take what is connected off P{pin}, look for a short; if it stays so, the pin or its DMA stream is broken"
@@ -129,6 +129,23 @@ def _channel(
     return judged(PULSES, what, words, expected, False, cure)
 
 
+def judge_long(values: dict[str, Any], steps: int, duration_s: float) -> Measurement:
+    """The line about a motion in which each joint makes so many ``steps``: the edges that were counted, by port."""
+    what = f"steps of a longer motion, {duration_s:g} s"
+    if values["longest_turn_cycles"] / CYCLES_PER_US > _LONGEST_TURN_US:
+        return left_out(PULSES, f"{what}: a turn of the loop took too long to capture all", "run it again")
+    counted = {port: count / 2 for port, count in zip(values["ports"], values["counts"], strict=True)}
+    due = {port: steps * sum(pin[0] == port for pin in values["steps"]) for port in values["ports"]}
+    return judged(
+        PULSES,
+        what,
+        ", ".join(f"{count:g} on port {port}" for port, count in counted.items()),
+        ", ".join(f"{count} on port {port}" for port, count in due.items()),
+        counted == due and not values["fault"],
+        "look at the lines about the single channels",
+    )
+
+
 def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
     """Figures of the loop while all joints move, and of the heap."""
     mean, longest = (values[name] / CYCLES_PER_US for name in ("turn_cycles", "longest_turn_cycles"))
@@ -138,7 +155,7 @@ def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
         f"{mean:.0f} us, the longest {longest:.0f}",
     )
     stages = ", ".join(f"{name} {values['free'][name]}" for name in ("engine", "loaded", "moved"))
-    yield Measurement("memory", "free heap beside engine and capture", f"{stages} bytes")
+    yield Measurement("memory", "free heap next to engine and capture", f"{stages} bytes")
 
 
 def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
@@ -181,5 +198,5 @@ def _stops(way: str, cycles: Sequence[int]) -> Measurement:
         f"worst {took_us.max():.1f} us" + (f", {gone_on} times they went on" if gone_on else ""),
         f"below {_SLOWEST_STOP_US:g} us each time",
         not gone_on and float(took_us.max()) < _SLOWEST_STOP_US,
-        "do not connect drivers: it does not stop the pulses; please report it with the output",
+        "do not connect drivers: interrupts come late, or do not stop the pulses; please report it with the output",
     )

@@ -10,15 +10,18 @@ from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.diagnosis.finding import Level
 from armtempo.link.board_messages import Hello
-from armtempo.selftest.pulse_part import CYCLES_PER_US, LONGEST_TURN_US
+from armtempo.selftest.pulse_part import CYCLES_PER_US
 from armtempo.selftest.result import Measurement, judged
 
 PART = "rates"
 JOINTS = (1, 2, 3, 6)
 DURATION_S = 0.4
 SIMULATED_DURATION_S = 0.05
-COUNTED_S = 2.0
-"""Of the motion whose edges are counted."""
+_LEAD_US, WATCHED_US = 20_000, 4096
+"""Between start and the motion's time 0 (``engine.LEAD_TICKS``); what a capture keeps."""
+_RESOLUTION_US = 1.5
+_SLOWER = 0.03
+"""Steps may be so much further apart than at the rate: a capture ends when a turn of the loop does."""
 KEPT = 0.8
 """Part of the rate that was found which the board states; it never states more than one that was not measured."""
 _ROUNDS = 5
@@ -99,17 +102,29 @@ def judge_ramp(found: tuple[float, bool], rate: int, count: int) -> Measurement:
     )
 
 
-def judge_counted(values: Mapping[str, Any], port: str, count: int, steps: int) -> Measurement:
-    """The line about the edges that were counted on a port while its joints made so many ``steps`` together."""
-    what = f"steps on port {port} at the rate to state, {count} joint{'s' if count > 1 else ''} moving"
-    if values["fault"] or values["longest_turn_cycles"] > LONGEST_TURN_US * CYCLES_PER_US:
-        return Measurement(PART, what, "left out: with the capture the loop comes round too late")
+def watch_us(duration_s: float) -> int:
+    """When a capture has the middle of a motion."""
+    return int(_LEAD_US + 5e5 * duration_s + WATCHED_US / 2)
+
+
+def judge_steps(values: Mapping[str, Any], port: str, rate: int, count: int) -> Measurement:
+    """The line about the steps in the middle of a motion of so many joints at that ``rate``, on the pins of a port."""
+    apart_us = 1e6 / rate
+    said = [
+        f"P{pin} {steps}, {least} to {most} us apart" for pin, (steps, least, most) in values["steps"].items()
+    ]
+    is_good = not values["fault"] and all(
+        steps >= (1 - _SLOWER) * (WATCHED_US / apart_us - 1)
+        and least >= apart_us - _RESOLUTION_US
+        and most <= apart_us * (1 + _SLOWER) + _RESOLUTION_US
+        for steps, least, most in values["steps"].values()
+    )
     return judged(
         PART,
-        what,
-        f"{values['edges'] / 2:g}",
-        str(steps),
-        values["edges"] == 2 * steps,
+        f"steps on port {port} in 4 ms at the rate to state, {_joints(count)}",
+        "; ".join(said) + (f"; fault {values['fault']}" if values["fault"] else ""),
+        f"{WATCHED_US / apart_us:.0f}, {apart_us:.1f} us apart",
+        is_good,
         "look at the lines about pulses; if nothing is wrong there, please report it with the output",
     )
 

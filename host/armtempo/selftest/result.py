@@ -34,7 +34,7 @@ def left_out(part: str, reason: str, cure: str) -> Measurement:
 
 @dataclass
 class SelfTest:
-    """The lines of one self-test of one board, and the figures behind them (``data``, by part)."""
+    """The lines of one self-test of one board, and the figures that they are from (``data``, by part)."""
 
     board_id: str
     simulated: bool

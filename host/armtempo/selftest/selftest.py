@@ -41,18 +41,21 @@ _BACK_S = 60.0
 _SIMULATED_TURN_US = 1000
 """What a turn of the loop takes on a virtual board, about as on the chip."""
 _SEED = 5
-_STOPS, _BATCH, _SIMULATED_STOPS = 1000, 100, 4
+_STOPS, _BATCH, _SIMULATED_STOPS = 1000, 50, 4
 """E-stop and limit switch, by software and by an edge, take turns. A batch is one call of the part."""
 _WAITS_US = (22_000, 78_000)
 """E-stops at random moments of ``motion.make``, which begins 20 ms after its start."""
 _STARVED_S = 0.06
+_LONG_S, _SIMULATED_LONG_S = 4.0, 0.3
+_MOST_EDGES = 2000
+"""On one port, of the motions of which each edge is looked at."""
 _LOOK_S = 0.3
 SILENT = "silence"
 """In the data: the part in which the board fell silent."""
 
 
 def run(client: Client, progress: Progress | None = None) -> SelfTest:
-    """Test the board behind ``client``, which runs the program again afterwards; its positions are unknown then.
+    """Test the board of ``client``, which runs the program again afterwards; its positions are unknown then.
 
     Raises LinkError, with nothing done, where something moves, a fault is pending, the drivers are on, or the program
     is not a part of the firmware; LinkError also where the board falls silent in a part, which it names.
@@ -168,7 +171,7 @@ def _drivers(prompt: Prompt) -> dict[str, Any]:
 
 
 def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
-    """All parts, each whatever became of the others, until the board falls silent in one."""
+    """All parts, each whether the others passed or failed, until the board falls silent in one."""
     try:
         prompt.enter(soft_reset=True)
         drivers = found.data[DRIVERS] = _drivers(prompt)
@@ -233,17 +236,28 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     for done, forward in ((0.4, True), (0.5, False)):
         work(done, 1)
         moved = motion.make(joints) if forward else motion.back_in_turn(joints)
-        arguments = {**_arguments(moved, found), "rates": moved.rates}
+        arguments = {**_arguments(moved, found), "rates": moved.rates, "most": _MOST_EDGES}
         if measured := _part(prompt, found, pulse_part.PULSES, "engine", "capture", "pulses", **arguments):
             found.add(pulse_part.judge(measured, moved, joints, forward))
             found.add([_still_off(measured.values, found)])
             if forward:
                 found.data[pulse_part.PULSES]["error_us"] = pulse_part.errors_us(measured, moved)
                 found.add(pulse_part.judge_turns(measured.values))
+    _move_long(prompt, found)
     moved = motion.make(joints)
     arguments = {**_arguments(moved, found), "rates": moved.rates}
     motions = [arguments.pop("motion"), motion.at_rates(_own(joints), _STARVED_S).hex()]
     _stop(prompt, found, {**arguments, "motions": motions}, work)
+
+
+def _move_long(prompt: Prompt, found: SelfTest) -> None:
+    """A motion of some seconds, whose edges are counted only."""
+    duration_s = _SIMULATED_LONG_S if found.simulated else _LONG_S
+    moved = motion.long(found.data[DRIVERS]["joints"], duration_s)
+    arguments = {**_arguments(moved, found), "rates": moved.rates, "most": 0}
+    if measured := _part(prompt, found, pulse_part.PULSES, "engine", "capture", "pulses", **arguments):
+        found.add([pulse_part.judge_long(measured.values, motion.long_steps(duration_s), duration_s)])
+        found.add([_still_off(measured.values, found)])
 
 
 def _stop(prompt: Prompt, found: SelfTest, arguments: dict[str, Any], work: Progress) -> None:
@@ -278,7 +292,7 @@ def _own(joints: Sequence[dict[str, Any]]) -> list[int]:
 def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     """The highest step rate of the arm's first 1, 2, … joints; on a virtual board of one and of all of them.
 
-    Then, for each, the steps of a longer motion at four fifths of it; and the shortest ramp of all joints.
+    Then, for each, the steps in the middle of a motion at four fifths of it; and the shortest ramp of all joints.
     """
     joints = found.data[DRIVERS]["joints"]
     most = len(joints)
@@ -290,7 +304,7 @@ def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         highest[count] = rate_part.highest(lambda rate: trials.keeps_up([rate] * count), count)  # noqa: B023
         found.add(rate_part.judge(highest[count], count))
         if rate := round(rate_part.KEPT * (highest[count] or 0)):
-            found.add(trials.counted(joints[:count], rate))
+            found.add(trials.watched(joints[:count], rate))
             if count == counts[-1]:
                 found.add([trials.ramp(rate, count)])
     found.add([rate_part.judge_load(trials.longest_cycles)])
@@ -310,22 +324,19 @@ class _Trials:
         self.longest_cycles = 0
 
     def keeps_up(self, rates: Sequence[int], duration_s: float = 0.0) -> bool | None:
-        """Whether so many joints make these rates; None where it could not be tried."""
+        """Whether that many joints make these rates; None if it could not be tried."""
         values = self._tried(rates, duration_s or self._duration_s, "")
         if values is None or values["fault"]:
             return None if values is None else False
         self.longest_cycles = max(self.longest_cycles, values["longest_turn_cycles"])
         return True
 
-    def counted(self, joints: Sequence[dict[str, Any]], rate: int) -> Iterator[Measurement]:
-        """The steps that are seen on the pins of a longer motion, port by port: to look costs the processor time."""
-        duration_s = self._duration_s if self._found.simulated else rate_part.COUNTED_S
-        steps = motion.steps_at(rate, duration_s)
-        ports = [engine_pins.table()["STEP"][joint["channel"]][0][0] for joint in joints]
-        for port in sorted(set(ports)):
-            values = self._tried([rate] * len(joints), duration_s, port)
+    def watched(self, joints: Sequence[dict[str, Any]], rate: int) -> Iterator[Measurement]:
+        """The steps on the pins in the middle of a motion, port by port, as the heap has room for one capture."""
+        for port in sorted({engine_pins.table()["STEP"][joint["channel"]][0][0] for joint in joints}):
+            values = self._tried([rate] * len(joints), self._duration_s, port)
             if values is not None:
-                yield rate_part.judge_counted(values, port, len(joints), ports.count(port) * steps)
+                yield rate_part.judge_steps(values, port, rate, len(joints))
 
     def ramp(self, rate: int, count: int) -> Measurement:
         """The shortest one to a rate."""
@@ -341,7 +352,7 @@ class _Trials:
             "rates": [motion.limit(rate) for rate in rates],
             "frames": rate_part.frames(),
             "idle_us": _SIMULATED_TURN_US if self._found.simulated else 0,
-            "port": port,
+            "watch": (port, rate_part.watch_us(duration_s)) if port else (),
         }
         files = ("engine", *(("capture",) if port else ()), "rates")
         measured = _part(self._prompt, self._found, rate_part.PART, *files, **arguments)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from armtempo.basics.arguments import checked_fields
-from armtempo.basics.virtual_id import PREFIX
 from armtempo.model.arm import Arm
+from armtempo.ports.names import VIRTUAL_ID
 
 DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 
@@ -119,4 +119,4 @@ class ProcessOptions:
 
 def unique_id(seed: int) -> str:
     """A virtual board's 24 hex digits, another for each seed."""
-    return (PREFIX + hashlib.sha256(b"virtual board %d" % seed).hexdigest())[:24]
+    return (VIRTUAL_ID + hashlib.sha256(b"virtual board %d" % seed).hexdigest())[:24]

@@ -204,7 +204,7 @@ def program_folders() -> list[str]:
     import armtempo_shared
 
     shared = Path(armtempo_shared.__file__).resolve().parent.parent
-    beside = shared.parent / "board"  # in a checkout; in site-packages all stand together
+    beside = shared.parent / "board"  # in a checkout; in site-packages all are together
     board = beside if (beside / "armtempo_board").is_dir() else shared
     return [str(folder) for folder in dict.fromkeys((board, shared))]
 

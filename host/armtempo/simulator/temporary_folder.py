@@ -26,7 +26,7 @@ class TemporaryFolder:
         unlocked = self.path / "new"
         self.lock = os.open(unlocked, os.O_CREAT | os.O_RDWR, 0o600)
         fcntl.flock(self.lock, fcntl.LOCK_EX)
-        unlocked.rename(self.path / _LOCK)  # under this name it is always locked, or left behind
+        unlocked.rename(self.path / _LOCK)  # under this name it is always locked, or abandoned
 
     def remove(self) -> None:
         """Remove it with all that is in it; nothing happens the second time."""

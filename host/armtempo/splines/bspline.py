@@ -39,7 +39,7 @@ def fit(points_deg: ArrayLike, degree: int, rests: Sequence[int] = ()) -> Array:
 
     ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J): Eq. (13) or (14), solved as a full
     matrix, as scipy's banded solver takes longer to load than most commands. The cubic rests in speed, the quintic
-    also in acceleration. A quintic stands still at the points ``rests`` too, where it may go on in any direction, and
+    also in acceleration. A quintic rests at the points ``rests`` too, where it may continue in any direction, and
     only comes near to the two points before and after each; they are at least ``degree`` apart and from the ends.
     Raises InputError for fewer than two points or values that are not finite.
     """

@@ -1,7 +1,7 @@
 """Sphinx settings of the documentation site; ``make docs`` builds it, warnings are errors.
 
 The source folder is the repository's root, so that the pages of host, board and shared link to each other and to
-files of code by their paths as they stand, on the site as in the repository.
+files of code by their paths, on the site as in the repository.
 """
 
 import sys

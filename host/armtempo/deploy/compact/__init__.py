@@ -1,7 +1,7 @@
 """Make the board program small before it is compiled: what a module costs in a board's memory is largely names.
 
 MicroPython keeps every name that a file mentions, and 10 to 20 bytes for each place where a module holds one. So
-packages within packages go (``flatten``), constants are put in where they are used (``constants``), the modules that
+packages within packages go (``_flatten``), constants are put in where they are used (``constants``), the modules that
 are always needed become one (``merge``), as do others that come and go together (``join``), the program's own names
 become short (``shorten``), and what is called only while nothing moves is imported for the call (``set_up``). The
 behaviour of the program does not change.
@@ -10,12 +10,12 @@ behaviour of the program does not change.
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 from armtempo.deploy.compact.constants import fold
-from armtempo.deploy.compact.flatten import flatten
 from armtempo.deploy.compact.frames import Function, Functions, functions, label
 from armtempo.deploy.compact.join import join
 from armtempo.deploy.compact.merge import CORE, merge, used_whole
@@ -48,7 +48,7 @@ def compact(
     while nothing moves, under the name of the module that is to hold them (``set_up``). Raises ValueError where a
     module asks another for a name that is not there, or a package cannot be made flat.
     """
-    trees, flat = flatten({module: _at_run_time(ast.parse(text)) for module, text in sources.items()})
+    trees, flat = _flatten({module: _at_run_time(ast.parse(text)) for module, text in sources.items()})
     whole = used_whole(trees)
     fold(trees, whole)
     join(trees, {flat[home]: [flat[module] for module in modules] for home, modules in together.items()})
@@ -86,3 +86,35 @@ def _at_run_time(tree: ast.Module) -> ast.Module:
 
 def _is_for_checkers(node: ast.stmt) -> bool:
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def _flatten(trees: Mapping[str, ast.Module]) -> tuple[dict[str, ast.Module], dict[str, str]]:
+    """The modules by names of two parts at most, and that name by the one before; ``trees`` is used up.
+
+    Packages within packages go; they may hold nothing but a docstring. Raises ValueError where one holds more, or
+    where two modules would have one name.
+    """
+    inner = {
+        module for module in trees if "." in module and any(each.startswith(f"{module}.") for each in trees)
+    }
+    flat: dict[str, str] = {}
+    for module in trees.keys() - inner:
+        top, *rest = module.split(".")
+        flat[module] = ".".join([top, *rest[-1:]])
+    _check_flat(trees, inner, flat)
+    for tree in trees.values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                node.module = flat.get(
+                    node.module, node.module.split(".")[0] if node.module in inner else node.module
+                )
+    return {flat[module]: trees[module] for module in trees if module not in inner}, flat
+
+
+def _check_flat(trees: Mapping[str, ast.Module], inner: set[str], flat: Mapping[str, str]) -> None:
+    for module in inner:
+        if any(not isinstance(node, ast.Expr) for node in trees[module].body):
+            raise ValueError(f"{module}: a package within a package holds nothing but its docstring")
+    twice = [name for name, count in Counter(flat.values()).items() if count > 1]
+    if twice:
+        raise ValueError(f"two modules are called {twice[0]}")

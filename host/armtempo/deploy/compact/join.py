@@ -10,7 +10,7 @@ from armtempo.deploy.compact.scopes import Scoped, Target, imported, top_names, 
 
 
 def join(trees: dict[str, ast.Module], together: Mapping[str, Collection[str]]) -> None:
-    """Make the modules that stand under another one in ``together`` part of that; names stay as they are.
+    """Make the modules that are under another one in ``together`` part of that; names stay as they are.
 
     Raises ValueError where two of them define the same name, or a function hides one that it means.
     """

@@ -24,7 +24,7 @@ def merge(
     """The modules of the smaller program, without what nothing in it mentions; ``trees`` is used up.
 
     What ``main`` imports at the head of a module, directly or through others, becomes the module ``core`` of
-    its package, each name behind that of its module. Packages, ``entries``, modules that a function imports and
+    its package, each name after that of its module. Packages, ``entries``, modules that a function imports and
     modules of which more than names is used stay as they are. ``keep``: names that are used from outside or found at
     run time. Raises ValueError where a name has no meaning.
     """
@@ -111,7 +111,7 @@ def _imported_later(trees: Mapping[str, ast.Module]) -> set[str]:
 
 
 def _in_order(trees: Mapping[str, ast.Module], main: str) -> list[str]:
-    """``main`` and what it needs, each behind what it needs itself."""
+    """``main`` and what it needs, each after what it needs itself."""
     found: list[str] = []
 
     def add(module: str) -> None:

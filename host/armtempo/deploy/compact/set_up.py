@@ -30,7 +30,7 @@ def set_up_methods(tree: ast.Module, wanted: Collection[str]) -> list[Method]:
 def move(trees: dict[str, ast.Module], home: str, target: str, methods: Collection[Method]) -> list[str]:
     """Move methods of the module ``home`` to the new module ``target`` of its package; returns their names there.
 
-    Each leaves a call of itself behind. The names are some that the module has already, which cost nothing.
+    Each leaves a call of itself. The names are some that the module has already, which cost nothing.
     """
     package, core = home.rsplit(".", 1)
     own = sorted(top_names(trees[home]))

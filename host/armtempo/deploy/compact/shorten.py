@@ -54,7 +54,7 @@ _OF_MODULES = """
     hex imag inf isinf isnan load loads log match math micros millis mode modf nan peek phase polar poll pull push pwm
     radians real rect rng scan search seed sin sqrt tan tau tell trunc uniform wfi
 """
-"""Names that the port's own modules have (``math``, ``pyb``, ...): they stand in the firmware and need no memory."""
+"""Names that the port's own modules have (``math``, ``pyb``, ...): they are in the firmware and need no memory."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Names:
 def short_names(trees: Mapping[str, ast.Module], keep: Collection[str], whole: Collection[str] = ()) -> Names:
     """Short names for all that is the program's own.
 
-    Not shortened: what built-in types or imported modules may mean by a name, what stands in a string or is a
+    Not shortened: what built-in types or imported modules may mean by a name, what is in a string or is a
     keyword in a call, names of modules, what modules of ``whole`` define, and ``keep``.
     """
     nodes = [node for tree in trees.values() for node in ast.walk(tree)]
@@ -95,7 +95,7 @@ def short_names(trees: Mapping[str, ast.Module], keep: Collection[str], whole: C
 
 
 def shorten(trees: Mapping[str, ast.Module], names: Names) -> None:
-    """Rename what stands in ``names``, and the parameters of functions to single letters."""
+    """Rename what is in ``names``, and the parameters of functions to single letters."""
     keywords = {name for tree in trees.values() for name in _keywords(list(ast.walk(tree)))}
     for module, tree in trees.items():
         for node in ast.walk(tree):

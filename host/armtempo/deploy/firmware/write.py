@@ -91,7 +91,7 @@ def _choose(tool: str | None) -> str:
 
 
 def _prepare(port: str | None, firmware: Image, tool: str, tell: Tell) -> None:
-    """See that a board with a port is the right one and stands still; for dfu-util, put it in its bootloader."""
+    """See that a board with a port is the right one and nothing moves; for dfu-util, put it in its bootloader."""
     if port is None and not _chips(tool):
         boards = [each.device for each in find_ports() if each.board]
         port = boards[0] if len(boards) == 1 else None

@@ -41,7 +41,7 @@ class Forms:
 def forms(variables: MotionVariables, low: Array, high: Array) -> Forms:
     """All Bernstein coefficients, between ``low`` and ``high``, each (S, k + 1, J).
 
-    A coefficient that two segments share stands there twice; that of the second counts.
+    A coefficient that two segments share is there twice; that of the second counts.
     """
     count = variables.degree + 1
     segment = np.arange(variables.segments)

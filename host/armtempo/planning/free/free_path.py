@@ -21,7 +21,7 @@ _COARSE_PIECES = 8
 _PIECES, _LEAST, _MOST = 28, 56, 224
 """Segments that an automatic layout has for each stretch between via points, and at least and at most in all."""
 _FEW = 5
-"""Segments for each stretch where there are so many of them that _MOST would leave less."""
+"""Segments for each stretch if there are more stretches than _MOST allows."""
 _EVEN_PIECES = 24
 """Segments for each stretch where all have the same number."""
 _ROUNDS = 3

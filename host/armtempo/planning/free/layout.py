@@ -1,4 +1,4 @@
-"""Where the via points of a free path stand among its segments, and what must hold there exactly."""
+"""Where the via points of a free path are among its segments, and what must hold there exactly."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ MOST_GAIN = 5.0
 MARGIN_STEPS = 2.0
 """This many steps of its motor are left to the end of a joint's range."""
 AXES = ("x", "y", "z", "tool-x", "tool-y", "tool-z")
-"""Axes of the base, and of the tool as it stands at the start."""
+"""Axes of the base, and of the tool as it is at the start."""
 _TRIED = (WHOLE, (APPROACH,), (PITCH,), (YAW,), (ROLL,), ())
 _PARALLEL = 0.99
 _HALVINGS = 8

@@ -83,7 +83,7 @@ def course(arm: Arm, job: Job, stretch: Stretch, first_deg: Array) -> Course:
     for via in range(stretch.first + 1, stretch.last):
         if kept(arm, job.via[via]) != fixed:
             raise PlanError(
-                f"P{stretch.first} to P{stretch.last}: the corner at P{via} cannot be cut, as the lines beside it keep "
+                f"P{stretch.first} to P{stretch.last}: the corner at P{via} cannot be cut, as the lines at it keep "
                 "different parts of the tool's orientation",
                 "leave blend_mm out, or give both via points the same kind of pose",
             )

@@ -21,7 +21,7 @@ def plain(turns):
 
 
 def emitted(entries):
-    """Cycles in which the ring interrupt's ``emit`` writes so many edges of a long cubic to a ring."""
+    """Cycles in which the ring interrupt's ``emit`` writes that many edges of a long cubic to a ring."""
     from array import array
 
     from armtempo_board.hardware import isr

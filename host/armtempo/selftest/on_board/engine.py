@@ -11,6 +11,7 @@ class NoPin:
         return 0
 
 
+_SEEN_TICKS = 168  # 2 us: a capture at 1 MHz has each pulse twice
 _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 
 
@@ -29,6 +30,7 @@ def make_engine(record, switches=False, rates=None, encoders=False, workspace=No
         head, joints, _ = armrecord.unpack(file.read())
     kept = armrecord.FLAG_ENABLE_HIGH | armrecord.FLAG_ESTOP_ACTIVE_HIGH | armrecord.FLAG_ESTOP_FITTED
     head["flags"] = head["flags"] & kept | (armrecord.FLAG_ESTOP_FITTED if switches else 0)
+    head["pulse_ticks"] = max(head["pulse_ticks"], _SEEN_TICKS)
     for joint in joints:
         joint["limit_low"] = joint["limit_high"] = armrecord.NONE
         joint["following_counts"] = 0
@@ -86,7 +88,7 @@ def serve(engine, idle_us):
 
 
 def load(engine, motion, start_steps):
-    """Stand at its start and load it; the motion. ValueError where the drivers are not off."""
+    """Put the joints at its start and load it; the motion. ValueError where the drivers are not off."""
     from armtempo_shared.motion import Motion
 
     output, driven, level = enable()

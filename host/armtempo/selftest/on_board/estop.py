@@ -1,11 +1,11 @@
-"""How long the outputs go on after E-stop and limit switch: by software (EXTI_SWIER, RM0090 12.3.5), by a real edge."""
+"""How long outputs continue after E-stop and limit switch: by software (EXTI_SWIER, RM0090 12.3.5), by a real edge."""
 
 _STARVE_US = 40_000
 _MOST_LOOKS = 100
 
 
 def stopped(engine, at, value):
-    """Cycles from writing a register until the input's interrupt has ended; -1 where the outputs go on."""
+    """Cycles from writing a register until the input's interrupt has ended; -1 if the outputs continue."""
     from armtempo_board.hardware.isr import FROZEN
 
     block = engine.block

@@ -2,8 +2,6 @@
 
 from binascii import hexlify
 
-_MOST_EDGES = 2000
-
 
 def directions(joints):
     """Level of each joint's DIR pin."""
@@ -16,13 +14,13 @@ def directions(joints):
     return found
 
 
-def measure(record, motion, start_steps, rates, idle_us):
-    """Run the motion (a record in hex) once; the edges go out as bulk data, 4 bytes each, port by port."""
+def measure(record, motion, start_steps, rates, idle_us, most):
+    """Run the motion (a record in hex) once; ``most`` edges go out as bulk data, 4 bytes each, port by port."""
     from binascii import unhexlify
 
     feed()
     count_cycles()
-    captures, steps = captured(record, len(start_steps), _MOST_EDGES)
+    captures, steps = captured(record, len(start_steps), most)
     engine, joints = make_engine(record, rates=rates)
     stages = {"engine": free()}
     longest = turns = 0
@@ -51,7 +49,7 @@ def measure(record, motion, start_steps, rates, idle_us):
         off = enable()
         engine.close()
     for capture in captures:
-        data = memoryview(capture.edges)[: min(capture.state[_COUNT], _MOST_EDGES)]
+        data = memoryview(capture.edges)[: min(capture.state[_COUNT], most)]
         for at in range(0, len(data), 32):
             print("#" + hexlify(data[at : at + 32]).decode())
     return {

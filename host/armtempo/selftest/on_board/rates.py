@@ -28,10 +28,11 @@ class Host:
         return size
 
 
-def measure(record, motion, rates, frames, idle_us, port=""):
+def measure(record, motion, rates, frames, idle_us, watch=()):
     """The first joints of the arm, one for each of ``rates``, from step 0 on: fault, turns of the loop, the longest.
 
-    ``frames``: hello, then two commands that take turns. ``port``: its edges are counted, on these joints' STEP pins.
+    ``frames``: hello, then two commands that take turns. ``watch``: a port, and the microsecond at which its capture
+    ends: the steps on its pins in the 4 ms before are measured.
     """
     from binascii import unhexlify
 
@@ -40,7 +41,7 @@ def measure(record, motion, rates, frames, idle_us, port=""):
 
     feed()
     count_cycles()
-    captures = captured(record, len(rates), 0, port)[0] if port else []
+    captures = captured(record, len(rates), 0, watch[0])[0] if watch else []
     host = Host([unhexlify(frame) for frame in frames])
     app = App(host, "/none")  # no arm is stored there: no pin is touched
     engine, _ = make_engine(record, rates=rates, workspace=app.controller.board.workspace)
@@ -52,19 +53,18 @@ def measure(record, motion, rates, frames, idle_us, port=""):
         if captures:
             begin(captures)
         app.controller.start_loaded(motion, 0)
+        begun_us = time.ticks_us()
         then = cycles()
         while app.controller.running:
             app.turn()
-            for capture in captures:
-                capture.look()
+            if captures and time.ticks_diff(time.ticks_us(), begun_us) > watch[1]:
+                end(captures)
             if idle_us:
                 time.sleep_us(idle_us)
             now = cycles()
             if app.controller.running:  # else it is the end, which nothing waits for
                 longest = max(longest, (now - then) & 0xFFFFFFFF)
             then = now
-        for capture in captures:
-            capture.look()
     finally:
         engine.freeze()
         if captures:
@@ -79,7 +79,7 @@ def measure(record, motion, rates, frames, idle_us, port=""):
         "turns": app.turns,
         "longest_turn_cycles": longest,
         "commands": host.sent,
-        "edges": sum([capture.state[_COUNT] for capture in captures]),
+        "steps": captures[0].window() if captures else {},
         "enable": off,
     }
 

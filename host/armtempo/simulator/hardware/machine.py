@@ -2,7 +2,6 @@
 
 import machine_state
 from chip import memory
-from chip import reset as _reset
 from chip.processor import CALL_TICKS
 from chip.watchdog import WDT  # noqa: F401
 from firmware.pin_api import Pin  # noqa: F401
@@ -74,9 +73,9 @@ def enable_irq(state=True):
 
 def soft_reset():
     """Start MicroPython again; the hardware keeps its registers."""
-    raise _reset.Reset(SOFT_RESET)
+    raise machine_state.Reset(SOFT_RESET)
 
 
 def reset():
     """As the reset button."""
-    raise _reset.Reset(HARD_RESET)
+    raise machine_state.Reset(HARD_RESET)

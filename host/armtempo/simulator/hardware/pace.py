@@ -12,7 +12,7 @@ import time
 import machine_state
 from chip.flash import real_open
 from chip.processor import TICKS_PER_MS, TICKS_PER_US
-from chip.reset import PowerOff
+from machine_state import PowerOff
 
 _HORIZON_TICKS = 500 * TICKS_PER_MS
 _NAP_MS = 5

@@ -6,9 +6,9 @@ import sys
 import machine_state
 import setup
 from chip import memory, timer_registers
-from chip.reset import PowerOff, Reset
 from firmware import boot
 from firmware.repl import Repl, SoftReset, board_print
+from machine_state import PowerOff, Reset
 
 _POWER_ON, _SOFT = 1, 0
 

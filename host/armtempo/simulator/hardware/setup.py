@@ -85,5 +85,5 @@ def _arm_record():
 
 
 def _stall(ms):
-    """The processor stands still so long; the timers do not."""
+    """The processor stands still for that time; the timers do not."""
     machine_state.board.stall(ms * TICKS_PER_MS)

@@ -7,8 +7,7 @@ import cases
 from math import cos, exp, pi, sin, sqrt
 
 from arm import switches
-from arm.noise import Noise
-from arm.stepper import Stepper
+from arm.stepper import Noise, Stepper
 
 # all cases: not emulated
 MS = 84_000

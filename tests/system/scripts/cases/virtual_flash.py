@@ -7,7 +7,7 @@ import sys
 
 import bare_board  # replaces time, os, uctypes, micropython; so before everything else
 import cases
-from chip.reset import Reset
+from machine_state import Reset
 
 # isort: split
 import os

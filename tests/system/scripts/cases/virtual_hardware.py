@@ -14,9 +14,9 @@ import power_cycles
 from chip import memory, timer_registers, timers
 from chip.flash import real_open
 from chip.processor import TICKS_PER_US
-from chip.reset import Reset
 from firmware import repl, usb_serial
 from firmware.external_interrupts import set_level
+from machine_state import Reset
 
 # isort: split
 import io

@@ -16,13 +16,32 @@ swings fast; each step sees the mean of what was commanded in it, so a pulse cou
 from math import asin, ceil, cos, pi, sin, sqrt
 
 from arm.ideal_motor import IdealMotor
-from arm.noise import Noise
 
 _DT_TICKS = 84_000
 _DT_S = 0.001
 _FINEST = 0.25  # rad that the rotor's free swing may turn in one part of a step
 _REST_STEPS = 0.002
 _SCATTER_LENGTH_DEG = 2.0  # of motion, over which a new repetition's scatter fades in
+_MULTIPLIER = 48271  # Park and Miller, Communications of the ACM 36 (1993) 7, page 105
+_MODULUS = 0x7FFFFFFF
+
+
+class Noise:
+    """Random numbers from a seed, the same on every interpreter."""
+
+    def __init__(self, seed):
+        self._state = seed % (_MODULUS - 1) + 1
+        for _ in range(8):
+            self.uniform()
+
+    def uniform(self):
+        """In (0, 1)."""
+        self._state = self._state * _MULTIPLIER % _MODULUS
+        return self._state / _MODULUS
+
+    def normal(self):
+        """Standard normal, as near as the sum of twelve uniform numbers is."""
+        return sum([self.uniform() for _ in range(12)]) - 6.0
 
 
 class Stepper(IdealMotor):

@@ -78,7 +78,7 @@ class Channel:
                 line.pulse(pulses or (0, 0), now)
 
     def plan(self, total):
-        """Find the next match of the compare value as it stands."""
+        """Find the next match of the present compare value."""
         timer = self.timer
         if self.mode == _PWM:
             return

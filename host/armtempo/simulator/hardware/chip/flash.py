@@ -11,7 +11,7 @@ board starts again. The chip writes through a cache: only ``sync`` makes what wa
 
 import os
 
-from chip.reset import Reset
+from machine_state import Reset
 
 BLOCK = 512
 BLOCKS = 190
@@ -112,7 +112,7 @@ class FlashFolder:
         self.mounts[point] = self.root
 
     def umount(self, point):
-        """Unmount what is there."""
+        """Unmount what is mounted."""
         if point not in self.mounts:
             raise OSError(_EINVAL)
         del self.mounts[point]

@@ -12,7 +12,6 @@ from chip import (
     capture,
     cycle_counter,
     dma,
-    external_lines,
     gpio,
     memory,
     timer_registers,
@@ -31,6 +30,7 @@ INTERRUPT_TICKS = 160
 CALLBACK_TICKS = 250
 """What a callback takes on top of its own simulated calls."""
 NEVER = timer_registers.NEVER
+_SWIER = 4  # word of EXTI
 _RCC_TIMERS = {
     1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (16, 3), 6: (16, 4), 7: (16, 5),
     9: (17, 16), 10: (17, 17), 11: (17, 18), 12: (16, 6), 13: (16, 7), 14: (16, 8),
@@ -117,7 +117,7 @@ class Chip:
         if "DMA2" in names or "TIM1" in names:
             self.reader.sync()
         if "EXTI" in names:
-            external_lines.sync(self)
+            self._sync_triggers()
         for block in blocks:
             memory.accept(block)
         self._find_happening()
@@ -131,6 +131,16 @@ class Chip:
                     extint.look()  # a pull resistor may have drawn its pin
         if routed:
             self.pins.route((self.timers[2], self.timers[5]))
+
+    def _sync_triggers(self):
+        """EXTI was written: a bit of its software trigger (RM0090 12.3.5) asks for the line's interrupt."""
+        at = memory.index("EXTI") + _SWIER
+        asked = memory.words[at]
+        if asked:
+            memory.poke(at, 0)  # as the handler's clearing of the pending bit does
+            for line, extint in self.extints.items():
+                if asked >> line & 1 and extint.enabled:
+                    self.pend("exti", line)
 
     def recount(self):
         """A timer was started or stopped: find those that time moves."""

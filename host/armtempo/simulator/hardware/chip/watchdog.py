@@ -4,7 +4,6 @@ import machine_state
 
 from chip import memory
 from chip.processor import TICKS_PER_MS
-from chip.reset import Reset
 
 _WDT_RESET = 3
 _RLR = 2
@@ -34,5 +33,5 @@ def _watch():
 
 def _look():
     if machine_state.board.now >= machine_state.board.watchdog_deadline:
-        raise Reset(_WDT_RESET)
+        raise machine_state.Reset(_WDT_RESET)
     _watch()

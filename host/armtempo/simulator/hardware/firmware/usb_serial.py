@@ -44,7 +44,7 @@ class SilentPort:
         """Move bytes between the buffers and the host."""
 
     def stuck(self):
-        """Whether the host does not read what is there for it."""
+        """Whether the host does not read what was sent to it."""
         return bool(self.sending) and not self.silent
 
     def put(self, data):
@@ -168,7 +168,7 @@ class USB_VCP:
         return sent
 
     def read(self, size=-1):
-        """What is there, up to ``size``; None if nothing is.
+        """What has been received, up to ``size``; None if nothing has.
 
         A program looks here once a turn of its main loop, so finding nothing also stands for the time that the turn's
         own work takes on the chip (option ``turn_us``).
@@ -180,7 +180,7 @@ class USB_VCP:
         return self.recv(there if size < 0 else min(size, there), timeout=0)
 
     def readinto(self, buffer, size=None):
-        """What is there, into a buffer; None if nothing is."""
+        """What has been received, into a buffer; None if nothing has."""
         got = self.read(len(buffer) if size is None else size)
         if got is None:
             return None

@@ -1,0 +1,55 @@
+"""Meshes of an arm's links, to be shown: STL files in mm, in a folder next to the arm file.
+
+``arm.toml`` has its meshes in ``arm-meshes``: ``3.stl`` moves with the third row and is in its frame, ``0.stl`` is the
+base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.model.arm import Arm
+
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+
+
+def folder_of(arm_file: Path) -> Path:
+    """Where the meshes of an arm file are."""
+    return arm_file.with_name(f"{arm_file.stem}-meshes")
+
+
+def of_arm(arm: Arm) -> dict[int, Path]:
+    """The files by the number of their row, 0 for the base; none for an arm without a file."""
+    if not arm.source:
+        return {}
+    folder = folder_of(Path(arm.source))
+    files = {number: folder / f"{number}.stl" for number in range(len(arm.joints) + 1)}
+    return {number: file for number, file in files.items() if file.is_file()}
+
+
+def write(arm_file: Path, corners_mm: Mapping[int, Array]) -> list[Path]:
+    """Write the triangles (N, 3, 3) of each row in the place of those that are there; the paths."""
+    folder = folder_of(arm_file)
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.stl"):
+        old.unlink()
+    written = []
+    for number, corners in sorted(corners_mm.items()):
+        triangles = np.zeros(len(corners), _TRIANGLE)
+        triangles["corners"] = corners
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        triangles["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        file = folder / f"{number}.stl"
+        file.write_bytes(bytes(80) + np.uint32(len(corners)).tobytes() + triangles.tobytes())
+        written.append(file)
+    return written
+
+
+def read(file: Path) -> Array:
+    """The triangles (N, 3, 3) of a file that ``write`` wrote."""
+    corners: Array = np.frombuffer(file.read_bytes(), _TRIANGLE, offset=84)["corners"].astype(np.float64)
+    return corners
