@@ -41,6 +41,8 @@ _LEAST_STEP = 1e-3
 to the angles is divided by its cube."""
 _FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
 _AGAIN = Schedule(first_barrier=1e-3, last_barrier=1e-4, curvature=False)
+_ROUNDED = 1e-10
+"""A path this little beyond a bound, as a part of the angles, keeps it as far as its digits go."""
 _AT_END = 1e-6
 """A via point this near to the end of a range, as a part of what its joint turns, is at it."""
 _NEAR = 1e-5
@@ -240,7 +242,7 @@ class Improver:
         points = collocation.grid(self.layout.segments, _PARTS, ends=False)
         best = here = motion.stretched(self.demand.limits)
         for number in range(rounds):
-            here = self._solve(here, points, first=number == 0)
+            here = self._inside(self._solve(here, points, first=number == 0), best)
             curve = here.curve(self.demand.limits)
             stretch = curve.stretch()
             points += collocation.peaks(curve, _PEAK_GRID_FACTOR * _PARTS, _PEAK_THRESHOLD)
@@ -249,6 +251,24 @@ class Improver:
             if stretch < 1.0 + _NEAR:
                 break
         return best
+
+    def _inside(self, motion: FreeMotion, within: FreeMotion) -> FreeMotion:
+        """The motion, drawn towards one within the bounds where meeting via points to the last digit moved it out."""
+        found, safe = (self._beyond(each) for each in (motion, within))
+        out = found > _ROUNDED
+        if not out.any():
+            return motion
+        part = float(np.min((_ROUNDED - safe[out]) / (found[out] - safe[out])))
+        if self._targets is not None or not part > 0.0:
+            return within
+        points = within.angle_points_deg + part * (motion.angle_points_deg - within.angle_points_deg)
+        return replace(motion, angle_points_deg=points)
+
+    def _beyond(self, motion: FreeMotion) -> Array:
+        """How far each Bernstein coefficient is beyond its bounds, as a part of the largest angle there: (S, 6, J)."""
+        at = angle_bounds.of_path(motion.angle_points_deg, DEGREE)
+        largest = np.maximum(1.0, np.maximum(np.abs(self.demand.low_deg), np.abs(self.demand.high_deg)))
+        return np.asarray(np.maximum(self._low - at, at - self._high) / largest)
 
     def equalities(self, unit_s: float) -> Equalities:
         """What must hold exactly, with angles in parts of ``size_deg`` and times in ``unit_s``."""

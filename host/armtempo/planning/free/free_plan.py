@@ -37,6 +37,12 @@ _WORTH_USING = 1e-3
 """A tolerance of less than this many mm or degrees is not made use of."""
 _ROUNDED = 1.001
 """Time is stretched by no more than this for what rounding does."""
+_BY_ORDER = 1.0 / np.arange(1, 4)
+"""Speed, acceleration and jerk fall by these powers as time is stretched."""
+_MARGINS = (0.0, 1e-8, 1e-7, 1e-6, 1e-5)
+"""What time is stretched by on top of that, from one time to the next."""
+_FAIR = 0.3 * checks.TOLERANCE
+"""By so much a limit may be exceeded after the first time."""
 _START_GAP = 1e-3
 """How near to the best one the time axis comes that a path in a corridor starts with."""
 _WIDER = 0.5 * checks.TOLERANCE
@@ -182,18 +188,28 @@ def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[S
 
 
 def _kept(arm: Arm, trajectory: Trajectory) -> Trajectory:
-    """The same, slower by the little that rounding of its control points may have done to its limits."""
-    factors = []
-    for spline, joint in zip(trajectory.joints, arm.driven, strict=True):
-        excess = extremes.of_joints((spline,))[0].values / np.array(joint.limits.values)
-        factors.append(float(np.max(excess ** (1.0 / np.arange(1, 4)))))
-    if trajectory.shared:
-        factors = [max(factors)] * len(factors)
-    joints = (
-        replace(spline, time_points_s=spline.time_points_s * factor) if 1.0 < factor < _ROUNDED else spline
-        for spline, factor in zip(trajectory.joints, factors, strict=True)
-    )
-    return replace(trajectory, joints=tuple(joints))
+    """The same, slower by the little that rounding of its control points may have done to its limits.
+
+    Where a small move is told by the last digits of its angles, the new times are rounded otherwise than the old: then
+    it is made slower again, by more each time.
+    """
+    for margin in _MARGINS:
+        factors = [
+            float(np.max((extremes.of_joints((spline,))[0].values / joint.limits.values) ** _BY_ORDER))
+            for spline, joint in zip(trajectory.joints, arm.driven, strict=True)
+        ]
+        if trajectory.shared:
+            factors = [max(factors)] * len(factors)
+        if all(factor <= 1.0 + (margin and _FAIR) for factor in factors):
+            break
+        joints = (
+            replace(spline, time_points_s=spline.time_points_s * (factor * (1.0 + margin)))
+            if 1.0 < factor < _ROUNDED
+            else spline
+            for spline, factor in zip(trajectory.joints, factors, strict=True)
+        )
+        trajectory = replace(trajectory, joints=tuple(joints))
+    return trajectory
 
 
 def _joint(motion: FreeMotion, column: int) -> JointSpline:

@@ -14,6 +14,10 @@ from armtempo.planning.linear_rows import LinearRows
 _CENTRE = Schedule(first_barrier=1e3, last_barrier=1e3, iterations=30, curvature=False)
 """Far from all bounds, however little that is like the path wanted."""
 _NEAR = Schedule(first_barrier=10.0, last_barrier=1e-10, curvature=False)
+_OFF = Schedule(first_barrier=10.0, last_barrier=1e-3, curvature=False)
+_TOO_NEAR = 1e-9
+"""A path this near to a bound, in the unit of the angles, is kept farther off, though less like the one wanted: there
+Newton's equations of a motion that starts with it would have no digits."""
 _WIDER = 2.0
 """Bounds are widened by this many times what the path is beyond them."""
 _BETTER, _STEPS = 0.99, 60
@@ -38,7 +42,10 @@ def nearest(forms: Forms, room: float, fixed: Equalities, wanted: Array) -> Arra
         before, excess = excess, _excess(forms, x) + room
         if not excess < _BETTER * before:
             return None
-    found = interior_point.minimise(_Alike(forms, 0.0, fixed, wanted), x, _NEAR)
+    program = _Alike(forms, 0.0, fixed, wanted)
+    found = interior_point.minimise(program, x, _NEAR)
+    if found.iterations and _excess(forms, found.x) > -_TOO_NEAR:
+        found = interior_point.minimise(program, x, _OFF)
     return found.x if found.iterations else None
 
 
