@@ -4,7 +4,8 @@
 
 MICROPYTHON: a checkout as ``armtempo firmware`` takes it. That command builds the firmware with the program; one
 without is built next to it, and gets the compiled files that ``armtempo deploy`` copies. QEMU (7.2 or newer) runs each;
-the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board. What stands
+the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board; then README's
+commands for one are run, but for those that write the flash, with encoders that are not watched. What stands
 in for timers, DMA, USB, encoders and backup SRAM (loop_board.c, firmware_loop.py, firmware_host.py of
 tests/board/scripts) is a part of both firmwares, so that it takes little of the heap; what it takes is given next to
 the chip's. FOLDER keeps what was built.
@@ -30,6 +31,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
 from armtempo.deploy import program_files
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import LimitSwitches, Safety
@@ -38,6 +40,8 @@ from armtempo.robot.board import Board
 from armtempo.robot.connect import connect
 
 from tests.benchmark import firmware, loop
+from tests.system import commandline
+from tests.system.test_examples import README, command_lines
 
 PROBES = ("firmware_loop.py", "firmware_host.py")
 MANIFEST = 'include("$(PORT_DIR)/boards/manifest.py")\n' + "".join(f'module("{name}")\n' for name in PROBES)
@@ -195,6 +199,25 @@ def run(elf: Path, image: Path) -> dict[str, Heap]:
         return heaps(said)
 
 
+def readme(elf: Path, image: Path) -> None:
+    """README's commands for a real board, each to end with 0: prints what the run ended with."""
+    (block,) = [each for each in command_lines(README) if ["armtempo", "flash"] in each]
+    with running(elf, image) as (port, _), tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        arm = folder / "paper.toml"
+        text = shipped.arm_path().read_text(encoding="utf-8")
+        arm.write_text(text.replace("following_error_deg = 2.0", "following_error_deg = 0.0"))
+        for _, command, *words in block:
+            if command in ("flash", "deploy") or words == []:
+                continue
+            arguments = [command, *(str(arm) if word == "paper" else word for word in words)]
+            if command == "plan":
+                arguments += ["--arm", str(arm)]
+            done = commandline.run(*arguments, folder=folder, ARMTEMPO_PORT=port)
+            assert done.exit_code == 0, f"{command}: {done.output}{done.errors}"
+        print(f"    README: {done.output.splitlines()[-1]}", flush=True)
+
+
 def move(elf: Path, image: Path, name: str) -> dict[str, Heap]:
     """Move a shipped arm a little from its home posture; as ``run``."""
     arm = unwatched(Arm.load(name))
@@ -230,6 +253,7 @@ def main(micropython: Path, folder: Path) -> None:
     for title, elf, image in both_ways(micropython, folder):
         print(title, flush=True)
         tell(run(elf, image))
+        readme(elf, image)
         print(f"    {SIX_JOINTS}, six joints:", flush=True)
         try:
             tell(move(elf, image, SIX_JOINTS))

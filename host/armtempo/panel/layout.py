@@ -175,13 +175,13 @@ def state_line(operator: Operator) -> str:
     """The board's state in a line."""
     if operator.trouble:
         return operator.trouble
-    state = operator.live.state
-    if state is None:
-        return ""
-    kind = f" ({words.VIRTUAL})" if state.virtual else ""
     doing = f" · {operator.busy}" if operator.busy else ""
     if operator.busy and operator.progress:
         doing += f" {operator.progress:.0%}"
+    state = operator.live.state
+    if state is None:  # its program is put on it
+        return f"{operator.port}{doing}"
+    kind = f" ({words.VIRTUAL})" if state.virtual else ""
     if state.moving and state.speed_percent != 100:
         speed = (
             words.AT_SPEED.format(percent=state.speed_percent) if state.speed_percent else words.IN_A_PAUSE
