@@ -46,6 +46,11 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Panels]:
         "other": 'name = "other"\n[[step]]\nwait_s = 1\n',
     }.items():
         (folder / f"{name}.toml").write_text(text)
+    (folder / "runs" / _MARKUP).mkdir(parents=True)
+    for name in ("run.json", "report.html"):
+        (folder / "runs" / _MARKUP / name).write_text(
+            "<script>document.title = 'hurt'</script><p>of another arm"
+        )
     with panels.panels(folder) as made:
         yield made
 
@@ -93,7 +98,7 @@ _SHIFTS = """() => new Promise(resolve => {
 
 
 def test_the_whole_way(page: Any, panel: Panel) -> None:
-    """Home, plan, run, pause, go on, stop, begin again, report; the board's tab."""
+    """Home, plan, run, pause, resume, stop, begin again, report; the board's tab."""
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     assert page.get_by_label("joint 1 +").is_disabled()
@@ -140,12 +145,13 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     wait_for(page, "moving")
     page.get_by_role("button", name="Run", exact=True).click()
     wait_for(page, "moving")
-    page.get_by_role("link", name="Report").nth(0).wait_for()
-    with page.expect_popup() as popup:
-        page.get_by_role("link", name="Report").first.click()
-    popup.value.wait_for_selector("text=joint 1")
-    popup.value.close()  # a page that is hidden is not drawn
-    assert len(list((panel.folder / "runs").glob("*/run.json"))) == 2
+    for run, text in (("feed-002", "joint 1"), (_MARKUP, "of another arm")):
+        with page.expect_popup() as popup:
+            page.locator(".nicegui-row", has_text=run).get_by_role("link", name="Report").click()
+        popup.value.wait_for_selector(f"text={text}")
+        assert popup.value.title() != "hurt"
+        popup.value.close()  # a page that is hidden is not drawn
+    assert len(list((panel.folder / "runs").glob("feed-*/run.json"))) == 2
     show(page, "Board")
     page.wait_for_selector(".nicegui-log >> text=Stop: the arm brakes along its path.")
     assert "jog" not in page.inner_text(".nicegui-log")

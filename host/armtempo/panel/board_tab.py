@@ -83,7 +83,7 @@ class BoardTab:
         if state is not None:
             values = asdict(state)
             rows = [
-                {"key": key.replace("_", " "), "value": str(values[key])}
+                {"key": words.STATE_KEYS.get(key, key.replace("_", " ")), "value": words.text(values[key])}
                 for key in _SHOWN
                 if values[key] != ""
             ]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 import numpy as np
 from nicegui import ui
@@ -82,14 +83,14 @@ class RunTab:
                     folder.name, on_change=lambda event, folder=folder: _choose(chosen, folder, event.value)
                 )
                 if (folder / REPORT_PAGE).is_file():
-                    ui.link(words.REPORT, f"/runs/{folder.name}/{REPORT_PAGE}", new_tab=True)
+                    ui.link(words.REPORT, _address(folder / REPORT_PAGE), new_tab=True)
         if len(folders) > 1:
             ui.button(words.COMPARE, on_click=lambda: self._compare(chosen)).props("outline no-caps")
 
     def _compare(self, folders: list[Path]) -> None:
         def compare() -> None:
             page = pipeline.compare(folders)
-            ui.navigate.to(f"/runs/{page.relative_to(self._operator.runs)}", new_tab=True)
+            ui.navigate.to(_address(page), new_tab=True)
 
         self._page.attempt(compare)
 
@@ -99,6 +100,11 @@ def _choose(chosen: list[Path], folder: Path, wanted: bool) -> None:
         chosen.append(folder)
     elif folder in chosen:
         chosen.remove(folder)
+
+
+def _address(file: Path) -> str:
+    """Where the panel serves a file of a run folder."""
+    return f"/runs/{quote(file.parent.name)}/{quote(file.name)}"
 
 
 def past_runs(folder: Path) -> list[Path]:

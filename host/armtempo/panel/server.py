@@ -23,6 +23,8 @@ from armtempo.panel.operator import Operator
 
 _RECONNECT_S = 20.0
 """A page whose connection breaks is kept for so long, so that a busy browser need not load it again."""
+_NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
+"""What a run folder holds, which may come from anybody, does nothing in the panel's name."""
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 
 
@@ -101,7 +103,7 @@ class Panel:
         path = (runs / name / file).resolve()
         if path.suffix not in _SUFFIXES or not path.is_relative_to(runs) or not path.is_file():
             return PlainTextResponse("no such file", 404)
-        return FileResponse(path)
+        return FileResponse(path, headers=_NO_SCRIPTS)
 
 
 def listen(host: str, port: int) -> socket.socket:

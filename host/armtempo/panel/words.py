@@ -97,6 +97,14 @@ STEP_KEYS = {
 }
 STEP_NOW = "Step {step}, cycle {cycle}"
 
+STATE_KEYS = {
+    "max_rate": "one joint, steps/s",
+    "max_rate_sum": "all together, steps/s",
+    "speed_percent": "speed, %",
+    "free_flash": "free flash, bytes",
+    "free_heap": "free heap, bytes",
+    "frames_bad": "damaged messages",
+}
 STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
 REFRESH, RENAME, REMOVE, NEW_NAME = "Read again", "Rename", "Remove", "New name"
 A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
@@ -111,3 +119,8 @@ SURE_DEPLOY = "Put this version's program on the board? The arm's position is un
 SURE_FLASH = (
     "Write the firmware in the project folder to the board? The arm's position is unknown afterwards."
 )
+
+
+def text(value: object) -> str:
+    """A value of the board's state."""
+    return {True: "yes", False: "no"}[value] if isinstance(value, bool) else str(value)
