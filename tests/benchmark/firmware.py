@@ -4,7 +4,7 @@
 
 MICROPYTHON: sources with what board/docs/firmware.md says next to them. The firmware of the STM32F4DISC is built
 twice, without the program and with it, and run by QEMU (7.2 or newer). ``DIFFERS`` says what is not as on the chip;
-what is, stands in ``chip.json`` and is compared with MicroPython's own board files before each build.
+what is, is in ``chip.json`` and is compared with MicroPython's own board files before each build.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ LIMIT_S = 300.0
 
 
 class Emulated:
-    """One firmware and what stands in its flash."""
+    """One firmware and what is in its flash."""
 
     def __init__(self, elf: Path, image: Path) -> None:
         self._elf = elf

@@ -4,7 +4,7 @@
 
 MICROPYTHON and how it is run: tests/benchmark/firmware.py. The program, as files and within the firmware, is driven by
 a host's frames: for each arm it is started afresh, gets the arm, a motion, home, start and stop. CHANGES: then, in one
-start of the program, so many random arms (1 to 6 joints, 1000 to 240 000 steps/s), each with an upload, a run and a
+start of the program, that many random arms (1 to 6 joints, 1000 to 240 000 steps/s), each with an upload, a run and a
 removal; more than 40 are up to 40 different ones, again and again.
 """
 
@@ -101,7 +101,7 @@ def arm_record(rates: list[int]) -> bytes:
 
 
 def motion_record(arm: bytes, segments: int) -> bytes:
-    """A slow motion of all joints in so many segments, from 0, that may brake."""
+    """A slow motion of all joints in that many segments, from 0, that may brake."""
     total_s = 0.1 * segments
     motion = bytearray(motions.cruise(100.0, arm[5], total_s / 2, total_s))
     struct.pack_into("<I64H", motion, 12, wire.record_crc(arm), *[6] * 64)

@@ -1,6 +1,6 @@
 """Sequences at every speed with whatever a user does: ``python -m tests.benchmark.soak [--legs N] [--minutes M]``.
 
-``--legs``: so many motions in virtual time (tests/system/scripts/cases/soak.py), 500 for each seed from ``--seed`` on.
+``--legs``: motions in virtual time (tests/system/scripts/cases/soak.py), 500 for each seed from ``--seed`` on.
 ``--minutes``: the shipped pick and place, repeated for ever on a virtual board in real time, while hosts come, pause
 it, change its speed and are killed. Either way the steps on the pins are compared with those of each motion's record.
 """
@@ -85,7 +85,7 @@ def in_real_time(minutes: float, numbers: random.Random, interpreter: str, folde
 
 
 def _killed(port: str, numbers: random.Random) -> None:
-    """A host that is killed, as it starts or while it looks on."""
+    """A host that is killed, as it starts or while it watches."""
     command = (
         sys.executable,
         "-m",

@@ -2,7 +2,7 @@
 
 A program runs a motion on the virtual board in real time. A hundred times each it is stopped by ``armtempo stop`` in
 another process, from the start of that process on (the key press), and by Ctrl-C, from the signal on. The end is
-when the board's answer to the stop has reached the program that looks on: a little after it braked. Beside them
+when the board's answer to the stop has reached the program that watches: a little after it braked. Besides them
 the least that any command costs here: a Python that starts and ends. A time takes about 3.5 s.
 """
 

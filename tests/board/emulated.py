@@ -211,7 +211,7 @@ def _compile(module: Path) -> bytes:
 
 
 def _at_code(data: bytes) -> _Reader:
-    """A reader that stands behind names and constants."""
+    """A reader that comes after names and constants."""
     reader = _Reader(data)
     reader.at = 4
     qstrs, objects = reader.number(), reader.number()

@@ -73,7 +73,7 @@ def steady(rate: float) -> bytes:
 
 
 def chance(rng: np.random.Generator) -> bytes:
-    """One joint, everything by chance: degree, segments, refinement, distances, speeds, where it begins."""
+    """One joint, everything random: degree, segments, refinement, distances, speeds, where it begins."""
     degree = int(rng.choice([3, 5]))
     segments = int(rng.integers(1, 6))
     refine = int(rng.choice([1, 1, 2, 3, 4, 8]))

@@ -31,7 +31,7 @@ def test_arms_one_after_the_other(name: str, tmp_path: Path) -> None:
 
 
 def test_what_fits() -> None:
-    """All parts of an engine stand in the blocks, one behind the other; whatever needs more words does not fit."""
+    """All parts of an engine are in the blocks, one after the other; whatever needs more words does not fit."""
     rng = random.Random(SEED)
     for _ in range(300):
         rates = [rng.randrange(1, 240_001) for _ in range(rng.randrange(1, 7))]

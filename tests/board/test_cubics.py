@@ -69,7 +69,7 @@ def put_node(board: Modules, solver: array[int], node: int, ticks: float, slope:
 
 
 def group_of(board: Modules, steps: int, slopes: tuple[float, float], ticks: float) -> tuple[int, bool]:
-    """Steps in a group of the cubic that takes so many ticks, from one slope to the other; whether these change."""
+    """Steps in a group of the cubic that takes that many ticks, from one slope to the other; whether these change."""
     solver = array("i", bytes(4 * board.newton.SOLVER_SIZE))
     queue = array("i", bytes(4 * board.queue.QUEUE_SIZE))
     queue[board.queue.TIME_SCALE] = TIME_SCALE

@@ -1,4 +1,4 @@
-"""The freeze between two instructions: compiled for the Cortex-M4, on an emulated core beside timers that go on.
+"""The freeze between two instructions: compiled for the Cortex-M4, on an emulated core next to timers that continue.
 
 On the virtual board no time passes within a callback. Here each instruction takes its time: matches, DMA and edges come
 wherever they fall.
@@ -120,7 +120,7 @@ class Chip:
 
 
 def frozen(machine: Machine, chip: Chip, edge: float, cycles: float) -> array[int]:
-    """Let the callback begin at a time; the block behind it, and the chip some milliseconds later."""
+    """Let the callback begin at a time; the block after it, and the chip some milliseconds later."""
     spent = 0
 
     def step(uc: Uc, address: int, size: int, _: object) -> None:
@@ -156,7 +156,7 @@ def frozen(machine: Machine, chip: Chip, edge: float, cycles: float) -> array[in
 @pytest.mark.slow
 @pytest.mark.parametrize(("cycles", "latency"), [(1.0, 3), (1.3, 40), (2.5, 10)])
 def test_at_every_tick_of_a_step(cycles: float, latency: int) -> None:
-    """No pulse is cut or lasts on, no step comes behind the stop, and the count is that of the pins."""
+    """No pulse is cut or lasts on, no step comes after the stop, and the count is that of the pins."""
     machine = Machine(ISR)
     stops_after = set()
     for tick in range(0, 358, 3):

@@ -42,7 +42,7 @@ def _words(count: int) -> array[int]:
 
 
 def _block(joints: int, made: int = 20) -> array[int]:
-    """Joints whose rings are fed; ``made`` entries stand in each."""
+    """Joints whose rings are fed; ``made`` entries are in each."""
     block = _words(AT["BLOCK_HEAD"] + 6 * AT["JOINT_WORDS"])
     block[AT["JOINTS"]] = joints
     block[AT["NEXT_SAMPLE"]] = 5000

@@ -71,7 +71,7 @@ def test_times_and_slopes_are_those_of_the_polynomials(newton: ModuleType, sign:
         angle, time = polynomial(angle_steps), polynomial(time_steps)
         solver = array("i", bytes(4 * newton.SOLVER_SIZE))
         solver[newton.TARGET] = (1 << 28) + sign  # half a step from the first point's whole one, which is
-        low = random.randrange(1 << 27)  # so much of a step behind it
+        low = random.randrange(1 << 27)  # so much of a step after it
         solver[newton.TIME_OFFSET] = offset = random.randrange(1 << 20)
         newton.set_interval(
             solver,

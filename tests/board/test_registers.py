@@ -48,7 +48,7 @@ for _timer in (1, 3, 4, 8):  # encoders
         f"TIM{_timer}+18": 0b0011 << 4 | 0b01 | 0b0011 << 12 | 0b01 << 8,  # IC1F, CC1S, IC2F, CC2S
         f"TIM{_timer}+2c": 0xFFFF,
     }
-# stream: request channel, compare register as seen from TIM2 (TIM5 lies 0xC00 behind it)
+# stream: request channel, compare register as seen from TIM2 (TIM5 lies 0xC00 after it)
 _STREAMS = {5: (3, 0x34), 6: (3, 0x38), 1: (3, 0x3C), 2: (6, 0xC34), 0: (6, 0xC3C), 3: (6, 0xC40)}
 for _stream, (_request, _compare) in _STREAMS.items():
     _at = 0x10 + 0x18 * _stream
@@ -111,7 +111,7 @@ def _documented() -> list[tuple[str, str]]:
 def test_sections_in_the_documentation() -> None:
     """The documented register table has the rows that the board applies."""
     source = (interpreters.ROOT / "board" / "armtempo_board" / "hardware" / "registers.py").read_text()
-    notes = re.findall(r"\),  # ([^:]*):", source)  # "18.4.1 (17.4.1)" behind each row
+    notes = re.findall(r"\),  # ([^:]*):", source)  # "18.4.1 (17.4.1)" after each row
     applied = {name for note in notes for name in _SECTION.findall(note)}
     documented = {name for sections, _ in _documented() for name in _SECTION.findall(sections)}
     assert applied
@@ -148,9 +148,7 @@ def test_emulated_and_virtual_board_have_the_memory_of_the_chip() -> None:
     begin, size = memory["RAM"]
     for path in (*firmware.SCRIPTS.glob("firmware_*.py"), Path(firmware.__file__).with_name("loop_board.c")):
         places = [int(found, 16) for found in re.findall(r"0x200[0-9A-F]{5}", path.read_text())]
-        assert all(place >= begin + 1024 * size for place in places), (
-            f"{path.name} stands in the chip's memory"
-        )
+        assert all(place >= begin + 1024 * size for place in places), f"{path.name} is in the chip's memory"
 
 
 def _assigned(path: Path) -> dict[str, object]:

@@ -78,7 +78,7 @@ def position_error(motion: Motion, joint: int, steps: Steps) -> float:
         place = np.concatenate([oracle.turns(piece), oracle.place_of(piece, steps.ticks)])
         angle = piece.first_steps + np.polynomial.polynomial.polyval(place, piece.angle)
         ticks = piece.first_ticks + np.polynomial.polynomial.polyval(place, piece.time)
-        for side in (-1e-3, 1e-3):  # just before and just behind
+        for side in (-1e-3, 1e-3):  # just before and just after
             at = commanded[np.searchsorted(steps.ticks, np.rint(1000 * ticks) / 1000 + side)]
             worst = max(worst, float(np.max(np.abs(angle - at), initial=0.0)))
     return worst

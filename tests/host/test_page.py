@@ -61,7 +61,7 @@ def curves() -> analysis.Curves:
 
 
 def figure(name: str) -> str:
-    """One of the figures as it stands in a page."""
+    """One of the figures as a page has it."""
     plan = shipped_plan()
     names = [joint.name for joint in plan.arm.driven]
     limits = [joint.limits for joint in plan.arm.driven if joint.limits]

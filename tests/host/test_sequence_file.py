@@ -348,7 +348,7 @@ def test_every_damage_of_a_record_is_seen(tmp_path: Path) -> None:
 
 
 def test_the_shipped_arm_is_the_papers_with_a_gripper() -> None:
-    """Its file stands by itself, for whoever copies it; what both say must not differ."""
+    """Its file is complete by itself, for users who copy it; what both say must not differ."""
     paper = Arm.paper()
     assert (ARM.joints, ARM.driver, ARM.safety) == (paper.joints, paper.driver, paper.safety)
 

@@ -34,7 +34,7 @@ class Ended:
     errors: str
 
     def said(self, *words: str) -> None:
-        """All of the words stand in its error output, without a traceback."""
+        """All of the words are in its error output, without a traceback."""
         assert "Traceback" not in self.errors, self.errors
         for word in words:
             assert word in self.errors, self.errors

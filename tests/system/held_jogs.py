@@ -1,4 +1,4 @@
-"""Random held jogs near the ends of the ranges: let go, fallen silent, cut off, or held to the end."""
+"""Random held jogs near the ends of the ranges: released, fallen silent, cut off, or held to the end."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class HeldEnd:
     """How it ended."""
 
     took_s: float
-    """On the board's clock, from the moment it was let go (of a jog that ended itself: 0)."""
+    """On the board's clock, from the moment it was released (of a jog that ended itself: 0)."""
     stated_s: float
     """Within which it was to be at rest."""
     within: bool

@@ -45,7 +45,7 @@ class Relay:
             self._slave = slave
 
     def unplug(self) -> None:
-        """Pull the cable: the port is gone, for whoever has it open as well."""
+        """Pull the cable: the port is gone, for all that have it open as well."""
         with self._lock:
             os.unlink(self.port)
             os.close(self._slave)

@@ -106,7 +106,7 @@ PORT = "/dev/ttyACM0"
 
 
 def put(text: str, folder: Path) -> None:
-    """What stands in a file by its first line."""
+    """What is in a file by its first line."""
     first, rest = text.split("\n", 1)
     name = first.split()[-1]
     added = (folder / name).read_text() + "\n" if "at the end of" in first else ""

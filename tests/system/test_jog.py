@@ -1,4 +1,4 @@
-"""Jog and teach on the virtual board: by step, held and let go, cut off, at a terminal's keys."""
+"""Jog and teach on the virtual board: by step, held and released, cut off, at a terminal's keys."""
 
 from __future__ import annotations
 

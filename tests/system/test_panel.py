@@ -99,7 +99,7 @@ _SHIFTS = """() => new Promise(resolve => {
 
 
 def test_the_whole_way(page: Any, panel: Panel) -> None:
-    """Home, plan, run, pause, go on, stop, begin again, report; the board's tab."""
+    """Home, plan, run, pause, resume, stop, begin again, report; the board's tab."""
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     assert page.get_by_label("joint 1 +").is_disabled()

@@ -254,7 +254,7 @@ def test_no_pulses_where_enable_cannot_be_inactive(tmp_path: Path) -> None:
 
 
 def test_motors_that_turn_in_spite_of_enable_stop_it(tmp_path: Path) -> None:
-    """The arm file has ENABLE the wrong way round; and an E-stop that is not wired, which the self-test can do without.
+    """The arm file has ENABLE the wrong way round; and an E-stop that is not wired, which the self-test works without.
 
     No joint goes further than its encoder needs to show it.
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from armtempo.basics.errors import InputError, PortGivenUpError
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.results import tell
+from armtempo.cli.results import remark
 from armtempo.formats.text import did_you_mean
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
@@ -53,7 +53,7 @@ def arm_file(path: Path | None) -> Path:
     """The file of the same, or the paper's arm's, which is printed."""
     setting = ProjectSettings().get(ARM, path)
     if not setting:
-        tell(f"no arm given; using the one that ships with armtempo, {shipped.PAPER!r}")
+        remark(f"no arm given; using the one that ships with armtempo, {shipped.PAPER!r}")
     return shipped.find(setting.value or shipped.PAPER).path
 
 
@@ -70,7 +70,7 @@ def arm_or_paper(path: Path | None, for_shape: bool = False) -> Arm:
     found = named_arm(path, for_shape)
     if found is None:
         found = Arm.paper()
-        tell(f"no arm given; using the one that ships with armtempo, {found.name!r}")
+        remark(f"no arm given; using the one that ships with armtempo, {found.name!r}")
     return found
 
 
@@ -100,7 +100,7 @@ def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]
             raise nothing_set(ARM, f"job {job.value} ({job.source}) is for which arm?")
         loaded = load_arm(arm_path)
         return loaded, load_job(job_path, loaded)
-    tell("no arm and no job given; using the feeding job and the arm that ship with armtempo")
+    remark("no arm and no job given; using the feeding job and the arm that ship with armtempo")
     return Arm.paper(), Job.paper()
 
 
@@ -115,13 +115,13 @@ def arm_of_board(board: Board, named: Arm | None) -> Arm:
 
     paper = Arm.paper()
     if board.info.arm_crc == record_crc(paper):
-        tell(f"arm: {paper.name}, which the board is set up for")
+        remark(f"arm: {paper.name}, which the board is set up for")
         return paper
     has = "another than the one that ships with armtempo" if board.info.arm_crc else "none yet"
     raise nothing_set(ARM, f"which arm does the board move? It is set up for {has}")
 
 
-def words(arm: Arm) -> str:
+def describe_arm(arm: Arm) -> str:
     """An arm as commands name it."""
     return source_words(arm.name, arm.source)
 
@@ -188,7 +188,7 @@ def port(given: str | None, others: bool = False) -> str:
     """
     setting = board_port.choose(given, others)
     if setting.source in board_port.UNASKED:
-        tell(f"port {setting.value}: {setting.source}")
+        remark(f"port {setting.value}: {setting.source}")
     return setting.value
 
 
@@ -217,9 +217,9 @@ def board(
 
     opened: Callable[..., Board] = connect.connect if wait else connect.connect_now
     log = given.log_traffic
-    found = opened(given.port, arm, log_traffic=log, sink=sink, any_program=any_program, tell=tell)
+    found = opened(given.port, arm, log_traffic=log, sink=sink, any_program=any_program, tell=remark)
     if found.info.virtual:
-        tell(f"port {found.port}: {virtual_words(found.port)}")
+        remark(f"port {found.port}: {virtual_words(found.port)}")
     return found
 
 
@@ -237,7 +237,7 @@ def shared_or_own(
         shared = shared_board.find(given.port or "")
         if shared is None:
             return board(given, arm, any_program, sink, wait=False)
-        tell(f"port {given.port}: through {shared.program}")
+        remark(f"port {given.port}: through {shared.program}")
         return shared
 
     return patiently(either)

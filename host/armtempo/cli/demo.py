@@ -55,7 +55,7 @@ def demo(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | 
         return
     with ProgressBar("planning") as progress:
         plan = pipeline.plan(Arm.paper(), Job.paper(), progress)
-    click.echo(f"arm: {chosen.words(plan.arm)}")
+    click.echo(f"arm: {chosen.describe_arm(plan.arm)}")
     for line in pipeline.summary(plan):
         click.echo(line)
     with chosen.board(BoardOptions(port, log_traffic), plan.arm) as board:
@@ -75,7 +75,7 @@ def _pick_and_place() -> None:
     arm = Arm.load(folder / "arm.toml")
     with ProgressBar("planning") as progress:
         plan = armtempo.plan_sequence(arm, Sequence.load(folder / "sequence.toml", arm), progress)
-    click.echo(f"arm: {chosen.words(arm)}")
+    click.echo(f"arm: {chosen.describe_arm(arm)}")
     for line in sequences.lines(plan):
         click.echo(line)
     part = arm.inputs[arm.input("part")]

@@ -51,7 +51,7 @@ def deploy(mpy: bool, package: Path | None, arm_path: Path | None, port: str | N
         "arm": arm.name if arm else None,
         "arm_fits": engine_room.Room.of_board(info).holds_arm(arm) if arm else None,
     }
-    of_arm = [f"{chosen.words(arm)}: {engine_room.of_arm(arm, info)}"] if arm else []
+    of_arm = [f"{chosen.describe_arm(arm)}: {engine_room.of_arm(arm, info)}"] if arm else []
     results.show(as_json, values, ["the board runs armtempo", *room, *of_arm])
 
 
@@ -97,11 +97,11 @@ def configure(given: BoardOptions) -> None:
 
 
 def _unchanged(arm: Arm) -> str:
-    return f"the board is already set up for {chosen.words(arm)}; nothing is changed"
+    return f"the board is already set up for {chosen.describe_arm(arm)}; nothing is changed"
 
 
 def _configured(arm: Arm, values: dict[str, Any]) -> list[str]:
-    lines = [f"the board is set up for {chosen.words(arm)}", values["memory"]]
+    lines = [f"the board is set up for {chosen.describe_arm(arm)}", values["memory"]]
     if motions := values["motions_to_upload_again"]:
         lines.append(
             f"{motions} stored motions were made for the old arm; upload again those that are needed"

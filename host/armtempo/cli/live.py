@@ -26,7 +26,7 @@ class Live(Watcher):
 
     def __init__(self, window: bool, where: str = "", aside: bool = False) -> None:
         """``where``: on what the motion runs, if that needs saying; ``aside``: say it on stderr."""
-        self._say = results.tell if aside else click.echo
+        self._say = results.remark if aside else click.echo
         self._window = window
         self._where = f", on {where}" if where else ""
         self._plot: LivePlot | None = None

@@ -160,7 +160,7 @@ def _save(made: dict[Path, Plan], force: bool) -> None:
 def _lines(file: Path, plan: Plan) -> list[str]:
     rates = checks.rate_words(checks.step_rates(plan.arm, plan.extremes))
     room = engine_room.of_arm(plan.arm)
-    return [f"arm: {chosen.words(plan.arm)}", *pipeline.summary(plan), rates, room, f"written: {file}"]
+    return [f"arm: {chosen.describe_arm(plan.arm)}", *pipeline.summary(plan), rates, room, f"written: {file}"]
 
 
 def _json(file: Path, plan: Plan) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def is_quiet() -> bool:
     return context is not None and bool(context.find_root().params.get("quiet"))
 
 
-def tell(text: str) -> None:
+def remark(text: str) -> None:
     """Print a remark on stderr, unless ``armtempo --quiet``."""
     if not is_quiet():
         click.echo(text, err=True)
@@ -62,4 +62,4 @@ def tell(text: str) -> None:
 
 def teller(as_json: bool) -> Callable[[str], None]:
     """What says how the work goes: on stdout, or on stderr where that is for the document."""
-    return tell if as_json else click.echo
+    return remark if as_json else click.echo

@@ -44,7 +44,7 @@ def run(
         sequence = chosen.load_sequence_plan(Path(what), given.arm_path)
         with chosen.board(given, sequence.arm) as board:
             board.configure(sequence.arm, replace=given.replace_arm)
-            results.teller(given.as_json)(f"arm: {chosen.words(sequence.arm)}")
+            results.teller(given.as_json)(f"arm: {chosen.describe_arm(sequence.arm)}")
             board.speed(percent / 100)
             sequences.run_and_tell(board, sequence, force, chosen.runs(out), given.as_json)
         return
@@ -53,7 +53,7 @@ def run(
     with chosen.board(given, named) as board:
         arm = chosen.arm_of_board(board, named)
         board.configure(arm, replace=given.replace_arm)
-        results.teller(given.as_json)(f"arm: {chosen.words(arm)}")
+        results.teller(given.as_json)(f"arm: {chosen.describe_arm(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):

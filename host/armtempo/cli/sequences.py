@@ -36,7 +36,7 @@ def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as
     with ProgressBar("planning") as progress:
         planned = armtempo.plan_sequence(arm, sequence, progress)
     planned.save(target, force)
-    found = [f"arm: {chosen.words(arm)}", *lines(planned), f"written: {target}"]
+    found = [f"arm: {chosen.describe_arm(arm)}", *lines(planned), f"written: {target}"]
     results.show(as_json, {"file": str(target), **values(planned)}, found)
 
 

@@ -37,10 +37,10 @@ def _named(found: BoardState, arm_path: Path | None) -> BoardState:
     try:
         named = chosen.named_arm(arm_path)
     except InputError as error:  # the board is worth looking at all the same
-        results.tell(f"armtempo: {error}")
+        results.remark(f"armtempo: {error}")
     if named is not None and found.arm_crc and not found.arm and not found.named(named).arm:
-        results.tell(
-            f"the board is set up for a different arm than {chosen.words(named)}; see 'armtempo configure'"
+        results.remark(
+            f"the board is set up for a different arm than {chosen.describe_arm(named)}; see 'armtempo configure'"
         )
     return found.named(named).named(Arm.paper())
 

@@ -60,7 +60,7 @@ def _stopped(given: BoardOptions, now: bool, told: bool) -> BoardState:
 
 def _tell(given: BoardOptions, answer: StopAnswer, now: bool) -> None:
     did = ("frozen" if now else "braking") if answer.moved else "nothing moved"
-    results.tell(f"port {given.port}: {did}, through {answer.program}")
+    results.remark(f"port {given.port}: {did}, through {answer.program}")
 
 
 def _rest(shared: SharedBoard) -> BoardState | None:
@@ -68,7 +68,7 @@ def _rest(shared: SharedBoard) -> BoardState | None:
     try:
         found = shared.state()
         if found.moving and found.rest_s:
-            results.tell(f"at rest in {found.rest_s:.2f} s")
+            results.remark(f"at rest in {found.rest_s:.2f} s")
         return shared.wait_for_rest()
     except NoAnswerError:
         raise

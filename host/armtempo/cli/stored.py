@@ -91,8 +91,8 @@ def _arm_of(board: Board, arm_path: Path | None) -> Arm | None:
     """The arm that the board is set up for, as far as it is known."""
     named = chosen.named_arm(arm_path)
     if named is not None and record_crc(named) != board.info.arm_crc:
-        results.tell(
-            f"the board is set up for a different arm than {chosen.words(named)}; see 'armtempo configure'"
+        results.remark(
+            f"the board is set up for a different arm than {chosen.describe_arm(named)}; see 'armtempo configure'"
         )
         named = None
     try:

@@ -30,7 +30,7 @@ def watch(given: BoardOptions) -> None:
     with chosen.shared_or_own(given, any_program=True) as board:
         if isinstance(board, SharedBoard):
             _show_messages(board.watch("sample", "status", "event"), given.as_json)
-            results.tell(f"{board.program} has closed {given.port}")
+            results.remark(f"{board.program} has closed {given.port}")
         else:
             _show_messages(_states(board), given.as_json)
 
@@ -94,7 +94,7 @@ def monitor(file: Path | None, given: BoardOptions) -> None:
         if isinstance(board, SharedBoard):
             for message in board.watch("traffic"):
                 say(message["time_s"], message["direction"], message["words"])
-            results.tell(f"{board.program} has closed {given.port}")
+            results.remark(f"{board.program} has closed {given.port}")
             return
         while True:
             board.status()

@@ -48,7 +48,9 @@ def output(name: str | None, value: str | None, given: BoardOptions) -> None:
         _print_json([_output_values(*entry) for entry in found], name)
         return
     if not found:
-        results.tell(f"arm {chosen.words(board.arm)} has no outputs: write [output.NAME] tables in its file")
+        results.remark(
+            f"arm {chosen.describe_arm(board.arm)} has no outputs: write [output.NAME] tables in its file"
+        )
     for line in _output_lines(found):
         click.echo(line)
 
@@ -107,7 +109,9 @@ def read_inputs(name: str | None, given: BoardOptions) -> None:
         results.show_json(values if name is None else values[0])
         return
     if not found:
-        results.tell(f"arm {chosen.words(board.arm)} has no inputs: write [input.NAME] tables in its file")
+        results.remark(
+            f"arm {chosen.describe_arm(board.arm)} has no inputs: write [input.NAME] tables in its file"
+        )
     for line in _input_lines(found):
         click.echo(line)
 
@@ -152,7 +156,7 @@ def _same_arm(arm_crc: int, named: Arm | None) -> Arm:
     arm = named or Arm.paper()
     if record_crc(arm) != arm_crc:
         raise LinkError(
-            f"the board is set up for a different arm than {chosen.words(arm)}",
+            f"the board is set up for a different arm than {chosen.describe_arm(arm)}",
             "give that arm's file with --arm",
         )
     return arm

@@ -24,7 +24,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.pose import checked_rows
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 
-_FAR_DEG, _FAR = 5.0, 50.0
+_MARGIN_DEG, _MARGIN_TOLERANCES = 5.0, 50.0
 """No tolerance makes up for a joint outside its range by more than that, or by this many times the tolerance."""
 _SWINGS = 3.0
 """A joint that is outside its range by this many times what the tolerance lets it turn, to first order, stays out."""
@@ -152,7 +152,7 @@ def _within_tolerance(
     tolerance_mm, tolerance_deg = (
         (given.tolerance_mm, given.tolerance_deg) if given else (TOLERANCE_MM, TOLERANCE_DEG)
     )
-    slack = math.radians(max(_FAR_DEG, _FAR * tolerance_deg))
+    slack = math.radians(max(_MARGIN_DEG, _MARGIN_TOLERANCES * tolerance_deg))
     beside = [each.placed_rad for each in choice.candidates if each.outside_rad <= slack]
     lever = math.hypot(*choice.shape.flange)
     reach = tolerance_mm + 2.0 * math.sin(0.5 * math.radians(tolerance_deg)) * lever

@@ -103,7 +103,7 @@ class Levels:
     """The board's answer to ``inputs``."""
 
     inputs: int
-    """Bit an input of the arm record: it is active."""
+    """One bit per input of the arm record: it is active."""
     outputs: tuple[int, ...]
     """The value of each output, 0 to 65535."""
 

@@ -1,4 +1,4 @@
-"""Which pin and timer each output, input and home switch of an arm takes, and what stands in the way."""
+"""Which pin and timer each output, input and home switch of an arm takes, and what collides."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Period:
 
 
 def problems(arm: PinUser) -> list[PinProblem]:
-    """What stands in the way of outputs, inputs and home switches, and of the board; empty if nothing does."""
+    """What collides with outputs, inputs and home switches, and with the board; empty if nothing does."""
     if not (arm.outputs or arm.inputs or _home_switches(arm)) and arm.board == DEFAULT:
         return []
     board = BOARDS[arm.board]

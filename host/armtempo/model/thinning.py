@@ -24,7 +24,7 @@ def thinned(points_deg: Array, tolerance_deg: float, times_s: Array | None = Non
             f"a tolerance of {tolerance_deg:g} degrees is not allowed",
             f"give one above 0, at most {LARGEST_DEG:g}",
         )
-    places, points = (times_s, points_deg) if times_s is not None else _along(points_deg)
+    places, points = (times_s, points_deg) if times_s is not None else _centripetal(points_deg)
     kept = _enough(places, points, tolerance_deg)
     for index in kept[1:-1]:
         fewer = kept[kept != index]
@@ -54,8 +54,8 @@ def _errors_deg(places: Array, points: Array, kept: NDArray[np.int64]) -> Array:
     return np.asarray(np.abs(spline(places) - points).max(axis=1))
 
 
-def _along(points: Array) -> tuple[Array, Array]:
-    """Places along the path, (m,), of those points, (m, J), that are not the same as the one before."""
+def _centripetal(points: Array) -> tuple[Array, Array]:
+    """Centripetal parameters, (m,), of those points, (m, J), that are not the same as the one before."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     moved = np.append(True, steps > 0.0)
     return np.append(0.0, np.cumsum(np.sqrt(steps[moved[1:]]))), points[moved]

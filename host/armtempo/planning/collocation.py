@@ -67,7 +67,7 @@ class Curve:
         return np.stack([bspline.evaluate(angle, segment, u) for angle in self.angle], axis=1)
 
     def stretch(self) -> float:
-        """The factor on time that brings the motion just within its limits, proven."""
+        """The factor on time with which the motion is just within its limits, proven."""
         ratios = extremes.magnitudes(self.angle, self.time) / self.limits
         return float(stretch_of(ratios.T).max())
 

@@ -79,7 +79,7 @@ class Fitness:
         return np.asarray(intervals_s.sum(axis=1) * self.stretch(intervals_s))
 
     def stretch(self, intervals_s: Array) -> Array:
-        """The factor on X that brings it just within the limits, on the grid: (N,)."""
+        """The factor on X with which it is just within the limits, on the grid: (N,)."""
         ratios = self.ratios(intervals_s)
         everywhere = (1, 2, 3)
         return stretch_of(np.maximum(_tops(ratios).max(axis=everywhere), ratios.max(axis=everywhere)))
@@ -103,7 +103,7 @@ def _tops(ratios: Array) -> Array:
 
 
 def stretch_of(ratios: Array) -> Array:
-    """Least factor on time that brings ``ratios`` (3, ...) of speed, acceleration and jerk down to 1."""
+    """Least factor on time with which ``ratios`` (3, ...) of speed, acceleration and jerk are 1 at most."""
     return np.asarray(np.maximum(np.maximum(ratios[0], np.sqrt(ratios[1])), np.cbrt(ratios[2])))
 
 

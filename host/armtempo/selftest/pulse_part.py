@@ -130,7 +130,7 @@ def _channel(
 
 
 def judge_long(values: dict[str, Any], steps: int, duration_s: float) -> Measurement:
-    """The line about a motion in which each joint makes so many ``steps``: the edges that were counted, by port."""
+    """The line about a motion in which each joint makes ``steps``: the edges that were counted, by port."""
     what = f"steps of a longer motion, {duration_s:g} s"
     if values["longest_turn_cycles"] / CYCLES_PER_US > _LONGEST_TURN_US:
         return left_out(PULSES, f"{what}: a turn of the loop took too long to capture all", "run it again")

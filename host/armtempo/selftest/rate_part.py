@@ -108,7 +108,7 @@ def watch_us(duration_s: float) -> int:
 
 
 def judge_steps(values: Mapping[str, Any], port: str, rate: int, count: int) -> Measurement:
-    """The line about the steps in the middle of a motion of so many joints at that ``rate``, on the pins of a port."""
+    """The line about the steps in the middle of a motion of that many joints at ``rate``, on the pins of a port."""
     apart_us = 1e6 / rate
     said = [
         f"P{pin} {steps}, {least} to {most} us apart" for pin, (steps, least, most) in values["steps"].items()

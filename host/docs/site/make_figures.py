@@ -31,7 +31,7 @@ TOOL = ["-m", "armtempo"]
 
 
 def solutions() -> Figure:
-    """The eight postures in which the paper's arm brings its tool to one pose, whatever its ranges."""
+    """The eight postures in which the paper's arm has its tool in one pose, whatever its ranges."""
     wanted = armtempo.forward(ARM, POSTURE_DEG)
     figure = Figure(figsize=(9.6, 5.4), layout="constrained")
     for number, found in enumerate(armtempo.inverse(ARM, wanted), 1):

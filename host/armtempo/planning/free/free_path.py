@@ -128,7 +128,7 @@ def _finished(demand: Demand, motion: FreeMotion, effort: Effort, even: bool) ->
     tightened = _tightened(demand)
     if not even:
         stretches = len(demand.via_deg) - 1
-        segments = min(effort.most, max(min(max(_PIECES * stretches, _LEAST), _MOST), _FEW * stretches))
+        segments = min(effort.most, max(_PIECES * stretches, _LEAST))
         finer = layout.shared_out(motion.stretch_times_s, segments, demand.stops)
         motion = min(
             (_resampled(tightened, finer, motion), motion.stretched(demand.limits)),

@@ -78,7 +78,7 @@ def _at_ends(angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: 
 
 
 def _per_axis(fixed: tuple[str, ...]) -> float:
-    """Brings the norm of a difference of rotations to that of one axis square to the turn: 2 sin(angle / 2)."""
+    """Factor from the norm of a difference of rotations to that of one axis square to the turn: 2 sin(angle / 2)."""
     return float(np.sqrt(0.5)) if fixed == WHOLE else 1.0
 
 

@@ -97,7 +97,7 @@ def follow(course: Course, start_deg: Array, end_deg: Array | None = None) -> Fo
         step = min(step, 1.0 - places[-1])
         place = places[-1] + step if 1.0 - places[-1] - step > 1e-9 else 1.0
         ways = np.array([place * length])
-        near = _ahead(places, postures, place)
+        near = _extrapolated(places, postures, place)
         if evenly and end_deg is not None:
             near = postures[0] + place * (end_deg - postures[0])
         angles, missed = _corrected(course, tool, ways, near[None])
@@ -113,8 +113,8 @@ def follow(course: Course, start_deg: Array, end_deg: Array | None = None) -> Fo
     return Followed(course, tool, np.array(places) * length, np.array(postures))
 
 
-def _ahead(places: list[float], postures: list[Array], place: float) -> Array:
-    """A guess from the last two postures."""
+def _extrapolated(places: list[float], postures: list[Array], place: float) -> Array:
+    """A first guess, from the last two postures."""
     if len(places) < 2:
         return postures[-1]
     part = (place - places[-1]) / (places[-1] - places[-2])

@@ -85,7 +85,7 @@ def reached(angles_deg: Array, times_s: Array, tool: Tool) -> tuple[float, float
 
 
 def excess(angles_deg: Array, times_s: Array, tool: Tool, limits: ToolLimits) -> float:
-    """The factor on time that brings the tool within its limits, proven; 1 at least. Arguments as in ``reached``."""
+    """The factor on time with which the tool is within its limits, proven; 1 at least. Arguments as in ``reached``."""
     kinds, group = np.unique(
         np.stack([limits.speed_mm_s, limits.acceleration_mm_s2], axis=1), axis=0, return_inverse=True
     )

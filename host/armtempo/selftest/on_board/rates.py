@@ -13,7 +13,7 @@ class Host:
         self.sent = 0
 
     def readinto(self, buffer, size):
-        """What is there, as of a port."""
+        """What has been received, as of a port."""
         if not self._left and time.ticks_diff(time.ticks_ms(), self._then_ms) >= _COMMAND_MS:
             self._then_ms = time.ticks_ms()
             self._left = self._frames[2 - self.sent % 2 if self.sent else 0]

@@ -24,7 +24,7 @@ _FLAGS_AT = const(0x14)  # of the external interrupts
 _FLAG_WORD = const(0)
 _PENDING_WORD = const(0)
 _COUNTER = const(9)
-_CLOCK_AS_PORT = const(0x814)  # bytes behind TIM2: IDR lies 0x10 behind it
+_CLOCK_AS_PORT = const(0x814)  # bytes after TIM2: IDR lies 0x10 after it
 
 began = array("I", [0])
 

@@ -38,9 +38,9 @@ class Beyond:
 
 
 class Port:
-    """Hands over the frames of a file, each behind its length in two bytes, then ends the program.
+    """Hands over the frames of a file, each after its length in two bytes, then ends the program.
 
-    Between frames there may be names of stages, each behind its length + _STAGE: the heap is told of there.
+    Between frames there may be names of stages, each after its length + _STAGE: the heap is reported there.
     """
 
     RTS = CTS = 0
@@ -87,7 +87,7 @@ class Port:
             self._second = 2 + self._left
 
     def write(self, buffer, start, count):
-        """Tell the host that looks on."""
+        """Tell the host that watches."""
         print("@ answer", hexlify(memoryview(buffer)[start : start + count]).decode())
         return count
 

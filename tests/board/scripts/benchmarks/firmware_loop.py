@@ -77,7 +77,7 @@ def pause():
 
 @micropython.viper
 def resume(spent: int):
-    """Let it go on, so many ticks later."""
+    """Let it continue, that many ticks later."""
     words = ptr32(state)
     ptr32(words[4])[0] = words[3]
     timer2 = ptr32(1 << 30)
@@ -210,7 +210,7 @@ def wait(ticks: int):
 
 
 class Port:
-    """Hands over the frames of a file, each behind its length in two bytes; tells of each turn."""
+    """Hands over the frames of a file, each after its length in two bytes; tells of each turn."""
 
     RTS = CTS = 0
 
@@ -245,7 +245,7 @@ class Port:
         return len(part)
 
     def write(self, buffer, start, count):
-        """Tell the host that looks on."""
+        """Tell the host that watches."""
         pause()
         self._said = True
         print("@ answer", hexlify(memoryview(buffer)[start : start + count]).decode())
@@ -295,7 +295,7 @@ def hold_clock():
 
 
 def start_clock(us):
-    """In the place of the short wait behind the start of the counters: from here on they run.
+    """In the place of the short wait after the start of the counters: from here on they run.
 
     The next start is as this one only where the settings say ``again``, which costs the program a little time.
     """

@@ -92,7 +92,7 @@ def unpack_from(*arguments):
 
 
 def watch(name, *arguments):
-    """As the built-in ``__import__``; what comes behind the check tells of it."""
+    """As the built-in ``__import__``; what comes after the check tells of it."""
     if name == "armtempo_board.endpoints":
         print("check", _MOST)
     return IMPORT(name, *arguments)

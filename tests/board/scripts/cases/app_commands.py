@@ -110,7 +110,7 @@ def case_a_frame_may_come_in_pieces():
 
 
 def case_what_the_port_took_makes_room():
-    """A piece of an event is enough; what stays behind it comes whole."""
+    """A piece of an event is enough; what stays after it comes whole."""
     port = stand_in.Port()
     link = SerialLink(port)
     size = 250

@@ -17,7 +17,7 @@ CTRL_C = b"\r\x03\r\x01"
 
 
 def leaves_by_ctrl_c(app, host):
-    """Within a few turns; what comes behind is left to the prompt."""
+    """Within a few turns; what comes after is left to the prompt."""
     host.port.inbox.extend(CTRL_C)
     for _ in range(10):
         if not app.left():
@@ -51,7 +51,7 @@ def case_noise_does_not_open_the_repl():
 
 
 def case_line_ends_alone_do_not_open_the_repl():
-    """A terminal's Enter, before the first frame and behind one."""
+    """A terminal's Enter, before the first frame and after one."""
     for clear in (False, True):
         request = prompt.PromptRequest()
         if clear:

@@ -68,7 +68,7 @@ def case_repeats_within_repeats_are_counted():
 
 
 def counters_of(host):
-    """{name: value} of the counters, and that behind the last there is none."""
+    """{name: value} of the counters, and that after the last there is none."""
     found = {}
     count = host.ask("counter", (0,))[1][0]
     for index in range(count):
@@ -196,7 +196,7 @@ def case_what_comes_next_is_prepared_over_rows_between():
 
 
 def case_without_room_nothing_is_prepared():
-    """Not when the sequence begins; or a motion is given up in the midst, and those behind it."""
+    """Not when the sequence begins; or a motion is given up in the midst, and those after it."""
     for late in (False, True):
         app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
         engine = app.controller.board.engine

@@ -36,7 +36,7 @@ def begin(rig, ramps=RAMPS):
 
 
 def case_anywhere():  # slow
-    """The stop is on the path, the samples go on to it, and nothing comes after it."""
+    """The stop is on the path, the samples continue to it, and nothing comes after it."""
     random.seed(SEED)
     for number in range(15 // FEWER):
         rig = Rig(joints(), planned=False)

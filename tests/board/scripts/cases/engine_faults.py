@@ -131,7 +131,7 @@ class Tapped:
 
     @property
     def duration(self):
-        """What the engine asks for behind its look at the E-stop."""
+        """What the engine asks for after its look at the E-stop."""
         tap()
         return MOTION.duration
 

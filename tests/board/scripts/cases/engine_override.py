@@ -24,7 +24,7 @@ SEED = 20263
 CHANGES = 6
 BRAKE = -1  # instead of a rate
 LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 13)
-"""A change that has just been asked for begins 75 ms later, and the stop 75 ms behind its end."""
+"""A change that has just been asked for begins 75 ms later, and the stop 75 ms after its end."""
 MOTIONS = int(([word for word in sys.argv[1:] if word.isdigit()] or [4 // FEWER])[0])
 
 
@@ -69,7 +69,7 @@ def length_by_table(motion, to_rest, duration, at):
 
 
 def some_motion():
-    """Three joints by chance, at rest at both ends."""
+    """Three random joints, at rest at both ends."""
     segments = random.randrange(4, 9)
     times = [0.0]
     for _ in range(segments + 4):

@@ -108,7 +108,7 @@ def one():
     kind = below(8)
     if kind == 0:
         broken = mutated(START)
-        return b"" if START in broken else broken  # unharmed with something behind it: it would start
+        return b"" if START in broken else broken  # unharmed with something after it: it would start
     if kind == 1:
         return bytes((wire.SYNC,)) + some_bytes(below(20))
     number = IDS[below(len(IDS))] if below(16) else below(256)

@@ -97,7 +97,7 @@ def case_when_to_write():
 
 
 def case_written_and_wrapped():
-    """The far-away entry stands behind the newest, the first word is repeated behind the end; too late is told."""
+    """The far-away entry is after the newest, the first word is repeated after the end; too late is told."""
     for entries in (64, 256, 1024):
         block, state, _, timer = ready(entries, 0, 0, 1000, 0)
         queue, ring = words(step_queue.QUEUE_SIZE), words(entries + 1)
@@ -235,7 +235,7 @@ def case_sample_times():
 
 
 def case_late_first_step():
-    """A channel is armed only while its first edge lies ahead, and behind a DIR turn and its set-up."""
+    """A channel is armed only while its first edge lies ahead, and after a DIR turn and its set-up."""
     block, timer, ring = words(BLOCK), words(18), words(1)
     at = isr.BLOCK_HEAD
     block[at + isr.CCR_AT] = isr.CCR1 + 1
@@ -284,7 +284,7 @@ def case_counters_in_step():
         assert isr.counters_agree(first, second) == agree, (a, b)
 
 
-PORT_A, TIM5, PORT_B, PORT_E = 1024, 768, 1280, 2048  # words behind TIM2
+PORT_A, TIM5, PORT_B, PORT_E = 1024, 768, 1280, 2048  # words after TIM2
 
 
 def of(line):
@@ -293,7 +293,7 @@ def of(line):
 
 
 def frozen(line, levels, high_a=0, high_b=0, runs=1, before=0):
-    """The block and the registers behind a freeze that a line calls for, with the levels of DIR and the STEP pins."""
+    """The block and the registers after a freeze that a line calls for, with the levels of DIR and the STEP pins."""
     block, registers = words(isr.BLOCK_WORDS), words(PORT_E + 8)
     address = uctypes.addressof(registers)
     block[isr.TIM2_AT], block[isr.TIM2_AT + 1] = address & 0x3FFFFFFF, address >> 30

@@ -43,7 +43,7 @@ ROOM = 12_000
 
 
 def arm_of(rates, outputs):
-    """So many switches, or a servo too, on pins of ports C and D; as many inputs on port B."""
+    """That many switches, or a servo too, on pins of ports C and D; as many inputs on port B."""
     rows = [row(channel=n, max_rate=rate, counts_num=0, counts_den=1) for n, rate in enumerate(rates)]
     names = [name for name, _ in armrecord.OUTPUT]
     table = [dict(dict.fromkeys(names, 0), pin=0x20 + number) for number in range(outputs)]

@@ -31,7 +31,7 @@ def halved(pieces, node, level):
 
 
 def walk(motion, joint, parts, number):
-    """Split and skip by chance; the numbers of parts, and the deepest level."""
+    """Split and skip at random; the numbers of parts, and the deepest level."""
     parts.load(motion, joint)
     count = deepest = 0
     while parts.measure():

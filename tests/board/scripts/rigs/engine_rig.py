@@ -24,7 +24,7 @@ class Steps:
         self.blocks = blocks
 
     def at(self, place):
-        """(time, direction) at a place [block, index], or None behind the last."""
+        """(time, direction) at a place [block, index], or None after the last."""
         if place[0] == len(self.blocks):
             return None
         first, gap, _, direction = self.blocks[place[0]]
@@ -95,7 +95,7 @@ class StepGenerator:
         return self._end_steps
 
     def turn(self):
-        """Go on in the other direction."""
+        """Continue in the other direction."""
         self.direction = -self.direction
         self.at_turn = False
 
@@ -117,7 +117,7 @@ class StepGenerator:
             self.ended = self._steps.at(self._place) is None
 
     def _lengthen(self, time, gap, steps):
-        """The item queued last has so many steps, all as far apart."""
+        """The item queued last has that many steps, all as far apart."""
         state = self.queue
         place = SLOTS + ITEM_WORDS * ((state[step_queue.IN] - 1) % step_queue.CAPACITY)
         base = (time - gap) & 0xFFFFFFFF

@@ -174,7 +174,7 @@ def begin(world, watch, crc):
 
 
 def said(world):
-    """(passed, row, value) of the rows that were told of; they are forgotten."""
+    """(passed, row, value) of the rows that were reported; they are forgotten."""
     found = [(fields[0], fields[2], fields[5]) for name, fields, _ in world.events if name == "row"]
     world.events.clear()
     return found

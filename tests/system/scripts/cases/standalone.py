@@ -27,7 +27,7 @@ def ready(world, default="go"):
 
 
 def tap(world):
-    """Press the button and let go."""
+    """Press the button and release it."""
     world.press()
     yield from world.wait(2 * STEADY_MS)
     world.press(0)
@@ -55,7 +55,7 @@ def unmoved(world, runs=0):
 
 
 def moves_when_pressed_anew(world, runs=0):
-    """The button, held until now, does nothing when let go; the next press starts a run."""
+    """The button, held until now, does nothing when released; the next press starts a run."""
     world.press(0)
     yield from unmoved(world, runs)
     yield from tap(world)

@@ -560,7 +560,7 @@ class Terminal(usb_serial.SilentPort):
 
     def put(self, data):
         self.shown += bytes(data)
-        assert len(self.shown) < 2000, "the prompt goes on without end"
+        assert len(self.shown) < 2000, "the prompt continues without end"
         return len(data)
 
 

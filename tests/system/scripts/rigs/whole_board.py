@@ -167,7 +167,7 @@ class World(SilentPort):
         Serial._take_in(self, data, 1 << 30)
 
     def press(self, level=1):
-        """Press the board's button, or let go of it."""
+        """Press the board's button, or release it."""
         set_level(BUTTON, level)
 
     def ask(self, name, values=(), tail=b""):

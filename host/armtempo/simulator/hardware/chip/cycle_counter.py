@@ -9,7 +9,7 @@ _TRCENA = 24
 
 
 class CycleCounter:
-    """``look`` brings the register up to date before it is read; ``sync`` takes what was written."""
+    """``look`` updates the register before it is read; ``sync`` takes what was written."""
 
     def __init__(self, board):
         self._board = board
