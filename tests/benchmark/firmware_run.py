@@ -212,7 +212,7 @@ def readme(elf: Path, image: Path) -> None:
                 continue
             arguments = [command, *(str(arm) if word == "paper" else word for word in words)]
             if command == "plan":
-                arguments += ["--arm", str(arm)]
+                arguments += ["--arm", str(arm), "--job", "paper"]
             done = commandline.run(*arguments, folder=folder, ARMTEMPO_PORT=port)
             assert done.exit_code == 0, f"{command}: {done.output}{done.errors}"
         print(f"    README: {done.output.splitlines()[-1]}", flush=True)

@@ -16,7 +16,6 @@ from armtempo_shared import codes
 from armtempo_shared.messages import MAX_PAYLOAD
 from micropython import const
 
-from armtempo_board import heap
 from armtempo_board.app.board import Board
 from armtempo_board.app.commands import Commands
 from armtempo_board.app.controller import Controller
@@ -42,7 +41,6 @@ class App:
         self.turns = self._failed = 0  # turns of the loop, and the last of them that failed
         self._failures = 0
         self._spare: "bytearray | None" = bytearray(_SPARE_BYTES)
-        heap.forget()
         self.controller.configure()
 
     def enter(self) -> None:

@@ -37,7 +37,6 @@ class Board:
         from armtempo_board.app import room
 
         flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
-        heap.forget()
         self.workspace = room.workspace()  # before anything fragments the heap
         self.samples = SampleBuffer(room.sample_bytes(), flags_at)
         self.root = root

@@ -2,7 +2,6 @@
 
 from armtempo_shared import codes
 
-from armtempo_board import heap
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -23,7 +22,6 @@ def check_start(
     """
     if limits is not None:
         check_splines(motion, joints, limits)
-    heap.forget()
     from armtempo_board.motion import endpoints  # here, so that it can be forgotten
 
     for number, joint in enumerate(joints):
