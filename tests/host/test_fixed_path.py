@@ -132,8 +132,8 @@ def test_more_refinement_is_never_slower() -> None:
 @pytest.mark.slow
 def test_automatic_refinement_stays_within_the_record() -> None:
     rng = np.random.default_rng(3)
-    via = tuple(map(tuple, np.cumsum(rng.normal(0, 10, (120, 3)), axis=0).tolist()))
-    arm = problems.make_arm([[50.0, 50.0, 150.0]] * 3)
+    via = tuple(map(tuple, np.cumsum(rng.normal(0, 10, (120, 1)), axis=0).tolist()))
+    arm = problems.make_arm([[50.0, 50.0, 150.0]])
     plan = planner.plan(arm, Job("long", via, optimiser="gradient", starts=1))
     refine = plan.trajectory.joints[0].refine
     assert 1 < refine < 18
@@ -207,21 +207,22 @@ def test_gradients_start_within_bounds_and_are_not_held_by_them() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("vias", "joints", "timing"),
-    [(2, 3, "shared"), (7, 2, "per-joint"), (260, 1, "shared")],
+    ("vias", "joints", "timing", "room"),
+    [(2, 3, "shared", 64), (7, 2, "per-joint", 64), (30, 1, "shared", 1)],
 )
-def test_auto_is_never_slower_than_any_fixed_refine(vias: int, joints: int, timing: str) -> None:
+def test_auto_is_never_slower_than_any_fixed_refine(vias: int, joints: int, timing: str, room: int) -> None:
     """By no more than the least saving for which it continues; from 258 via points on the record has no finer axis."""
     points = bspline.fit(np.random.default_rng(vias).normal(0, 40, (vias, joints)), 5)
     together = [list(range(joints))] if timing == "shared" else [[joint] for joint in range(joints)]
     groups = [Group(tuple(own), points[:, own], LIMITS[: len(own)]) for own in together]
     job = Job("any", ((0.0,) * joints,) * vias, timing=timing, iterations=20)
-    most = time_parameterization.most_refine(job, vias - 1, joints)
+    assert time_parameterization.most_refine(job, 257, joints) == 1
+    most = min(room, time_parameterization.most_refine(job, vias - 1, joints))
     times = {
         refine: max(
             axis.total_s for axis in time_parameterization.axes(groups, replace(job, refine=refine), most)
         )
-        for refine in ("auto", *range(1, min(most, 3) + 1 if vias < 100 else 1), most)
+        for refine in ("auto", *range(1, min(most, 3) + 1), most)
     }
     assert times["auto"] <= min(times.values()) * 1.001, times
 

@@ -166,7 +166,7 @@ def test_progress_grows_to_the_whole(refine: int, polish: bool) -> None:
 def test_a_plan_can_be_ended_at_any_time(changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """By an exception out of its progress, called in each step of a solve 0.05 s after the last."""
     monkeypatch.setattr(progress, "_EVERY_S", 0.0)
-    job = replace(JOB, timing="shared", iterations=5, **{"refine": 8, **changes})
+    job = replace(JOB, via=JOB.via[:4], timing="shared", iterations=5, **{"refine": 8, **changes})
     watch = Ends(at=10**9)
     planner.plan(ARM, job, watch)
     assert watch.calls > 40

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -292,9 +293,14 @@ def paste(page: Any, text: str) -> None:
 
 
 def open_sequence(page: Any, file: str) -> None:
-    """Open the file of a sequence."""
-    page.get_by_role("combobox", name="Sequence").press("ArrowDown")  # which no notification covers
-    page.get_by_role("option", name=file).dispatch_event("click")
+    """Open the file of a sequence; a list that is just being filled does not open, so again then."""
+    option = page.get_by_role("option", name=file)
+    for _ in range(20):
+        page.get_by_role("combobox", name="Sequence").press("ArrowDown")
+        with suppress(Exception):  # a time-out
+            option.wait_for(timeout=3000)
+            break
+    option.dispatch_event("click")
     page.get_by_label("step 1", exact=True).wait_for()
 
 

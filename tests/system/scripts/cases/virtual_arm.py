@@ -6,7 +6,7 @@ import cases
 # isort: split
 from math import cos, exp, pi, sin, sqrt
 
-from arm import switches
+from arm import motors
 from arm.stepper import Noise, Stepper
 
 # all cases: not emulated
@@ -206,7 +206,7 @@ def case_limit_switches_trip_at_and_beyond_their_angles():
     board = bare_board.start()
     motor = Line()
     joint = {"limit_low": 0, "low_deg": -8.0, "limit_high": 1, "high_deg": 30.0, "limit_active_high": 1}
-    found = switches.fitted(motor, joint, Wired)
+    found = motors.limit_switches(motor, joint, Wired)
     for angle_deg, levels in ((-9.0, [1, 0]), (-8.0, [1, 0]), (-7.9, [0, 0]), (29.9, [0, 0]), (30.0, [0, 1])):
         motor.angle_deg = lambda angle_deg=angle_deg: angle_deg
         for switch in found:
