@@ -16,7 +16,7 @@ _SPARE_ENTRIES = 8  # of a ring, that are not overwritten: as in isr.py
 PROCESSOR_WORDS = 1024
 """Words (4 bytes) that the processor alone reaches: the chip's backup SRAM, which is no part of MicroPython's heap
 (hardware/backup_sram.py of the board program). So none of them are for rings, which DMA reads."""
-GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 49, 18, 128)
+GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 49, 26, 128)
 """Words of a joint's step generator, in the order in which they are taken.
 
 Pieces of angle and of time, their control points, their measures; the solver, the law of time, the queue of steps.

@@ -6,11 +6,11 @@ angles in steps / 2**28, times in ticks / 2**16.
 ::
 
     offset  type   field
-    0       4s     magic  b"ATM2"
+    0       4s     magic  b"ATM3"
     4       B      degree k, 3 or 5
     5       B      joints
     6       B      flags: bit 0, all joints share one time axis
-    7       B      0
+    7       B      the shape p + 16 q of the ramp to rest, 1 <= p < q <= 15 (EVEN_RAMP)
     8       H      segments n of the angle splines
     10      H      refine R: the time axes have n * R segments
     12      I      crc32 of the arm record it was made for
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     Ramps = tuple[Sequence[int], Sequence[int]]
 
-MAGIC = b"ATM2"
+MAGIC = b"ATM3"
 SHARED_AXIS = 1
 RAMP_ENTRIES = 32
 RAMP_UNIT_TICKS = 16384
@@ -45,6 +45,9 @@ _RAMPS = "<%dH" % RAMP_ENTRIES
 _RAMPS_SIZE = struct.calcsize(_RAMPS)
 _RAMPS_AT = struct.calcsize(_HEAD)
 HEAD_SIZE = _RAMPS_AT + 2 * _RAMPS_SIZE
+EVEN_RAMP = 5 + 16 * 11
+"""The shape of all other ramps. From the end of a ramp at which the rate is least, its slope rises over p/16 of its
+length, falls over the last 1 - q/16, and is constant in between, but for what lets its way be a multiple of 1/64."""
 NO_RAMPS = (0,) * RAMP_ENTRIES, (0,) * RAMP_ENTRIES
 """Of a motion that can neither brake nor change its speed."""
 
@@ -67,17 +70,18 @@ def pack(
     refine: int,
     ramps: "Ramps",
     arm_crc: int,
+    brake_shape: int = EVEN_RAMP,
 ) -> bytes:
     """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
     all, its n * R + k control points (int, ticks * 2**16). ``ramps``: RAMP_ENTRIES lengths of ramps to rest and as many
-    of others, in RAMP_UNIT_TICKS.
+    of others, in RAMP_UNIT_TICKS. ``brake_shape``: of ramps to rest.
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
     flags = SHARED_AXIS if shared else 0
-    head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, 0, segments, refine, arm_crc)
+    head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, brake_shape, segments, refine, arm_crc)
     for lengths in ramps:
         head += struct.pack(_RAMPS, *lengths)
     body: "list[int]" = []
@@ -101,9 +105,9 @@ class MotionHead:
     def __init__(self, head: bytes, length: int) -> None:
         if length < HEAD_SIZE + 4 or len(head) < HEAD_SIZE:
             raise MotionError("too short")
-        (magic, self.degree, self.joints, flags, zero, self.segments, self.refine,
+        (magic, self.degree, self.joints, flags, self.brake_shape, self.segments, self.refine,
          self.arm_crc) = struct.unpack_from(_HEAD, head, 0)  # fmt: skip
-        if magic != MAGIC or zero != 0 or flags & ~SHARED_AXIS:
+        if magic != MAGIC or not 1 <= self.brake_shape & 15 < self.brake_shape >> 4 or flags & ~SHARED_AXIS:
             raise MotionError("not a motion record of this version")
         if self.degree not in (3, 5) or not 1 <= self.joints <= MAX_JOINTS:
             raise MotionError("unknown degree or number of joints")

@@ -27,7 +27,7 @@ from armtempo.model.parts import Limits
 from armtempo.planning import brake_time, planner
 from armtempo.planning.brake_time import EXCESS, TO_REST, UNIT_S
 from armtempo.splines.trajectory import Trajectory
-from armtempo_shared.motion import RAMP_ENTRIES
+from armtempo_shared.motion import EVEN_RAMP, RAMP_ENTRIES
 from scipy.optimize import linprog
 
 from tests.host import problems
@@ -78,9 +78,10 @@ def ratios(trajectory: Trajectory, limits: Sequence[Limits]) -> Array:
     """(3, MOMENTS): the record's time over the shortest of its law, over that of any law, and the motion's rest."""
     allowed = np.array([limit.values for limit in limits])
     moments = (np.arange(MOMENTS) + 0.5) / MOMENTS
-    record_s = brake_time.of_motion(trajectory, limits).rest_s(moments * trajectory.duration_s)
+    record = brake_time.of_motion(trajectory, limits)
+    record_s = record.rest_s(moments * trajectory.duration_s)
     ramps = brake_time._Ramps(trajectory, allowed)
-    lawful_s = ramps.shortest_s(moments, TO_REST[:1], np.full(MOMENTS, SHORTEST_S))
+    lawful_s = ramps.shortest_s(moments, TO_REST[:1], np.full(MOMENTS, SHORTEST_S), record.shape)
     any_s = [
         Shortest(trajectory, allowed, [moment])(time) for moment, time in zip(moments, lawful_s, strict=True)
     ]
@@ -94,7 +95,7 @@ def table_ratios(trajectory: Trajectory, limits: Sequence[Limits], parts: int) -
     spaces = np.linspace(1, RAMP_ENTRIES - 3, SPACES).astype(int)[:, None]
     starts = (spaces + np.array([0.0, 0.5, 1.0])) / (RAMP_ENTRIES - 1)
     lawful_s = brake_time._Ramps(trajectory, allowed).shortest_s(
-        starts[:, 1], TO_REST[:1], np.full(SPACES, SHORTEST_S)
+        starts[:, 1], TO_REST[:1], np.full(SPACES, SHORTEST_S), EVEN_RAMP
     )
     found = []
     for space, known_s in zip(starts, lawful_s, strict=True):

@@ -93,7 +93,7 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
 
 
 def _brake(start_s: float, length_s: float) -> tuple[int, int]:
-    """In ticks; the length whole in the record's units and on the grid of ramps, 2^14 and 8000 ticks: as it is run."""
+    """In ticks; the length whole in the record's units and on the grid of ramps, 2^14 and 64000 ticks: as it is run."""
     whole = 125 * RAMP_UNIT_TICKS
     return round(start_s * walking.TICK_HZ), round(length_s * walking.TICK_HZ / whole) * whole
 
@@ -146,7 +146,7 @@ def test_braking_from_full_speed(tmp_path: Path) -> None:
 
 def _verify_braked(motion: Motion, joint: int, steps: walking.Steps, start: int, length: int) -> None:
     exact = oracle.without_grazes(oracle.crossings(motion, joint), walking.GAP_TICKS)
-    count = int(np.sum(exact.ticks < start + length / 2))
+    count = int(np.sum(exact.ticks < walking.braked(np.array([start + length]), start, length)))
     assert abs(len(steps.ticks) - count) <= 1
     count = min(count, len(steps.ticks))
     np.testing.assert_array_equal(steps.direction[:count], exact.direction[:count])

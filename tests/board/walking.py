@@ -10,12 +10,14 @@ from armtempo_shared import limits
 from armtempo_shared.motion import Motion
 from numpy.typing import NDArray
 
-from tests import interpreters
+from tests import interpreters, ramps
 from tests.board import oracle
 
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "walk.py"
 PULSE_TICKS = 168
 GAP_TICKS = 20_000
+BRAKE_SHAPE = 3 + 16 * 7
+"""Slowly at first: 9/16 of the time until it brakes most."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ def walk(
     paths = [folder / f"{number}.atm" for number in range(len(records))]
     for path, record in zip(paths, records, strict=True):
         path.write_bytes(record)
-    words = [str(word) for word in (PULSE_TICKS, GAP_TICKS, room, *brake, *paths)]
+    words = [str(word) for word in (PULSE_TICKS, GAP_TICKS, room, *brake, BRAKE_SHAPE, *paths)]
     verdicts = interpreters.run(interpreter, SCRIPT, *words).splitlines()
     return verdicts, [Path(f"{path}.steps").read_bytes() for path in paths]
 
@@ -94,7 +96,7 @@ def peak_rate(record: bytes) -> float:
 def braked(ticks: NDArray[np.float64], start: int, length: int) -> NDArray[np.float64]:
     """Motion time at a real time while braking (the law in ``armtempo_board/stepgen/time_law.py``)."""
     x = np.clip((ticks - start) / length, 0.0, 1.0)
-    return np.where(ticks < start, ticks, start + length * (x - 2.5 * x**4 + 3 * x**5 - x**6))
+    return np.where(ticks < start, ticks, start + length * ramps.passed(x, 1.0, 0.0, BRAKE_SHAPE))
 
 
 TICK_HZ = limits.TICK_HZ

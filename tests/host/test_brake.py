@@ -12,14 +12,21 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
 from armtempo.planning import brake_time, planner, point_to_point
 from armtempo.splines.trajectory import Trajectory
+from armtempo_shared.motion import EVEN_RAMP
 
+from tests import ramps
 from tests.host import problems
 
 PROBLEMS = {problem.name: problem for problem in problems.load()}
 
 
 def changed_excess(
-    trajectory: Trajectory, limits: list[Limits], starts_s: Array, lengths_s: Array, rate: tuple[float, float]
+    trajectory: Trajectory,
+    limits: list[Limits],
+    starts_s: Array,
+    lengths_s: Array,
+    rate: tuple[float, float],
+    shape: int,
 ) -> Array:
     """Largest speed, and acceleration or jerk, over their limits as the rate goes from one to the other: (starts, 2).
 
@@ -27,8 +34,7 @@ def changed_excess(
     """
     before, after = rate
     x = np.linspace(0.0, 1.0, 151)
-    rates = before + (after - before) * (10 * x**3 - 15 * x**4 + 6 * x**5)
-    passed = np.concatenate([[0.0], np.cumsum((rates[1:] + rates[:-1]) / 2)]) / 150
+    passed = ramps.passed(x, before, after, shape)
     times = starts_s[:, None] + lengths_s[:, None] * passed
     values = trajectory(times.ravel()).reshape(*times.shape, -1)
     allowed = np.array([limit.values for limit in limits])
@@ -57,10 +63,13 @@ def test_every_change_keeps_its_limits_from_anywhere_and_quicker_ones_do_not(nam
         (brakes.change_s(starts), ((0.0, 1.0), (0.95, 0.6), (0.1, 0.7))),
     ):
         for rate in rates:
-            found = changed_excess(plan.trajectory, limits, starts, lengths, rate)
+            shape = EVEN_RAMP if rate[1] else brakes.shape
+            found = changed_excess(plan.trajectory, limits, starts, lengths, rate, shape)
             assert found[:, 0].max() <= 1 + 1e-6
             assert found[:, 1].max() <= brake_time.EXCESS * 1.02, rate
-    quicker = changed_excess(plan.trajectory, limits, starts, 0.85 * brakes.rest_s(starts), (1.0, 0.0))
+    quicker = changed_excess(
+        plan.trajectory, limits, starts, 0.85 * brakes.rest_s(starts), (1.0, 0.0), brakes.shape
+    )
     assert np.mean(quicker[:, 1] > brake_time.EXCESS) > 0.6
 
 
@@ -81,8 +90,8 @@ def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
     brakes = brake_time.of_motion(motion, limits)
     starts = every_start(motion, 121)
     worst = max(
-        changed_excess(motion, limits, starts, brakes.rest_s(starts), (1.0, 0.0))[:, 1].max(),
-        changed_excess(motion, limits, starts, brakes.change_s(starts), (0.0, 1.0))[:, 1].max(),
+        changed_excess(motion, limits, starts, brakes.rest_s(starts), (1.0, 0.0), brakes.shape)[:, 1].max(),
+        changed_excess(motion, limits, starts, brakes.change_s(starts), (0.0, 1.0), EVEN_RAMP)[:, 1].max(),
     )
     assert 0.97 * brake_time.EXCESS <= worst <= 1.01 * brake_time.EXCESS
 

@@ -68,6 +68,8 @@ def test_any_other_length_is_refused() -> None:
         (6, 2, "version"),
         (6, 4, "version"),
         (7, 1, "version"),
+        (7, 0x70, "version"),
+        (7, 0x77, "version"),
         (0, ord("B"), "version"),
         (8, 0, "segments"),
         (10, 0, "segments"),

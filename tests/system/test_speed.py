@@ -15,7 +15,9 @@ from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
 from armtempo.runs import stretched
 from armtempo.simulator import LaunchOptions, launch
+from armtempo_shared.motion import EVEN_RAMP
 
+from tests import ramps
 from tests.system import boards, commandline
 from tests.system.boards import small_plan
 
@@ -143,8 +145,8 @@ def test_changes_keep_the_brake_times_limits() -> None:
             start = rng.uniform(0, trajectory.duration_s)
             step = float(brakes.change_s(start) if after else brakes.rest_s(start)) / 1500
             x = np.arange(1501) / 1500
-            rate = before + (after - before) * (10 * x**3 - 15 * x**4 + 6 * x**5)
-            passed = np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * step
+            shape = EVEN_RAMP if after else brakes.shape
+            passed = 1500 * step * ramps.passed(x, before, after, shape)
             values = trajectory(np.minimum(start + passed, trajectory.duration_s))
             for order in range(3):
                 values = np.diff(values, axis=0) / step

@@ -8,6 +8,7 @@ for. Imported before a motion, and forgotten after it.
 from array import array
 
 from armtempo_shared.limits import LONGEST_RUN_TICKS
+from armtempo_shared.motion import EVEN_RAMP
 from micropython import const
 
 from armtempo_board import features
@@ -52,8 +53,9 @@ class Override:
         self._motion_kiticks = self._real_kiticks = 0
         self.rate = rate
         time_law.set_length(self.law, 0)
-        self._set(time_law.START_HIGH, rate, rate)
-        self._set(time_law.END_HIGH, rate, rate)
+        time_law.set_ramp(self.law, EVEN_RAMP, rate, rate)
+        self._set(time_law.START_HIGH)
+        self._set(time_law.END_HIGH)
         self.steady_kiticks = -1 << 20
 
     def ramp_end_ticks(self, from_ticks: int, rate: int) -> int:
@@ -70,7 +72,8 @@ class Override:
         since = max(from_kiticks - self._real_kiticks, 0)
         at = self._motion_kiticks + since // PERMILLE * self.rate + since % PERMILLE * self.rate // PERMILLE
         units: int = self._motion.ramp_units(at >> (self._shift - 10), self._parts, True)
-        return self._real_kiticks + since + (units << (_UNIT_BITS - 10))
+        grid = ((units << 8) + PERMILLE - 1) // PERMILLE  # RAMP_GRID_TICKS are 1000 << 6
+        return self._real_kiticks + since + (125 * grid >> 1)
 
     def _thousands(self, from_ticks: int) -> int:
         """Thousands of ticks from the last ramp's end, rounded up."""
@@ -88,21 +91,23 @@ class Override:
         self._real_ticks += PERMILLE * thousands
         self._motion_ticks += self.rate * thousands
         length = self._ramp_ticks(self._motion_ticks, rate)
+        shape = EVEN_RAMP if rate else self._motion.brake_shape
         time_law.set_length(self.law, length)
-        self._set(time_law.START_HIGH, self.rate, rate)
+        time_law.set_ramp(self.law, shape, self.rate, rate)
+        self._set(time_law.START_HIGH)
         self._real_ticks += length
-        self._motion_ticks += (self.rate + rate) * (length // (2 * PERMILLE))
-        self._set(time_law.END_HIGH, self.rate, rate)
+        way = 64 * min(self.rate, rate) + abs(rate - self.rate) * time_law.way_64ths(shape)
+        self._motion_ticks += way * (length // time_law.RAMP_GRID_TICKS)
+        self._set(time_law.END_HIGH)
         self._motion_kiticks = self._motion_ticks >> 10
         self._real_kiticks = self._real_ticks >> 10
         self.rate = rate
         self.steady_kiticks = (self._real_ticks >> 10) + 1
 
-    def _set(self, end: int, before: int, after: int) -> None:
-        """Put one end of the ramp, where motion and real time are now, and the rates into the law."""
+    def _set(self, end: int) -> None:
+        """Put one end of the ramp, where motion and real time are now, into the law."""
         time_law.set_times(self.law, end, self._motion_ticks)
         time_law.set_times(self.law, end + time_law.REAL_START_HIGH - time_law.START_HIGH, self._real_ticks)
-        time_law.set_rates(self.law, before, after)
 
     def put_path(self, sample: "array[int]", at: int) -> None:
         """Put the motion's own time into a sample that begins at word ``at`` (buffers.py)."""

@@ -69,7 +69,7 @@ _LOW = const(6)
 _BIAS = const(1 << 28)
 # as in time_law.py: words of the law
 _REAL_START_HIGH = const(4)
-_MOTION_HIGH = const(14)
+_MOTION_HIGH = const(22)
 # what was found, as subdivision.py says it
 _NOT_YET = const(0)
 _FOUND_AT_START = const(2)
@@ -88,7 +88,7 @@ _BOTH = const(3)
 _THIS_RING = const(1)  # bit of the first one at hand
 _CLEARED = (_STEPS, _REACHED, _LAST_STEP, _MODE, _HELD_BACK, _HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
-_LAW_WORDS = const(18)  # as in time_law.py
+_LAW_WORDS = const(26)  # as in time_law.py
 _BEFORE = const(-1)  # in Ki ticks: before a motion
 _FAR = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
 

@@ -1,11 +1,13 @@
 """Real time as a function of the motion's own time, whose rate is 1 as planned and may be anything below.
 
-The rate is constant but for ramps: over a length L of real time it goes from one value to another as S(x) = 10 x**3 -
-15 x**4 + 6 x**5, x = (real time - start) / L. Braking is a ramp to 0. Counted by r from that end of the ramp at which
-the rate is least, the rate is b + h S(r), and the motion's time from there on is b r + h e(r) of L, with the convex
-e(r) = r**4 (2.5 - 3 r + r**2). This law moves the nodes, time and slope; all steps between them follow. Rates
-are in thousandths and times at the ends of a ramp in whole ticks, so outside the ramps real time is exact, however
-long the motion is. Fractions here have 30 bits.
+The rate is constant but for ramps: over a length L of real time it goes from one value to another. Braking is a ramp to
+0. Counted by r, in parts of L, from that end of the ramp at which the rate is least, the rate is b + h S(r), and the
+motion's time from there on is b r + h e(r) of L, e the integral of S. S goes from 0 to 1; its slope is 0 at r = 0, s1
+at r = p/16, s2 at r = q/16, 0 at r = 1, and linear in between, so e is convex, and of third order in each of the three
+pieces. p and q are the shape of the ramp, which the record gives for braking; s1 and s2 differ by as little as makes
+e(1) a multiple of 1/64. This law moves the nodes, time and slope; all steps between them follow. Rates are in
+thousandths and times at the ends of a ramp in whole ticks, so outside the ramps real time is exact, however long the
+motion is. Fractions here have 30 bits.
 """
 
 import micropython
@@ -30,13 +32,21 @@ BEFORE = const(10)  # rate before it, in thousandths,
 AFTER = const(11)  # and after it
 _LEAST = const(12)  # b
 _RISE = const(13)  # h
-GIVEN_WORDS = const(14)
+_SHAPE = const(14)  # p + 16 q
+_RATE_1 = const(15)  # S at p/16,
+_RATE_2 = const(16)  # and at q/16
+_WAY_1 = const(17)  # e at p/16,
+_WAY_2 = const(18)  # and at q/16
+_GAIN_1 = const(19)  # slope of S at p/16 times the length of the second piece,
+_GAIN_2 = const(20)  # and that at q/16 times the length of the third
+_WHOLE = const(21)  # b + h e(1)
+GIVEN_WORDS = const(22)
 # for a joint: what times of the subinterval that is gone through count from, 4096 ticks, + bezier.BIAS
-MOTION_HIGH = const(14)  # in the motion's time
-REAL_HIGH = const(15)  # and in real time
-_SLOPE = const(16)  # results of ``_evaluate``,
-_VALUE = const(17)  # and of ``_ticks_of``
-LAW_WORDS = const(18)
+MOTION_HIGH = const(22)  # in the motion's time
+REAL_HIGH = const(23)  # and in real time
+_SLOPE = const(24)  # results of ``_evaluate``,
+_VALUE = const(25)  # and of ``_ticks_of``
+LAW_WORDS = const(26)
 
 # words of an end of the ramp, from START_HIGH or END_HIGH on
 _MOTION = const(0)
@@ -45,8 +55,8 @@ _REAL = const(2)
 _REAL_LOW = const(3)
 
 PERMILLE = const(1000)
-RAMP_GRID_TICKS = const(8000)
-"""Lengths of ramps are multiples of it, so that both ends lie on whole ticks."""
+RAMP_GRID_TICKS = const(64000)
+"""Lengths of ramps are multiples of it, so that both ends lie on whole ticks: rates count in 1/1000, e(1) in 1/64."""
 LONGEST_RAMP_TICKS = const(1 << 30)
 
 # as in newton.py: words of a node
@@ -66,7 +76,6 @@ _BIAS = const(1 << 28)
 _HALF_MASK = const((1 << 15) - 1)
 _LONGEST = const(1 << 28)
 _MOST = const((1 << 30) - 1)
-_FIVE_EIGHTHS = const(5 << 27)
 _LEAST_RATE = const(1 << 10)
 _FAR = const(1 << 17)  # in 4096 ticks: longer than any ramp and subinterval
 _AHEAD = const(4096)  # this many thousand units are added, where a time may lie before the ramp
@@ -88,12 +97,30 @@ def set_length(law: "array[int]", ticks: int) -> None:
     law[UNIT] = unit
 
 
-def set_rates(law: "array[int]", before: int, after: int) -> None:
-    """The rates, in thousandths."""
+def way_64ths(shape: int) -> int:
+    """64 e(1) of a shape."""
+    first, second = shape & 15, shape >> 4
+    equal = 16 + second - first
+    return ((192 - 4 * (first + second)) * equal - 64 * (16 - first) + 3 * equal // 2) // (3 * equal)
+
+
+def set_ramp(law: "array[int]", shape: int, before: int, after: int) -> None:
+    """The shape of the ramp, 1 <= p < q <= 15, and the rates before and after, in thousandths."""
+    first, second = shape & 15, shape >> 4
+    way = way_64ths(shape)
+    late = 192 - 4 * (first + second) - 3 * way  # 64ths of the rise that s2 is the cause of
+    law[_SHAPE] = shape
+    law[_RATE_1] = ((64 - late) * first << 24) // second
+    law[_WAY_1] = first * law[_RATE_1] // 48
+    law[_GAIN_1] = ((64 - late) * (second - first) << 25) // second
+    law[_GAIN_2] = (late * (16 - second) << 25) // (16 - first)
+    law[_RATE_2] = (1 << _FRACTION_BITS) - (law[_GAIN_2] >> 1)
+    law[_WAY_2] = (way << 24) - (16 - second) * ((1 << _FRACTION_BITS) - law[_GAIN_2] // 6) // 16
     law[BEFORE] = before
     law[AFTER] = after
     law[_LEAST] = (min(before, after) << _FRACTION_BITS) // PERMILLE
     law[_RISE] = (abs(after - before) << _FRACTION_BITS) // PERMILLE
+    law[_WHOLE] = law[_LEAST] + (law[_RISE] * way >> 6)
 
 
 @micropython.viper
@@ -104,25 +131,46 @@ def _evaluate(law: ptr32, r: int, left: int) -> int:
     """
     rounds = 0
     while True:
+        # The piece of the shape: its length in 16ths, what S and e are at its beginning, and its way from there
+        first = law[_SHAPE] & 15
+        second = law[_SHAPE] >> 4
+        if r < first << 26:
+            width = first
+            u = r
+            gain = rate = way = 0
+            bend = law[_RATE_1]
+        elif r < second << 26:
+            width = second - first
+            u = r - (first << 26)
+            gain = law[_GAIN_1]
+            rate = law[_RATE_1]
+            way = law[_WAY_1]
+            bend = law[_RATE_2] - rate - gain
+        else:
+            width = 16 - second
+            u = r - (second << 26)
+            gain = law[_GAIN_2]
+            rate = law[_RATE_2]
+            way = law[_WAY_2]
+            bend = _MOST - rate - gain + 1
+        first = u // width
+        u = (first << 4) + ((u - first * width) << 4) // width  # of the piece
+        digit = u >> 15
+        low = u & _HALF_MASK
+        bend = (bend >> 15) * digit + (((bend & _HALF_MASK) * digit) >> 15) + (((bend >> 15) * low) >> 15)
+        second = (gain >> 1) + bend // 3
+        second = (
+            (second >> 15) * digit + (((second & _HALF_MASK) * digit) >> 15) + (((second >> 15) * low) >> 15)
+        )
+        second += rate
+        second = (
+            (second >> 15) * digit + (((second & _HALF_MASK) * digit) >> 15) + (((second >> 15) * low) >> 15)
+        )
+        way += (second >> 4) * width + (((second & 15) * width) >> 4)
+        gain += bend
+        rate += (gain >> 15) * digit + (((gain & _HALF_MASK) * digit) >> 15) + (((gain >> 15) * low) >> 15)
         digit = r >> 15
         low = r & _HALF_MASK
-        square = digit * digit + ((digit * low) >> 14) + ((low * low) >> 30)
-        rate = _FIVE_EIGHTHS - r + (r >> 4) + (square >> 2) + (square >> 3)
-        way = _FIVE_EIGHTHS - r + (r >> 2) + (square >> 2)
-        first = square >> 15
-        second = square & _HALF_MASK
-        cube = first * digit + ((first * low) >> 15) + ((second * digit) >> 15)
-        fourth = first * first + ((first * second) >> 14)
-        first = cube >> 15
-        second = cube & _HALF_MASK
-        rate = (
-            first * (rate >> 15) + ((second * (rate >> 15)) >> 15) + ((first * (rate & _HALF_MASK)) >> 15)
-        ) << 4
-        first = fourth >> 15
-        second = fourth & _HALF_MASK
-        way = (
-            first * (way >> 15) + ((second * (way >> 15)) >> 15) + ((first * (way & _HALF_MASK)) >> 15)
-        ) << 2
         first = law[_RISE] >> 15
         second = law[_RISE] & _HALF_MASK
         rate = first * (rate >> 15) + ((second * (rate >> 15)) >> 15) + ((first * (rate & _HALF_MASK)) >> 15)
@@ -231,7 +279,7 @@ def to_real_time(given: object, node: ptr32, place: int, scale: int) -> int:
         rising = 1 if law[AFTER] > rate else 0
         place = int(_share(given, place, fraction, scale))
         if not rising:
-            place = law[_LEAST] + (law[_RISE] >> 1) - place
+            place = law[_WHOLE] - place
             if place < 0:
                 place = 0
         place = int(_evaluate(given, _MOST, place))
@@ -303,7 +351,7 @@ def to_motion_time(given: object, sample: ptr32, at: int) -> object:
         _evaluate(given, place, -1)
         place = law[_VALUE]
         if not rising:
-            place = law[_LEAST] + (law[_RISE] >> 1) - place
+            place = law[_WHOLE] - place
             if place < 0:
                 place = 0
         _ticks_of(given, place)

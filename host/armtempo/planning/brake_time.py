@@ -1,8 +1,9 @@
 """How long a motion takes to brake to rest, or to change its speed otherwise, by where on its path that begins.
 
 The board lets the motion's own time run at another rate, so the arm stays on its path: in the brake time the rate goes
-from r0 to r1 as r0 + (r1 - r0) (10 x³ - 15 x⁴ + 6 x⁵), x = time since its beginning / brake time. Braking and pauses
-are r1 = 0; changes of speed and going on have times of their own.
+from r0 to r1, by the law in ``armtempo_board/stepgen/time_law.py``. Braking and pauses are r1 = 0, and their ramps have
+the shape that makes them shortest over the motion; other changes of speed have times of their own, and one
+shape.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from armtempo_shared.limits import TICK_HZ
-from armtempo_shared.motion import RAMP_ENTRIES, RAMP_UNIT_TICKS
+from armtempo_shared.motion import EVEN_RAMP, RAMP_ENTRIES, RAMP_UNIT_TICKS
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
@@ -43,7 +44,9 @@ UNIT_S = RAMP_UNIT_TICKS / TICK_HZ
 _LONGEST = 65535
 _LONGER = 1.02
 _STARTS = 6  # in each part of the table
-_PHASES = 40
+_PHASES = 15  # of each piece of a ramp
+_SHAPES = [p + 16 * q for p in (1, 2, 3, 4, 5, 6, 7) for q in (5, 6, 7, 8, 9, 10, 12, 14) if p < q]
+_SHAPE_STARTS = 12
 _SAMPLES = 4000
 _SHORTEST_S = 0.01
 _HALVINGS = 6
@@ -54,12 +57,14 @@ _NEGLIGIBLE = 1e-6  # of RAMP_UNIT_TICKS
 class BrakeTimes:
     """How long changes take that begin at RAMP_ENTRIES equal steps of a motion's time, in RAMP_UNIT_TICKS.
 
-    Linear in between. ``to_rest``, ``others``: (RAMP_ENTRIES,), whole numbers.
+    Linear in between. ``to_rest``, ``others``: (RAMP_ENTRIES,), whole numbers. ``shape``: of ramps to rest, as in the
+    record of a motion (``armtempo_shared.motion``).
     """
 
     duration_s: float
     to_rest: Array
     others: Array
+    shape: int = EVEN_RAMP
 
     def rest_s(self, time_s: float | Array) -> Array:
         """How long braking takes from a time of the motion on."""
@@ -90,16 +95,29 @@ def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
             f"the motion {trajectory.name!r} goes beyond the arm's acceleration or jerk limits",
             "plan it again",
         )
-    to_rest = _table(ramps, TO_REST, TO_REST[:1], np.full(RAMP_ENTRIES, _SHORTEST_S / UNIT_S))
-    return BrakeTimes(trajectory.duration_s, to_rest, _table(ramps, OTHERS, OTHERS[:2], to_rest))
+    shape = _best_shape(ramps)
+    to_rest = _table(ramps, TO_REST, TO_REST[:1], np.full(RAMP_ENTRIES, _SHORTEST_S / UNIT_S), shape)
+    others = _table(ramps, OTHERS, OTHERS[:2], to_rest, EVEN_RAMP)
+    return BrakeTimes(trajectory.duration_s, to_rest, others, shape)
 
 
-def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array) -> Array:
+def _best_shape(ramps: _Ramps) -> int:
+    """The shape of ramps to rest that are shortest in the mean, each against the best shape from where it begins."""
+    starts = np.tile((np.arange(_SHAPE_STARTS) + 0.5) / _SHAPE_STARTS, len(_SHAPES))
+    shapes = np.repeat(_SHAPES, _SHAPE_STARTS)
+    lengths = ramps.shortest_s(starts, TO_REST[:1], np.full(len(starts), _SHORTEST_S), shapes)
+    lengths = lengths.reshape(len(_SHAPES), -1)
+    return _SHAPES[int(np.argmin(np.mean(lengths / lengths.min(axis=0), axis=1)))]
+
+
+def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array, shape: int) -> Array:
     """Entries from ``least`` on; ``worst``: the rates that need most."""
     parts = RAMP_ENTRIES - 1
     place = np.arange(_STARTS * parts + 1) / _STARTS
     needed = (
-        ramps.shortest_s(place / parts, worst, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), least))
+        ramps.shortest_s(
+            place / parts, worst, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), least), shape
+        )
         / UNIT_S
     )
     table = np.maximum(needed[::_STARTS], least)
@@ -111,7 +129,7 @@ def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array) -> Array:
     while True:
         before_s, length_s = length_s, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), table)
         new = np.flatnonzero(length_s != before_s)
-        found[new] = ramps.excess(place[new] / parts, length_s[new], rates) > EXCESS
+        found[new] = ramps.excess(place[new] / parts, length_s[new], rates, shape) > EXCESS
         found &= length_s < UNIT_S * _LONGEST
         if not np.any(found):
             return table
@@ -144,34 +162,37 @@ class _Ramps:
         self._motion = np.stack([trajectory(time, order).T for order in (1, 2, 3)])
         self.worst_of_motion = float(np.max(np.abs(self._motion[1:]) / allowed.T[1:, :, None]))
 
-    def shortest_s(self, starts: Array, rates: Rates, least_s: Array) -> Array:
-        """From ``least_s`` on, to 1 %, for each of ``starts``, parts of the motion's time."""
+    def shortest_s(self, starts: Array, rates: Rates, least_s: Array, shapes: Array | int) -> Array:
+        """From ``least_s`` on, to 1 %, for each of ``starts``, parts of the motion's time; ``shapes``: theirs."""
+        shapes = np.broadcast_to(shapes, starts.shape)
         low, high = least_s.copy(), least_s.copy()
         left = np.arange(len(starts))
-        while len(left := left[self.excess(starts[left], high[left], rates) > EXCESS]):
+        while len(left := left[self.excess(starts[left], high[left], rates, shapes[left]) > EXCESS]):
             low[left], high[left] = high[left], 2.0 * high[left]
             left = left[high[left] < 2.0 * UNIT_S * _LONGEST]
         left = np.flatnonzero(high > low)
         for _ in range(_HALVINGS):
             middle = 0.5 * (low[left] + high[left])
-            fails = self.excess(starts[left], middle, rates) > EXCESS
+            fails = self.excess(starts[left], middle, rates, shapes[left]) > EXCESS
             low[left] = np.where(fails, middle, low[left])
             high[left] = np.where(fails, high[left], middle)
         return high
 
-    def excess(self, starts: Array, length_s: Array, rates: Rates) -> Array:
+    def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Array | int) -> Array:
         """The largest acceleration or jerk over its limit in changes between ``rates``, for each start."""
-        x = np.linspace(0.0, 1.0, _PHASES + 1)
         worst = np.zeros(len(starts))
         if not len(starts):
             return worst
         length = length_s[:, None]
+        place, rise, slope, bend, way, whole = _ramp(np.atleast_1d(shapes))
         for before, after in rates:
-            change = after - before
-            rate = before + change * x**3 * (10 - 15 * x + 6 * x**2)
-            rate1 = change * 30 * x**2 * (1 - x) ** 2 / length
-            rate2 = change * 60 * x * (1 - x) * (1 - 2 * x) / length**2
-            passed = before * x + change * x**4 * (2.5 - 3 * x + x**2)
+            least, change = min(before, after), after - before
+            rate = least + abs(change) * rise
+            rate1 = change * slope / length
+            rate2 = abs(change) * bend / length**2
+            passed = least * place + abs(change) * way
+            if change < 0.0:
+                passed = least + abs(change) * whole - passed
             speed, acceleration, jerk = self._at(self._duration_s * starts[:, None] + length * passed)
             changed2 = acceleration * rate**2 + speed * rate1
             changed3 = jerk * rate**3 + 3 * acceleration * rate * rate1 + speed * rate2
@@ -188,3 +209,37 @@ class _Ramps:
         values += (place - before) * (self._motion.take(before + 1, axis=2) - values)
         np.copyto(values, 0.0, where=place > _SAMPLES - 1)
         return values[0], values[1], values[2]
+
+
+def _ramp(shapes: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """r, S, S', S'' and e (N, 3 * _PHASES) at the ends of each piece and in between, and e(1) (N, 1), of shapes (N,).
+
+    As in ``armtempo_board/stepgen/time_law.py``.
+    """
+    second, first = np.divmod(shapes[:, None], 16.0)
+    first, second = first / 16.0, second / 16.0
+    whole = np.rint(64 * (3 - first - second - (1 - first) / (1 + second - first)) / 3) / 64
+    late = 3 * (1 - whole) - first - second
+    slopes = (0.0 * first, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0 * first)
+    at = np.linspace(0.0, 1.0, _PHASES)
+    rise = way = start = 0.0 * first
+    pieces = []
+    for width, before, after in zip(
+        (first, second - first, 1 - second), slopes[:-1], slopes[1:], strict=True
+    ):
+        gain, bend = width * before, width * (after - before)
+        pieces.append(
+            (
+                start + width * at,
+                rise + at * (gain + at * bend / 2),
+                before + at * (after - before),
+                (after - before) / width + 0.0 * at,
+                way + width * at * (rise + at * (gain / 2 + at * bend / 6)),
+            )
+        )
+        start = start + width
+        rise, way = pieces[-1][1][:, -1:], pieces[-1][4][:, -1:]
+    place, rises, slope, second_slope, ways = (
+        np.concatenate(one, axis=1) for one in zip(*pieces, strict=True)
+    )
+    return place, rises, slope, second_slope, ways, whole

@@ -66,7 +66,8 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
     checks.check_held(trajectory, arm)
     first = trajectory.joints[0]
     crc = record_crc(arm_record(arm))
-    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc)
+    shape = brakes.shape if brakes else motion.EVEN_RAMP
+    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc, shape)
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:

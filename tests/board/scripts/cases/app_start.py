@@ -158,7 +158,7 @@ def case_an_engine_is_made_beside_a_piece_that_is_held_if_memory_is_short():
 def case_a_damaged_motion_is_listed_and_refused():
     arm = stand_in.arm()
     root = folder_with(arm)
-    for name, data in (("cut", b"ATM2"), ("empty", b""), ("noise", bytes(20000))):
+    for name, data in (("cut", b"ATM3"), ("empty", b""), ("noise", bytes(20000))):
         with open(root + "/" + name + ".atm", "wb") as file:
             file.write(data)
     _, host, hello = started(root)

@@ -10,6 +10,8 @@ from brake_motion import BRAKE_TICKS, RAMPS, path, record
 from engine_rig import FEWER, TICK_HZ, Rig, arm
 
 SEED = 20262
+LENGTH_TICKS = -(-(RAMPS[0][0] * motion.RAMP_UNIT_TICKS) // 64000) * 64000
+"""Of a ramp, as it is run."""
 
 
 def joints():
@@ -50,7 +52,7 @@ def case_anywhere():  # slow
         rig.run_to(3 * TICK_HZ)
         assert rig.engine.fault == 0, rig.engine.fault
         assert rig.engine.known == 7
-        rest = (end - BRAKE_TICKS / 2) / TICK_HZ
+        rest = (end - LENGTH_TICKS / 2) / TICK_HZ
         for joint, (position, exact) in enumerate(zip(rig.commanded(), path(rest))):
             assert abs(position - exact) < 0.6, (number, joint, position, exact)
         assert rig.commanded() == [motor.position for motor in rig.arm.motors]

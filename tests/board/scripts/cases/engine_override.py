@@ -16,8 +16,8 @@ from armtempo_board.errors import Refused
 from armtempo_shared import codes
 from armtempo_shared.limits import LONGEST_RUN_TICKS
 from armtempo_shared.messages import NO_JOINT, RESUME
-from armtempo_shared.motion import NO_RAMPS, RAMP_ENTRIES, RAMP_UNIT_TICKS
-from brake_motion import BRAKE_TICKS, RAMPS, record
+from armtempo_shared.motion import EVEN_RAMP, NO_RAMPS, RAMP_ENTRIES, RAMP_UNIT_TICKS
+from brake_motion import BRAKE_TICKS, RAMPS, ramp_way, record, some_shape
 from engine_rig import FEWER, TICK_HZ, Rig, arm
 
 SEED = 20263
@@ -82,7 +82,7 @@ def some_motion():
         inner = [(random.random() - 0.5) * size for _ in range(segments - 5)] if segments > 5 else []
         last = (random.random() - 0.5) * size
         angles.append([0.0] * 5 + inner + [last] * (segments - len(inner)))
-    return record(some_ramps(), angles, times)
+    return record(some_ramps(), angles, times, some_shape())
 
 
 def begin(motion, rate=1000):
@@ -90,7 +90,7 @@ def begin(motion, rate=1000):
     rig = Rig(joints(), planned=False)
     rig.trusting()
     recorders = [Recorder(rig, joint) for joint in rig.joints]
-    rig.laws = [(0, 0, 0, rate, rate)]
+    rig.laws = [(0, 0, 0, rate, rate, EVEN_RAMP)]
     rig.engine.load(motion, rate)
     ramp = rig.engine.rates.override.ramp
 
@@ -104,8 +104,8 @@ def begin(motion, rate=1000):
         assert override.steady_ticks() == end
         longer = end - start - length_by_table(motion, to == 0, override._duration_ticks, passed)
         near = RAMP_UNIT_TICKS * (1 + 725 * 31 * 2 / 4096)  # two places of 4096
-        assert -near < longer <= 8000 + near, longer
-        rig.laws.append((start, passed, end - start, before, to))
+        assert -near < longer <= 64000 + near, longer
+        rig.laws.append((start, passed, end - start, before, to, EVEN_RAMP if to else motion.brake_shape))
 
     rig.engine.rates.override.ramp = watched
     rig.engine.start()
@@ -114,11 +114,12 @@ def begin(motion, rate=1000):
 
 def motion_ticks(laws, ticks):
     """The motion's own time at a real time: the law in words of paper."""
-    start, passed, length, before, after = [law for law in laws if law[0] <= max(ticks, 0)][-1]
-    if ticks >= start + length:
-        return passed + (before + after) * length / 2000 + (ticks - start - length) * after / 1000
-    x = (ticks - start) / length
-    return passed + length * (before * x + (after - before) * x**4 * (2.5 - 3 * x + x * x)) / 1000
+    start, passed, length, before, after, shape = [law for law in laws if law[0] <= max(ticks, 0)][-1]
+    late = max(ticks - start - length, 0)
+    x = (ticks - late - start) / length if length else 0.0
+    least, change = min(before, after), abs(after - before)
+    way = ramp_way(shape, x) if after > before else ramp_way(shape, 1.0) - ramp_way(shape, 1.0 - x)
+    return passed + (length * (least * x + change * way) + late * after) / 1000
 
 
 def check_steps(rig, recorders, expected):

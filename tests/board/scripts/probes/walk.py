@@ -30,8 +30,9 @@ step_rates.together = 1_000_000
 class SameRamps:
     """A motion, as far as ``Override`` asks one, whose ramps all last as long."""
 
-    def __init__(self, ticks):
+    def __init__(self, ticks, shape):
         self._units = ticks // RAMP_UNIT_TICKS
+        self.brake_shape = shape
 
     def ramp_units(self, _at, _parts, _to_rest):
         return self._units
@@ -40,7 +41,7 @@ class SameRamps:
 FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
 
 
-def walk(motion, joint, generator, out, pulse, gap, room, start, length):
+def walk(motion, joint, generator, out, pulse, gap, room, start, length, shape):
     """All steps of one joint; nothing may be allocated on the way."""
     ring, state = array("I", bytes(4 * (MASK + 2))), array("i", bytes(4 * isr.STATE_WORDS))
     state[isr.MASK] = MASK
@@ -48,7 +49,7 @@ def walk(motion, joint, generator, out, pulse, gap, room, start, length):
     generator.load(motion, joint, first_position(motion, joint), pulse, gap)
     head = 0
     braked = not length
-    OVERRIDE.begin(1000, SameRamps(length), 1 << 38)
+    OVERRIDE.begin(1000, SameRamps(length, shape), 1 << 38)
     start_kiticks = start >> 10
     lock, unlock = heap_lock, heap_unlock
     while generator.waits() or not generator.ended:
@@ -79,7 +80,7 @@ def first_position(motion, joint):
     return (total // 60 + (1 << 28)) >> 29
 
 
-def main(pulse, gap, room, start, length, *records):
+def main(pulse, gap, room, start, length, shape, *records):
     """Walk all with one generator, as the board reuses them."""
     generator = StepGenerator(Memory(list(engine_memory.GENERATOR_PARTS)))
     for record in records:
@@ -93,7 +94,13 @@ def main(pulse, gap, room, start, length, *records):
         print(wrong)
         with open(record + ".steps", "wb") as out:
             for joint in range(0 if wrong else motion.joints):
-                walk(motion, joint, generator, out, int(pulse), int(gap), int(room), int(start), int(length))
+                walk(
+                    motion,
+                    joint,
+                    generator,
+                    out,
+                    *[int(word) for word in (pulse, gap, room, start, length, shape)],
+                )
 
 
 def nothing():

@@ -1,5 +1,7 @@
 """A small motion of three joints that turn and rest, as a record and as a function of time."""
 
+import random
+
 from armtempo_shared import motion
 from armtempo_shared.basis import BASIS, FACTORIAL
 from armtempo_shared.limits import TICK_HZ
@@ -20,10 +22,33 @@ def whole(values, scale):
     return [round(value * scale) for value in values]
 
 
-def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES):
+def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES, shape=motion.EVEN_RAMP):
     angles = [whole(points, 1 << 28) for points in control_points]
     times = [whole(time_points, TICK_HZ << 16)]
-    return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0))
+    return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0, shape))
+
+
+def some_shape():
+    """That of a ramp to rest."""
+    first = random.randrange(1, 15)
+    return first + 16 * random.randrange(first + 1, 16)
+
+
+def ramp_way(shape, r):
+    """e at r of a shape: the integral of a rate from 0 to 1 whose slope is linear between 0, p/16, q/16 and 1."""
+    first, second = (shape & 15) / 16, (shape >> 4) / 16
+    equal = (1 - first) / (1 + second - first)  # of the rise that the slope at q/16 is the cause of
+    whole = int(64 * (3 - first - second - equal) / 3 + 0.5) / 64
+    late = 3 - first - second - 3 * whole
+    way = rate = start = 0.0
+    slopes = (0.0, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0)
+    for width, before, after in zip((first, second - first, 1 - second), slopes, slopes[1:]):
+        x = min(max(r - start, 0.0), width)
+        bend = (after - before) / width
+        way += x * (rate + x * (before / 2 + x * bend / 6))
+        rate += x * (before + x * bend / 2)
+        start += width
+    return way
 
 
 def spline(points, segment, u):

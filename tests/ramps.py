@@ -1,0 +1,34 @@
+"""Ramps of the rate of a motion's own time, by SciPy's splines: what the board's law is compared with."""
+
+from __future__ import annotations
+
+import numpy as np
+from armtempo_shared.motion import EVEN_RAMP
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+
+
+def rise(shape: int = EVEN_RAMP) -> BSpline:
+    """S of a shape p + 16 q with p < q: its slope is linear between 0, p/16, q/16 and 1."""
+    places = np.array([0, shape & 15, shape >> 4, 16]) / 16
+    hats = np.array([places[2], 1 - places[1]]) / 2  # S(1) and e(1) by the slopes at p and q
+    ways = hats * (1 - np.array([sum(places[:3]), sum(places[1:])]) / 3)
+    way = np.floor(64 * sum(ways) / sum(hats) + 0.5) / 64
+    return make_interp_spline(places, [0, *np.linalg.solve([hats, ways], [1, way]), 0], k=1).antiderivative()
+
+
+def rate(x: ArrayLike, before: float, after: float, shape: int = EVEN_RAMP) -> NDArray[np.float64]:
+    """The rate at parts x of a ramp."""
+    x = np.asarray(x)
+    return np.asarray(
+        before + (after - before) * (rise(shape)(x) if after > before else 1 - rise(shape)(1 - x))
+    )
+
+
+def passed(x: ArrayLike, before: float, after: float, shape: int = EVEN_RAMP) -> NDArray[np.float64]:
+    """The motion's time from the beginning of a ramp to parts x of it, in ramp lengths."""
+    x, way = np.asarray(x), rise(shape).antiderivative()
+    change = abs(after - before)
+    return np.asarray(
+        before * x + change * way(x) if after > before else after * x + change * (way(1) - way(1 - x))
+    )
