@@ -23,7 +23,7 @@ Pieces of angle and of time, their control points, their measures; the solver, t
 """
 GENERATOR_WORDS = sum(GENERATOR_PARTS)
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
-LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 11
+LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 9
 """For arms whose joints' highest step rates sum up to 240 000 steps/s; some have rings of SHORT_MS then.
 
 The last words are left over at the ends of blocks.

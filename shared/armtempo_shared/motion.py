@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import BinaryIO
 
-    Ramps = tuple[Sequence[int], Sequence[int]]
+    Ramps = tuple[Sequence[int], Sequence[int], int]
 
 MAGIC = b"ATM3"
 SHARED_AXIS = 1
@@ -48,7 +48,7 @@ HEAD_SIZE = _RAMPS_AT + 2 * _RAMPS_SIZE
 EVEN_RAMP = 5 + 16 * 11
 """The shape of all other ramps. From the end of a ramp at which the rate is least, its slope rises over p/16 of its
 length, falls over the last 1 - q/16, and is constant in between, but for what lets its way be a multiple of 1/64."""
-NO_RAMPS = (0,) * RAMP_ENTRIES, (0,) * RAMP_ENTRIES
+NO_RAMPS = (0,) * RAMP_ENTRIES, (0,) * RAMP_ENTRIES, EVEN_RAMP
 """Of a motion that can neither brake nor change its speed."""
 
 
@@ -70,19 +70,18 @@ def pack(
     refine: int,
     ramps: "Ramps",
     arm_crc: int,
-    brake_shape: int = EVEN_RAMP,
 ) -> bytes:
     """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
     all, its n * R + k control points (int, ticks * 2**16). ``ramps``: RAMP_ENTRIES lengths of ramps to rest and as many
-    of others, in RAMP_UNIT_TICKS. ``brake_shape``: of ramps to rest.
+    of others, in RAMP_UNIT_TICKS, and the shape of those to rest.
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
     flags = SHARED_AXIS if shared else 0
-    head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, brake_shape, segments, refine, arm_crc)
-    for lengths in ramps:
+    head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, ramps[2], segments, refine, arm_crc)
+    for lengths in ramps[:2]:
         head += struct.pack(_RAMPS, *lengths)
     body: "list[int]" = []
     for joint, points in enumerate(angles):

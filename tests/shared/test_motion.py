@@ -9,7 +9,7 @@ import pytest
 from armtempo_shared import limits, motion
 
 ARM_CRC = 0x12345678
-RAMPS = tuple(range(1, 33)), tuple(range(1000, 65000, 2000))
+RAMPS = tuple(range(1, 33)), tuple(range(1000, 65000, 2000)), 3 + 16 * 7
 
 
 def packed(

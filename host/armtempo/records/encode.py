@@ -66,15 +66,14 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
     checks.check_held(trajectory, arm)
     first = trajectory.joints[0]
     crc = record_crc(arm_record(arm))
-    shape = brakes.shape if brakes else motion.EVEN_RAMP
-    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc, shape)
+    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc)
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
-    """The lengths of ramps as whole numbers."""
+    """The lengths and the shape of ramps as whole numbers."""
     if brakes is None:
         return motion.NO_RAMPS
-    return [int(entry) for entry in brakes.to_rest], [int(entry) for entry in brakes.others]
+    return [int(entry) for entry in brakes.to_rest], [int(entry) for entry in brakes.others], brakes.shape
 
 
 def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:

@@ -56,8 +56,9 @@ def joints():
 
 
 def some_ramps():
-    """Lengths up to BRAKE_TICKS that are all different."""
-    return [[random.randrange(300, longest) for longest in lengths] for lengths in RAMPS]
+    """Lengths up to BRAKE_TICKS that are all different, and a shape."""
+    to_rest, others = [[random.randrange(300, longest) for longest in lengths] for lengths in RAMPS[:2]]
+    return to_rest, others, some_shape()
 
 
 def length_by_table(motion, to_rest, duration, at):
@@ -82,7 +83,7 @@ def some_motion():
         inner = [(random.random() - 0.5) * size for _ in range(segments - 5)] if segments > 5 else []
         last = (random.random() - 0.5) * size
         angles.append([0.0] * 5 + inner + [last] * (segments - len(inner)))
-    return record(some_ramps(), angles, times, some_shape())
+    return record(some_ramps(), angles, times)
 
 
 def begin(motion, rate=1000):

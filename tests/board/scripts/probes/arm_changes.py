@@ -58,7 +58,12 @@ def motion_of(arm, segments):
     points = [min(max(i - 4, 0), 2) * 10 << 28 for i in range(segments + 5)]
     times = [(i - 2) * 8_400_000 << 16 for i in range(segments + 5)]
     return motion.pack(
-        5, [points] * arm[5], [times] * arm[5], 1, ((6,) * motion.RAMP_ENTRIES,) * 2, wire.record_crc(arm)
+        5,
+        [points] * arm[5],
+        [times] * arm[5],
+        1,
+        ((6,) * motion.RAMP_ENTRIES, (6,) * motion.RAMP_ENTRIES, motion.EVEN_RAMP),
+        wire.record_crc(arm),
     )
 
 

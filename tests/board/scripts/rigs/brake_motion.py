@@ -8,7 +8,8 @@ from armtempo_shared.limits import TICK_HZ
 
 SEGMENTS = 9
 BRAKE_TICKS = TICK_HZ // 5
-RAMPS = ((BRAKE_TICKS // motion.RAMP_UNIT_TICKS,) * motion.RAMP_ENTRIES,) * 2
+_LENGTHS = (BRAKE_TICKS // motion.RAMP_UNIT_TICKS,) * motion.RAMP_ENTRIES
+RAMPS = _LENGTHS, _LENGTHS, motion.EVEN_RAMP
 # steps at the control points, seconds at those of the time axis
 ANGLES = (
     (0, 0, 0, 0, 0, 400, 1800, 2500, 3000, 3000, 3000, 3000, 3000, 3000),
@@ -22,10 +23,10 @@ def whole(values, scale):
     return [round(value * scale) for value in values]
 
 
-def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES, shape=motion.EVEN_RAMP):
+def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES):
     angles = [whole(points, 1 << 28) for points in control_points]
     times = [whole(time_points, TICK_HZ << 16)]
-    return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0, shape))
+    return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0))
 
 
 def some_shape():

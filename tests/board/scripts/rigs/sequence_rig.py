@@ -53,7 +53,14 @@ def leg(first, last, arm_crc=ARM_CRC):
     """A motion of both joints from one step to another."""
     points = [first * ONE_STEP] * 5 + [(first + last) * ONE_STEP // 2] + [last * ONE_STEP] * 5
     times = [1000 * ONE_TICK * index for index in range(len(points))]
-    return motion.pack(5, [points, points], [times], 1, ((6,) * motion.RAMP_ENTRIES,) * 2, arm_crc)
+    return motion.pack(
+        5,
+        [points, points],
+        [times],
+        1,
+        ((6,) * motion.RAMP_ENTRIES, (6,) * motion.RAMP_ENTRIES, motion.EVEN_RAMP),
+        arm_crc,
+    )
 
 
 LEGS = {"there": leg(0, 10), "back": leg(10, 0), "on": leg(10, 20)}
