@@ -116,6 +116,10 @@ def test_the_links_shapes_move_with_their_rows(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, command)
     assert "wrote 2 meshes" in done.output
     assert "already exists" in CliRunner().invoke(main, command).output
+    mine = tmp_path / "arm-meshes" / "mine.stl"
+    mine.write_text("not of this arm")
+    CliRunner().invoke(main, [*command, "--force"])
+    assert mine.read_text() == "not of this arm"
     arm = Arm.read(out)
     files = mesh_files.of_arm(arm)
     last = max(number for number, joint in enumerate(arm.joints, 1) if joint.name == "j4")

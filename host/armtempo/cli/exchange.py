@@ -178,8 +178,9 @@ def import_urdf(
     fit = fitting.fit(chain)
     text = arm_text.arm_text(chain, fit, urdf.name)
     Arm.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
-    written = urdf_meshes.write(chain, fit, urdf, out) if meshes else []
+    corners_mm = urdf_meshes.of_rows(chain, fit, urdf) if meshes else {}
     replace_text(out, text)
+    written = mesh_files.write(out, corners_mm) if meshes else []
     values = {
         "file": str(out),
         "meshes": [str(file) for file in written],

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
+from armtempo.formats.atomic_file import why
 from armtempo.model.arm import Arm
 
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
@@ -32,21 +34,28 @@ def of_arm(arm: Arm) -> dict[int, Path]:
 
 
 def write(arm_file: Path, corners_mm: Mapping[int, Array]) -> list[Path]:
-    """Write the triangles (N, 3, 3) of each row in the place of those that are there; the paths."""
+    """Write the triangles (N, 3, 3) of each row in the place of those that are there; the paths.
+
+    InputError if they cannot be written.
+    """
     folder = folder_of(arm_file)
-    folder.mkdir(exist_ok=True)
-    for old in folder.glob("*.stl"):
-        old.unlink()
-    written = []
-    for number, corners in sorted(corners_mm.items()):
-        triangles = np.zeros(len(corners), _TRIANGLE)
-        triangles["corners"] = corners
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        triangles["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-        file = folder / f"{number}.stl"
-        file.write_bytes(bytes(80) + np.uint32(len(corners)).tobytes() + triangles.tobytes())
-        written.append(file)
-    return written
+    try:
+        folder.mkdir(exist_ok=True)
+        for old in folder.glob("*.stl"):
+            if old.stem.isdigit():
+                old.unlink()
+        return [_write(folder / f"{row}.stl", corners) for row, corners in sorted(corners_mm.items())]
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {why(error)}", "choose another place") from None
+
+
+def _write(file: Path, corners_mm: Array) -> Path:
+    triangles = np.zeros(len(corners_mm), _TRIANGLE)
+    triangles["corners"] = corners_mm
+    normal = np.cross(corners_mm[:, 1] - corners_mm[:, 0], corners_mm[:, 2] - corners_mm[:, 0])
+    triangles["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    file.write_bytes(bytes(80) + np.uint32(len(corners_mm)).tobytes() + triangles.tobytes())
+    return file
 
 
 def read(file: Path) -> Array:

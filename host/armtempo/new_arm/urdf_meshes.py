@@ -10,17 +10,16 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.kinematics import all_frames
-from armtempo.model import mesh_files
 from armtempo.new_arm import urdf_bodies
 from armtempo.new_arm.urdf_fitting import Fit
 from armtempo.new_arm.urdf_reader import MM, Chain
 from armtempo.new_arm.urdf_rows import geometry
 
 
-def write(chain: Chain, fit: Fit, urdf: Path, arm_file: Path) -> list[Path]:
-    """Write an STL file for each row that carries something, and one for the base; their paths.
+def of_rows(chain: Chain, fit: Fit, urdf: Path) -> dict[int, Array]:
+    """Triangles (N, 3, 3) in mm of each row that carries something, and 0: of the base.
 
-    InputError for a mesh that cannot be read; nothing is written then.
+    InputError for a mesh that cannot be read.
     """
     frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))
     row_of = {row.joint: number for number, row in enumerate(fit.rows, 1) if row.joint is not None}
@@ -30,7 +29,7 @@ def write(chain: Chain, fit: Fit, urdf: Path, arm_file: Path) -> list[Path]:
         to_row = np.linalg.inv(frames[row])
         for corners_mm in _corners(chain, urdf, links):
             found.setdefault(row, []).append(corners_mm @ to_row[:3, :3].T + to_row[:3, 3])
-    return mesh_files.write(arm_file, {row: np.concatenate(parts) for row, parts in found.items()})
+    return {row: np.concatenate(parts) for row, parts in found.items()}
 
 
 def _links(chain: Chain) -> list[set[str]]:
