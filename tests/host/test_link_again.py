@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import random
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from threading import Event, Thread
 
 import pytest
 from armtempo.basics.errors import LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.transport import SerialTransport
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion
+from armtempo.robot.board import Board
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
@@ -185,3 +190,33 @@ def test_a_cable_that_is_out_does_not_keep_who_wants_an_end(tmp_path: Path) -> N
     with pytest.raises(LinkError, match="no stop could be sent"):
         replay(*prepared(pipe), unplug, stop)
     assert pipe.clock() - ended_s[0] < 10.0
+
+
+def test_a_board_is_closed_between_the_commands_of_other_threads(tmp_path: Path) -> None:
+    client = connect(Pipe(tmp_path / "flash"))
+    closed = Event()
+    stack = ExitStack()
+    stack.callback(closed.set)
+    board = Board(client, "pipe", stack)
+    with client.session.turns:
+        closing = Thread(target=board.close)
+        closing.start()
+        assert not closed.wait(0.05)
+        client.hello()
+    closing.join()
+    assert closed.is_set()
+    with pytest.raises(LinkError, match="the board on pipe was closed"):
+        client.hello()
+
+
+def test_a_port_that_was_closed_meanwhile_is_a_broken_one() -> None:
+    host, device = os.openpty()
+    port = SerialTransport(os.ttyname(device), exclusive=False)
+    port.close()
+    port._serial.is_open = True  # as another thread sees it that is just within a call
+    with pytest.raises(LinkError, match="broke"):
+        port.write(b"x")
+    with pytest.raises(LinkError, match="broke"):
+        port.read(0.0)
+    os.close(host)
+    os.close(device)

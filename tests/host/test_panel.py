@@ -7,6 +7,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -379,3 +380,22 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
     assert deployed.is_set()
     assert made.board is board  # type: ignore[comparison-overlap]
     made.close()
+
+
+def test_a_fault_of_ours_does_not_end_the_states(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 0.01)
+    asked: list[int] = []
+    board = Board()
+
+    @contextmanager
+    def fail(timeout_s: float) -> Iterator[bool]:
+        asked.append(1)
+        yield 1 // 0
+
+    board.client.session.in_a_hurry = fail
+    made = Operator(lambda sink: board, "sim", Desk(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type, return-value]
+    wait(lambda: len(asked) > 3)
+    made.close()
+    assert "the board's state" in caplog.text

@@ -120,6 +120,10 @@ class Panel:
         assert self.process.stdout
         self.process.stdout.close()
 
+    def check(self) -> None:
+        """That nothing failed in its program: what waits for it would wait long."""
+        assert "Traceback" not in "".join(self.errors), "".join(self.errors)
+
     def cut(self, cut: bool) -> None:
         """Cut the cable, or mend it."""
         for cable in self.cables:
@@ -143,7 +147,9 @@ class Panels:
         self._last: Panel | None = None
 
     def __call__(self) -> Panel:
-        """One that runs."""
+        """One that runs, and in which nothing has failed."""
+        if self._last is not None:
+            self._last.check()
         if self._last is None or not self._last.running:
             self.close()
             options = ("--web-port", "0", "--no-show", "--port", self._port, *self._options)
@@ -160,7 +166,7 @@ class Panels:
         """End the last one, in which nothing may have failed."""
         if self._last is not None:
             self._last.end()
-            assert "Traceback" not in "".join(self._last.errors), "".join(self._last.errors)
+            self._last.check()
 
 
 def asked(address: str, request: bytes) -> bytes:

@@ -211,6 +211,7 @@ class Session:
 
         Raises ``reason`` where that fails, OtherBoardError if another board answers.
         """
+        self.check()
         if self.reopen is None:
             raise reason
         self.tell(f"{reason.problem}; waiting for it to come back")

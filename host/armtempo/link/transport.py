@@ -15,6 +15,11 @@ from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseEr
 BAUD_RATE = 115_200
 """Has no effect over USB; a UART between host and board would use it."""
 _ADVICE = "'armtempo ports' lists the ports"
+_BROKEN = (
+    serial.SerialException,
+    OSError,
+    TypeError,
+)  # TypeError: pyserial, closed by another thread meanwhile
 
 
 class Transport(Protocol):
@@ -52,14 +57,14 @@ class SerialTransport:
         try:
             self._serial.timeout = timeout_s
             return bytes(self._serial.read(max(1, self._serial.in_waiting)))
-        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: pyserial, closed meanwhile
+        except _BROKEN as error:
             raise _broken(self.name, error) from error
 
     def write(self, data: bytes) -> None:
         """See Transport."""
         try:
             self._serial.write(data)
-        except (serial.SerialException, OSError) as error:
+        except _BROKEN as error:
             raise _broken(self.name, error) from error
 
     def wake(self) -> None:

@@ -261,3 +261,5 @@ class Operator:
             except ArmtempoError as error:
                 if board is self._board:
                     self.trouble = str(error)
+            except Exception:  # a fault of ours: logged, and states go on
+                _LOG.exception("panel: the board's state")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -47,6 +47,7 @@ from armtempo.robot.run import Run
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
+from armtempo.robot.stored_motion import TURN_S
 from armtempo.robot.where import Where, posture_deg
 from armtempo.runs.sequence_reader import SequenceRun
 from armtempo.selftest import selftest
@@ -79,8 +80,13 @@ class Board:
 
     def close(self) -> None:
         """Free the port; a virtual board ends. Nothing else can be done with this object then."""
-        self._stack.close()
-        self.client.session.check = self._closed
+        with self._last_turn():
+            self._stack.close()
+            self.client.session.check = self._closed
+
+    def _last_turn(self) -> AbstractContextManager[bool]:
+        """While no other thread is within a command: it would open a port again that was closed under it."""
+        return self.client.session.in_a_hurry(TURN_S)
 
     def _closed(self) -> None:
         raise LinkError(f"the board on {self.port} was closed", "open it again with armtempo.connect")
@@ -92,7 +98,8 @@ class Board:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self._stack.__exit__(kind, value, trace)
+            with self._last_turn():
+                self._stack.__exit__(kind, value, trace)
         finally:
             self.close()
 
