@@ -16,11 +16,11 @@ import pytest
 from armtempo import connect
 from armtempo.basics.errors import ArmtempoError, LinkError
 from armtempo.diagnosis.finding import Level
+from armtempo.diagnosis.selftest import board_part, prompt, rate_part
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Driver, JointModel, LimitSwitches, Safety
 from armtempo.records import encode
 from armtempo.robot import motor_test
-from armtempo.selftest import board_part, prompt, rate_part
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
 from armtempo_shared import codes
