@@ -13,10 +13,9 @@ import click
 import pytest
 import serial
 from armtempo import cli
-from armtempo.basics import errors
+from armtempo.basics import errors, toml_table
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.cli import LazyGroup, state
-from armtempo.formats import toml_table
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import SerialTransport
 from armtempo.robot import board_state, speed

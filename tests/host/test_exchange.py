@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics import number_table
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.formats import number_table
 from armtempo.model import exchange, shipped, thinning, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

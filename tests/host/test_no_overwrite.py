@@ -6,9 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.formats.atomic_file import replace_text
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

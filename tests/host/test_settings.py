@@ -8,10 +8,10 @@ import random
 from pathlib import Path
 
 import pytest
+from armtempo.basics.settings import NAMES, OPTIONS, ProjectSettings, variable_of
 from armtempo.cli import main
+from armtempo.ports import board_port
 from armtempo.ports.listing import Port
-from armtempo.project import board_port
-from armtempo.project.settings import NAMES, OPTIONS, ProjectSettings, variable_of
 from click.testing import CliRunner, Result
 
 SEED = 1301

@@ -18,9 +18,9 @@ from click.shell_completion import CompletionItem
 
 from armtempo.basics.errors import INTERRUPTED, ArmtempoError
 from armtempo.basics.installation import installed_version
+from armtempo.basics.text import did_you_mean
 from armtempo.cli import results
 from armtempo.cli.commands import COMMANDS, GROUPS
-from armtempo.formats.text import did_you_mean
 
 _EXAMPLES = """\
 Examples:

@@ -9,13 +9,13 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import JOB, ProjectSettings
 from armtempo.cli import chosen, options, results
 from armtempo.diagnosis import arm_check, figures
 from armtempo.diagnosis.figures import JointFigures, table
 from armtempo.diagnosis.finding import Finding, Level
 from armtempo.model.arm import Arm
 from armtempo.planning.checks import rate_words
-from armtempo.project.settings import JOB, ProjectSettings
 from armtempo.report import arm_picture, drawing
 
 

@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armtempo.basics.errors import InputError, PortGivenUpError
+from armtempo.basics.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
+from armtempo.basics.text import did_you_mean
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import remark
-from armtempo.formats.text import did_you_mean
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, is_name
 from armtempo.model.tool_pose import Pose
+from armtempo.ports import board_port
 from armtempo.ports.names import SIM, is_sim
-from armtempo.project import board_port
-from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
 
 if TYPE_CHECKING:  # planner and link take long to import, and many commands need neither
     from armtempo.link.traffic import Sink

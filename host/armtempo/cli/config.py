@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics import settings
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import ProjectSettings, Setting
 from armtempo.cli import options, results
+from armtempo.ports import board_port
 from armtempo.ports.listing import find_ports
 from armtempo.ports.names import SIM
-from armtempo.project import board_port, settings
-from armtempo.project.settings import ProjectSettings, Setting
 
 
 @click.command("config")

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics import settings
 from armtempo.basics.errors import ArmtempoError
+from armtempo.basics.settings import ProjectSettings
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.diagnosis import arm_check, machine
 from armtempo.diagnosis.finding import Finding, Level, error, good, note
 from armtempo.model import shipped
-from armtempo.project import board_port, settings
-from armtempo.project.settings import ProjectSettings
+from armtempo.ports import board_port
 from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 from armtempo_shared.limits import MAX_JOINTS
 
+from armtempo.basics import number_table, toml_table
+from armtempo.basics.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
-from armtempo.formats import number_table, toml_table
-from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.model import mesh_files, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

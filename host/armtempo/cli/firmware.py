@@ -8,12 +8,12 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import PORT, ProjectSettings
 from armtempo.cli import options, results
 from armtempo.cli.progress import ProgressBar
 from armtempo.deploy import changes
 from armtempo.deploy.firmware import build, checkout, frozen, image, write
 from armtempo.deploy.firmware.image import Image
-from armtempo.project.settings import PORT, ProjectSettings
 
 
 @click.command("firmware")

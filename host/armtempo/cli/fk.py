@@ -10,8 +10,8 @@ import click
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.text import aligned
 from armtempo.cli import chosen, options, posture, results
-from armtempo.formats.text import aligned
 from armtempo.kinematics.chain import spread_deg
 from armtempo.kinematics.forward import all_frames
 from armtempo.kinematics.geometry import Geometry

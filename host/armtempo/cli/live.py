@@ -17,8 +17,8 @@ from armtempo.cli.progress import ProgressBar
 from armtempo.link.board_messages import Sample
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report.live_plot import LivePlot
+from armtempo.report.run_folder import Repetition, RunFolder
 from armtempo.robot.recording import Watcher
-from armtempo.runs.run_folder import Repetition, RunFolder
 
 
 class Live(Watcher):

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
 from armtempo.diagnosis import figures
-from armtempo.formats.atomic_file import replace_text
 from armtempo.new_arm import folder as project_folder
 from armtempo.new_arm import given_geometry, joint_entry, questions
 from armtempo.new_arm.given_geometry import ArmText

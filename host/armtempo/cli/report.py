@@ -9,12 +9,12 @@ from typing import Any
 import click
 
 from armtempo import pipeline
+from armtempo.basics.atomic_file import check_replaceable
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.cli import options, results
-from armtempo.formats.atomic_file import check_replaceable
 from armtempo.report import evaluation, sequence_report, verdict
+from armtempo.report.sequence_reader import SequenceRun, is_sequence_run
 from armtempo.robot.run import Run
-from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run
 
 
 @click.command("report")

@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import ArmtempoError
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 
 _DOCUMENT = "armtempo.document"
 """Key of click's context: a JSON document was printed."""

@@ -12,12 +12,12 @@ import click
 from armtempo_shared.sequence import END, MOVE, REPEAT, WAIT
 
 import armtempo
+from armtempo.basics.atomic_file import check_not_input
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError
+from armtempo.basics.text import aligned
 from armtempo.cli import chosen, results
 from armtempo.cli.progress import ProgressBar
 from armtempo.cli.state import counted
-from armtempo.formats.atomic_file import check_not_input
-from armtempo.formats.text import aligned
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share

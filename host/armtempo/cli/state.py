@@ -8,9 +8,9 @@ from pathlib import Path
 import click
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.text import aligned
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.formats.text import aligned
 from armtempo.model.arm import Arm
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 

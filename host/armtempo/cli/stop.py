@@ -10,8 +10,8 @@ from armtempo.basics.errors import ArmtempoError, LinkError, NoAnswerError, Port
 from armtempo.cli import chosen, options, results, state
 from armtempo.cli.options import BoardOptions
 from armtempo.model.arm import Arm
-from armtempo.project import quick_stop
-from armtempo.project.quick_stop import StopAnswer
+from armtempo.ports import quick_stop
+from armtempo.ports.quick_stop import StopAnswer
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.shared_board import SharedBoard

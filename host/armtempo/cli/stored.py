@@ -9,10 +9,10 @@ import click
 import numpy as np
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.text import aligned
 from armtempo.cli import chosen, options, posture, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
-from armtempo.formats.text import aligned
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import is_sequence_plan

@@ -8,14 +8,14 @@ from pathlib import Path
 import click
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import ARM, ProjectSettings, nothing_set
 from armtempo.cli import chosen, jog, keys, options
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
-from armtempo.formats.atomic_file import replace_text
 from armtempo.model import job_text, posture, posture_text, shipped
 from armtempo.model.arm import Arm
-from armtempo.project.settings import ARM, ProjectSettings, nothing_set
 from armtempo.robot.board import Board
 
 
