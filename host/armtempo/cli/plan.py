@@ -64,6 +64,7 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     metavar="N|auto",
     help="Instead of the job's segments between via points: 1 to 64, or as many as shorten the motion.",
 )
+@click.option("--holds", metavar="NAME", help="Instead of the job's: the load of the arm file in the tool.")
 @click.option("--polish/--no-polish", default=None, help="Whether a gradient solver finishes the search.")
 @click.option("--optimiser", metavar="NAME", help="Instead of the job's search algorithm.")
 @click.option("--population", type=click.IntRange(4), help="Instead of the job's population.")
