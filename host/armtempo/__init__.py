@@ -122,13 +122,13 @@ if TYPE_CHECKING:
     from armtempo.model.tool_way import ToolWay
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.listing import find_ports
+    from armtempo.report.sequence_reader import SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
     from armtempo.robot.run import Run
     from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
-    from armtempo.runs.sequence_reader import SequenceRun
     from armtempo.splines.spline import Spline
     from armtempo.splines.trajectory import Trajectory
 
@@ -183,7 +183,7 @@ _HOMES = {
     "armtempo.robot.run": ("Run",),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
-    "armtempo.runs.sequence_reader": ("SequenceRun",),
+    "armtempo.report.sequence_reader": ("SequenceRun",),
     "armtempo.splines.spline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }

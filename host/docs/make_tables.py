@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo import optimise
-from armtempo.formats import part
+from armtempo.basics import part
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
 from armtempo.optimise.parameters import Number, Parameter
 

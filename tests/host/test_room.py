@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics import toml_table
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.diagnosis.arm_check import check_arm
-from armtempo.formats import toml_table
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

@@ -9,11 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec, toml_table
-from armtempo.formats.text import did_you_mean
-from armtempo.formats.toml_table import Table
+from armtempo.basics.text import did_you_mean
+from armtempo.basics.toml_table import Table
 from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, room, shipped
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output

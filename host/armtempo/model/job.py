@@ -9,10 +9,10 @@ from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 
+from armtempo.basics import json_codec, number_table, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec, number_table, toml_table
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 from armtempo.model import pose_table, shipped, tool_way, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, Pose

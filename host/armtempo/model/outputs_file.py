@@ -8,7 +8,7 @@ from typing import Any
 from armtempo_shared.limits import MAX_INPUTS, MAX_OUTPUTS
 
 from armtempo.basics.errors import InputError
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 from armtempo.model.outputs import KINDS, PWM, SERVO, SWITCH, Input, Output
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,24}")

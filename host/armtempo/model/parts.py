@@ -8,10 +8,10 @@ from itertools import pairwise
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
-from armtempo.formats.part import check, key
+from armtempo.basics.part import check, key
 
 LEVELS = ("low", "high")
 NOTHING = "nothing"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from armtempo.basics import part
 from armtempo.basics.arguments import fits
 from armtempo.basics.errors import InputError
-from armtempo.formats import part
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 from armtempo.model import outputs_file
 from armtempo.model.parts import (
     CURVE,

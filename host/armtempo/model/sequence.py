@@ -9,11 +9,11 @@ from typing import Any
 
 from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS
 
+from armtempo.basics import toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import toml_table
-from armtempo.formats.text import did_you_mean
-from armtempo.formats.toml_table import Table
+from armtempo.basics.text import did_you_mean
+from armtempo.basics.toml_table import Table
 from armtempo.model import tool_way
 from armtempo.model.arm import Arm, read_posture
 from armtempo.model.job import Job, held, is_name, name_of, read_angles

@@ -12,10 +12,10 @@ from typing import Any
 from armtempo_shared import sequence as record
 from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
+from armtempo.basics.atomic_file import check_replaceable, replace_text, why
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
-from armtempo.formats.atomic_file import check_replaceable, replace_text, why
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.splines.trajectory import Trajectory

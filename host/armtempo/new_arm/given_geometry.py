@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from armtempo.basics import toml_table
 from armtempo.basics.errors import InputError
-from armtempo.formats import toml_table
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.new_arm import joint_entry

@@ -8,9 +8,9 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT, Table
 
+from armtempo.basics import toml_table
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
-from armtempo.formats import toml_table
-from armtempo.formats.atomic_file import replace_text
 from armtempo.model.arm import Arm
 from armtempo.model.parts import NOTHING
 from armtempo.model.sequence import Sequence, is_sequence

@@ -8,14 +8,14 @@ from typing import Any
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
+from armtempo.basics.text import aligned
 from armtempo.diagnosis.resolution import findings as coarse_steps
-from armtempo.formats.text import aligned
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, path_deviation, torque
 from armtempo.planning.free import free_plan
-from armtempo.runs.replayed import JointResult
+from armtempo.report.replayed import JointResult
 from armtempo.splines.trajectory import Trajectory
 
 _HEAD = (
