@@ -31,6 +31,7 @@ __all__ = [
     "Dynamics",
     "Encoder",
     "Goto",
+    "Hold",
     "Input",
     "InputError",
     "Job",
@@ -38,6 +39,7 @@ __all__ = [
     "LimitSwitches",
     "Limits",
     "LinkError",
+    "Load",
     "MissingPackageError",
     "Motor",
     "Output",
@@ -100,23 +102,33 @@ if TYPE_CHECKING:
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
-    from armtempo.model.parts import Driver, Dynamics, Encoder, Joint, Limits, LimitSwitches, Motor, Safety
+    from armtempo.model.parts import (
+        Driver,
+        Dynamics,
+        Encoder,
+        Joint,
+        Limits,
+        LimitSwitches,
+        Load,
+        Motor,
+        Safety,
+    )
     from armtempo.model.plan import Plan
     from armtempo.model.posture import ArmPosture
     from armtempo.model.sequence import Sequence
     from armtempo.model.sequence_plan import SequencePlan
-    from armtempo.model.steps import Count, Goto, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
+    from armtempo.model.steps import Count, Goto, Hold, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
     from armtempo.model.tool_pose import Pose
     from armtempo.model.tool_way import ToolWay
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.listing import find_ports
+    from armtempo.report.sequence_reader import SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
     from armtempo.robot.run import Run
     from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
-    from armtempo.runs.sequence_reader import SequenceRun
     from armtempo.splines.spline import Spline
     from armtempo.splines.trajectory import Trajectory
 
@@ -143,6 +155,7 @@ _HOMES = {
         "Joint",
         "LimitSwitches",
         "Limits",
+        "Load",
         "Motor",
         "Safety",
     ),
@@ -150,6 +163,7 @@ _HOMES = {
     "armtempo.model.steps": (
         "Count",
         "Goto",
+        "Hold",
         "Repeat",
         "RunMotion",
         "SetOutput",
@@ -169,7 +183,7 @@ _HOMES = {
     "armtempo.robot.run": ("Run",),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
-    "armtempo.runs.sequence_reader": ("SequenceRun",),
+    "armtempo.report.sequence_reader": ("SequenceRun",),
     "armtempo.splines.spline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }

@@ -22,7 +22,7 @@ def main() -> None:
     ):  # it may be ignored, in the background
         _signal.signal(_signal.SIGINT, _end)
     if sys.argv[1:2] == ["stop"]:
-        from armtempo.project import quick_stop
+        from armtempo.ports import quick_stop
 
         quick_stop.send(sys.argv[2:])
     from armtempo.cli import main as command

@@ -5,8 +5,8 @@
     plan     arm and job -> Plan              planning: via angles, path, time axes, checks
     load     trajectory file -> Plan          model.plan
     run      Plan -> records -> board         records.encode, link, robot.stored_motion; there evaluator, rings, timers
-             board -> samples -> run folder   link.follow, runs.run_folder
-    report   run folder -> page and figures   runs.analysis, report
+             board -> samples -> run folder   link.follow, report.run_folder
+    report   run folder -> page and figures   report
 
 Each stage takes the result of the one before and nothing else, so a chain can begin and end anywhere: a plan can
 be kept in a file, a motion on the board, a run in its folder.
@@ -31,10 +31,10 @@ from armtempo.planning.free import corridor_curve as corridors
 from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.records import encode
 from armtempo.report import comparison, sequence_report, text_summary
+from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
-from armtempo.runs.sequence_reader import SequenceRun
 
 __all__ = [
     "compare",

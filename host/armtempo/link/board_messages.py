@@ -11,7 +11,7 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 from armtempo.ports.names import is_virtual
 
 

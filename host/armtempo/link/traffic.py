@@ -17,8 +17,8 @@ from typing import Any, Self
 
 from armtempo_shared import wire
 
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import why
 from armtempo.link.transport import Transport
 
 HEADER = "# armtempo traffic 1"

@@ -17,6 +17,8 @@ from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
+from armtempo.diagnosis.selftest import selftest
+from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMotion
 from armtempo.model.arm import Arm
@@ -26,6 +28,7 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.records import encoded_motion, encoded_sequence
 from armtempo.records.encoded_motion import EncodedMotion, MotionKey
+from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot import (
     arm_state,
     board_state,
@@ -49,9 +52,6 @@ from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.stored_motion import TURN_S
 from armtempo.robot.where import Where, posture_deg
-from armtempo.runs.sequence_reader import SequenceRun
-from armtempo.selftest import selftest
-from armtempo.selftest.result import SelfTest
 
 
 @checked

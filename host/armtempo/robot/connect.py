@@ -11,7 +11,7 @@ from armtempo.basics.arguments import checked
 from armtempo.link.connect import open_board, patiently
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.arm import Arm
-from armtempo.project import board_port
+from armtempo.ports import board_port
 from armtempo.robot.board import Board
 from armtempo.robot.sharing import Sharing
 

@@ -14,14 +14,14 @@ from armtempo_shared import codes
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, BoardError, InputError
 from armtempo.diagnosis.finding import Level
+from armtempo.diagnosis.selftest.result import Measurement, SelfTest, judged
+from armtempo.diagnosis.selftest.selftest import UNIQUE_ID_DIGITS
 from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning.jog.jog_motion import SLOWEST, move_of
 from armtempo.robot import arm_state, jog
 from armtempo.robot.stop_request import StopRequest
-from armtempo.selftest.result import Measurement, SelfTest, judged
-from armtempo.selftest.selftest import UNIQUE_ID_DIGITS
 
 PART = "motors"
 ARM_FILE = "arm_file"

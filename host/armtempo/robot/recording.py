@@ -14,11 +14,11 @@ from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.model import arm_json
 from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.report import run_folder
+from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
 from armtempo.robot.goto import go_back
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
-from armtempo.runs import run_folder
-from armtempo.runs.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
 
 _END_S = 1e-3
 """A run that ended earlier than its motion by more than this was stopped."""

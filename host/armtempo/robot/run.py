@@ -11,10 +11,9 @@ import numpy as np
 
 from armtempo.basics.arguments import checked
 from armtempo.model.plan import Plan
-from armtempo.report import run_report
-from armtempo.runs import reader, replayed
-from armtempo.runs.replayed import JointResult, results
-from armtempo.runs.run_folder import COMPLETE, Repetition
+from armtempo.report import replayed, run_reader, run_report
+from armtempo.report.replayed import JointResult, results
+from armtempo.report.run_folder import COMPLETE, Repetition
 from armtempo.splines.trajectory import Trajectory
 
 
@@ -22,13 +21,13 @@ from armtempo.splines.trajectory import Trajectory
 class Run:
     """A run folder: what was run, and what came back."""
 
-    def __init__(self, content: reader.RunData) -> None:
+    def __init__(self, content: run_reader.RunData) -> None:
         self._content = content
 
     @classmethod
     def load(cls, path: Path | str) -> Run:
         """The run in a folder, whole or cut short; RunFolderError if it is none or contradicts itself."""
-        return cls(reader.load(Path(path)))
+        return cls(run_reader.load(Path(path)))
 
     def __repr__(self) -> str:
         states = ", ".join(repetition.state for repetition in self.repetitions) or "nothing recorded"
@@ -50,7 +49,7 @@ class Run:
         return self._content.meta
 
     @property
-    def repetitions(self) -> tuple[reader.RepetitionData, ...]:
+    def repetitions(self) -> tuple[run_reader.RepetitionData, ...]:
         """The samples of each repetition as arrays."""
         return self._content.repetitions
 

@@ -17,8 +17,8 @@ from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.records import encoded_sequence
-from armtempo.runs import run_folder, sequence_folder
-from armtempo.runs.sequence_folder import SequenceFolder
+from armtempo.report import run_folder, sequence_folder
+from armtempo.report.sequence_folder import SequenceFolder
 
 ACKNOWLEDGED = 8
 """The board is notified of samples that have arrived, this many at a time."""

@@ -122,7 +122,7 @@ def attach(port: str | None = None) -> SharedBoard:
     ``port``: as for ``connect``; where none is named, also the only one that is open. Raises LinkError if no
     program has it, or the one that has it hangs.
     """
-    from armtempo.project import board_port
+    from armtempo.ports import board_port
 
     if not (port is None or (isinstance(port, str) and port.isprintable())):
         raise InputError(f"attach: port is {port!r:.40}", "give the name of a port, or None")

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 

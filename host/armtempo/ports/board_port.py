@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import PORT, ProjectSettings, Setting, nothing_set
 from armtempo.ports import claim
 from armtempo.ports.caller import Ownership, ownership
 from armtempo.ports.listing import find_ports
 from armtempo.ports.names import SIM
-from armtempo.project.settings import PORT, ProjectSettings, Setting, nothing_set
 
 ONLY_BOARD = "the only board plugged in"
 ONLY_OPEN = "the only port that an armtempo program has open"

@@ -16,7 +16,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from armtempo.basics.errors import InputError
-from armtempo.formats.text import did_you_mean, visible
+from armtempo.basics.text import did_you_mean, visible
 
 _AGAIN = "restore the file from a copy, or make it again with the command that wrote it"
 ADDED = {"added": True}

@@ -75,7 +75,7 @@ class ProjectSettings:
         """What ``armtempo.toml`` sets; its paths are relative to it."""
         if self.file is None:
             return {}
-        from armtempo.formats import toml_table  # takes a while, and most commands have no project folder
+        from armtempo.basics import toml_table  # takes a while, and most commands have no project folder
 
         table = toml_table.read(_near(self.file))
         found = {name: table.text(name) for name in NAMES if table.has(name)}

@@ -8,7 +8,7 @@ from dataclasses import MISSING, Field, dataclass, fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from armtempo.basics.errors import InputError
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

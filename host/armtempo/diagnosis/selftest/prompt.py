@@ -35,6 +35,8 @@ machine.WDT(timeout=100)
 time.sleep(2)
 {RESET}"""
 """The same by the watchdog, which nobody feeds; by ``RESET`` where it does not come."""
+_DROP = " [globals().pop(name) for name in [name for name in globals() if name not in before]]\n"
+"""What a part defined goes, ``before`` included: a program that continues has its heap back."""
 PARTS = ("drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep")
 """By their numbers, from 1 on, the board remembers over a reset which one it is in."""
 
@@ -73,13 +75,12 @@ class Prompt:
             self._port.enter_raw_repl(soft_reset, timeout_overall=_ENTER_S)
 
     def measure(self, *parts: str, **arguments: Any) -> Measured:
-        """Send files of ``on_board`` and call ``measure`` of the last one with these arguments."""
+        """Send files of ``on_board``, call ``measure`` of the last one with these arguments, and drop them."""
         part = parts[-1]
         text = "".join((_FOLDER / f"{name}.py").read_text(encoding="utf-8") for name in ("common", *parts))
         number = PARTS.index(part) + 1
-        return self._run(
-            part, f"{text}\nnoted = note({number})\ntry: tell(measure(**{arguments!r}))\nfinally: note(0)\n"
-        )
+        call = f"noted = note({number})\ntry: tell(measure(**{arguments!r}))\nfinally:\n note(0)\n{_DROP}"
+        return self._run(part, f"before = list(globals())\n{text}\n{call}")
 
     def rates(self) -> dict[str, float]:
         """Kilobytes a second, from the board and to it."""

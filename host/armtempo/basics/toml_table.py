@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import why
-from armtempo.formats.text import did_you_mean, is_plain, misspelt
+from armtempo.basics.text import did_you_mean, is_plain, misspelt
 
 _REQUIRED: Any = object()
 

@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import why
 
 _SEPARATORS = (";", "\t", ",")
 """In this order: with the first two a comma may be the decimal one."""
