@@ -31,6 +31,7 @@ __all__ = [
     "Dynamics",
     "Encoder",
     "Goto",
+    "Hold",
     "Input",
     "InputError",
     "Job",
@@ -38,6 +39,7 @@ __all__ = [
     "LimitSwitches",
     "Limits",
     "LinkError",
+    "Load",
     "MissingPackageError",
     "Motor",
     "Output",
@@ -100,12 +102,22 @@ if TYPE_CHECKING:
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
-    from armtempo.model.parts import Driver, Dynamics, Encoder, Joint, Limits, LimitSwitches, Motor, Safety
+    from armtempo.model.parts import (
+        Driver,
+        Dynamics,
+        Encoder,
+        Joint,
+        Limits,
+        LimitSwitches,
+        Load,
+        Motor,
+        Safety,
+    )
     from armtempo.model.plan import Plan
     from armtempo.model.posture import ArmPosture
     from armtempo.model.sequence import Sequence
     from armtempo.model.sequence_plan import SequencePlan
-    from armtempo.model.steps import Count, Goto, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
+    from armtempo.model.steps import Count, Goto, Hold, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
     from armtempo.model.tool_pose import Pose
     from armtempo.model.tool_way import ToolWay
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
@@ -143,6 +155,7 @@ _HOMES = {
         "Joint",
         "LimitSwitches",
         "Limits",
+        "Load",
         "Motor",
         "Safety",
     ),
@@ -150,6 +163,7 @@ _HOMES = {
     "armtempo.model.steps": (
         "Count",
         "Goto",
+        "Hold",
         "Repeat",
         "RunMotion",
         "SetOutput",

@@ -175,9 +175,11 @@ def import_urdf(
         raise InputError(f"{out}: is the URDF itself", "choose another name")
     chain = reader.read(urdf, base, tip)
     fit = fitting.fit(chain)
-    text = arm_text.arm_text(chain, fit, urdf.name)
-    Arm.of_table(toml_table.parse(text, str(out)))  # an arm file that could not be read again is not written
     corners_mm = urdf_meshes.of_rows(chain, fit, urdf) if meshes else {}
+    text = arm_text.arm_text(chain, fit, urdf)
+    arm = Arm.of_table(
+        toml_table.parse(text, str(out))
+    )  # an arm file that could not be read again is not written
     replace_text(out, text)
     written = mesh_files.write(out, corners_mm) if meshes else []
     values = {
@@ -190,10 +192,13 @@ def import_urdf(
         "postures": fit.postures,
         "worst_position_mm": float(fit.position_mm),
         "worst_rotation_deg": float(fit.rotation_deg),
+        "radii_mm": [joint.radius_mm for joint in arm.joints],
     }
     lines = [
         f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}",
         f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees",
+        f"{sum(joint.radius_mm > 0.0 for joint in arm.joints)} of {len(arm.joints)} rows have a radius_mm, from the "
+        "links' shapes",
         f"wrote {out}; add the motors, then: armtempo check --arm {out}",
     ]
     if meshes:

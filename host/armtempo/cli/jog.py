@@ -33,6 +33,7 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
     show_default=True,
     help="Percent of the speed limits.",
 )
+@options.holds
 @options.gamepad
 @options.board(options.arm_of_board, options.replace_arm)
 def jog(
@@ -41,6 +42,7 @@ def jog(
     about: str | None,
     by: float | None,
     speed: float,
+    holds: str | None,
     gamepad: bool,
     given: BoardOptions,
 ) -> None:
@@ -53,7 +55,7 @@ def jog(
     moves = _one_move(joint, axis, about, by, gamepad, given.as_json)
     arm = chosen.named_arm(given.arm_path)
     with chosen.board(given, arm) as board:
-        prepare(board, chosen.arm_of_board(board, arm), given.replace_arm)
+        prepare(board, chosen.arm_of_board(board, arm).holding(holds), given.replace_arm)
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 screen(board, pressed, speed).loop()

@@ -70,6 +70,9 @@ replace_arm = click.option(
 gamepad = click.option(
     "--gamepad", is_flag=True, help="Use a gamepad in addition to the keys (needs the extra 'gamepad')."
 )
+holds = click.option(
+    "--holds", metavar="NAME", help="Load of the arm file that the tool holds: it keeps to the room, too."
+)
 job = click.option(
     "--job",
     "job_path",

@@ -29,9 +29,12 @@ from armtempo.robot.stop_request import Stopped
 @click.command("goto", context_settings={"ignore_unknown_options": True})
 @click.argument("where", nargs=-1, required=True, shell_complete=options.files)
 @click.option("--line", is_flag=True, help="Move the tool in a straight line, turning evenly.")
+@options.holds
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
-def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: BoardOptions) -> None:
+def goto(
+    where: tuple[str, ...], line: bool, holds: str | None, job_path: Path | None, given: BoardOptions
+) -> None:
     """Move straight to a posture.
 
     WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such
@@ -46,7 +49,7 @@ def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: Board
         )
     wanted = NamedPosture.of(where[0], given.arm_path, given.altered)
     with chosen.board(given, wanted.arm) as board:
-        arm = chosen.arm_of_board(board, wanted.arm)
+        arm = chosen.arm_of_board(board, wanted.arm).holding(holds)
         target_deg = wanted.angles_deg(arm, job_path)
         board.configure(arm, replace=given.replace_arm)
         try:

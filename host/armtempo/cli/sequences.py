@@ -21,6 +21,7 @@ from armtempo.cli.state import counted
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share
+from armtempo.report import text_summary
 from armtempo.robot.board import Board
 from armtempo.robot.sequence_run import cycles, where
 from armtempo.robot.stop_request import Stopped
@@ -94,6 +95,7 @@ def lines(planned: SequencePlan) -> list[str]:
         found.append(f"cycle (step {cycle.step}, {times}): {_made_of(cycle.share)}")
     if planned.total is not None:
         found.append(f"in all: {_made_of(planned.total)}")
+    found.extend(text_summary.torque_lines(planned.loaded_legs))
     found.append(f"pause between two motions: about {PAUSE_S:g} s; waits for inputs are not counted")
     return found
 
