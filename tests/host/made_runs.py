@@ -15,8 +15,7 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
 from armtempo.records import encoded_motion
-from armtempo.report import arm_figure, drawing, plots
-from armtempo.runs import run_folder
+from armtempo.report import arm_figure, drawing, plots, run_folder
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armtempo.runs import analysis, differentiation
-from armtempo.runs.reader import RepetitionData
+from armtempo.report import analysis, differentiation
+from armtempo.report.run_reader import RepetitionData
 from armtempo.splines import bspline
 from armtempo.splines.trajectory import JointSpline, Trajectory
 

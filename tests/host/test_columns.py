@@ -7,17 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from armtempo.basics.text import aligned
 from armtempo.cli import stored
 from armtempo.diagnosis.finding import Finding, Level
-from armtempo.formats.text import aligned
 from armtempo.model.plan import Plan
 from armtempo.planning import lower_bounds
 from armtempo.records import encoded_motion
-from armtempo.report import text_summary
-from armtempo.runs import run_folder
-from armtempo.runs.reader import RunData
-from armtempo.runs.replayed import results
-from armtempo.runs.run_folder import Repetition
+from armtempo.report import run_folder, text_summary
+from armtempo.report.replayed import results
+from armtempo.report.run_folder import Repetition
+from armtempo.report.run_reader import RunData
 
 from tests.host import made_runs
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics import number_table
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.formats import number_table
 from armtempo.model import exchange, shipped, thinning, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -160,7 +160,8 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = run(main, ["import", "feed.csv", "--name", "again"])
     assert made.exit_code == 0, made.output
     assert re.match(
-        r"15 lines thinned to \d+ via points: .* within 0.1 deg; the times are planned anew\n", made.output
+        r"15 lines reduced to \d+ via points: .* within 0.1 deg; 'armtempo plan' computes new times\n",
+        made.output,
     )
     assert Job.load("again.toml", ARM).timing == "shared"
     assert run(main, ["import", "feed.csv", "--name", "again"]).exit_code == 0  # the same content

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from armtempo.kinematics import chain
 from armtempo.paper import searches
-from armtempo.report import arm_figure, drawing, html_page, plan_section, plots
-from armtempo.runs import analysis
+from armtempo.report import analysis, arm_figure, drawing, html_page, plan_section, plots
 
 from tests.host.made_runs import shipped_plan
 

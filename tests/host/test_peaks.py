@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from armtempo.model.parts import Limits
-from armtempo.runs import analysis, peaks
-from armtempo.runs.reader import RepetitionData
+from armtempo.report import analysis, peaks
+from armtempo.report.run_reader import RepetitionData
 from armtempo.splines.extremes import of_joints
 from armtempo.splines.trajectory import Trajectory
 

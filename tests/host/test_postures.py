@@ -218,5 +218,5 @@ def test_the_digits_written_mean_the_same_steps() -> None:
 def test_an_arm_that_ships_is_not_written_to() -> None:
     result = CliRunner().invoke(main, ["teach", "--posture", "park", "--arm", "ar4", "--port", "sim"])
     assert result.exit_code == 2
-    assert "ships with armtempo" in result.output
+    assert "belongs to armtempo" in result.output
     assert "armtempo new FOLDER --like ar4" in result.output

@@ -14,7 +14,7 @@ from threading import Thread
 from typing import Any
 
 import armtempo
-from armtempo.formats import toml_table
+from armtempo.basics import toml_table
 from armtempo.model import shipped
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState

@@ -16,11 +16,11 @@ import pytest
 from armtempo import connect
 from armtempo.basics.errors import ArmtempoError, LinkError
 from armtempo.diagnosis.finding import Level
+from armtempo.diagnosis.selftest import board_part, prompt, rate_part
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Driver, JointModel, LimitSwitches, Safety
 from armtempo.records import encode
 from armtempo.robot import motor_test
-from armtempo.selftest import board_part, prompt, rate_part
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
 from armtempo_shared import codes
@@ -339,7 +339,7 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert found.data["arm_file"] == ["joint 1: encoder: direction = 1"]
     lines = {line.what: (line.verdict, line.measured.split(",")[0]) for line in found.lines}
     assert lines == {
-        "joint 1: direction": (Level.GOOD, "as the arm file has it"),
+        "joint 1: direction": (Level.GOOD, "as in the arm file"),
         "joint 1: encoder": (Level.ERROR, "-9 counts for 28 steps"),
         "the switch at the low end of joint 1": (Level.GOOD, "stopped the joint"),
         "the switch at the high end of joint 1": (Level.ERROR, "not seen"),

@@ -10,10 +10,9 @@ import pytest
 from armtempo.basics.errors import BoardError, InputError
 from armtempo.link.board_messages import Sample
 from armtempo.planning import brake_time
-from armtempo.report import run_report
+from armtempo.report import run_report, stretched
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
-from armtempo.runs import stretched
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared.motion import EVEN_RAMP
 

@@ -10,21 +10,22 @@ from armtempo.link.transport import Transport
 
 LOOK_S = 0.4
 _REPL_SIGNS = (b">>>", b"raw REPL")
-"""Bytes by which a REPL is known; not the firmware's name, which the program's answer to ``hello`` has too."""
+"""Bytes that identify a REPL; not the firmware's name, which is also in the answer to ``hello``."""
 _FRAME_SIGNS = (bytes((SYNC,)), bytes((wire.EVENT["ok"][1], wire.COMMAND["hello"][1])))
-"""A frame's first byte, or what an answer to ``hello`` begins with."""
+"""A frame's first byte, or the beginning of an answer to ``hello``."""
 _ECHO = b"#armtempo?"
 _NUDGE = b"\r\x02\r" + _ECHO + b"\r"
-"""Ends a line, leaves a raw REPL, and writes a comment, which a prompt echoes even inside an unfinished line; the board
-program ignores it."""
+"""Ends a line, leaves a raw REPL, and writes a comment, which a prompt echoes even in an unfinished line; the
+board program ignores these bytes."""
 
 _ASK = b"print('armtempo','is','here')if'armtempo'in open('/flash/main.py').read()else 0\r"
 _HERE = b"armtempo is here"
-"""Asks the prompt whether the program is in the flash; the echo of the question is not the answer."""
+"""The prompt's answer if the program is in the flash; differs from the echo of the question."""
 
 
 def explain(transport: Transport, heard: bytes) -> LinkError:
-    """The error to raise, by what the port sends: nothing, a REPL, pieces of frames, or else; ``heard`` so far."""
+    """The error for what the port sends: nothing, a REPL, parts of frames, or something else; ``heard``:
+    bytes received before."""
     transport.write(_NUDGE)
     heard += _listen(transport)
     where = f"the board on {transport.name}"

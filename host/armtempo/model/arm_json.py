@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from armtempo.basics import json_codec
+from armtempo.basics.atomic_file import replace_text, why
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
-from armtempo.formats.atomic_file import replace_text, why
 from armtempo.model import boards, pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.outputs import KINDS, SWITCH, Output

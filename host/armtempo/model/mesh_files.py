@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import why
 from armtempo.model.arm import Arm
 
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])

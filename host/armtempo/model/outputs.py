@@ -9,7 +9,7 @@ from armtempo_shared.limits import FULL_OUTPUT
 
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats.text import did_you_mean
+from armtempo.basics.text import did_you_mean
 
 SWITCH, PWM, SERVO = "switch", "pwm", "servo"
 KINDS = (SWITCH, PWM, SERVO)

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from armtempo_shared.basis import BASIS
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import check_replaceable, replace_text, why
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
-from armtempo.formats.atomic_file import check_replaceable, replace_text, why
 from armtempo.model import arm_json, exchange
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, Job
@@ -88,6 +88,11 @@ class Plan:
 
     def __repr__(self) -> str:
         return f"<Plan {self.job.name!r} for {self.arm.name!r}: {len(self.via_deg)} via points, {self.total_s:.3f} s>"
+
+    @property
+    def holding(self) -> Arm:
+        """The arm with what it holds in this motion."""
+        return self.arm.holding(self.job.holds)
 
     @property
     def total_s(self) -> float:

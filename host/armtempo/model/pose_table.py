@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from armtempo.basics.errors import InputError
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 from armtempo.model import pose
 from armtempo.model.tool_pose import LARGEST_DEG, LARGEST_MM, SMALLEST, WHOLE, Pose
 

@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from armtempo.basics.atomic_file import replace_text, why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import replace_text, why
 from armtempo.model import posture as named
 from armtempo.model.arm import Arm
 

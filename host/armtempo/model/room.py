@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 
 FAR_MM = 1e5
 """Walls and boxes are within so much; beyond is no wall."""

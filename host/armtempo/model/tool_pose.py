@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
 from armtempo.model import pose
 
 Rows = tuple[tuple[float, ...], ...]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 
 LINE_TOLERANCE_MM, LINE_TOLERANCE_DEG = 0.5, 0.5
 """How far the tool may leave a line or an arc, unless the job says otherwise."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.formats.number_table import NumberTable
+from armtempo.basics.number_table import NumberTable
 from armtempo.model import thinning
 from armtempo.model.arm import Arm
 from armtempo.model.exchange import CSV_COLUMNS, TIME_COLUMN

@@ -7,8 +7,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import why
 from armtempo.model.arm import Arm
 from armtempo.new_arm.given_geometry import ArmText
 

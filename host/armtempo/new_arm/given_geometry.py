@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from armtempo.basics import toml_table
 from armtempo.basics.errors import InputError
-from armtempo.formats import toml_table
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.new_arm import joint_entry
@@ -44,7 +44,7 @@ def from_urdf(urdf: Path) -> ArmText:
     from armtempo.new_arm import urdf_reader as reader
 
     chain = reader.read(urdf, None, None)
-    return _checked(arm_text.arm_text(chain, fitting.fit(chain), urdf.name))
+    return _checked(arm_text.arm_text(chain, fitting.fit(chain), urdf))
 
 
 def from_joints(name: str, joints: Sequence[JointEntry], modified: bool = False) -> ArmText:

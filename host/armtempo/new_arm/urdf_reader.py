@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError, MissingPackageError
-from armtempo.formats.atomic_file import why
 from armtempo.model.parts_file import MAX_ANGLE_DEG
 from armtempo.new_arm import urdf_bodies, urdf_tip
 from armtempo.new_arm.urdf_bodies import Body

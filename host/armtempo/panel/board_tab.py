@@ -17,8 +17,8 @@ from armtempo.panel.live import Lines
 from armtempo.panel.operator import Needs
 
 if TYPE_CHECKING:
+    from armtempo.diagnosis.selftest.result import SelfTest
     from armtempo.panel.panel_page import PanelPage
-    from armtempo.selftest.result import SelfTest
 
 _SHOWN = (
     "port",

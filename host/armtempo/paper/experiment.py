@@ -15,10 +15,10 @@ from armtempo.model.plan import Plan
 from armtempo.paper import motions, printed
 from armtempo.paper.claims import DIFFERS, SAME, Claim
 from armtempo.ports.names import SIM
+from armtempo.report import analysis, peaks
 from armtempo.report.evaluation import Evaluation, evaluate
 from armtempo.robot.connect import connect
 from armtempo.robot.stop_request import StopRequest
-from armtempo.runs import analysis, peaks
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 

@@ -30,6 +30,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     ``progress`` raises ends the planning.
     """
     checks.limits_of(arm)
+    holding = arm.holding(job.holds)
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
     way = free_plan.motion if checks.is_free(job) else through_plan.motion
@@ -43,7 +44,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
-    room_check.check(arm, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
+    room_check.check(holding, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
     return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())
 
 

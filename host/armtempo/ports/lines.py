@@ -24,7 +24,7 @@ class LineReader:
     def read(self) -> Message | None:
         """The next message; None at the end of the connection.
 
-        Raises LinkError for what is no message, TimeoutError as the socket's time-out says, OSError if the
+        Raises LinkError for an invalid message, TimeoutError after the socket's time-out, OSError if the
         connection breaks.
         """
         while b"\n" not in self._data:
@@ -43,7 +43,7 @@ class LineReader:
 
 
 def to_line(message: Message) -> bytes:
-    """A message as it is sent."""
+    """A message as bytes to send."""
     return json.dumps(message, allow_nan=False, separators=(",", ":")).encode() + b"\n"
 
 

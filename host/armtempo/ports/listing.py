@@ -1,4 +1,4 @@
-"""Serial ports of this machine, and which have the USB ids of a board."""
+"""The serial ports of this machine, and whether each has the USB ids of a board."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class Port:
     device: str
     description: str
     board: bool
-    """Its USB ids are those of MicroPython on an STM32."""
+    """Whether its USB ids are those of MicroPython on an STM32."""
 
 
 def find_ports() -> list[Port]:
     """All serial ports, likely boards first."""
-    from serial.tools import list_ports  # takes a while, and most commands are told their port
+    from serial.tools import list_ports  # imported here: it takes a while, and most commands get their port
 
     found = [
         Port(info.device, _describe(info), info.vid == _VENDOR and info.pid in _PRODUCTS)

@@ -1,4 +1,4 @@
-"""What other programs may ask for: the requests, their fields, and what each field must be."""
+"""The requests of other programs, their fields and the fields' types."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.ports.claim import VERSION
 from armtempo.ports.lines import Message
 
-TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
+TYPE_CHECKING = False  # as in "typing", whose import takes longer than the rest of a stop
 if TYPE_CHECKING:
     from typing import Any
 
@@ -21,7 +21,7 @@ _SHOWN = 40
 
 
 class Field:
-    """One field of a request: ``words`` say what it must be, ``fits`` whether a value is that."""
+    """One field of a request: ``words`` describe its values, ``fits`` tests one."""
 
     def __init__(self, words: str, fits: Callable[[Any], bool], needed: bool = True) -> None:
         self.words = words
@@ -69,12 +69,12 @@ REQUESTS: Mapping[str, Fields] = {
 
 
 def is_id(value: object) -> bool:
-    """Whether a value can be the ``id`` of a request: the answer must be able to repeat it."""
+    """Whether a value is allowed as the ``id`` of a request, which the answer repeats."""
     return type(value) is int or _is_text(value)
 
 
 def check(request: Message, fields: Fields) -> None:
-    """Raise LinkError if the fields of a request are not as the table says."""
+    """Raise LinkError if the fields of a request do not fit the table."""
     name = request["request"]
     for field, wanted in fields.items():
         if field not in request:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from armtempo.formats.text import aligned
+from armtempo.basics.text import aligned
 from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.report import plots
 

@@ -12,12 +12,12 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import MissingPackageError
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 from armtempo.model.parts import Limits
 from armtempo.planning.torque import MotorTorques
+from armtempo.report import stretched
+from armtempo.report.analysis import Curves
 from armtempo.report.drawing import PAGE_COLOUR
-from armtempo.runs import stretched
-from armtempo.runs.analysis import Curves
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armtempo.formats.atomic_file import replace_text
+from armtempo.basics.atomic_file import replace_text
 from armtempo.kinematics import chain
 from armtempo.model.arm import Arm
 from armtempo.planning import torque
 from armtempo.report import arm_figure, drawing, html_page, plan_section, plots, result_section
 from armtempo.report.evaluation import Evaluation, evaluate
-from armtempo.runs.run_folder import COMPLETE
+from armtempo.report.run_folder import COMPLETE
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.formats.atomic_file import replace_text
+from armtempo.basics.atomic_file import replace_text
 from armtempo.report import html_page
+from armtempo.report.leg_results import LegResult, results
 from armtempo.report.run_report import PAGE
+from armtempo.report.sequence_reader import SequenceRun
 from armtempo.report.verdict import BAD, GOOD, OPEN, STEPS_OFF, Verdict, VerdictItem
-from armtempo.runs.leg_results import LegResult, results
-from armtempo.runs.sequence_reader import SequenceRun
 
 _LEGS = {
     "motion": "its number, as in the file NAME-1, NAME-2 … on the board",

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.report import peaks, stretched
 from armtempo.report.evaluation import Evaluation
-from armtempo.runs import peaks, stretched
-from armtempo.runs.run_folder import COMPLETE
+from armtempo.report.run_folder import COMPLETE
 
 GOOD, BAD, OPEN = "good", "bad", "open"
 """What a finding is: as it should be, not so, or not to be told from what was recorded."""

@@ -1,4 +1,4 @@
-"""In what two arm records differ, in the words of the arm file, and what comes of replacing one by the other."""
+"""The differences between two arm records, in terms of the arm file, and the consequences of replacing one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LOSES = "after which the position is unknown"
 
 
 def describe(old: bytes, new: bytes) -> str:
-    """In what a new record differs from the old one, in words."""
+    """Describe the differences between the new and the old record."""
     try:
         (old_head, old_joints, _), (new_head, new_joints, _) = armrecord.unpack(old), armrecord.unpack(new)
         wiring = [*zip(armrecord.unpack_outputs(old), armrecord.unpack_outputs(new), strict=True)]
@@ -50,7 +50,7 @@ def describe(old: bytes, new: bytes) -> str:
 
 
 def consequence(old: bytes, new: bytes) -> str:
-    """What becomes of the position, and of stored motions, where the new record replaces the old one."""
+    """Describe the consequences for the position and stored motions if the new record replaces the old one."""
     try:
         (old_head, old_joints, _), (new_head, new_joints, _) = armrecord.unpack(old), armrecord.unpack(new)
     except armrecord.ArmRecordError:

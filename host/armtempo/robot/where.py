@@ -1,4 +1,4 @@
-"""Where an arm is to go, as people say it: the angles of a posture."""
+"""A target posture as users give it, and its angles."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from armtempo.planning import point_to_point, via_points
 from armtempo.records.encoded_motion import EncodedMotion
 
 Where = Plan | EncodedMotion | SequencePlan | Path | str | ArrayLike
-"""A posture: by its name in the arm file, the driven joints' angles in degrees, (J,), or a motion (or its file)
-or sequence for its start."""
+"""A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
+(or of its file) or sequence."""
 
 
 def posture_deg(where: Where, arm: Arm) -> Array:
-    """The driven joints' angles of a posture, in degrees (J,); a sequence that moves nothing begins at home.
+    """The driven joints' angles of a posture, degrees (J,); for a sequence without motions: the home posture.
 
-    Raises InputError for a posture that does not fit the arm, or that it has no name for.
+    Raises InputError for an unknown name, or a posture that does not fit the arm.
     """
     if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
         where = Plan.load(where)

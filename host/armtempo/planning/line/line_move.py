@@ -25,10 +25,11 @@ def straight_line(
     end: Sequence[float] | Pose,
     speed_mm_s: float | None = None,
     progress: Progress | None = None,
+    holds: str = "",
 ) -> Trajectory:
     """The tool in a straight line from a posture (J,) to another one, or to a pose; errors as in ``planner.plan``.
 
-    ``speed_mm_s``: the tool's limit.
+    ``speed_mm_s``: the tool's limit; ``holds``: the load of the arm in it.
     """
     target = end if isinstance(end, Pose) else tuple(map(float, end))
     job = Job(
@@ -36,6 +37,7 @@ def straight_line(
         via=(tuple(map(float, start_deg)), target),
         ways=(ToolWay(1, line=True, speed_mm_s=speed_mm_s),),
         refine=_REFINE,
+        holds=holds,
     )
     return planner.plan(arm, job, progress).trajectory
 

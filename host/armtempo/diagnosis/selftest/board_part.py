@@ -8,7 +8,7 @@ from typing import Any
 from armtempo_shared.limits import TICK_HZ
 
 from armtempo.diagnosis.finding import Level
-from armtempo.selftest.result import Measurement, judged
+from armtempo.diagnosis.selftest.result import Measurement, judged
 
 BOARD, CYCLES, MEMORY = "board", "cycles", "memory"
 _CORE_HZ = 2 * TICK_HZ

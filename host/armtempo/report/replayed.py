@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError, RunFolderError
-from armtempo.formats.atomic_file import why
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.records import decode
-from armtempo.runs.reader import RunData
-from armtempo.runs.run_folder import ARM, MOTION
+from armtempo.report.run_folder import ARM, MOTION
+from armtempo.report.run_reader import RunData
 from armtempo.splines.trajectory import Trajectory
 
 

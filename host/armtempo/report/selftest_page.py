@@ -8,13 +8,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from armtempo.basics.atomic_file import replace_text, why
 from armtempo.basics.errors import InputError
 from armtempo.diagnosis.finding import Level
-from armtempo.formats.atomic_file import replace_text, why
+from armtempo.diagnosis.selftest.pulse_part import CYCLES_PER_US, PULSES, SAFETY
+from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.report.drawing import PAGE_COLOUR, inline_svg
 from armtempo.report.html_page import BAD, GOOD, OPEN, Page
-from armtempo.selftest.pulse_part import CYCLES_PER_US, PULSES, SAFETY
-from armtempo.selftest.result import SelfTest
 
 JSON, HTML = "selftest.json", "selftest.html"
 _KINDS = {Level.GOOD: GOOD, Level.ERROR: BAD, Level.NOTE: OPEN}

@@ -26,9 +26,9 @@ from typing import Any, Self
 
 from armtempo_shared import limits
 
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.basics.installation import installed_version
-from armtempo.formats.atomic_file import replace_text
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.link.follow import Gap
 from armtempo.model.arm import Arm

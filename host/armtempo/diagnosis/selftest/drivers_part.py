@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from armtempo.diagnosis.finding import Level
-from armtempo.selftest.result import Measurement, judged, left_out
+from armtempo.diagnosis.selftest.result import Measurement, judged, left_out
 
 DRIVERS = "drivers"
 _STILL = 2

@@ -10,10 +10,10 @@ from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.runs import stretched
-from armtempo.runs.differentiation import of_curves
-from armtempo.runs.reader import RepetitionData
-from armtempo.runs.run_folder import COMPLETE
+from armtempo.report import stretched
+from armtempo.report.differentiation import of_curves
+from armtempo.report.run_folder import COMPLETE
+from armtempo.report.run_reader import RepetitionData
 from armtempo.splines.trajectory import Trajectory
 
 SAMPLE_S = SAMPLE_TICKS / TICK_HZ

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import RunFolderError
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 from armtempo.link.follow import Gap
-from armtempo.runs.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition
-from armtempo.runs.sequence_folder import FORMAT as SEQUENCE_FORMAT
+from armtempo.report.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition
+from armtempo.report.sequence_folder import FORMAT as SEQUENCE_FORMAT
 
 _LARGEST = 2.0**53
 """Integers beyond this are not exact as doubles."""

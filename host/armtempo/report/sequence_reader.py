@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import ArmtempoError, RunFolderError
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 from armtempo.records import decode
-from armtempo.runs import reader
-from armtempo.runs.reader import RepetitionData
-from armtempo.runs.run_folder import META, JointScale
-from armtempo.runs.sequence_folder import FORMAT, ROWS, SAMPLES, VERSION, leg_file
+from armtempo.report import run_reader
+from armtempo.report.run_folder import META, JointScale
+from armtempo.report.run_reader import RepetitionData
+from armtempo.report.sequence_folder import FORMAT, ROWS, SAMPLES, VERSION, leg_file
 from armtempo.splines.trajectory import Trajectory
 
 _RESTORE = "restore the folder from a copy, or run again"
@@ -68,10 +68,10 @@ class SequenceRun:
         folder = Path(path)
         meta = _meta(folder / META)
         try:
-            joints = tuple(reader.scale(**joint) for joint in meta["joints"])
-            rows = tuple(_row(cells) for cells in reader.whole_lines(folder / ROWS))
-            lines = reader.whole_lines(folder / SAMPLES)
-            samples = reader.parsed(folder / SAMPLES, str(meta["state"]), joints, lines)
+            joints = tuple(run_reader.scale(**joint) for joint in meta["joints"])
+            rows = tuple(_row(cells) for cells in run_reader.whole_lines(folder / ROWS))
+            lines = run_reader.whole_lines(folder / SAMPLES)
+            samples = run_reader.parsed(folder / SAMPLES, str(meta["state"]), joints, lines)
             run = np.array([int(line["run"]) for line in lines], dtype=np.int64)
             row = np.array([int(line["row"] or _UNKNOWN) for line in lines], dtype=np.int64)
             motions = [int(entry["motion"]) for entry in meta["rows"]]

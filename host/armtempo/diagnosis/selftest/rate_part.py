@@ -9,9 +9,9 @@ from armtempo_shared import wire
 from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.diagnosis.finding import Level
+from armtempo.diagnosis.selftest.pulse_part import CYCLES_PER_US
+from armtempo.diagnosis.selftest.result import Measurement, judged
 from armtempo.link.board_messages import Hello
-from armtempo.selftest.pulse_part import CYCLES_PER_US
-from armtempo.selftest.result import Measurement, judged
 
 PART = "rates"
 JOINTS = (1, 2, 3, 6)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.runs.sequence_reader import SequenceRun
+from armtempo.report.sequence_reader import SequenceRun
 
 END_S = 1e-3
 """A sample as near as this to the end of the motion is its last."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.runs.reader import RepetitionData
+from armtempo.report.run_reader import RepetitionData
 from armtempo.splines.trajectory import Trajectory
 
 _EQUAL_S = 1e-6

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from armtempo_shared import wire
 
+from armtempo.diagnosis.selftest.result import Measurement, judged
 from armtempo.link import Client
-from armtempo.selftest.result import Measurement, judged
 
 PART = "link"
 _COMMANDS = 10_000

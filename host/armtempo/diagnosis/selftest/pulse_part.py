@@ -11,9 +11,9 @@ from armtempo_shared.meanings import ERRORS
 
 from armtempo.basics.arrays import Array
 from armtempo.diagnosis.finding import Level
-from armtempo.selftest.motion import TestMotion
-from armtempo.selftest.prompt import Measured
-from armtempo.selftest.result import Measurement, judged, left_out
+from armtempo.diagnosis.selftest.motion import TestMotion
+from armtempo.diagnosis.selftest.prompt import Measured
+from armtempo.diagnosis.selftest.result import Measurement, judged, left_out
 
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0

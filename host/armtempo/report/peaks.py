@@ -9,9 +9,9 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.model.parts import Limits
-from armtempo.runs import stretched
-from armtempo.runs.analysis import SAMPLE_S, Curves
-from armtempo.runs.differentiation import noise, of_curves, quantisation_sigma, weights
+from armtempo.report import stretched
+from armtempo.report.analysis import SAMPLE_S, Curves
+from armtempo.report.differentiation import noise, of_curves, quantisation_sigma, weights
 from armtempo.splines.trajectory import Trajectory
 
 PEAK_WINDOW = 11

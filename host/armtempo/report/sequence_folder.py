@@ -23,8 +23,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from armtempo.link.board_messages import RowBegun, Sample, SequenceState
-from armtempo.runs import run_folder
-from armtempo.runs.run_folder import BROKEN, INTERRUPTED, RUNNING, JointScale
+from armtempo.report import run_folder
+from armtempo.report.run_folder import BROKEN, INTERRUPTED, RUNNING, JointScale
 
 FORMAT = "armtempo sequence run"
 VERSION = 1

@@ -1,25 +1,25 @@
-"""Which board is meant where no port is given."""
+"""The port to use if none is given."""
 
 from __future__ import annotations
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import PORT, ProjectSettings, Setting, nothing_set
 from armtempo.ports import claim
 from armtempo.ports.caller import Ownership, ownership
 from armtempo.ports.listing import find_ports
 from armtempo.ports.names import SIM
-from armtempo.project.settings import PORT, ProjectSettings, Setting, nothing_set
 
 ONLY_BOARD = "the only board plugged in"
 ONLY_OPEN = "the only port that an armtempo program has open"
 UNASKED = (ONLY_BOARD, ONLY_OPEN)
-"""Sources of a port that nobody has named; such a choice is printed."""
+"""Sources of a default port; such a choice is printed."""
 
 
 def choose(given: str | None = None, others: bool = False) -> Setting:
-    """The port to use, and why it: ``given``, the variable, the project folder, else the one likely board.
+    """The port to use, and its source: ``given``, the variable, the project folder, else the only likely board.
 
-    ``others``: a port that another program of armtempo has open will do too, if it is the only one; for commands
-    that go through that program. Raises InputError if there is no such port, or more than one.
+    ``others``: also accept the only port that another armtempo program has open, for commands that work
+    through that program. Raises InputError if there is no port, or more than one.
     """
     found = ProjectSettings().get(PORT, given)
     if found:

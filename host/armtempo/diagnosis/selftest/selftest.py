@@ -15,12 +15,9 @@ from armtempo_shared.meanings import ERRORS
 from armtempo.basics.errors import BoardError, LinkError
 from armtempo.basics.progress import Progress, stage, watched
 from armtempo.diagnosis.finding import Level
-from armtempo.link import Client
-from armtempo.link.board_messages import Hello
-from armtempo.model import engine_pins
-from armtempo.selftest import board_part, drivers_part, link_part, motion, pulse_part, rate_part
-from armtempo.selftest.drivers_part import DRIVERS
-from armtempo.selftest.prompt import (
+from armtempo.diagnosis.selftest import board_part, drivers_part, link_part, motion, pulse_part, rate_part
+from armtempo.diagnosis.selftest.drivers_part import DRIVERS
+from armtempo.diagnosis.selftest.prompt import (
     PARTS,
     RESET,
     WATCHDOG_RESET,
@@ -30,7 +27,10 @@ from armtempo.selftest.prompt import (
     SilentError,
     at_prompt,
 )
-from armtempo.selftest.result import Measurement, SelfTest, judged
+from armtempo.diagnosis.selftest.result import Measurement, SelfTest, judged
+from armtempo.link import Client
+from armtempo.link.board_messages import Hello
+from armtempo.model import engine_pins
 
 _FEATURE = "sequences"
 """Of the program in the firmware, with the modules that the parts import; as files it is without both."""
