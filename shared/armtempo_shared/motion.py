@@ -14,9 +14,9 @@ angles in steps / 2**28, times in ticks / 2**16.
     8       H      segments n of the angle splines
     10      H      refine R: the time axes have n * R segments
     12      I      crc32 of the arm record it was made for
-    16      H[64]  the ramp to rest, by where it begins: at 64 equal steps of the motion's time from its start to its end.
-                   Low 11 bits: its length, linear in between. The rest: its shape (RAMP_SHAPES), up to the next
-                   step. All 0: it cannot
+    16      H[64]  the ramp to rest, by where it begins: at 64 equal steps of the motion's time from its start to its
+                   end. Low 11 bits: its length, linear in between. The rest: its shape (RAMP_SHAPES), up to the
+                   next step. All 0: it cannot
     144     H[32]  the same at 32 steps for any other change of the speed
     208     q[]    per joint: n + k angle control points; its n * R + k time control points,
                    or, with a shared axis, those once after the last joint
@@ -54,9 +54,9 @@ RAMP_SHAPES = (
     b"\x43\x26\xc2\x20\xf4\x1e\x76\x22\xf6\x1e\xa6\x20\xf1\x28\xf5\x22\x84\x21\x93\x29\xf3\x28\xf1\x1e"
     b"\xa4\x2a\x82\x26\xf3\x24\xf1\x22\xf3\x1e\xf6\x22\xc8\x1e\x82\x24"
 )
-"""Shapes of ramps: p + 16 q and 64 w of each. From the end of a ramp at which the rate is least, its slope rises to s1 over
-p/16 of its length, goes to s2 until q/16, and falls to 0; w of the length is the way of a rate from 0 to 1, which with p
-and q says what s1 and s2 are. Chosen so that each of 30 random motions has one that is close to its best shape."""
+"""Shapes of ramps: p + 16 q and 64 w of each. From the end of a ramp at which the rate is least, its slope rises to s1
+over p/16 of its length, goes to s2 until q/16, and falls to 0; w of the length is the way of a rate from 0 to 1, which
+with p and q says what s1 and s2 are. Each of 30 random motions has one here that is close to its best."""
 EVEN_RAMP = 0
 """The shape for changes that are none to rest."""
 NO_RAMPS = (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS
@@ -85,8 +85,8 @@ def pack(
     """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
-    all, its n * R + k control points (int, ticks * 2**16). ``ramps``: REST_ENTRIES entries of ramps to rest, OTHER_ENTRIES
-    of others, and the bits of their unit.
+    all, its n * R + k control points (int, ticks * 2**16). ``ramps``: REST_ENTRIES entries of ramps to rest,
+    OTHER_ENTRIES of others, and the bits of their unit.
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1

@@ -4,9 +4,9 @@ The rate is constant but for ramps: over a length L of real time it goes from on
 0. Counted by r, in parts of L, from that end of the ramp at which the rate is least, the rate is b + h S(r), and the
 motion's time from there on is b r + h e(r) of L, e the integral of S. S goes from 0 to 1; its slope is 0 at r = 0, s1
 at r = p/16, s2 at r = q/16, 0 at r = 1, and linear in between, so e is convex, and of third order in each of the three
-pieces. p, q and e(1), a multiple of 1/64, are the shape of the ramp, which the record gives. This law moves the nodes, time and slope; all steps between them follow. Rates are in
-thousandths and times at the ends of a ramp in whole ticks, so outside the ramps real time is exact, however long the
-motion is. Fractions here have 30 bits.
+pieces. p, q and e(1), a multiple of 1/64, are the shape of the ramp, which the record gives. This law moves the nodes,
+time and slope; all steps between them follow. Rates are in thousandths and times at the ends of a ramp in whole ticks,
+so outside the ramps real time is exact, however long the motion is. Fractions here have 30 bits.
 """
 
 import micropython

@@ -36,6 +36,8 @@ limits themselves a motion that is already at them could only brake very slowly:
 jerk of the path."""
 
 Rates = tuple[tuple[float, float], ...]
+Shapes = NDArray[np.int64]
+"""Numbers of RAMP_SHAPES."""
 TO_REST: Rates = ((1.0, 0.0), (0.75, 0.0), (0.5, 0.0), (0.25, 0.0), (0.1, 0.0))
 OTHERS: Rates = (
     (0.0, 1.0),
@@ -76,7 +78,7 @@ class BrakeTimes:
     duration_s: float
     to_rest: Array
     others: Array
-    shapes: NDArray[np.int64]
+    shapes: Shapes
     unit_bits: int
 
     def rest_s(self, time_s: float | Array) -> Array:
@@ -92,10 +94,10 @@ class BrakeTimes:
             self._unit_s * np.interp(time_s, np.linspace(0.0, self.duration_s, len(table)), table)
         )
 
-    def rest_shapes(self, time_s: Array) -> NDArray[np.int64]:
+    def rest_shapes(self, time_s: Array) -> Shapes:
         """The shapes of ramps to rest from times of the motion on."""
         place = (np.asarray(time_s) * (len(self.shapes) / self.duration_s)).astype(int)
-        return self.shapes[np.clip(place, 0, len(self.shapes) - 1)]
+        return np.asarray(self.shapes[np.clip(place, 0, len(self.shapes) - 1)])
 
     @property
     def _unit_s(self) -> float:
@@ -135,8 +137,8 @@ def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
         bits += 1
 
 
-def _best_shapes(ramps: _Ramps) -> NDArray[np.int64]:
-    """(REST_ENTRIES - 1,): with which ramps to rest from both ends and the middle of a part are shortest in the mean."""
+def _best_shapes(ramps: _Ramps) -> Shapes:
+    """(REST_ENTRIES - 1,): those whose ramps to rest from ends and middle of a part are shortest in the mean."""
     starts = np.linspace(0.0, 1.0, 2 * REST_ENTRIES - 1)
     even_s = ramps.shortest_s(starts, _WORST_TO_REST, np.full(len(starts), _SHORTEST_S), EVEN_RAMP)
     lengths = np.array(
@@ -148,19 +150,17 @@ def _best_shapes(ramps: _Ramps) -> NDArray[np.int64]:
 class _Kind:
     """Changes between ``rates``, of which ``worst`` need most, with a shape in each part of their table.
 
-    ``needed_s``: (parts, starts + 1), how long those take that begin at equal steps from one end of a part to the other.
+    ``needed_s``: (parts, starts + 1), how long those take that begin at equal steps from one end of a part to another.
     """
 
-    def __init__(
-        self, ramps: _Ramps, rates: Rates, worst: Rates, shapes: NDArray[np.int64], starts: int
-    ) -> None:
+    def __init__(self, ramps: _Ramps, rates: Rates, worst: Rates, shapes: Shapes, starts: int) -> None:
         self._ramps, self._rates, self._shapes = ramps, rates, shapes
         self._starts = starts
         at, shape = self._places(starts)
         least_s = np.full(at.size, _SHORTEST_S)
         self.needed_s = ramps.shortest_s(at.ravel(), worst, least_s, shape.ravel()).reshape(at.shape)
 
-    def _places(self, starts: int) -> tuple[Array, NDArray[np.int64]]:
+    def _places(self, starts: int) -> tuple[Array, Shapes]:
         """Parts of the motion's time, and the shapes from there on."""
         parts = len(self._shapes)
         at = (np.arange(parts)[:, None] + np.linspace(0.0, 1.0, starts + 1)) / parts
@@ -169,7 +169,7 @@ class _Kind:
     def table(self, unit_s: float) -> Array:
         """The entries, in units; RAMP_LENGTH: perhaps too short."""
         needed = self.needed_s / unit_s
-        table = np.append(needed[:, 0], 0.0)
+        table: Array = np.append(needed[:, 0], 0.0)
         table[1:] = np.maximum(table[1:], needed[:, -1])
         _lift(table, needed)
         table = np.minimum(np.ceil(table), RAMP_LENGTH)
@@ -226,7 +226,7 @@ class _Ramps:
         found._phases = _FEW_PHASES
         return found
 
-    def shortest_s(self, starts: Array, rates: Rates, least_s: Array, shapes: Array | int) -> Array:
+    def shortest_s(self, starts: Array, rates: Rates, least_s: Array, shapes: Shapes | int) -> Array:
         """From ``least_s`` on, to 1 %, for each of ``starts``, parts of the motion's time; ``shapes``: theirs."""
         shapes = np.broadcast_to(shapes, starts.shape)
         low, high = least_s.copy(), least_s.copy()
@@ -243,7 +243,7 @@ class _Ramps:
         low = np.where(enough, 0.5 * most_s, most_s)
         return np.where(enough, self._halved(starts, rates, low, most_s, shapes), 2.0 * most_s)
 
-    def _halved(self, starts: Array, rates: Rates, low: Array, high: Array, shapes: Array) -> Array:
+    def _halved(self, starts: Array, rates: Rates, low: Array, high: Array, shapes: Shapes) -> Array:
         """Of times between ``low``, which is not enough, and ``high``, which is."""
         low, high = low.copy(), high.copy()
         left = np.flatnonzero(high > low)
@@ -254,7 +254,7 @@ class _Ramps:
             high[left] = np.where(fails, high[left], middle)
         return high
 
-    def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Array | int) -> Array:
+    def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Shapes | int) -> Array:
         """The largest acceleration or jerk over its limit in changes between ``rates``, for each start."""
         worst = np.zeros(len(starts))
         if not len(starts):
@@ -287,7 +287,7 @@ class _Ramps:
         return values[0], values[1], values[2]
 
 
-def _ramp(shapes: Array, phases: int) -> tuple[Array, Array, Array, Array, Array, Array]:
+def _ramp(shapes: Shapes, phases: int) -> tuple[Array, Array, Array, Array, Array, Array]:
     """r, S, S', S'' and e (N, 3 * phases) at the ends of each piece and in between, and e(1) (N, 1), of shapes (N,).
 
     As in ``armtempo_board/stepgen/time_law.py``.
