@@ -11,7 +11,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.cli import main
 from armtempo.diagnosis import machine
 from armtempo.diagnosis.finding import Level
-from armtempo.ports.listing import Port
+from armtempo.ports.board_port import Port
 from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
 from click.testing import CliRunner

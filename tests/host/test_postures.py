@@ -13,7 +13,8 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.cli.posture import NamedPosture
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import arm_json, posture_text, shipped
+from armtempo.model import arm_json, shipped
+from armtempo.model import taught as posture_text
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner, via_points

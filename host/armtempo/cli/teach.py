@@ -14,7 +14,8 @@ from armtempo.basics.settings import ARM, ProjectSettings, nothing_set
 from armtempo.cli import chosen, jog, keys, options
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
-from armtempo.model import job_text, posture, posture_text, shipped
+from armtempo.model import posture, shipped
+from armtempo.model import taught as posture_text
 from armtempo.model.arm import Arm
 from armtempo.robot.board import Board
 
@@ -169,7 +170,7 @@ class TaughtPoints:
 
     def save(self, file: Path) -> None:
         """Write the job; InputError for fewer than two points."""
-        text = job_text.of_points(job_text.name_of(file), self.points_deg)
+        text = posture_text.of_points(posture_text.name_of(file), self.points_deg)
         replace_text(file, text)
         click.echo(
             f"written: {file}, {len(self.points_deg)} via points; 'armtempo plan --job {file}' plans it"

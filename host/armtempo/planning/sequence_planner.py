@@ -19,7 +19,6 @@ from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, planner, via_points
-from armtempo.planning.line import line_move
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
@@ -141,7 +140,7 @@ class _Compiler:
             to = target.angles_deg if target else pose
             assert to is not None
             try:
-                found = line_move.straight_line(self.arm, here.angles_deg, to, step.speed_mm_s, self.progress)
+                found = planner.straight_line(self.arm, here.angles_deg, to, step.speed_mm_s, self.progress)
             except ArmtempoError as error:
                 raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
             self._known[key] = self._add(found)
