@@ -2,7 +2,7 @@
 
     python -m tests.benchmark.rooms [--first 0] [--count 1000]
 
-Straight motions of arms that ship, links of random radii, boxes and walls. Distances are taken at 1500 times of each
+Straight motions of arms that ship, links and loads of random radii, boxes. Distances are taken at 1500 times of each
 motion between points on the links and the boxes; what moves less than that between samples is allowed for. Exits with 1
 where a motion is accepted that touches, or more than 2 % are refused that do not.
 """
@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm
+from armtempo.model.parts import Load
 from armtempo.model.room import ArmRoom, KeepOut
 from armtempo.planning import point_to_point, room_check
 from armtempo.splines.trajectory import Trajectory
@@ -43,14 +44,19 @@ def random_room(seed: int) -> tuple[Arm, Trajectory]:
             boxes.append(KeepOut(f"box {number}", tuple(centre - half), tuple(centre + half)))
         radius = float(rng.choice([0.0, 0.01, 0.04])) * reach
         joints = tuple(replace(joint, radius_mm=radius) for joint in arm.joints)
-        arm = replace(arm, joints=joints, room=ArmRoom(tuple(boxes)))
+        load = None
+        if rng.random() < 0.5:
+            figures = reach * rng.uniform(0.0, (0.05, 0.2))
+            centre = tuple(map(float, 0.1 * reach * rng.uniform(-1.0, 1.0, 3)))
+            load = Load("random", 0.0, *map(float, figures), "xyz"[rng.integers(3)], centre)
+        arm = replace(arm, joints=joints, room=ArmRoom(tuple(boxes)), held=load)
         if not room_check.posture_touches(arm, start):
             return arm, point_to_point.straight("random", start, end, arm)
     raise AssertionError("no posture is free")
 
 
 def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
-    """Least distance of the links from the boxes at this many times, less the radius."""
+    """Least distance of the links, and of what is held, from the boxes at this many times, less the radius."""
     driven = trajectory(np.linspace(0.0, trajectory.duration_s, count))
     angles = np.tile([joint.home_deg for joint in arm.joints], (count, 1)).astype(float)
     angles[:, list(arm.driven_indices)] = driven
@@ -74,6 +80,10 @@ def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
         pose[:, :3, 1] = np.cos(alpha) * across + np.sin(alpha) * z
         pose[:, :3, 2] = np.cos(alpha) * z - np.sin(alpha) * across
         pose[:, :3, 3] = out[:, :, -1]
+    if load := arm.held:
+        held = np.tile(np.array(load.centre_mm)[:, None], (1, _POINTS))
+        held["xyz".index(load.along)] += load.length_mm * (part - 0.5)
+        least = min(least, _least(arm, pose[:, :3, :3] @ held + pose[:, :3, 3:]) - load.radius_mm)
     return least
 
 

@@ -244,7 +244,7 @@ def test_a_sound_link_is_called_so(tmp_path: Path) -> None:
     found = board_state.read(client, "pipe")
     assert "link      OK: no damaged messages, no lost samples" in state.lines(found)
     worse = state.lines(replace(found, frames_bad=3, samples_lost=2))
-    assert "link      messages damaged 3 times, 2 samples lost: check cable and plugs" in worse
+    assert "link      3 damaged messages, 2 lost samples: check cable and plugs" in worse
 
 
 def test_a_misspelt_key_is_guessed() -> None:

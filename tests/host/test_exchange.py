@@ -160,7 +160,8 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = run(main, ["import", "feed.csv", "--name", "again"])
     assert made.exit_code == 0, made.output
     assert re.match(
-        r"15 lines thinned to \d+ via points: .* within 0.1 deg; the times are planned anew\n", made.output
+        r"15 lines reduced to \d+ via points: .* within 0.1 deg; 'armtempo plan' computes new times\n",
+        made.output,
     )
     assert Job.load("again.toml", ARM).timing == "shared"
     assert run(main, ["import", "feed.csv", "--name", "again"]).exit_code == 0  # the same content

@@ -13,7 +13,7 @@ from armtempo.kinematics.dynamics import GRAVITY_M_S2, joint_torques
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.model.parts import Dynamics, Joint, JointModel
+from armtempo.model.parts import Dynamics, Joint, JointModel, Load
 from armtempo.model.plan import Plan
 from armtempo.planning import planner, torque
 from armtempo.planning.planner import slower
@@ -128,6 +128,20 @@ def test_power_is_the_change_of_energy_and_what_friction_takes(name: str) -> Non
         lost = sum(b.friction_nm * abs(v) + b.viscous_nm_s * v * v for b, v in zip(body, speed, strict=True))
         change_of_energy = np.gradient(energy(arm, np.degrees(angles), step), step)[3]
         assert power - lost == pytest.approx(change_of_energy, rel=1e-5, abs=1e-5)
+
+
+def test_a_load_weighs_as_a_row_of_its_own_would() -> None:
+    arm = loaded("ar4")
+    load = Load(
+        "part", 0.7, centre_mm=(10.0, -20.0, 40.0), inertia_kg_m2=(0.02, 0.03, 0.04, 1e-3, 2e-3, 3e-3)
+    )
+    body = Dynamics(load.mass_kg, load.centre_mm, load.inertia_kg_m2)
+    still = Joint("load", 0.0, 0.0, 0.0, 0.0, (-0.001, 0.001), dynamics=body)
+    motion = np.random.default_rng(SEED).uniform(-2.0, 2.0, (3, 20, len(arm.joints)))
+    found = joint_torques(replace(arm, loads=(load,)).holding("part"), *motion)
+    with_row = np.concatenate([motion, np.zeros((3, 20, 1))], axis=2)
+    wanted = joint_torques(replace(arm, joints=(*arm.joints, still)), *with_row)[:, :-1]
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
 
 
 def weighty(curve: tuple[tuple[float, float], ...] = ((0.0, 0.5), (60.0, 0.4))) -> Plan:

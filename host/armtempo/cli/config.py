@@ -1,4 +1,4 @@
-"""``armtempo config`` and ``ports``: what is set and where that comes from, and where a board may be."""
+"""``armtempo config`` and ``ports``: the settings with their sources, and the serial ports."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def config(
 
 
 def _unset_port(found: dict[str, Setting]) -> str:
-    """What happens where no port is set."""
+    """The text for a port that is not set."""
     if found[settings.PORT]:
         return ""
     try:

@@ -1,4 +1,4 @@
-"""The board program's sources on this machine, and their hash, with which that of a board is compared."""
+"""The board program's sources on this machine, and their hash, which is compared with a board's."""
 
 from __future__ import annotations
 

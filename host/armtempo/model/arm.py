@@ -17,7 +17,7 @@ from armtempo.basics.toml_table import Table
 from armtempo.model import boards, outputs_file, parts_file, pin_use, room, shipped, tool_pose
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
-from armtempo.model.parts import DrivenJoint, Driver, Joint, Limits, Motor, Safety
+from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
 from armtempo.model.room import ArmRoom
 from armtempo.model.tool_pose import Pose
@@ -47,6 +47,10 @@ class Arm:
     """In the order of the file; the board knows nothing of them."""
     room: ArmRoom | None = field(default=None, metadata=json_codec.ADDED)
     """Where it may move; the board knows nothing of it."""
+    loads: tuple[Load, ...] = field(default=(), metadata=json_codec.ADDED)
+    """What its tool may hold; the board knows nothing of them."""
+    held: Load | None = field(default=None, metadata=json_codec.ADDED)
+    """What it holds; see ``holding``."""
     homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
     """Names of the joints that are homed first, together those of an entry; the others follow one by one."""
 
@@ -125,9 +129,22 @@ class Arm:
         outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
         postures = top.table("posture")
         around = room.read(top.table("room"))
+        loads = parts_file.loads(top)
         homing = parts_file.homing(top, [joint.name for joint in joints])
         top.done()
-        arm = cls(name, joints, driver, safety, top.file, board, outputs, inputs, room=around, homing=homing)
+        arm = cls(
+            name,
+            joints,
+            driver,
+            safety,
+            top.file,
+            board,
+            outputs,
+            inputs,
+            room=around,
+            loads=loads,
+            homing=homing,
+        )
         if not postures:
             return arm
         return replace(arm, postures=tuple(read_posture(postures, name, arm) for name in postures.names()))
@@ -156,6 +173,12 @@ class Arm:
     def input(self, name: str) -> int:
         """The number of an input, from 0; InputError if the arm has none of this name."""
         return self._number("input", name, [entry.name for entry in self.inputs])
+
+    def holding(self, load: str | None) -> Arm:
+        """The arm with a load of its file in its tool, "", "nothing" or None: with none; InputError for another."""
+        if not load or load == NOTHING:
+            return self if self.held is None else replace(self, held=None)
+        return replace(self, held=self.loads[self._number("load", load, [each.name for each in self.loads])])
 
     def _number(self, what: str, name: str, names: list[str]) -> int:
         if name in names:

@@ -66,6 +66,8 @@ class Job:
     speed_mm_s: float | None = field(default=None, metadata=json_codec.ADDED)
     acceleration_mm_s2: float | None = field(default=None, metadata=json_codec.ADDED)
     """Limits of the tool on all ways."""
+    holds: str = field(default="", metadata=json_codec.ADDED)
+    """The load of the arm that the tool holds; "": none, and in a sequence what it holds there."""
     path: str = field(default="through", metadata=json_codec.ADDED)
     """``"through"``: the spline of Eqs. (13) and (14); ``"free"``: it may bend between the via points."""
     corridor_deg: float | None = field(default=None, metadata=json_codec.ADDED)
@@ -156,6 +158,7 @@ class Job:
             ways=ways,
             speed_mm_s=tool_way.limit(top, "speed_mm_s"),
             acceleration_mm_s2=tool_way.limit(top, "acceleration_mm_s2"),
+            holds=held(top, arm),
             path=top.choice("path", PATHS, cls.path),
             corridor_deg=_corridor(top, "corridor_deg"),
             corridor_mm=_corridor(top, "corridor_mm"),
@@ -198,6 +201,16 @@ class Job:
     def paper(cls, arm: Arm | Path | str | None = None) -> Job:
         """The job that ships with armtempo: the paper's feeding motion, for its arm or ``arm``."""
         return cls.load(shipped.job_path(), arm or shipped.arm_path())
+
+
+def held(top: Table, arm: Arm) -> str:
+    """``holds``: a load of the arm, or "nothing"; "" where it is not given."""
+    name = top.text("holds") if top.has("holds") else ""
+    try:
+        arm.holding(name)
+    except InputError as error:
+        raise InputError(f"{top.file}: {top.place}holds: {error.problem}", error.hint) from None
+    return name
 
 
 def _corridor(top: Table, key: str) -> float | None:

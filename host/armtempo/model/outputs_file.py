@@ -23,17 +23,18 @@ _MAX_ANGLE_DEG = 3600.0
 
 def outputs(top: Table) -> tuple[Output, ...]:
     """The outputs of a file; InputError, naming file, key and value, for what is not allowed."""
-    return tuple(_output(name, table) for name, table in _named(top, "output", MAX_OUTPUTS))
+    return tuple(_output(name, table) for name, table in named(top, "output", MAX_OUTPUTS))
 
 
 def inputs(top: Table) -> tuple[Input, ...]:
     """The inputs of a file; raises as ``outputs``."""
-    return tuple(_input(name, table) for name, table in _named(top, "input", MAX_INPUTS))
+    return tuple(_input(name, table) for name, table in named(top, "input", MAX_INPUTS))
 
 
-def _named(top: Table, key: str, most: int) -> list[tuple[str, Table]]:
+def named(top: Table, key: str, most: int | None = None) -> list[tuple[str, Table]]:
+    """The tables [key.NAME] of a file, of which the board takes ``most``; raises as ``outputs``."""
     found = top.named_tables(key)
-    if len(found) > most:
+    if most is not None and len(found) > most:
         raise InputError(f"{top.file}: {len(found)} tables [{key}.NAME]", f"the board has room for {most}")
     for name, _ in found:
         if not _NAME.fullmatch(name):

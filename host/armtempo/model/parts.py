@@ -14,6 +14,8 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.part import check, key
 
 LEVELS = ("low", "high")
+NOTHING = "nothing"
+"""What an arm holds that holds no load."""
 _LEAST_LIMIT = 0.001
 _MOST_US = 500.0
 Curve = tuple[tuple[float, float], ...]
@@ -148,7 +150,7 @@ class Dynamics:
     """What a row of the table carries, and the friction of its joint."""
 
     mass_kg: float = field(
-        metadata=key("of the link with all that is fixed to it: motors, the tool and what it holds", 0.0, 1e3)
+        metadata=key("of the link with all that is fixed to it: motors, the tool", 0.0, 1e3)
     )
     centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Its centre of mass in the frame after the row."""
@@ -162,6 +164,32 @@ class Dynamics:
     def __post_init__(self) -> None:
         """InputError for figures that no link has."""
         check(self)
+
+
+@checked_fields
+@dataclass(frozen=True)
+class Load:
+    """What the tool may hold: its mass, and the capsule that contains it, in the frame after the last row."""
+
+    name: str
+    mass_kg: float = field(default=0.0, metadata=key("of it", 0.0, 1e3))
+    radius_mm: float = field(default=0.0, metadata=key("of the capsule that contains it", 0.0, 1e4))
+    length_mm: float = field(
+        default=0.0, metadata=key("of the capsule, between the centres of its ends; 0: a ball", 0.0, 1e4)
+    )
+    along: str = field(
+        default="z", metadata=key("axis of the tool along which the capsule lies", choices=("x", "y", "z"))
+    )
+    centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of the capsule, and of mass."""
+    inertia_kg_m2: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """As of ``Dynamics``."""
+
+    def __post_init__(self) -> None:
+        """InputError for figures that nothing has."""
+        check(self)
+        if self.name == NOTHING:
+            raise InputError(f"[load.{NOTHING}]: {NOTHING!r} means no load", "choose another name")
 
 
 @checked_fields
@@ -185,7 +213,7 @@ class Joint:
     """The drive is on the link before the previous one and turns this link by a parallelogram: the angle
     is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
     radius_mm: float = field(default=0.0, metadata=json_codec.ADDED)
-    """Of the link about its d and its a; what it holds included."""
+    """Of the link about its d and its a."""
     dynamics: Dynamics | None = field(default=None, metadata=json_codec.ADDED)
 
 

@@ -19,6 +19,7 @@ from armtempo.model.parts import (
     JointModel,
     Limits,
     LimitSwitches,
+    Load,
     Motor,
     Safety,
     is_curve,
@@ -90,9 +91,26 @@ def joint(table: Table, number: int) -> Joint:
 def _dynamics(table: Table | None) -> Dynamics | None:
     if table is None:
         return None
-    x, y, z = table.numbers("centre_mm", 3, *[] if table.peek("mass_kg") else [(0.0,) * 3])
-    xx, yy, zz, xy, xz, yz = table.numbers("inertia_kg_m2", 6, (0.0,) * 6)
-    return part.read(Dynamics, table, centre_mm=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
+    centre = table.numbers("centre_mm", 3, *[] if table.peek("mass_kg") else [(0.0,) * 3])
+    return part.read(Dynamics, table, centre_mm=centre, inertia_kg_m2=_inertia(table))
+
+
+def _inertia(table: Table) -> tuple[float, ...]:
+    return table.numbers("inertia_kg_m2", 6, (0.0,) * 6)
+
+
+def loads(top: Table) -> tuple[Load, ...]:
+    """The tables [load.NAME]."""
+    return tuple(
+        part.read(
+            Load,
+            table,
+            name=name,
+            centre_mm=table.numbers("centre_mm", 3, (0.0,) * 3),
+            inertia_kg_m2=_inertia(table),
+        )
+        for name, table in outputs_file.named(top, "load")
+    )
 
 
 def _home(table: Table, low: float, high: float) -> float:

@@ -90,6 +90,11 @@ class Plan:
         return f"<Plan {self.job.name!r} for {self.arm.name!r}: {len(self.via_deg)} via points, {self.total_s:.3f} s>"
 
     @property
+    def holding(self) -> Arm:
+        """The arm with what it holds in this motion."""
+        return self.arm.holding(self.job.holds)
+
+    @property
     def total_s(self) -> float:
         """The motion time: when the last joint arrives, seconds."""
         return self.trajectory.duration_s

@@ -16,7 +16,7 @@ from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
 from armtempo.model import tool_way
 from armtempo.model.arm import Arm, read_posture
-from armtempo.model.job import Job, is_name, name_of, read_angles
+from armtempo.model.job import Job, held, is_name, name_of, read_angles
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.steps import (
@@ -26,6 +26,7 @@ from armtempo.model.steps import (
     STOP,
     Count,
     Goto,
+    Hold,
     Repeat,
     RunMotion,
     SetOutput,
@@ -38,7 +39,7 @@ from armtempo.model.steps import (
 LONGEST_NAME = 20
 """Of a sequence: its motions are stored as NAME-1, NAME-2 …, within the board's 24 characters."""
 HOME = "home"
-_KINDS = ("goto", "run", "output", "wait_s", "wait_input", "count", "repeat", "end", "call")
+_KINDS = ("goto", "run", "output", "holds", "wait_s", "wait_input", "count", "repeat", "end", "call")
 
 
 def is_sequence(path: Path | str) -> bool:
@@ -161,7 +162,7 @@ class _Reader:
     def _kind(self, table: Table, index: int) -> str:
         table.known(*_KINDS, "to", "active", "timeout_s", "on_timeout")
         kinds = [key for key in _KINDS if table.has(key)]
-        if kinds == ["output", "wait_s"]:
+        if kinds[:1] == ["output"] and set(kinds) <= {"output", "holds", "wait_s"}:
             return "output"
         if len(kinds) == 1:
             return kinds[0]
@@ -215,7 +216,7 @@ class _Reader:
         return self.motions[path]
 
     def output(self, table: Table, step: int) -> list[Step]:
-        only(table, "output", "to", "wait_s")
+        only(table, "output", "to", "wait_s", "holds")
         name, place = table.text("output"), _place(table)
         _placed(place, self.arm.output, name)
         to = table.peek("to")
@@ -224,10 +225,15 @@ class _Reader:
         _placed(f"{place}to: ", self.arm.outputs[self.arm.output(name)].raw, to)
         table.known("to")
         found: list[Step] = [SetOutput(name, to, where=place, step=step)]
+        found += self.holds(table, step) if table.has("holds") else []
         return found + (self.wait(table, step) if table.has("wait_s") else [])
 
+    def holds(self, table: Table, step: int) -> list[Step]:
+        only(table, "holds", "output", "to", "wait_s")
+        return [Hold(held(table, self.arm), where=_place(table), step=step)]
+
     def wait(self, table: Table, step: int) -> list[Step]:
-        only(table, "output", "to", "wait_s")
+        only(table, "output", "to", "wait_s", "holds")
         return [Wait(table.number("wait_s", least=0.001, most=MOST_S), where=_place(table), step=step)]
 
     def wait_input(self, table: Table, step: int) -> list[Step]:
@@ -273,6 +279,7 @@ _GETTERS: dict[str, _Getter] = {
     "goto": _Reader.goto,
     "run": _Reader.run,
     "output": _Reader.output,
+    "holds": _Reader.holds,
     "wait_s": _Reader.wait,
     "wait_input": _Reader.wait_input,
     "count": _Reader.count,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -85,9 +85,17 @@ class SequencePlan:
     counters: tuple[str, ...]
     """Their names, by their number in the rows."""
     versions: Mapping[str, str]
+    loads: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
+    """What the tool holds in each leg; "": nothing."""
 
     def __repr__(self) -> str:
         return f"<SequencePlan {self.name!r} for {self.arm.name!r}: {len(self.rows)} rows, {len(self.legs)} motions>"
+
+    @property
+    def loaded_legs(self) -> list[tuple[Arm, Trajectory]]:
+        """Each leg with the arm as it is loaded there."""
+        loads = self.loads or ("",) * len(self.legs)
+        return [(self.arm.holding(load), leg) for load, leg in zip(loads, self.legs, strict=False)]
 
     @property
     def start_deg(self) -> tuple[float, ...] | None:

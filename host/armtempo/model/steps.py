@@ -71,6 +71,14 @@ class SetOutput(Placed):
 
 @checked_fields
 @dataclass(frozen=True)
+class Hold(Placed):
+    """The tool holds a load of the arm from now on; "nothing": none."""
+
+    load: str
+
+
+@checked_fields
+@dataclass(frozen=True)
 class Wait(Placed):
     """Wait for a time."""
 
@@ -134,7 +142,7 @@ class Repeat(Placed):
             )
 
 
-Step = Goto | RunMotion | SetOutput | Wait | WaitInput | Count | Repeat
+Step = Goto | RunMotion | SetOutput | Hold | Wait | WaitInput | Count | Repeat
 
 
 def _check_wait(wait_s: float) -> None:

@@ -97,7 +97,7 @@ def from_urdf(urdf: Path) -> ArmText:
     from armtempo.new_arm import urdf_reader as reader
 
     chain = reader.read(urdf, None, None)
-    return _checked(arm_text.arm_text(chain, fitting.fit(chain), urdf.name))
+    return _checked(arm_text.arm_text(chain, fitting.fit(chain), urdf))
 
 
 def from_joints(name: str, joints: Sequence[JointEntry], modified: bool = False) -> ArmText:

@@ -36,6 +36,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     ``progress`` raises ends the planning.
     """
     checks.limits_of(arm)
+    holding = arm.holding(job.holds)
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
     way = free_plan.motion if checks.is_free(job) else through_plan.motion
@@ -49,7 +50,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
-    room_check.check(arm, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
+    room_check.check(holding, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
     return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())
 
 
@@ -84,10 +85,11 @@ def straight_line(
     end: Sequence[float] | Pose,
     speed_mm_s: float | None = None,
     progress: Progress | None = None,
+    holds: str = "",
 ) -> Trajectory:
     """A single straight line of the tool from a posture (J,) to another one, or to a pose; errors as in ``plan``.
 
-    ``speed_mm_s``: the tool's limit.
+    ``speed_mm_s``: the tool's limit; ``holds``: the load of the arm in it.
     """
     target = end if isinstance(end, Pose) else tuple(map(float, end))
     job = Job(
@@ -95,6 +97,7 @@ def straight_line(
         via=(tuple(map(float, start_deg)), target),
         ways=(ToolWay(1, line=True, speed_mm_s=speed_mm_s),),
         refine=_LINE_REFINE,
+        holds=holds,
     )
     return plan(arm, job, progress).trajectory
 

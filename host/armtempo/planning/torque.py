@@ -143,7 +143,7 @@ def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan
     factor, low, high = 1.0, 0.0, math.inf
     for number in range(_TRIES):
         found = planner.plan(_scaled(arm, factor), job, part(progress, number, _TRIES))
-        least = least_margin(found.arm, found.trajectory)
+        least = least_margin(found.holding, found.trajectory)
         if least is not None and least.margin < ENOUGH:
             high, short = factor, f"{least.joint}: {least.words}"
         elif best is not None and found.total_s > best.total_s * (1.0 - _PAYS):

@@ -1,4 +1,4 @@
-"""Messages over a socket: one line of JSON each, UTF-8; what may be asked for, and what each field must be."""
+"""Messages over a socket, one line of JSON each, UTF-8; the requests, their fields and the fields' types."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class LineReader:
     def read(self) -> Message | None:
         """The next message; None at the end of the connection.
 
-        Raises LinkError for what is no message, TimeoutError as the socket's time-out says, OSError if the
+        Raises LinkError for an invalid message, TimeoutError after the socket's time-out, OSError if the
         connection breaks.
         """
         while b"\n" not in self._data:
@@ -51,7 +51,7 @@ class LineReader:
 
 
 def to_line(message: Message) -> bytes:
-    """A message as it is sent."""
+    """A message as bytes to send."""
     return json.dumps(message, allow_nan=False, separators=(",", ":")).encode() + b"\n"
 
 
@@ -70,7 +70,7 @@ def _no_number(word: str) -> None:
 
 
 class Field:
-    """One field of a request: ``words`` say what it must be, ``fits`` whether a value is that."""
+    """One field of a request: ``words`` describe its values, ``fits`` tests one."""
 
     def __init__(self, words: str, fits: Callable[[Any], bool], needed: bool = True) -> None:
         self.words = words
@@ -118,12 +118,12 @@ REQUESTS: Mapping[str, Fields] = {
 
 
 def is_id(value: object) -> bool:
-    """Whether a value can be the ``id`` of a request: the answer must be able to repeat it."""
+    """Whether a value is allowed as the ``id`` of a request, which the answer repeats."""
     return type(value) is int or _is_text(value)
 
 
 def check(request: Message, fields: Fields) -> None:
-    """Raise LinkError if the fields of a request are not as the table says."""
+    """Raise LinkError if the fields of a request do not fit the table."""
     name = request["request"]
     for field, wanted in fields.items():
         if field not in request:

@@ -79,7 +79,7 @@ def evaluate(folder: Path) -> Evaluation:
     if not usable:
         raise RunFolderError(f"{folder}: contains no samples", "run it again")
     found = complaints(run)
-    arm = plan.arm if plan else _arm(run, found)
+    arm = plan.holding if plan else _arm(run, found)
     return Evaluation(run, trajectory, arm, plan, analysis.curves(usable, trajectory), tuple(found))
 
 

@@ -1,4 +1,4 @@
-"""The arm as the board knows it: its record, in what that differs from another, and the positions of the joints."""
+"""The arm's record on the board, its differences from another, and the positions of the joints."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ _LOSES = "after which the position is unknown"
 
 
 def configure(client: Client, arm: Arm, replace: bool) -> None:
-    """Make sure the board has this arm's record; where it is new, positions are unknown.
+    """Send the arm's record to the board, unless the board already has it; positions are unknown afterwards.
 
-    ``replace``: also in the place of another record; where that differs in limits alone, the board keeps the
-    positions. Raises LinkError if the board has another record and ``replace`` is false, InputError where
-    the arm does not fit the board, which keeps the one it has, BoardError if it is moving.
+    ``replace``: replace another record; if only limits differ, the board keeps the positions. Raises
+    LinkError if the board has another record and ``replace`` is false, InputError if the arm does not fit the
+    board (which then keeps its record), BoardError during a motion.
     """
     data = encode.arm_record(arm)
     if client.info.arm_crc == wire.record_crc(data):
@@ -70,7 +70,7 @@ def _other_arm(arm: Arm, old: bytes, new: bytes) -> LinkError:
 def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:
     """Declare the arm's position: ``angles_deg`` (J,), or the arm file's home posture.
 
-    Raises InputError for a posture that does not fit the arm, BoardError if the board is moving.
+    Raises InputError for a posture that does not fit the arm, BoardError during a motion.
     """
     posture = point_to_point.posture(arm.home_deg if angles_deg is None else angles_deg, arm)
     client.home([round(steps) for steps in posture * _steps_per_deg(arm)])
@@ -88,7 +88,7 @@ def home_unknown(client: Client, arm: Arm) -> None:
 
 
 def posture_deg(client: Client, arm: Arm) -> Array:
-    """Where the joints are by the steps commanded, degrees (J,); LinkError if that is unknown."""
+    """Joint angles from the commanded steps, degrees (J,); raises LinkError if a position is unknown."""
     status = client.status()
     unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
     if unknown:
@@ -100,7 +100,7 @@ def posture_deg(client: Client, arm: Arm) -> Array:
 
 
 def is_at(client: Client, arm: Arm, target_deg: Array) -> bool:
-    """Whether every joint is within half a step of ``target_deg`` (J,); LinkError if that is unknown."""
+    """Whether every joint is within half a step of ``target_deg`` (J,); raises LinkError if a position is unknown."""
     return bool(np.all(np.abs(posture_deg(client, arm) - target_deg) * _steps_per_deg(arm) <= 0.5))
 
 
@@ -109,7 +109,7 @@ def _steps_per_deg(arm: Arm) -> Array:
 
 
 def difference(old: bytes, new: bytes) -> str:
-    """In what a new record differs from the old one, in words."""
+    """Describe the differences between the new and the old record."""
     try:
         (old_head, old_joints, _), (new_head, new_joints, _) = armrecord.unpack(old), armrecord.unpack(new)
         wiring = [*zip(armrecord.unpack_outputs(old), armrecord.unpack_outputs(new), strict=True)]
@@ -128,7 +128,7 @@ def difference(old: bytes, new: bytes) -> str:
 
 
 def consequence(old: bytes, new: bytes) -> str:
-    """What becomes of the position, and of stored motions, where the new record replaces the old one."""
+    """Describe the consequences for the position and stored motions if the new record replaces the old one."""
     try:
         (old_head, old_joints, _), (new_head, new_joints, _) = armrecord.unpack(old), armrecord.unpack(new)
     except armrecord.ArmRecordError:
