@@ -22,7 +22,7 @@ from armtempo.basics.errors import (
 )
 from armtempo.link import traffic
 from armtempo.link.client import Client
-from armtempo.link.program_version import own_crc
+from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
@@ -145,7 +145,7 @@ def _check_program(board: Client) -> None:
                 f"the board on {board.session.transport.name} runs version {board.info.program_crc:08x} of the board "
                 f"program, installed here is {own_crc():08x}"
             ),
-            "update it: 'armtempo flash' if the program is in its firmware, else 'armtempo deploy'",
+            f"update it: {UPDATE}",
         )
 
 
