@@ -9,6 +9,8 @@ from pathlib import Path
 from armtempo_shared.program_hash import sources_crc
 
 PACKAGES = ("armtempo_board", "armtempo_shared")
+UPDATE = "'armtempo flash' if the program is in the board's firmware, else 'armtempo deploy'"
+"""What to do about another version."""
 
 
 def package_folder(name: str) -> Path:

@@ -14,7 +14,7 @@ from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
-from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, room, shipped
+from armtempo.model import boards, outputs_file, parts_file, pin_use, room, shipped, tool_pose
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
@@ -264,7 +264,7 @@ def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
     if forms == ["angles_deg"]:
         found = ArmPosture(name, table.numbers("angles_deg", len(arm.driven)))
     else:
-        found = ArmPosture(name, replace(pose_table.read(table, where), posture_deg=arm.all_home_deg))
+        found = ArmPosture(name, replace(tool_pose.from_table(table, where), posture_deg=arm.all_home_deg))
     table.done()
     if problem := arm.posture_problem(found):
         raise InputError(f"{where}: {problem}", "give a posture that the arm can take")

@@ -13,9 +13,9 @@ from armtempo.basics import json_codec, number_table, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
-from armtempo.model import pose_table, shipped, tool_way, via_table
+from armtempo.model import shipped, tool_way, via_table
 from armtempo.model.arm import Arm
-from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, Pose
+from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, Pose, from_table
 from armtempo.model.tool_way import ToolWay
 from armtempo.optimise import ALGORITHMS
 
@@ -311,7 +311,7 @@ def _via(table: Table, where: str, arm: Arm, way: ToolWay | None) -> tuple[float
         _done(table, way)
         return found
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
-    pose = pose_table.read(table, where)
+    pose = from_table(table, where)
     table.done()
     if way and way.line:  # its tolerances are those of the line
         pose = replace(pose, tolerance_mm=TOLERANCE_MM, tolerance_deg=TOLERANCE_DEG)

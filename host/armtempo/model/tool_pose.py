@@ -12,6 +12,7 @@ from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
+from armtempo.basics.toml_table import Table
 from armtempo.model import pose
 
 Rows = tuple[tuple[float, ...], ...]
@@ -35,6 +36,8 @@ TOLERANCE_MM, TOLERANCE_DEG = 0.1, 0.1
 
 SMALLEST, LARGEST_MM, LARGEST_DEG = 1e-6, 1000.0, 180.0
 """Tolerances that make sense."""
+ORIENTATIONS = ("rpy_deg", "quaternion", "approach")
+"""Keys that give an orientation in one piece; position_mm goes with one of them, with single angles, or alone."""
 
 
 @checked
@@ -133,3 +136,42 @@ class Pose:
 
 def _rows(matrix: Array) -> Rows:
     return tuple(map(tuple, matrix.tolist()))
+
+
+def from_table(table: Table, where: str) -> Pose:
+    """The pose that ``table`` gives as ``matrix`` or ``position_mm``; InputError, naming ``where``, else."""
+    found = _matrix(table, where) if table.has("matrix") else _positioned(table, where)
+    return replace(
+        found,
+        tolerance_mm=table.number("tolerance_mm", found.tolerance_mm, least=SMALLEST, most=LARGEST_MM),
+        tolerance_deg=table.number("tolerance_deg", found.tolerance_deg, least=SMALLEST, most=LARGEST_DEG),
+    )
+
+
+def _matrix(table: Table, where: str) -> Pose:
+    given = table.array("matrix", "the 4 rows of a pose, lengths in mm")
+    if len(given) != 4:
+        raise table.fail("matrix", "4 rows of 4 numbers")
+    rows = Table({f"row {n}": row for n, row in enumerate(given, 1)}, table.file, "matrix ")
+    matrix = np.array([rows.numbers(f"row {n}", 4) for n in range(1, 5)])
+    return Pose.of_matrix(pose.checked(matrix, f"{where}.matrix"))
+
+
+def _positioned(table: Table, where: str) -> Pose:
+    position = table.numbers("position_mm", 3)
+    angles = {name: table.number(f"{name}_deg") for name in WHOLE if table.has(f"{name}_deg")}
+    given = [key for key in ORIENTATIONS if table.has(key)]
+    if len(given) + bool(angles) > 1:
+        raise InputError(
+            f"{where}: {', '.join((*given, *(f'{name}_deg' for name in angles)))} cannot be given together",
+            "give position_mm alone, with one of rpy_deg, quaternion and approach, or with any of roll_deg, "
+            "pitch_deg and yaw_deg",
+        )
+    if given == ["quaternion"]:
+        matrix = pose.from_quaternion(position, table.numbers("quaternion", 4), f"{where}.quaternion")
+        return Pose.of_matrix(matrix)
+    if given == ["approach"]:
+        return Pose.of_approach(position, table.numbers("approach", 3), f"{where}.approach")
+    if given == ["rpy_deg"]:
+        angles = dict(zip(WHOLE, table.numbers("rpy_deg", 3), strict=True))
+    return Pose.of_angles(position, angles, where)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from armtempo.basics.errors import ArmtempoError
 from armtempo.diagnosis.finding import Finding, error, good, note
+from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.robot.board_state import BoardState
 
 _LEAST_HEAP = 8_000
@@ -37,7 +38,7 @@ def _program(state: BoardState) -> Finding:
     text = f"{state.program_crc:08x}, protocol {state.protocol}"
     if state.program_current:
         return good("program", f"{text}, as installed here")
-    return error("program", f"{text}, which differs from the one installed here", "armtempo deploy")
+    return error("program", f"{text}, which differs from the one installed here, {own_crc():08x}", UPDATE)
 
 
 def _room(state: BoardState) -> Finding:

@@ -1,11 +1,14 @@
-"""Writing a posture into the text of an arm file: one table is added or replaced, everything else is unchanged."""
+"""What was taught, as text: a posture in an arm file, of which everything else is unchanged; a job of via points."""
 
 from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+from armtempo_shared.limits import MAX_NAME
 
 from armtempo.basics.atomic_file import replace_text, why
 from armtempo.basics.errors import InputError
@@ -15,6 +18,14 @@ from armtempo.model.arm import Arm
 _HEADER = re.compile(r"\s*\[\[?[\w.\"' -]+\]\]?\s*(#.*)?")
 _ANGLES = re.compile(r"(?m)^(\s*angles_deg\s*=\s*)\[[^\]]*\]")
 _MARK = "\ufeff"
+_HEAD = """\
+# Via points that were taught with 'armtempo teach'; every key: armtempo help files
+name = "{name}"
+"""
+_VIA = """
+[[via]]
+angles_deg = [{angles}]
+"""
 
 
 def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool) -> None:
@@ -123,3 +134,22 @@ def _parsed(text: str, path: Path) -> dict[str, Any]:
         return _content(text)
     except ValueError as error:
         raise InputError(f"{path}: not valid TOML: {error}", "correct that place") from None
+
+
+def name_of(path: Path) -> str:
+    """The name of a job in a file, made of the file's."""
+    name = "".join(
+        letter if letter.isascii() and (letter.isalnum() or letter in "-_") else "-" for letter in path.stem
+    )
+    return name[:MAX_NAME].strip("-") or "taught"
+
+
+def of_points(name: str, points_deg: Sequence[Sequence[float]]) -> str:
+    """The job through via points, each (J,) in degrees; InputError for fewer than two."""
+    if len(points_deg) < 2:
+        raise InputError(
+            f"{len(points_deg)} via point{'' if len(points_deg) == 1 else 's'} make no motion, so no job was written",
+            "take at least 2, where the arm stands differently",
+        )
+    vias = [_VIA.format(angles=", ".join(f"{angle:.12g}" for angle in row)) for row in points_deg]
+    return "".join([_HEAD.format(name=name), *vias])
