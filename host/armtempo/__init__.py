@@ -121,7 +121,7 @@ if TYPE_CHECKING:
     from armtempo.model.tool_pose import Pose
     from armtempo.model.tool_way import ToolWay
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
-    from armtempo.ports.listing import find_ports
+    from armtempo.ports.board_port import find_ports
     from armtempo.report.sequence_reader import SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
@@ -144,7 +144,7 @@ _HOMES = {
     ),
     "armtempo.kinematics.many": ("inverse_many",),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
-    "armtempo.ports.listing": ("find_ports",),
+    "armtempo.ports.board_port": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job", "Stop"),
     "armtempo.model.outputs": ("Input", "Output"),

@@ -13,7 +13,7 @@ from typing import Any, Self
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortGivenUpError
 from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
-from armtempo.ports.lines import LineReader, Message, to_line
+from armtempo.ports.messages import LineReader, Message, to_line
 
 HUNG_S = 2.0
 """A program that has not answered ``hello`` for this long counts as hanging."""

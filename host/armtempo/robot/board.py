@@ -42,6 +42,7 @@ from armtempo.robot import (
 )
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.by_hand import HandGuided
+from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardInput, BoardOutput
@@ -51,7 +52,6 @@ from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.stored_motion import TURN_S
-from armtempo.robot.where import Where, posture_deg
 
 
 @checked
