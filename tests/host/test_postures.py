@@ -50,9 +50,9 @@ def test_a_posture_is_read_and_found_by_name(tmp_path: Path) -> None:
     ("more", "said"),
     [
         ("[posture.home]\nangles_deg = [0, 0, 0]", "posture.home: 'home' is the posture"),
-        ("[posture.P1]\nangles_deg = [0, 0, 0]", "posture.P1: 'P1' means a via point"),
-        ("[posture.nan]\nangles_deg = [0, 0, 0]", "posture.nan: 'nan' is no name"),
-        ("[posture.'1st']\nangles_deg = [0, 0, 0]", "posture.1st: '1st' is no name"),
+        ("[posture.P1]\nangles_deg = [0, 0, 0]", "posture.P1: 'P1' is the name of a job's via point"),
+        ("[posture.nan]\nangles_deg = [0, 0, 0]", "posture.nan: 'nan' is not a valid name"),
+        ("[posture.'1st']\nangles_deg = [0, 0, 0]", "posture.1st: '1st' is not a valid name"),
         ("[posture.park]\nangles_deg = [0, 0]", "posture.park.angles_deg"),
         ("[posture.park]\nangles_deg = [0, 500, 0]", "posture.park: joint 2: 500 degrees is outside"),
         ("[posture.park]\nangle_deg = [0, 0, 0]", "posture.park: exactly one of"),
