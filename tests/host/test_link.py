@@ -171,7 +171,7 @@ def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(pipe.app.controller.board.engine, "freeze", lambda: None)
     begin_s = pipe.clock()
     pipe.run_samples = 10_000
-    with pytest.raises(LinkError, match="does not; switch off"):
+    with pytest.raises(LinkError, match="still moves; switch off"):
         stored_motion.stop(board, now=False)
     assert pipe.clock() - begin_s < 15.0
 

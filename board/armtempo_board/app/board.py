@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _BOOT_BYTES = const(4)
-MOTION_CODE_BYTES = const(14_500)
-"""The large pieces of the code that only a motion needs."""
 NEVER_MS = const((1 << 30) - 1)
 
 
@@ -80,21 +78,9 @@ class Board:
         self._store = None
 
     def make_engine(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
-        """For an arm, as ``armrecord.unpack`` gives it.
-
-        Where memory is short, what stays lies next to pieces that a motion's code needs.
-        """
+        """For an arm, as ``armrecord.unpack`` gives it."""
         gc.collect()
-        if self.workspace.is_short:
-            heap.hold(MOTION_CODE_BYTES)
-        try:
-            self.engine = Engine(EngineParts(head, joints, self.workspace))
-        except MemoryError:  # rather an arm whose motions may be refused for want of a large piece than none
-            heap.release()
-            gc.collect()
-            self.engine = Engine(EngineParts(head, joints, self.workspace))
-        finally:
-            heap.release()
+        self.engine = Engine(EngineParts(head, joints, self.workspace))
 
     # what it knows
 

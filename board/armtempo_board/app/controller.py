@@ -17,7 +17,6 @@ from armtempo_shared.messages import RESUME, SAMPLE_BRAKING, START_HELD, START_H
 from micropython import const
 
 from armtempo_board import features, heap
-from armtempo_board.app.board import MOTION_CODE_BYTES
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -213,8 +212,6 @@ class Controller:
         """
         heap.collect_often(heap.OFTEN if self.board.workspace.is_short else heap.SELDOM)
         self.tidy()
-        if self.board.workspace.is_short:
-            heap.hold(MOTION_CODE_BYTES)  # before anything that the start needs can lie there
         try:
             motion = self.load(name, crc)
             self.tidy()
@@ -224,8 +221,6 @@ class Controller:
             self._withdraw_assumed()
             heap.collect_often()
             raise
-        finally:
-            heap.release()
         self.start_loaded(motion, flags)
 
     def start_loaded(self, motion: "MotionFile", flags: int) -> None:

@@ -165,13 +165,9 @@ class Engine:
         limits = None if self.skip_check else self.limits
         duration_ticks = start_check.check_start(motion, self.drives, limits, self.known)
         del start_check
-        heap.release()
         heap.tidy()
-        try:
-            from armtempo_board.stepgen.override import Override
-        except MemoryError:  # what the first attempt left free lies otherwise
-            gc.collect()
-            from armtempo_board.stepgen.override import Override
+        from armtempo_board.stepgen.override import Override
+
         override = Override()
         override.begin(rate, motion, duration_ticks)
         if override.end_ticks() > LONGEST_RUN_TICKS:

@@ -15,8 +15,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import room_check
 from armtempo.planning.free import free_plan
-from armtempo.planning.planned import Planned
 from armtempo.planning.room_check import Bodies, Touch
+from armtempo.planning.through_plan import Planned
 
 _ROUNDS = 5
 """Motions that are planned at most, each along the way found more closely."""
