@@ -231,7 +231,7 @@ def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
 
 REFUSED = [
     ("two_ends", [], ["choose with --tip", ": tool (j1, j2, j3), l2 (j1, j2), camera (j1, j2), l1 (j1)\n"]),
-    ("wheel", [], ["'wheel' turn without end, as wheels do"]),
+    ("wheel", [], ["turning without end, as wheels do: 'wheel';"]),
     ("gripper", ["--tip", "right_finger"], ["joint 'right': it mimics 'left'"]),
     ("gripper", ["--tip", "thumb"], ["has no link 'thumb' for --tip", "left_finger"]),
     ("gripper", ["--base", "hand", "--tip", "l1"], ["no chain leads from link 'hand' to 'l1'"]),

@@ -47,7 +47,10 @@ def test_board_on_a_port(tmp_path: Path) -> None:
 def test_stored_motion_keeps_its_place_in_a_sim_folder(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
     armtempo("upload", file, "--port", "sim:flash", cwd=tmp_path)
-    assert "samples-01.csv: complete" in armtempo("run", "small", "--port", "sim:flash", cwd=tmp_path)
+    done = commandline.run("run", "small", "--port", "sim:flash", folder=tmp_path)
+    assert "samples-01.csv: complete" in done.output
+    assert done.errors.count("started for this command: its arm begins at home") == 1
+    assert "started for this command" not in done.output
 
 
 def test_board_set_up_for_another_arm(tmp_path: Path) -> None:

@@ -339,7 +339,7 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert found.data["arm_file"] == ["joint 1: encoder: direction = 1"]
     lines = {line.what: (line.verdict, line.measured.split(",")[0]) for line in found.lines}
     assert lines == {
-        "joint 1: direction": (Level.GOOD, "as the arm file has it"),
+        "joint 1: direction": (Level.GOOD, "as in the arm file"),
         "joint 1: encoder": (Level.ERROR, "-9 counts for 28 steps"),
         "the switch at the low end of joint 1": (Level.GOOD, "stopped the joint"),
         "the switch at the high end of joint 1": (Level.ERROR, "not seen"),

@@ -1,4 +1,4 @@
-"""Writing a file whole or not at all, and nothing over what should be kept."""
+"""Writing a file completely or not at all, without overwriting files that should be kept."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from armtempo.basics.errors import InputError
 
 
 def replace_text(path: Path, text: str, newline: str | None = None) -> None:
-    """Write a file aside and put it in place of the old one, so that it is never half there.
+    """Write a temporary file and rename it, so that the file is never incomplete.
 
-    ``newline``: as of ``open``; "" leaves the ends of lines as they are. A link stays one; a pipe or a device, such as
-    /dev/stdout, is written to. Raises InputError if it cannot be written; what was there before stays.
+    ``newline``: as in ``open``. A symbolic link is followed; a pipe or a device, such as /dev/stdout, is
+    written directly. Raises InputError if it cannot be written; the old file is kept.
     """
     try:
         if path.exists() and not path.is_file():
@@ -26,7 +26,7 @@ def replace_text(path: Path, text: str, newline: str | None = None) -> None:
 
 
 def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
-    """Raise InputError where ``target`` is a file that is read here: inputs are never written."""
+    """Raise InputError if ``target`` is one of the ``inputs``: inputs are never overwritten."""
     for file in inputs:
         with suppress(OSError):
             if file and target.exists() and os.path.samefile(target, file):
@@ -36,9 +36,9 @@ def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
 
 
 def check_replaceable(target: Path, text: str, force: bool, rule: str = "") -> None:
-    """Raise InputError where ``target`` is there with other content than ``text``, unless ``force``.
+    """Raise InputError if ``target`` exists with content other than ``text``, unless ``force``.
 
-    ``rule``: when it is replaced without, in words.
+    ``rule``: when it is replaced without ``force``, for the message.
     """
     if force or not target.is_file() or _holds(target, text):
         return

@@ -1,7 +1,6 @@
-"""Dataclasses to JSON values and back; reading refuses what the types do not describe.
+"""Dataclasses to JSON values and back; reading refuses values that do not fit the types.
 
-A key that is missing is refused too, but for a field marked ``ADDED``: files from before it was there are read with
-its default.
+A missing key is refused, except for a field marked ``ADDED``: files written before it existed get its default.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from armtempo.basics.text import did_you_mean, visible
 
 _AGAIN = "restore the file from a copy, or make it again with the command that wrote it"
 ADDED = {"added": True}
-"""Metadata of a dataclass field that older files do not have; its default is what they meant."""
+"""Metadata of a dataclass field that older files do not have; they get its default."""
 
 
 def encode(value: Any) -> Any:
@@ -37,7 +36,7 @@ def encode(value: Any) -> Any:
 
 
 def decode(kind: Any, value: Any, where: str) -> Any:
-    """The ``value`` read from JSON as an object of type ``kind``.
+    """Convert a ``value`` read from JSON to an object of type ``kind``.
 
     ``where`` names the place for the message. Raises InputError for a missing or unknown key, or a value of
     another type.
@@ -71,7 +70,7 @@ def _plain(kind: Any, value: Any, where: str) -> Any:
 def _union(kind: Any, value: Any, where: str) -> Any:
     tables = [option for option in get_args(kind) if dataclasses.is_dataclass(option)]
     if len(tables) == 1 and isinstance(value, dict):
-        return decode(tables[0], value, where)  # its error says more
+        return decode(tables[0], value, where)  # its error is more specific
     for option in get_args(kind):
         try:
             return decode(option, value, where)

@@ -1,4 +1,4 @@
-"""Tables of numbers as text: commas, semicolons or tabs between the columns, a header line or none."""
+"""Text tables of numbers: columns separated by commas, semicolons or tabs, with or without a header line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
 
 _SEPARATORS = (";", "\t", ",")
-"""In this order: with the first two a comma may be the decimal one."""
+"""Tried in this order; with the first two, a comma may be the decimal separator."""
 
 
 @dataclass(frozen=True)
@@ -19,13 +19,13 @@ class NumberTable:
     """The cells of a table; ``header`` is None if the first line is all numbers."""
 
     path: Path | str
-    """Its file, or what it is, in words."""
+    """Its file, or a description."""
     header: list[str] | None
     rows: list[tuple[int, list[str]]]
     """Line number from 1, and its cells."""
 
     def numbers(self, columns: list[int]) -> list[list[float]]:
-        """These columns of every row; InputError names the line and the value that is no finite number."""
+        """These columns of every row; raises InputError, with line and value, for a cell that is no finite number."""
         return [self._row(number, row, columns) for number, row in self.rows]
 
     def _row(self, number: int, row: list[str], columns: list[int]) -> list[float]:
@@ -44,7 +44,7 @@ class NumberTable:
 
 
 def read(path: Path) -> NumberTable:
-    """The table in a text file, as ``of_text``. InputError if it cannot be read."""
+    """The table in a text file, as ``of_text``; raises InputError if it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -55,7 +55,7 @@ def read(path: Path) -> NumberTable:
 
 
 def of_text(text: str, path: Path | str) -> NumberTable:
-    """The table in a text that comes from ``path``; empty lines are left out. InputError if it is not a table."""
+    """The table in a text from ``path``; skips empty lines. Raises InputError if it is not a table."""
     separator = _separator(text)
     try:
         lines = list(enumerate(csv.reader(text.splitlines(), delimiter=separator), 1))
@@ -72,7 +72,7 @@ def _separator(text: str) -> str:
 
 
 def _pointed(row: list[str], separator: str) -> list[str]:
-    """The cells with decimal points, where the comma does not separate them."""
+    """The cells with decimal points, if the comma is not the separator."""
     return row if separator == "," else [cell.replace(",", ".") for cell in row]
 
 

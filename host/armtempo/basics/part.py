@@ -1,4 +1,4 @@
-"""A table of a TOML file as a dataclass: each field says once what its key means and what it may be."""
+"""A table of a TOML file as a dataclass: each field has the meaning and the allowed values of its key."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Key:
-    """What a key means, as the reference page says it, and its least and largest value or its choices."""
+    """The meaning of a key, for the reference page, and its least and largest value or its choices."""
 
     meaning: str
     least: float = -math.inf
@@ -60,7 +60,7 @@ def _value(table: Table, one: Field[Any], known: Key) -> Any:
 
 
 def check(part: DataclassInstance) -> None:
-    """InputError for a value that no file could have either."""
+    """Raise InputError for a value that would be refused in a file."""
     for one, known in keys(part):
         value = getattr(part, one.name)
         said = f"{type(part).__name__}: {one.name} is"

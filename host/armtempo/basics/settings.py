@@ -1,4 +1,4 @@
-"""ProjectSettings of the commands, and where each comes from: an option, a variable, the project folder, a default."""
+"""Settings of the commands, and the source of each: an option, a variable, the project folder, a default."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Setting:
     value: str
     """"" if nothing is set."""
     source: str
-    """Where it comes from, in words; "" if nothing is set."""
+    """Description of its source; "" if nothing is set."""
 
     @property
     def path(self) -> Path:
@@ -35,9 +35,10 @@ class Setting:
 
 
 class ProjectSettings:
-    """What is set in ``folder``, or the current one: an option wins over a variable, that over the project folder.
+    """The settings in ``folder`` (default: the current folder): an option overrides a variable, that the
+    project folder.
 
-    Raises InputError where ``armtempo.toml`` is not as it should be.
+    Raises InputError if ``armtempo.toml`` is invalid.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -53,7 +54,7 @@ class ProjectSettings:
         return None
 
     def get(self, name: str, given: str | Path | None = None) -> Setting:
-        """The setting of that name; ``given``: what the option says, if it was given."""
+        """The setting ``name``; ``given``: the option's value, if given."""
         if given is not None and str(given):
             return Setting(name, str(given), OPTIONS[name])
         variable = variable_of(name)
@@ -72,10 +73,10 @@ class ProjectSettings:
 
     @cached_property
     def _in_file(self) -> dict[str, str]:
-        """What ``armtempo.toml`` sets; its paths are relative to it."""
+        """The settings in ``armtempo.toml``; its paths are relative to it."""
         if self.file is None:
             return {}
-        from armtempo.basics import toml_table  # takes a while, and most commands have no project folder
+        from armtempo.basics import toml_table  # slow to import, and most commands have no project folder
 
         table = toml_table.read(_near(self.file))
         found = {name: table.text(name) for name in NAMES if table.has(name)}
@@ -90,7 +91,7 @@ def variable_of(name: str) -> str:
 
 
 def nothing_set(name: str, what: str) -> InputError:
-    """The error where a command needs a setting and nothing gives it; ``what``: it needs what for what."""
+    """The error if a needed setting is missing; ``what``: the error's text."""
     return InputError(
         what,
         f'give {OPTIONS[name]}, or set {variable_of(name)}, or write {name} = "…" into an {FILE} '
@@ -105,7 +106,7 @@ def _from_file(file: Path, name: str, value: str) -> str:
         and not Path(value).suffix
         and not (file.parent / value).exists()
     ):
-        return value  # the name of an arm that ships
+        return value  # the name of a shipped arm
     if name != PORT:
         return _beside(file, value)
     kind, colon, folder = value.partition(":")
@@ -113,12 +114,12 @@ def _from_file(file: Path, name: str, value: str) -> str:
 
 
 def _beside(file: Path, value: str) -> str:
-    """A path relative to the file, as seen from the current folder."""
+    """A path relative to the file, made relative to the current folder."""
     return str(_near(file.parent) / Path(value).expanduser())
 
 
 def _near(path: Path | None) -> Path:
-    """A path as short as it can be said from here."""
+    """The shortest path from the current folder."""
     assert path is not None
     try:
         short = os.path.relpath(path)

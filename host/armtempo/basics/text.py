@@ -1,4 +1,4 @@
-"""Text for people: without characters that steer a terminal, in columns, and what a misspelt word may mean."""
+"""Text output: escaped control characters, columns, suggestions for misspelt words."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 
 
 def is_plain(text: str) -> bool:
-    """Whether a name has only characters that show: no control, format or line-breaking characters."""
+    """Whether a name has only printable characters: no control, format or line-breaking characters."""
     return text.isprintable()
 
 
 def visible(text: str) -> str:
-    r"""The text with control and format characters spelt out, such as ``\x1b``; line ends stay."""
+    r"""The text with control and format characters escaped, such as ``\x1b``; line ends are kept."""
     return "".join(
         char if char.isprintable() or char == "\n" else char.encode("unicode_escape").decode("ascii")
         for char in text
@@ -30,24 +30,24 @@ def aligned(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> list[str]:
 
 
 _LIKELY, _SURE = 0.6, 0.8
-"""Least similarity, as ``difflib`` measures it: for a question, for a statement."""
+"""Least similarity (of ``difflib``) for a suggestion, and for a statement."""
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """A question for the nearest known word, to stand after an error; "" if none is near."""
+    """A question with the most similar known word, to append to an error; "" if none is similar."""
     near = _nearest(word, known, _LIKELY)
     return f"; did you mean {near!r}?" if near else ""
 
 
 def misspelt(word: str, found: Iterable[str]) -> str:
-    """The one of the words found that is most surely ``word``, with a letter wrong or two exchanged; else ""."""
+    """The word in ``found`` that is most probably a misspelt ``word``; "" if none is."""
     words = list(found)
     exchanged = [other for other in words if sorted(other) == sorted(word)]
     return exchanged[0] if exchanged else _nearest(word, words, _SURE)
 
 
 def _nearest(word: str, known: Iterable[str], least: float) -> str:
-    import difflib  # takes a while, and most words are known
+    import difflib  # imported here: it takes a while, and most words are known
 
     found = difflib.get_close_matches(word, list(known), 1, least)
     return found[0] if found else ""

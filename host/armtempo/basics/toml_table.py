@@ -23,7 +23,7 @@ def read(path: Path | str) -> Table:
     Raises InputError if the file is missing, unreadable or not TOML.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
+        text = Path(path).read_text(encoding="utf-8-sig")  # some editors begin a file with a byte order mark
     except FileNotFoundError:
         raise InputError(f"{path}: no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -38,7 +38,10 @@ def parse(text: str, file: str) -> Table:
     """The top table of TOML text; ``file`` names it in messages. Raises InputError if it is not TOML."""
     try:
         return Table(tomllib.loads(text), file)
-    except (ValueError, RecursionError) as error:  # not all of tomllib's are its own: numbers of 5000 digits
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # tomllib also raises other errors, for numbers of 5000 digits
         raise InputError(
             f"{file}: not valid TOML: {error}",
             "'armtempo import' makes a job file of a table"
@@ -48,7 +51,7 @@ def parse(text: str, file: str) -> Table:
 
 
 def typed(text: str) -> Any:
-    """The value that was typed: a number, true or false, or a list if it is one in TOML, else the text."""
+    """The value of a typed text: a number, boolean or list if it is one in TOML, else the text."""
     try:
         value = tomllib.loads(f"x = {text}")
     except (ValueError, RecursionError):
@@ -66,7 +69,7 @@ class Table:
         self._asked: list[str] = []
 
     def fail(self, key: str, allowed: str) -> InputError:
-        """The error for a key: say what it has and what is allowed."""
+        """The error for a key, with its value and what is allowed."""
         name = f"{self.place}{key}"
         if key not in self._values:
             return InputError(
@@ -76,7 +79,7 @@ class Table:
         return InputError(f"{self.file}: {name} = {value} is not allowed", f"give {allowed}")
 
     def _misspelt(self, key: str) -> str:
-        """A note on a key that is there and may be meant."""
+        """A note about a similar key in the table; "" if there is none."""
         near = misspelt(key, [other for other in self._values if other not in self._asked])
         return f"; {self.place}{near} is there: is it misspelt?" if near else ""
 
@@ -85,7 +88,7 @@ class Table:
         return key in self._values
 
     def peek(self, key: str) -> Any:
-        """The value as given, unchecked, or None; for one that may be of several kinds."""
+        """The unchecked value, or None; for keys that allow several types."""
         return self._values.get(key)
 
     def is_text(self, key: str) -> bool:
@@ -93,11 +96,11 @@ class Table:
         return isinstance(self._values.get(key), str)
 
     def names(self) -> tuple[str, ...]:
-        """Its keys, in the order of the file."""
+        """The table's keys, in the order of the file."""
         return tuple(self._values)
 
     def known(self, *keys: str) -> None:
-        """These keys may be there, whether a getter asks for them or not."""
+        """Allow these keys, even if no getter reads them."""
         self._asked.extend(keys)
 
     def _get(self, key: str, default: Any, allowed: str) -> Any:
@@ -134,7 +137,7 @@ class Table:
     def choice(
         self, key: str, choices: Sequence[Any], default: Any = _REQUIRED, allowed: str | None = None
     ) -> Any:
-        """One of ``choices``; ``allowed`` says in words what they are, where there are many."""
+        """One of ``choices``; ``allowed``: their description in the message, if there are many."""
         allowed = allowed or "one of " + ", ".join(repr(choice) for choice in choices)
         value = self._get(key, default, allowed)
         if not any(type(value) is type(choice) and value == choice for choice in choices):
@@ -179,7 +182,7 @@ class Table:
         return Table(value, self.file, f"{self.place}{key}.")
 
     def named_tables(self, key: str) -> list[tuple[str, Table]]:
-        """The tables [key.NAME] with their names, in the order of the file; none where the key is not given."""
+        """The tables [key.NAME] with their names, in the order of the file; empty if the key is not given."""
         outer = self.table(key)
         if outer is None:
             return []
@@ -191,7 +194,7 @@ class Table:
         return found
 
     def tables(self, key: str, called: Callable[[int], str] | None = None) -> list[Table]:
-        """A list of tables ([[key]]), at least one; ``called``: what a message calls each, by its number from 0."""
+        """A list of tables ([[key]]), at least one; ``called``: the name of each in messages, by its number from 0."""
         entries = self.array(key, f"a list of tables, [[{key}]]")
         if not all(isinstance(entry, dict) for entry in entries):
             raise self.fail(key, f"a list of tables, [[{key}]]")
@@ -219,7 +222,7 @@ class Table:
 
 
 def _is_number(value: Any) -> bool:
-    """A finite number, and no whole one beyond the largest double."""
+    """Whether it is a finite number, and no integer beyond the largest double."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= sys.float_info.max

@@ -91,9 +91,7 @@ class LazyGroup(click.Group):
         """Run the command; an error that the user can correct is one message, without a traceback."""
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
-                stream.reconfigure(
-                    errors="replace"
-                )  # a character that the code page lacks must not end a command
+                stream.reconfigure(errors="replace")  # the code page may lack a character
         as_json = "--json" in [*ctx._protected_args, *ctx.args]
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads make work on matrices this small slower
         try:

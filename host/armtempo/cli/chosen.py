@@ -222,7 +222,7 @@ def board(
     log = given.log_traffic
     found = opened(given.port, arm, log_traffic=log, sink=sink, any_program=any_program, tell=remark)
     if found.info.virtual:
-        remark(f"port {found.port}: {virtual_words(found.port)}")
+        remark(f"port {found.port}: {_virtual_words(found.port)}")
     return found
 
 
@@ -256,7 +256,7 @@ def board_state(given: BoardOptions) -> BoardState:
                 continue
 
 
-def virtual_words(port: str) -> str:
+def _virtual_words(port: str) -> str:
     """Describe the virtual board on a port."""
     if port == SIM:
         return "a virtual board, which ends with this command"

@@ -23,9 +23,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.pose import to_quaternion, to_rpy_deg
 
 
-@click.command(
-    "fk", context_settings={"ignore_unknown_options": True}
-)  # "-10,20,30" is a posture, not an option
+# "-10,20,30" is a posture, not an option
+@click.command("fk", context_settings={"ignore_unknown_options": True})
 @click.argument("where", nargs=-1)
 @options.job
 @options.arm

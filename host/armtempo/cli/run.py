@@ -87,7 +87,7 @@ def run_and_tell(
 
     ``as_json``: print the result as JSON, and the progress to stderr.
     """
-    virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
+    virtual = "a virtual board" if board.info.virtual else ""
     with Live(window=live, where=virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
     results.show(as_json, run.to_json(), text_summary.result_lines(run.results))

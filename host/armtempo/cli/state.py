@@ -11,6 +11,7 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
+from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.model.arm import Arm
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 
@@ -47,8 +48,8 @@ def _named(found: BoardState, arm_path: Path | None) -> BoardState:
 
 def lines(state: BoardState) -> list[str]:
     """The board, its state, and the joints' positions."""
-    virtual = f", {chosen.virtual_words(state.port)}" if state.virtual else ""
-    current = "" if state.program_current else "; differs from the one installed here: 'armtempo deploy'"
+    virtual = ", a virtual board" if state.virtual else ""
+    current = "" if state.program_current else f"; installed here is {own_crc():08x}: {UPDATE}"
     return [
         f"board     {state.board_id}{virtual}",
         f"port      {state.port}",

@@ -49,7 +49,7 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
         with ProgressBar("uploading") as progress:
             board.upload(motion, default=as_default, progress=progress, replace=force)
         virtual = board.info.virtual
-        where = f" on {chosen.virtual_words(board.port)}" if virtual else ""
+        where = " on a virtual board" if virtual else ""
     values = {"name": motion.name, "sequence": False, "size_bytes": len(motion.data), "virtual": virtual}
     results.show(given.as_json, values, [f"{motion.name}: {len(motion.data)} bytes stored{where}"])
 
@@ -67,7 +67,7 @@ def list_motions(given: BoardOptions) -> None:
             results.show_json({"virtual": board.info.virtual, "motions": [_listed(one) for one in found]})
             return
         arm = _arm_of(board, given.arm_path)
-        virtual = f"  on {chosen.virtual_words(board.port)}" if board.info.virtual else ""
+        virtual = "  on a virtual board" if board.info.virtual else ""
         click.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum{virtual}")
         for entry in found:
             click.echo(_row(entry))

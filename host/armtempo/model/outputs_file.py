@@ -22,7 +22,7 @@ _MAX_ANGLE_DEG = 3600.0
 
 
 def outputs(top: Table) -> tuple[Output, ...]:
-    """The outputs of a file; InputError, naming file, key and value, for what is not allowed."""
+    """The outputs of a file; raises InputError, with file, key and value, for invalid ones."""
     return tuple(_output(name, table) for name, table in named(top, "output", MAX_OUTPUTS))
 
 
@@ -88,7 +88,7 @@ def _states(output: Output, table: Table | None) -> tuple[tuple[str, float], ...
 
 
 def _safe(output: Output, table: Table) -> float:
-    """Without it: 0, which a servo has to have within its angles."""
+    """The safe value; default 0, which must be within a servo's angles."""
     names = [name for name, _ in output.states]
     if not table.has("safe") and output.kind != SERVO:
         return 0.0
@@ -117,7 +117,7 @@ def _input(name: str, table: Table) -> Input:
 
 
 def pin(table: Table, key: str = "pin", allowed: str = _PIN_WORDS) -> str:
-    """The name of a pin, such as ``"PD0"``; whether the board has it is not judged here."""
+    """The name of a pin, such as ``"PD0"``; whether the board has it is checked in ``pin_use``."""
     found = table.text(key)
     if not _PIN.fullmatch(found):
         raise table.fail(key, allowed)

@@ -181,7 +181,7 @@ def _refuse_wheels(path: Path, moving: list[Any]) -> None:
     endless = [joint.name for joint in moving if joint.type == "continuous"]
     if endless and (len(endless) == len(moving) or len(moving) <= _WHEEL_JOINTS):
         raise InputError(
-            f"{path}: {', '.join(map(repr, endless))} turn without end, as wheels do: this chain is not an arm",
+            f"{path}: turning without end, as wheels do: {', '.join(map(repr, endless))}; this chain is not an arm",
             "choose another chain with --base and --tip; a joint of an arm gets limits (type='revolute') in the URDF",
         )
 

@@ -19,8 +19,8 @@ from armtempo.panel.desk import Desk
 from armtempo.panel.live import Lines, LiveArm
 from armtempo.panel.sequence_desk import SequenceDesk
 from armtempo.robot.board import Board
+from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.stop_request import Stopped
-from armtempo.robot.where import Where, posture_deg
 
 LOOK_S = 0.25
 """Interval of the board's states while no samples come."""

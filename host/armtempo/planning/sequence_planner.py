@@ -19,7 +19,6 @@ from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, planner, room_check, via_points
-from armtempo.planning.line import line_move
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
@@ -162,7 +161,7 @@ class _Compiler:
             to = target.angles_deg if target else pose
             assert to is not None
             try:
-                found = line_move.straight_line(
+                found = planner.straight_line(
                     self.arm, here.angles_deg, to, step.speed_mm_s, self.progress, self._holds
                 )
             except ArmtempoError as error:

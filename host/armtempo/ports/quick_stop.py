@@ -1,8 +1,8 @@
-"""The beginning of ``armtempo stop``: the request is on its way before the rest of the command is imported.
+"""The beginning of ``armtempo stop``: sends the request before the rest of the command is imported.
 
-From the key press to the brake most time goes into starting Python, so this imports next to nothing: no ``typing``, no
-``socket``, no ``json`` before the request is sent (``python -m tests.benchmark.stop_latency``). What it cannot
-do, such as a board that no other program has, the command does as ever.
+Most of the time from the key press to the brake is the start of Python, so this module imports very little:
+no ``typing``, ``socket`` or ``json`` before the request is sent (``python -m tests.benchmark.stop_latency``).
+Other cases, such as a board that no other program has, are left to the command.
 """
 
 from __future__ import annotations
@@ -11,32 +11,32 @@ import os
 
 from armtempo.ports import claim_file, names
 
-TYPE_CHECKING = False  # as "typing" has it
+TYPE_CHECKING = False  # as in "typing"
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 BY = "'armtempo stop'"
-"""Who asked for the stop, as the other program says it."""
+"""Who asks for the stop, for the other program's messages."""
 ANSWER_S = 8.0
 _HELLO_S = 2.0
 _PROJECT_FILE = "armtempo.toml"
 
 
 class StopAnswer:
-    """What the program that has the port answered. (A data class would take 10 ms to import.)"""
+    """The answer of the program that has the port. (A data class would take 10 ms to import.)"""
 
     def __init__(self, moved: bool, program: str) -> None:
-        """``program``: who it is, in words."""
+        """``program``: its description."""
         self.moved = moved
         self.program = program
 
 
 _answers: dict[tuple[str, bool], StopAnswer] = {}
-"""By the port's name and ``now``."""
+"""Answers by the port's name and ``now``."""
 
 
 def send(arguments: Sequence[str]) -> None:
-    """Pass a stop on to the program that has the port, if the arguments after ``stop`` are plain ones."""
+    """Send a stop to the program that has the port, if the arguments after ``stop`` are simple."""
     now, port = "--now" in arguments, os.environ.get("ARMTEMPO_PORT", "")
     rest = [word for word in arguments if word not in ("--now", "--json")]
     if len(rest) == 2 and rest[0] == "--port":
@@ -50,16 +50,16 @@ def send(arguments: Sequence[str]) -> None:
         if claim:
             _pass_on(claim, now)
     except (OSError, ValueError, KeyError, TypeError):
-        return  # the command meets the same, and says so
+        return  # the command meets the same error and reports it
 
 
 def take_answer(port: str, now: bool) -> StopAnswer | None:
-    """What ``send`` was answered for this port; None if it has not asked."""
+    """The answer to ``send`` for this port; None if it did not ask."""
     return _answers.pop((names.same_for_all(port), now), None)
 
 
 def _claim(port: str) -> list[str]:
-    """The fields of the claim to a port; where none is named, of the only claim there is; else nothing."""
+    """The fields of the claim to a port (default: of the only claim); empty if there is none."""
     found = [fields for fields in map(claim_file.read, claim_file.paths()) if fields]
     if not port:
         found = [fields for fields in found if _lives(int(fields[4]))]
@@ -69,7 +69,7 @@ def _claim(port: str) -> list[str]:
 
 
 def _lives(pid: int) -> bool:
-    """Whether there is such a process, as far as that can be told."""
+    """Whether the process exists, if that can be determined."""
     if os.name == "posix":
         try:
             os.kill(pid, 0)
@@ -79,7 +79,7 @@ def _lives(pid: int) -> bool:
 
 
 def _port_of_project() -> str:
-    """The port of the nearest ``armtempo.toml``, by its full path; "" if there is none, or it names none."""
+    """The port in the nearest ``armtempo.toml``, as a full path; "" if none is set."""
     place = os.getcwd()
     while not os.path.isfile(os.path.join(place, _PROJECT_FILE)):
         if place == os.path.dirname(place):
@@ -96,7 +96,7 @@ def _port_of_project() -> str:
 
 
 def _pass_on(claim: list[str], now: bool) -> None:
-    """Ask, and keep the answer."""
+    """Send the request, and keep the answer."""
     name, _, _, program, pid, number, address, token, version = claim
     said = f'{{"id":1,"request":"hello","version":{version},"token":"{token}"}}\n'
     asked = f'{{"id":2,"request":"stop","now":{"true" if now else "false"},"by":"{BY}"}}\n'
@@ -106,7 +106,7 @@ def _pass_on(claim: list[str], now: bool) -> None:
 
         caller.remember_hanging(number)
         return
-    import json  # it brakes by now
+    import json  # the board is braking now
 
     answer = json.loads(lines[1])
     if answer.get("ok"):
@@ -114,8 +114,8 @@ def _pass_on(claim: list[str], now: bool) -> None:
 
 
 def _answers_of(address: str, requests: str) -> list[bytes]:
-    """The two lines that come back; none where nothing comes, because the other program hangs."""
-    import _socket  # of every CPython; "socket" around it takes several ms to import
+    """The two answered lines; empty if the other program hangs."""
+    import _socket  # part of CPython; its wrapper "socket" takes several ms to import
 
     local = address.isdecimal()
     connection = _socket.socket(_socket.AF_INET if local else _socket.AF_UNIX, _socket.SOCK_STREAM)
