@@ -272,9 +272,11 @@ class Controller:
             """The next run begins as planned again: what a host wanted for it is used up, or that host is gone."""
             self._next_rate = _PERMILLE
 
-    def hold(self) -> None:
-        """A held run is still wanted."""
-        self._hold_ms = time.ticks_ms()
+    if features.JOG:
+
+        def hold(self) -> None:
+            """A held run is still wanted."""
+            self._hold_ms = time.ticks_ms()
 
     def measure_free(self) -> None:
         """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
