@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -53,6 +53,9 @@ from armtempo.runs.sequence_reader import SequenceRun
 from armtempo.selftest import selftest
 from armtempo.selftest.result import SelfTest
 
+_MOST_REPETITIONS = 99
+"""Their files are numbered with two digits."""
+
 
 @checked
 class Board:
@@ -82,11 +85,16 @@ class Board:
         """Free the port; a virtual board ends. Nothing else can be done with this object then."""
         with self._last_turn():
             self._stack.close()
-            self.client.session.check = self._closed
 
-    def _last_turn(self) -> AbstractContextManager[bool]:
-        """While no other thread is within a command: it would open a port again that was closed under it."""
-        return self.client.session.in_a_hurry(TURN_S)
+    @contextmanager
+    def _last_turn(self) -> Iterator[None]:
+        """While no other thread is within a command: it would open a port again that was closed under it.
+
+        One that waits longer, for a cable that is out, finds that the board is closed.
+        """
+        with self.client.session.in_a_hurry(TURN_S):
+            self.client.session.check = self._closed
+            yield
 
     def _closed(self) -> None:
         raise LinkError(f"the board on {self.port} was closed", "open it again with armtempo.connect")
@@ -325,7 +333,7 @@ class Board:
         watcher: Watcher | None = None,
         stop: StopRequest | None = None,
     ) -> Run:
-        """Replay a motion ``repeat`` times and record what comes back in a new run folder below ``out``.
+        """Replay a motion ``repeat`` times, up to 99, and record what comes back in a new run folder below ``out``.
 
         ``motion``: a plan, its file (FILE.json), or the name of a motion on the board. The arm must be homed and be
         where the motion begins, else LinkError, as where the board keeps another motion under its name (``upload``
@@ -334,8 +342,8 @@ class Board:
         motion; ``watcher`` sees folder, samples and repetitions. Whatever ends the run early raises, and what was
         recorded until then is ``last_run``.
         """
-        if repeat < 1:
-            raise InputError(f"repeat = {repeat} is not allowed", "give 1 or more")
+        if not 1 <= repeat <= _MOST_REPETITIONS:
+            raise InputError(f"repeat: {repeat} is not in the range 1<=x<={_MOST_REPETITIONS}", "change it")
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._stoppable(stop) as wanted:
