@@ -26,7 +26,7 @@ _ENDING = ".mpy"
 
 
 class Archive:
-    """As MicroPython wants a file system, as far as imports need it."""
+    """A file system for MicroPython with the methods that imports need."""
 
     def __init__(self) -> None:
         with open(_FILE, "rb") as file:
@@ -39,7 +39,7 @@ class Archive:
         """The same."""
 
     def stat(self, path: str) -> "tuple[int, ...]":
-        """Whether a module or a folder is there; OSError."""
+        """Status of a module or folder; raises OSError if it does not exist."""
         if self._offset(path):
             return (_REGULAR,) + (0,) * 9
         if self._find(path[_BEFORE:] + "/") < 0:
@@ -58,7 +58,7 @@ class Archive:
         return deflate.DeflateIO(file, deflate.ZLIB, 0, True)
 
     def _offset(self, path: str) -> int:
-        """Where a module begins, 0: it is not there."""
+        """Offset of a module; 0: it does not exist."""
         name = path[_BEFORE : -len(_ENDING)] + " "
         at = self._find(name)
         if at < 0 or not path.endswith(_ENDING):
@@ -67,7 +67,7 @@ class Archive:
         return int(self._index[begin : self._index.find(b"\n", begin)])
 
     def _find(self, text: str) -> int:
-        """Where a line of the index begins so, or -1."""
+        """Place of a line of the index with this beginning, or -1."""
         at = self._index.find(b"\n" + text.encode())
         return at + 1 if at >= 0 else -1
 
