@@ -3,10 +3,10 @@
 A motion from the arm file to the report::
 
     arm = armtempo.Arm.load("my_arm.toml")          # or Arm.paper(), the shipped one
-    job = armtempo.Job.load("my_job.toml", arm)     # or Job("mine", via_deg=[[0, -60, 40], [30, -20, 10]])
-    plan = armtempo.plan(arm, job)                  # plan.trajectory(time_s, order), plan.total_s, plan.save(…)
+    job = armtempo.Job.load("my_job.toml", arm)     # or Job("mine", via_deg=[[0, -60, 40], …])
+    plan = armtempo.plan(arm, job)                  # plan.trajectory(time_s), plan.save(…)
     with armtempo.connect("/dev/ttyACM0") as board: # or "sim", a virtual board
-        board.home(arm)                             # declares that the arm is at home; nothing moves
+        board.home(arm)                             # says that it is there; nothing moves
         run = board.run(plan, repeat=3)
     run.report()                                    # run.samples: a structured array
 

@@ -274,9 +274,11 @@ class Controller:
             """Reset the rate of the next run: the host's value was used, or that host is gone."""
             self._next_rate = _PERMILLE
 
-    def hold(self) -> None:
-        """A held run is still wanted."""
-        self._hold_ms = time.ticks_ms()
+    if features.JOG:
+
+        def hold(self) -> None:
+            """A held run is still wanted."""
+            self._hold_ms = time.ticks_ms()
 
     def measure_free(self) -> None:
         """Update ``free_flash`` and ``free_heap``; takes milliseconds, so not during a motion."""

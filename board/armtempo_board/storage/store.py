@@ -14,12 +14,11 @@ from binascii import crc32, hexlify
 from armtempo_shared import codes
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
 from armtempo_shared.messages import ARM_RECORD_NAME
-from armtempo_shared.motion import MotionError
 from micropython import const
 
 from armtempo_board import features
 from armtempo_board.errors import Refused
-from armtempo_board.storage.motion_file import MotionFile, stated_crc
+from armtempo_board.storage import motion_file
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -40,6 +39,8 @@ _SEQUENCE_MAGIC = (
     b"ATS"  # of every version, as in armtempo_shared.sequence, which is loaded for sequences only
 )
 _PIECE = const(512)
+_0, _9, _A, _Z = const(0x30), const(0x39), const(0x61), const(0x7A)  # letters, small
+_SMALL = const(0x20)
 _MOST_FREE = const(0x3FFFFFFF)
 
 
@@ -52,8 +53,8 @@ def _motion_file(name: str) -> str:
     """The file of a motion; raises Refused for an invalid name."""
     if not 0 < len(name) <= MAX_NAME:
         raise Refused(codes.BAD_NAME)
-    for letter in name:
-        if not ("a" <= letter <= "z" or "A" <= letter <= "Z" or "0" <= letter <= "9" or letter in "-_"):
+    for byte in name.encode():  # letters as strings would each be a name that MicroPython keeps
+        if not (_A <= byte | _SMALL <= _Z or _0 <= byte <= _9 or byte in b"-_"):
             raise Refused(codes.BAD_NAME)
     return name + _MOTION
 
@@ -181,19 +182,38 @@ class Store:
         """All bytes of a small record; refuses with NOT_FOUND, or TOO_LONG if it does not fit into memory."""
         return self._read(_file_name(name))
 
-    def motion(self, name: str) -> MotionFile:
+    def motion(self, name: str) -> motion_file.MotionFile:
         """A stored motion, with head and checksum checked."""
         return self._motion(_motion_file(name))
 
-    def is_sequence(self, name: str) -> bool:
-        """Whether the record of this name is a sequence; refuses with NOT_FOUND."""
-        if not name:
-            raise Refused(codes.NOT_FOUND)
-        return self._is_sequence(_motion_file(name))
+    if features.SEQUENCES:
 
-    def sequence(self, name: str) -> "Any":
-        """A stored sequence (``SequenceFile``), with head and checksum checked."""
-        return self._sequence(_motion_file(name))
+        def is_sequence(self, name: str) -> bool:
+            """Whether the record of this name is a sequence; refuses with NOT_FOUND."""
+            if not name:
+                raise Refused(codes.NOT_FOUND)
+            return self._is_sequence(_motion_file(name))
+
+        def sequence(self, name: str) -> "Any":
+            """A stored sequence (``SequenceFile``), with head and checksum checked."""
+            return self._sequence(_motion_file(name))
+
+        def _sequence(self, file_name: str) -> "Any":
+            from armtempo_board.storage import sequence_file  # here, so that it can be forgotten
+
+            size = self._size_of(file_name)
+            try:
+                return self._guard(sequence_file.SequenceFile, self._path(file_name), size)
+            except ValueError:  # SequenceError, or MotionError for its checksum
+                raise Refused(codes.BAD_RECORD)
+
+        def _check_sequence(self, file_name: str) -> None:
+            from armtempo_shared import sequence_check  # here, so that it can be forgotten
+
+            try:
+                sequence_check.check(self._sequence(file_name))
+            except ValueError:  # SequenceError
+                raise Refused(codes.BAD_RECORD)
 
     def size_of(self, name: str) -> int:
         """Bytes of a record; NOT_FOUND."""
@@ -316,8 +336,8 @@ class Store:
 
     def _check_motion(self, file_name: str, crc: int) -> None:
         try:
-            found = self._guard(stated_crc, self._path(file_name), self._size_of(file_name))
-        except MotionError:
+            found = self._guard(motion_file.stated_crc, self._path(file_name), self._size_of(file_name))
+        except motion_file.MotionError:
             raise Refused(codes.BAD_CHECKSUM)
         if found != crc:
             raise Refused(codes.BAD_CHECKSUM)
@@ -325,15 +345,10 @@ class Store:
 
     def _check_kind(self, file_name: str) -> None:
         """Refuse a record that is neither a motion nor a sequence."""
-        if not features.SEQUENCES or not self._is_sequence(file_name):
+        if features.SEQUENCES and self._is_sequence(file_name):
+            self._check_sequence(file_name)
+        else:
             self._motion(file_name)
-            return
-        from armtempo_shared import sequence_check  # here, so that it can be forgotten
-
-        try:
-            sequence_check.check(self._sequence(file_name))
-        except ValueError:  # SequenceError
-            raise Refused(codes.BAD_RECORD)
 
     def _is_sequence(self, file_name: str) -> bool:
         self._size_of(file_name)
@@ -343,20 +358,11 @@ class Store:
         finally:
             file.close()
 
-    def _sequence(self, file_name: str) -> "Any":
-        from armtempo_board.storage import sequence_file  # here, so that it can be forgotten
-
+    def _motion(self, file_name: str) -> motion_file.MotionFile:
         size = self._size_of(file_name)
         try:
-            return self._guard(sequence_file.SequenceFile, self._path(file_name), size)
-        except ValueError:  # SequenceError, or MotionError for its checksum
-            raise Refused(codes.BAD_RECORD)
-
-    def _motion(self, file_name: str) -> MotionFile:
-        size = self._size_of(file_name)
-        try:
-            return self._guard(MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
-        except MotionError:
+            return self._guard(motion_file.MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
+        except motion_file.MotionError:
             if not self._is_sequence(file_name):
                 raise Refused(codes.BAD_RECORD)
             raise Refused(codes.IS_SEQUENCE if features.SEQUENCES else codes.NEEDS_FIRMWARE)
