@@ -13,10 +13,9 @@ import click
 import pytest
 import serial
 from armtempo import cli
-from armtempo.basics import errors
+from armtempo.basics import errors, toml_table
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.cli import LazyGroup, state
-from armtempo.formats import toml_table
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import SerialTransport
 from armtempo.robot import board_state, speed
@@ -245,7 +244,7 @@ def test_a_sound_link_is_called_so(tmp_path: Path) -> None:
     found = board_state.read(client, "pipe")
     assert "link      OK: no damaged messages, no lost samples" in state.lines(found)
     worse = state.lines(replace(found, frames_bad=3, samples_lost=2))
-    assert "link      messages damaged 3 times, 2 samples lost: check cable and plugs" in worse
+    assert "link      3 damaged messages, 2 lost samples: check cable and plugs" in worse
 
 
 def test_a_misspelt_key_is_guessed() -> None:

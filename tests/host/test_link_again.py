@@ -117,7 +117,7 @@ def test_a_wanted_stop_shortens_the_waiting(tmp_path: Path, trouble: str) -> Non
         stop.wanted = True
 
     begin_s = pipe.clock()
-    words = {"unplug_for": "no stop could be sent", "silence_for": "told to stop and does not"}
+    words = {"unplug_for": "no stop could be sent", "silence_for": "told to stop but still moves"}
     with pytest.raises(LinkError, match=words[trouble]):
         replay(board, stored, interrupt, stop)
     assert pipe.clock() - begin_s < 20.0

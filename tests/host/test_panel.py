@@ -350,7 +350,7 @@ def test_steps_are_edited_and_comments_stay(steps: SequenceDesk) -> None:
 
 def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceDesk) -> None:
     steps.delete(3)
-    with pytest.raises(InputError, match="repeat has no end"):
+    with pytest.raises(InputError, match="repeat without an end"):
         steps.save()
     assert steps.file is not None
     assert steps.file.read_text() == SEQUENCE

@@ -19,7 +19,7 @@ from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
 from armtempo.report import comparison, plots, run_report, verdict
 from armtempo.report.evaluation import evaluate
-from armtempo.runs.run_folder import MOTION
+from armtempo.report.run_folder import MOTION
 from click.testing import CliRunner
 
 from tests import browser

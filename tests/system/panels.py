@@ -15,9 +15,9 @@ from threading import Thread
 from typing import Any, TypeVar
 
 import armtempo
+from armtempo.basics import toml_table
 from armtempo.basics.errors import LinkError
 from armtempo.deploy import package, program_files
-from armtempo.formats import toml_table
 from armtempo.model import shipped
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState

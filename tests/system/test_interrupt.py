@@ -13,8 +13,8 @@ from armtempo import simulator
 from armtempo.link import open_board
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
+from armtempo.report import run_folder, run_reader
 from armtempo.robot import arm_state
-from armtempo.runs import reader, run_folder
 from armtempo.simulator import InjectedFault, LaunchOptions, launch
 
 from tests.system import commandline
@@ -37,7 +37,7 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
         with open_board(board.port) as found:
             status = found.status()
     assert not status.moving
-    run = reader.load(tmp_path / "runs" / "small-001")
+    run = run_reader.load(tmp_path / "runs" / "small-001")
     repetition = run.meta["repetitions"][0]
     assert repetition["state"] == run_folder.INTERRUPTED
     assert len(run.repetitions[0].index) == repetition["samples"] >= 3
@@ -54,7 +54,7 @@ def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: P
         process.kill()
         process.communicate()
         assert "state" in armtempo("stop", "--port", board.port, cwd=tmp_path)
-    run = reader.load(tmp_path / "runs" / "small-001")
+    run = run_reader.load(tmp_path / "runs" / "small-001")
     assert run.repetitions[0].state == run_folder.RUNNING
     assert len(run.repetitions[0].index) >= 2
 
@@ -102,9 +102,9 @@ def test_sigterm_ends_a_run_whose_board_has_fallen_silent(tmp_path: Path) -> Non
         commandline.wait_for(lambda: samples_in(tmp_path) > 3, "the first samples")
         command.terminate()
         done = commandline.ended(command, ENDS_WITHIN_S)
-    done.said("armtempo: the board was told to stop and does not", "switch off")
+    done.said("armtempo: the board was told to stop but still moves", "switch off")
     assert done.exit_code == 1
-    assert reader.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "broken"
+    assert run_reader.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "broken"
 
 
 def test_a_second_ctrl_c_ends_it_at_once(tmp_path: Path) -> None:
@@ -121,4 +121,4 @@ def test_a_second_ctrl_c_ends_it_at_once(tmp_path: Path) -> None:
             assert not board.status().moving
     done.said("interrupted")
     assert done.exit_code == 130
-    assert reader.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "interrupted"
+    assert run_reader.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "interrupted"

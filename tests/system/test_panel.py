@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 import tomlkit
-from armtempo.formats import toml_table
+from armtempo.basics import toml_table
 from armtempo.panel import words
 
 from tests import browser

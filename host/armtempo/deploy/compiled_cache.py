@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
+from armtempo.basics import atomic_file
 from armtempo.basics.errors import InputError
-from armtempo.formats import atomic_file
 
 Files = Mapping[str, bytes]
 """By the path on the board, below the library folder."""

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from armtempo.basics.text import aligned
 from armtempo.diagnosis import drives, torque
 from armtempo.diagnosis.resolution import resolutions
-from armtempo.formats.text import aligned
 from armtempo.model.arm import Arm
 
 _HEAD = ("joint", "steps/deg", "step deg", "step at tool mm", "top steps/s", "motor rpm", "torque margin")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics.forward import array_frames
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
-from armtempo.model.parts import Dynamics
+from armtempo.model.parts import Dynamics, Load
 
 GRAVITY_M_S2 = 9.80665
 """Along the base's -z."""
@@ -21,15 +22,44 @@ _M = 1e-3
 def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) -> Array:
     """Torque in Nm that each joint needs, friction included: (N, joints); a row without ``dynamics`` weighs nothing.
 
+    What the arm holds is part of the last link.
+
     ``angles``, ``rates`` and ``rate_changes`` of all joints, each (N, joints) in rad, rad/s and rad/s^2. What a
     parallel linkage turns is counted from the link before the previous one: its rods weigh nothing.
     """
     bodies = [joint.dynamics or Dynamics(0.0) for joint in arm.joints]
+    if arm.held:
+        bodies[-1] = _with_load(bodies[-1], arm.held)
     geometry = Geometry.of(arm)
     by_row = _row_torques(geometry, bodies, angles, rates, rate_changes)
     turns = np.array(geometry.turns(list(np.eye(len(bodies)))))
     friction, damping = np.array([(body.friction_nm, body.viscous_nm_s) for body in bodies]).T
     return np.asarray(by_row @ turns + friction * np.sign(rates) + damping * rates)
+
+
+def _with_load(link: Dynamics, load: Load) -> Dynamics:
+    if not (mass := link.mass_kg + load.mass_kg):
+        return link
+    both = [
+        (each.mass_kg, _M * np.array(each.centre_mm), inertia_matrix(each.inertia_kg_m2))
+        for each in (link, load)
+    ]
+    centre, ((xx, xy, xz), (_, yy, yz), (_, _, zz)) = as_one(mass, both)
+    x, y, z = centre / _M
+    return replace(link, mass_kg=mass, centre_mm=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
+
+
+def as_one(mass: float, parts: Sequence[tuple[float, Array, Array]]) -> tuple[Array, Array]:
+    """Centre (3,) of bodies of ``mass`` in all, and their inertia (3, 3) about it.
+
+    ``parts``: mass, centre (3,) in m and inertia (3, 3) about that, of each.
+    """
+    centre = np.sum([own * place for own, place, _ in parts], axis=0) / mass
+    inertia = np.zeros((3, 3))
+    for own, place, tensor in parts:
+        away = place - centre
+        inertia += tensor + own * (away @ away * np.eye(3) - np.outer(away, away))
+    return centre, inertia
 
 
 def _row_torques(

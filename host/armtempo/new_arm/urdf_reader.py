@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError, MissingPackageError
-from armtempo.formats.atomic_file import why
 from armtempo.model.parts_file import MAX_ANGLE_DEG
 from armtempo.new_arm import urdf_bodies, urdf_tip
 from armtempo.new_arm.urdf_bodies import Body
@@ -181,7 +181,7 @@ def _refuse_wheels(path: Path, moving: list[Any]) -> None:
     endless = [joint.name for joint in moving if joint.type == "continuous"]
     if endless and (len(endless) == len(moving) or len(moving) <= _WHEEL_JOINTS):
         raise InputError(
-            f"{path}: {', '.join(map(repr, endless))} turn without end, as wheels do: this chain is not an arm",
+            f"{path}: turning without end, as wheels do: {', '.join(map(repr, endless))}; this chain is not an arm",
             "choose another chain with --base and --tip; a joint of an arm gets limits (type='revolute') in the URDF",
         )
 

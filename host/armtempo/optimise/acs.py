@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.optimise.cs import BETA, levy_scale
-from armtempo.optimise.parameters import Number, OneOf, Parameter
-from armtempo.optimise.tracker import Result, Task, Tracker
+from armtempo.optimise.task import Number, OneOf, Parameter, Result, Task, Tracker
 
 
 class Nests:

@@ -12,8 +12,7 @@ import math
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.optimise.parameters import Number, Parameter
-from armtempo.optimise.tracker import Result, Task, Tracker
+from armtempo.optimise.task import Number, Parameter, Result, Task, Tracker
 
 BETA = Number(1.5, 0.3, 1.99, "index of the Lévy distribution, Eq. (23)")
 """The index of the distribution, in the range that Mantegna gives for his method (Physical Review E 49 (5),

@@ -20,8 +20,8 @@ from armtempo.panel.operator import Needs
 from armtempo.robot.board import Board
 
 if TYPE_CHECKING:
+    from armtempo.diagnosis.selftest.result import SelfTest
     from armtempo.panel.panel_page import PanelPage
-    from armtempo.selftest.result import SelfTest
 
 _SHOWN = (
     "port",

@@ -11,6 +11,7 @@ from threading import Event as ThreadEvent
 from threading import Lock, Thread
 
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError, PortInUseError
+from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.plan import Plan
 from armtempo.panel import words
@@ -18,9 +19,8 @@ from armtempo.panel.desk import Desk
 from armtempo.panel.live import Lines, LiveArm
 from armtempo.panel.sequence_desk import SequenceDesk
 from armtempo.robot.board import Board
+from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.stop_request import Stopped
-from armtempo.robot.where import Where, posture_deg
-from armtempo.selftest.result import SelfTest
 
 LOOK_S = 0.25
 """Interval of the board's states while no samples come."""

@@ -10,9 +10,9 @@ import numpy as np
 from nicegui import run, ui
 
 from armtempo import pipeline
+from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
-from armtempo.formats import number_table
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.moved_tool import moved_tool_deg
 from armtempo.model import via_table

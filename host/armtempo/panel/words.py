@@ -81,6 +81,7 @@ STEP_KINDS = {
     "goto": "go to",
     "run": "run",
     "output": "set output",
+    "holds": "tool holds",
     "wait_s": "wait, s",
     "wait_input": "wait for input",
     "count": "count",
@@ -90,6 +91,7 @@ STEP_KINDS = {
 }
 STEP_KEYS = {
     "to": "to",
+    "holds": "tool holds",
     "wait_s": "wait, s",
     "active": "active",
     "timeout_s": "time-out, s",

@@ -60,11 +60,11 @@ def segment_distance(start: Array, end: Array, other_start: Array, other_end: Ar
         (other_start, start, way),
         (other_end, start, way),
     ):
-        best = np.minimum(best, _point_distance(point, base, along))
+        best = np.minimum(best, point_distance(point, base, along))
     return np.asarray(best)
 
 
-def _point_distance(point: Array, start: Array, way: Array) -> Array:
+def point_distance(point: Array, start: Array, way: Array) -> Array:
     """Distance of points (N, 3) from segments: (N,)."""
     square = np.sum(way**2, axis=1)
     part = np.sum((point - start) * way, axis=1)

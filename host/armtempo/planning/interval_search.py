@@ -12,7 +12,7 @@ from armtempo.basics.progress import Progress
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.parts import Limits
 from armtempo.optimise import Settings, minimise
-from armtempo.optimise.tracker import Result
+from armtempo.optimise.task import Result
 from armtempo.planning import checks, rest_to_rest
 from armtempo.planning.fitness import Fitness
 from armtempo.planning.fixed_path import FixedPath

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.planning import limit_ratios
+from armtempo.planning import limit_rows
 from armtempo.planning.collocation import Points
 from armtempo.planning.variables import Index, MotionVariables, derivative_matrix, time_basis
 
@@ -46,7 +46,7 @@ class Rows:
         return cls(np.concatenate(points), np.concatenate(slopes, axis=1), (speed, acceleration, jerk))
 
     def ratios(self, times: Array) -> Array:
-        """Their ratios to the limits, (M,), with t', t'', t''' (3, M) there; see ``limit_ratios``."""
+        """Their ratios to the limits, (M,), with t', t'', t''' (3, M) there; see ``limit_rows``."""
         t1, t2, t3 = times
         q1, q2, q3 = self.slopes
         _, a, j = self.kinds
@@ -101,7 +101,7 @@ class Rows:
 
 def _reachable(angle: Array, time: Array, limits: Array) -> list[Array]:
     """Whether a row could be reached, by its sign: three times (2, P, J)."""
-    ratios = limit_ratios.ratios(angle, time, limits)
+    ratios = limit_rows.ratios(angle, time, limits)
     points = np.arange(angle.shape[1])
     first = np.abs(angle[0]) / limits[:, 0]
     fastest = first.argmax(axis=1)

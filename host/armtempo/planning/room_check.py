@@ -18,6 +18,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 from armtempo.basics.progress import alive
 from armtempo.kinematics.chain import all_angles_deg, outline_mm
+from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.room import ArmRoom, KeepOut
@@ -52,7 +53,7 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """The links of an arm: two segments for each row of the table, along its d and its a."""
+    """The links of an arm: two segments for each row of the table, along its d and its a; and what its tool holds."""
 
     arm: Arm
 
@@ -63,13 +64,37 @@ class Bodies:
 
     @cached_property
     def names(self) -> list[str]:
-        """Of each segment, (2 joints,)."""
-        return [f"the link of {joint.name}" for joint in self.arm.joints for _ in range(2)]
+        """Of each segment, (S,)."""
+        found = [f"the link of {joint.name}" for joint in self.arm.joints for _ in range(2)]
+        return [*found, *([f"the load {self.arm.held.name}"] if self.arm.held else [])]
 
     @cached_property
     def radius_mm(self) -> Array:
-        """Of each segment, (2 joints,)."""
-        return np.repeat([joint.radius_mm for joint in self.arm.joints], 2)
+        """Of each segment, (S,)."""
+        found = np.repeat([joint.radius_mm for joint in self.arm.joints], 2)
+        return np.append(found, self.arm.held.radius_mm) if self.arm.held else found
+
+    @cached_property
+    def load_ends_mm(self) -> Array:
+        """The ends of the load's segment in the tool's frame: (2, 3), or (0, 3)."""
+        if not (load := self.arm.held):
+            return np.empty((0, 3))
+        way = np.zeros(3)
+        way["xyz".index(load.along)] = 0.5 * load.length_mm
+        return np.array(load.centre_mm) + np.stack([-way, way])
+
+    def ends(self, driven_deg: Array) -> tuple[Array, Array]:
+        """Where the segments begin and end at postures (N, J): both (S, N, 3)."""
+        angles = all_angles_deg(self.arm, driven_deg)
+        points = np.moveaxis(outline_mm(self.arm, angles), 1, 0)
+        starts, ends = points[:-1], points[1:]
+        if self.arm.held:
+            tool = forward(Geometry.of(self.arm), np.radians(angles))
+            load = tool[:, None, :3, 3] + self.load_ends_mm @ np.swapaxes(tool[:, :3, :3], 1, 2)
+            starts, ends = (
+                np.concatenate([both, load[None, :, end]]) for end, both in enumerate((starts, ends))
+            )
+        return starts, ends
 
     @cached_property
     def turned(self) -> Array:
@@ -79,8 +104,11 @@ class Bodies:
 
     @cached_property
     def reach_mm(self) -> Array:
-        """How far a segment is from the axis of a row at most, (2 joints, joints); 0 if that does not move it."""
+        """How far a segment is from the axis of a row at most, (S, joints); 0 if that does not move it."""
         lengths = np.array([(abs(joint.d_mm), abs(joint.a_mm)) for joint in self.arm.joints]).ravel()
+        lengths = np.append(lengths, np.linalg.norm(self.load_ends_mm, axis=1).max(initial=0.0))[
+            : len(self.names)
+        ]
         found = np.zeros((len(lengths), len(self.arm.joints)))
         for segment in range(len(lengths)):
             for row in range(len(self.arm.joints)):
@@ -99,34 +127,35 @@ class Bodies:
         if not self.radius_mm.any():
             return []
         found = []
-        home = outline_mm(self.arm, np.array(self.arm.all_home_deg, dtype=float))[None]
+        starts, ends = self.ends(np.array([self.arm.home_deg]))
+        row = np.minimum(
+            np.arange(len(self.radius_mm)) // 2, len(self.arm.joints) - 1
+        )  # a load is with the last
         for one in range(len(self.radius_mm)):
             for other in range(one + 1, len(self.radius_mm)):
-                between = self.turned[one // 2 + 1 : other // 2 + 1].any()
-                if other // 2 - one // 2 < 2 or not between or not self.radius_mm[[one, other]].all():
+                between = self.turned[row[one] + 1 : row[other] + 1].any()
+                if row[other] - row[one] < 2 or not between or not self.radius_mm[[one, other]].all():
                     continue
-                apart = segment_distance(home[:, one], home[:, one + 1], home[:, other], home[:, other + 1])[
-                    0
-                ]
+                apart = segment_distance(starts[one], ends[one], starts[other], ends[other])[0]
                 if apart > self.radius_mm[one] + self.radius_mm[other]:
                     found.append((one, other))
         return found
 
     def distances(self, driven_deg: Array) -> Array:
         """Of postures (N, J): moving segments from obstacles, then pairs from each other; less their radii, (N, M)."""
-        points = outline_mm(self.arm, all_angles_deg(self.arm, driven_deg))
-        found = [
-            box_distance(points[:, segment], points[:, segment + 1], box.low_mm, box.high_mm)
-            - self.radius_mm[segment]
-            for segment in self.moves
-            for box in self.obstacles
-        ]
-        for one, other in self.pairs:
-            apart = segment_distance(
-                points[:, one], points[:, one + 1], points[:, other], points[:, other + 1]
-            )
-            found.append(apart - self.radius_mm[one] - self.radius_mm[other])
-        return np.stack(found, axis=1)
+        starts, ends = self.ends(driven_deg)
+        count, found = len(driven_deg), []
+        if self.obstacles and len(self.moves):
+            flat = starts[self.moves].reshape(-1, 3), ends[self.moves].reshape(-1, 3)
+            away = np.stack([box_distance(*flat, box.low_mm, box.high_mm) for box in self.obstacles])
+            away = away.reshape(len(self.obstacles), -1, count) - self.radius_mm[self.moves, None]
+            found.append(np.swapaxes(away, 0, 1).reshape(-1, count))
+        if self.pairs:
+            one, other = np.array(self.pairs).T
+            four = (each.reshape(-1, 3) for each in (starts[one], ends[one], starts[other], ends[other]))
+            thick = self.radius_mm[one] + self.radius_mm[other]
+            found.append(segment_distance(*four).reshape(-1, count) - thick[:, None])
+        return np.concatenate(found).T
 
     @cached_property
     def named(self) -> list[tuple[str, str]]:
@@ -146,7 +175,8 @@ class Bodies:
 
 def has_room(arm: Arm) -> bool:
     """Whether there is anything that the arm may touch."""
-    return bool(arm.room and arm.room.obstacles) or sum(joint.radius_mm > 0.0 for joint in arm.joints) > 1
+    thick = sum(joint.radius_mm > 0.0 for joint in arm.joints) + bool(arm.held and arm.held.radius_mm)
+    return bool(arm.room and arm.room.obstacles) or thick > 1
 
 
 def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:

@@ -18,8 +18,7 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, planner, via_points
-from armtempo.planning.line import line_move
+from armtempo.planning import checks, planner, room_check, via_points
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
@@ -38,7 +37,6 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     """
     compiler = _Compiler(arm, progress)
     source = sequence.source or f"sequence {sequence.name!r}"
-    source = sequence.source or f"sequence {sequence.name!r}"
     start = compiler.posture(sequence.start, f"{source}: start: ") if sequence.start else _End(None, "")
     rows, _ = compiler.rows(sequence.steps, start.angles_deg, start.name)
     if not rows:
@@ -46,7 +44,13 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     check_size(len(rows), len(compiler.legs), len(compiler.counters), source)
     legs = [replace(leg, name=f"{sequence.name}-{number}") for number, leg in enumerate(compiler.legs, 1)]
     return SequencePlan(
-        arm, sequence.name, tuple(legs), tuple(rows), tuple(compiler.counters), planner.versions()
+        arm,
+        sequence.name,
+        tuple(legs),
+        tuple(rows),
+        tuple(compiler.counters),
+        planner.versions(),
+        tuple(compiler.loads),
     )
 
 
@@ -72,8 +76,12 @@ class _Compiler:
     progress: Progress | None
     legs: list[Trajectory] = field(default_factory=list)
     counters: list[str] = field(default_factory=list)
+    loads: list[str] = field(default_factory=list)
+    """What the tool holds in each leg."""
+    _holds: str = ""
+    """What it holds now."""
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
-    _plans: dict[int, Trajectory] = field(default_factory=dict)
+    _plans: dict[tuple[int, str], Trajectory] = field(default_factory=dict)
     _motions: dict[int, SourceMotion] = field(default_factory=dict)
     _depth: int = 0
 
@@ -88,10 +96,21 @@ class _Compiler:
                 rows, end = self._goto(step, end)
             elif isinstance(step, kinds.RunMotion):
                 rows, end = self._run(step, end)
+            elif isinstance(step, kinds.Hold):
+                rows = self._hold(step)
             else:
                 rows = [self._still(step)]
             found += rows
         return found, end
+
+    def _hold(self, step: kinds.Hold) -> list[SequenceRow]:
+        """The motions that follow are those with the load; the board knows nothing of it."""
+        try:
+            self.arm.holding(step.load)
+        except InputError as error:
+            raise InputError(f"{step.where}{error.problem}", error.hint) from None
+        self._holds = step.load
+        return []
 
     def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
         """The first pass comes before the others if it begins elsewhere than they do."""
@@ -118,9 +137,10 @@ class _Compiler:
         target = self._target(step)
         if here.angles_deg is None or here.angles_deg == target.angles_deg:
             return [], _End(target.angles_deg, target.name)
-        key = (here.angles_deg, target.angles_deg)
+        key = (self._holds, here.angles_deg, target.angles_deg)
         if key not in self._known:
-            self._known[key] = self._add(self._straight(step, here.angles_deg, target.angles_deg))
+            found = self._straight(step, here.angles_deg, target.angles_deg)
+            self._known[key] = self._add(found, self._holds)
         words = f"goto {target.name}"
         return [_move(self._known[key], step.step, words)], _End(target.angles_deg, target.name)
 
@@ -136,15 +156,17 @@ class _Compiler:
             )
         if target and target.angles_deg == here.angles_deg:
             return [], here
-        key = ("line", here.angles_deg, target.angles_deg if target else pose, step.speed_mm_s)
+        key = (self._holds, "line", here.angles_deg, target.angles_deg if target else pose, step.speed_mm_s)
         if key not in self._known:
             to = target.angles_deg if target else pose
             assert to is not None
             try:
-                found = line_move.straight_line(self.arm, here.angles_deg, to, step.speed_mm_s, self.progress)
+                found = planner.straight_line(
+                    self.arm, here.angles_deg, to, step.speed_mm_s, self.progress, self._holds
+                )
             except ArmtempoError as error:
                 raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
-            self._known[key] = self._add(found)
+            self._known[key] = self._add(found, self._holds)
         if target:
             end = _End(target.angles_deg, target.name)
         else:
@@ -162,9 +184,10 @@ class _Compiler:
                 f"{here.name or _words(here.angles_deg)} ({_words(here.angles_deg)})",
                 f"put a step before it that goes there: goto with the same file as run, {motion.name!r}",
             )
-        key = ("run", id(motion))
+        holds = _job(motion).holds or self._holds
+        key = ("run", id(trajectory), holds)
         if key not in self._known:
-            self._known[key] = self._add(trajectory)
+            self._known[key] = self._add(trajectory, holds)
         return [_move(self._known[key], step.step, f"run {motion.name}")], _End(
             end, f"the end of {motion.name}"
         )
@@ -200,9 +223,12 @@ class _Compiler:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
-        if id(motion) not in self._plans:
-            self._plans[id(motion)] = self._of(motion.source, where)
-        return self._plans[id(motion)]
+        for (known, _), found in self._plans.items():  # one with another load will do if it keeps to the room
+            arm = self.arm.holding(_job(motion).holds or self._holds)
+            if known == id(motion) and room_check.touch_of(arm, found) is None:
+                return found
+        found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
+        return found
 
     def _of(self, source: Job | Plan, where: str) -> Trajectory:
         if isinstance(source, Plan):
@@ -210,13 +236,15 @@ class _Compiler:
                 raise InputError(
                     f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
                 )
+            room_check.check(self.arm.holding(source.job.holds or self._holds), source.trajectory)
             return source.trajectory
-        found = planner.plan(self.arm, source, self.progress).trajectory
+        job = replace(source, holds=source.holds or self._holds)
+        found = planner.plan(self.arm, job, self.progress).trajectory
         checks.check_held(found, self.arm)
         return found
 
     def _straight(self, step: kinds.Goto, start: Angles, end: Angles) -> Trajectory:
-        job = Job("goto", via_deg=[start, end], optimiser=GRADIENT, refine=_REFINE)
+        job = Job("goto", via_deg=[start, end], optimiser=GRADIENT, refine=_REFINE, holds=self._holds)
         try:
             return planner.plan(self.arm, job, self.progress).trajectory
         except ArmtempoError as error:
@@ -249,8 +277,9 @@ class _Compiler:
             words,
         )
 
-    def _add(self, trajectory: Trajectory) -> int:
+    def _add(self, trajectory: Trajectory, holds: str) -> int:
         self.legs.append(trajectory)
+        self.loads.append(holds)
         return len(self.legs) - 1
 
     def _same(self, one: Angles, other: Angles) -> bool:
@@ -258,6 +287,10 @@ class _Compiler:
             abs(a - b) * joint.steps_per_deg <= _SAME_STEPS
             for a, b, joint in zip(one, other, self.arm.driven, strict=True)
         )
+
+
+def _job(motion: SourceMotion) -> Job:
+    return motion.source.job if isinstance(motion.source, Plan) else motion.source
 
 
 def _move(leg: int, step: int, words: str) -> SequenceRow:

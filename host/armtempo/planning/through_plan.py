@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
@@ -11,10 +13,18 @@ from armtempo.model.job import Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
-from armtempo.planning.planned import Planned
 from armtempo.planning.time_parameterization import Group, Timed
 from armtempo.splines import bspline
 from armtempo.splines.trajectory import JointSpline, Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A trajectory, how it was found, and what the user must know of it."""
+
+    trajectory: Trajectory
+    searches: tuple[Search, ...]
+    notes: tuple[str, ...]
 
 
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:

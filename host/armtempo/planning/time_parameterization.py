@@ -14,7 +14,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress, stage
 from armtempo.model.job import REFINE, Job
 from armtempo.model.parts import Limits
-from armtempo.optimise.tracker import Result
+from armtempo.optimise.task import Result
 from armtempo.planning import interval_search
 from armtempo.planning.fixed_path import FixedPath, Optimum
 from armtempo.planning.variables import time_points

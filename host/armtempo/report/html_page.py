@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 
 _STYLE = Path(__file__).with_name("page.css")
 

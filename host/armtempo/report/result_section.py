@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armtempo.report import html_page, verdict
+from armtempo.report import analysis, html_page, peaks, verdict
 from armtempo.report.evaluation import Evaluation
-from armtempo.runs import analysis, peaks
 
 _MEASURED = {
     "joint": "",

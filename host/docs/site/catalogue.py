@@ -44,10 +44,12 @@ class Commands(Directive):
         )
         for paragraph in (command.help or "").split("\n\n"):
             section += nodes.paragraph(text=" ".join(paragraph.replace("\b", "").split()))
-        arguments = [(name, described(command, name)) for name in names_of_arguments(command)]
+        names = [name for name in names_of_arguments(command) if "{" not in name]  # that one says it itself
+        arguments = [(name, described(command, name)) for name in names]
         if arguments:
             section += table(("argument", "what it is"), arguments)
-        records = [_plain(parameter.get_help_record(context)) for parameter in command.params]
+        options = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
+        records = [_plain(option.get_help_record(context)) for option in options]
         if any(records):
             section += table(("option", "what it does"), [record for record in records if record])
         return section

@@ -24,7 +24,7 @@ from armtempo.planning.free.free_motion import Demand, FreeMotion, Tolerance, th
 from armtempo.planning.free.free_path import Effort, Shortest
 from armtempo.planning.free.layout import DEGREE, LEAST_PIECES, uniform
 from armtempo.planning.lower_bounds import Floor
-from armtempo.planning.planned import Planned
+from armtempo.planning.through_plan import Planned
 from armtempo.planning.time_parameterization import MIN_DURATION_S
 from armtempo.planning.tool import Tool
 from armtempo.planning.variables import time_points

@@ -27,7 +27,7 @@ from armtempo.planning.line.follow import passed
 from armtempo.planning.line.line_path import DEGREE, Led, LinePath, led_stretches, proven_path
 from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
 from armtempo.planning.lower_bounds import Floor
-from armtempo.planning.planned import Planned
+from armtempo.planning.through_plan import Planned
 from armtempo.planning.tool import Tool
 from armtempo.planning.variables import time_points
 from armtempo.splines import bspline, time_axis
