@@ -11,9 +11,9 @@ _NOT_ALWAYS = """
     pins registers arm_setup run_start start_check motion_check rate_check override time_law interval_steps
     cubics endpoints next_motion arm_check motion_file engine_memory room backup_sram armtempo_shared.motion
     bezier_weights store store_commands measured_rates command_rows armrecord table program_hash basis output_setup
-    start_up set_up
+    set_up
 """
-"""Modules; the last two are those of the compact form that hold what is called at rest only."""
+"""Modules; the last one is that of the compact form that holds what is called at rest only."""
 
 
 def keep_code(keeps: bool) -> None:

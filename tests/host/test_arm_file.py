@@ -108,7 +108,7 @@ def test_what_is_wrong_is_said_with_file_key_and_value(
 
 
 def test_a_missing_file_and_an_empty_one(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="neither a file"):
         Arm.load(tmp_path / "none.toml")
     empty = tmp_path / "empty.toml"
     empty.touch()

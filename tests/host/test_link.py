@@ -1,22 +1,30 @@
-"""Commands, runs and their samples over a good line, against the board's own link, store and commands."""
+"""Commands, runs and samples over a good line, against the board's own link; refusals in words; the traffic log."""
 
 from __future__ import annotations
 
 import random
 from pathlib import Path
+from typing import Any
 
 import pytest
-from armtempo.basics.errors import BoardError, LinkError
-from armtempo.link import Client
+from armtempo.basics.errors import BoardError, InputError, LinkError
+from armtempo.link import Client, traffic
 from armtempo.link.client import harmless_number
 from armtempo.link.follow import Follower
+from armtempo.link.refusal import refusal
 from armtempo.link.session import Session
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
+from armtempo_shared.limits import MAX_MOTION_BYTES
+from armtempo_shared.meanings import VALUES
 
 from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, started
+from tests.system.relay import ReplayTransport
+
+NUMBERS = sorted(VALUES.keys() - {"too_fast", "too_long", "pin_taken"})
+"""Names of codes whose number is said as the table of meanings has it."""
 
 
 @pytest.mark.slow
@@ -283,3 +291,115 @@ def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     assert not said or "messages arrived damaged (" in said
     assert indices == sorted(set(indices))
     assert (tmp_path / "flash" / "feed.atm").read_bytes() in (old, new)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_every_number_is_said_with_what_it_is(name: str) -> None:
+    code = wire.ERROR_CODES[name]
+    _, meaning, cure = wire.ERRORS[code]
+    error = refusal("no", code, 1, 4711)
+    assert error.code == code
+    assert str(error) == f"no: {meaning} (joint 2) [{VALUES[name]}: 4711]; {cure}"
+
+
+def test_a_pin_is_named_with_what_can_hold_it() -> None:
+    code = wire.ERROR_CODES["pin_taken"]
+    assert "(joint 2) [PE9: encoder 1]; give another pin" in str(refusal("no", code, 1, 0x49))
+    assert "[PA0: the button, STEP of channel 6]" in str(refusal("no", code))
+    assert "[PE12: ENABLE of the drivers]" in str(refusal("no", code, value=0x4C))
+    assert "[PD0: it, or its timer, has another output or input already]" in str(
+        refusal("no", code, value=0x30)
+    )
+
+
+def test_a_limit_of_the_arm_is_not_taken_for_one_of_the_board() -> None:
+    code = wire.ERROR_CODES["too_fast"]
+    assert "speed limit in the arm file that the board has (joint 2) [steps/s needed: 395]; " in str(
+        refusal("no", code, 1, 395)
+    )
+    assert "together need more steps per second than the board can make [steps/s needed: 3950]; " in str(
+        refusal("no", code, 255, 3950)
+    )
+
+
+def test_what_has_no_number_or_joint_says_none() -> None:
+    assert str(refusal("no", wire.ERROR_CODES["not_moving"])) == "no: nothing is moving; no action needed"
+    assert "error 200, unknown to this version [7]" in str(refusal("no", 200, value=7))
+
+
+@pytest.mark.parametrize(
+    ("joint", "value", "words"),
+    [
+        (255, MAX_MOTION_BYTES, "it takes 16384 bytes at most"),
+        (0, 1 << 38, "its numbers reach 274877906944"),
+    ],
+)
+def test_a_motion_that_does_not_fit_says_by_how_much(joint: int, value: int, words: str) -> None:
+    text = str(refusal("no", wire.ERROR_CODES["too_long"], joint, value))
+    assert f"[{words}]; lower refine, use shared timing or fewer via points, or split it" in text
+
+
+def test_a_record_larger_than_the_board_takes(tmp_path: Path) -> None:
+    board, _ = ready(Pipe(tmp_path / "flash"))
+    with pytest.raises(BoardError, match=r"refused 'put_begin'.*\[it takes 16384 bytes at most"):
+        board.upload("big", bytes(MAX_MOTION_BYTES + 1))
+
+
+def test_a_command_for_which_the_board_has_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is answered by its own code."""
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+
+    def short_of_memory(self: Any, name: str) -> Any:
+        raise MemoryError
+
+    monkeypatch.setattr(pipe._later["armtempo_board.storage.store"].Store, "motion", short_of_memory)
+    with pytest.raises(BoardError, match=r"refused 'start'.*ran out of memory in this command"):
+        board.start("feed", wire.record_crc(data))
+
+
+def test_recorded_traffic_replays(tmp_path: Path) -> None:
+    path = tmp_path / "traffic.log"
+    pipe = Pipe(tmp_path / "flash")
+    with traffic.LogFile(path) as log:
+        logged = traffic.LoggedTransport(pipe, log)
+        seen = [Client(Session(logged, pipe.clock), 1).hello()]
+    path.write_text(path.read_text(encoding="utf-8") + "0.1\t<\tcut", encoding="utf-8")
+    replayed = Client(Session(ReplayTransport(traffic.read_log(path))), 1)
+    assert replayed.hello() == seen[0]
+    with pytest.raises(LinkError, match="replay"):
+        replayed.status()
+    assert f"ok hello protocol={wire.PROTOCOL_VERSION}" in path.read_text(encoding="utf-8")
+
+
+def test_traffic_log_refuses_other_files(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    with pytest.raises(InputError, match="cannot be read"):
+        list(traffic.read_log(path))
+    path.write_text("something\n")
+    with pytest.raises(InputError, match="not a traffic log"):
+        list(traffic.read_log(path))
+    path.write_text(f"{traffic.HEADER}\n1.0\t!\t00\t\n")
+    with pytest.raises(InputError, match="line 2"):
+        list(traffic.read_log(path))
+
+
+def test_every_message_has_words() -> None:
+    for entry in wire.COMMAND.values():
+        payload = bytes(64) if entry[4] else bytes(len(wire.encode(entry, [0] * len(entry[3]))))
+        assert entry[0] in traffic.describe(traffic.TO_BOARD, 1, entry[1], payload)
+    assert "unknown" in traffic.describe(traffic.FROM_BOARD, 1, 0xEE, b"")
+    assert "malformed" in traffic.describe(traffic.FROM_BOARD, 1, wire.EVENT["done"][1], b"x")
+
+
+def test_a_log_on_a_full_disk_is_cut_short_and_the_traffic_goes_on(tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():  # not on every system
+        return
+    pipe = Pipe(tmp_path / "flash")
+    with pytest.raises(InputError, match="cut short: No space left"), traffic.LogFile(full) as log:  # noqa: PT012
+        board = Client(Session(traffic.LoggedTransport(pipe, log), pipe.clock), 1)
+        board.hello()
+        board.status()
+    with pytest.raises(InputError, match="cannot be written"):
+        traffic.LogFile(tmp_path)

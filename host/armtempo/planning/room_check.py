@@ -144,15 +144,18 @@ class Bodies:
     def distances(self, driven_deg: Array) -> Array:
         """Of postures (N, J): moving segments from obstacles, then pairs from each other; less their radii, (N, M)."""
         starts, ends = self.ends(driven_deg)
-        found = [
-            box_distance(starts[segment], ends[segment], box.low_mm, box.high_mm) - self.radius_mm[segment]
-            for segment in self.moves
-            for box in self.obstacles
-        ]
-        for one, other in self.pairs:
-            apart = segment_distance(starts[one], ends[one], starts[other], ends[other])
-            found.append(apart - self.radius_mm[one] - self.radius_mm[other])
-        return np.stack(found, axis=1)
+        count, found = len(driven_deg), []
+        if self.obstacles and len(self.moves):
+            flat = starts[self.moves].reshape(-1, 3), ends[self.moves].reshape(-1, 3)
+            away = np.stack([box_distance(*flat, box.low_mm, box.high_mm) for box in self.obstacles])
+            away = away.reshape(len(self.obstacles), -1, count) - self.radius_mm[self.moves, None]
+            found.append(np.swapaxes(away, 0, 1).reshape(-1, count))
+        if self.pairs:
+            one, other = np.array(self.pairs).T
+            four = (each.reshape(-1, 3) for each in (starts[one], ends[one], starts[other], ends[other]))
+            thick = self.radius_mm[one] + self.radius_mm[other]
+            found.append(segment_distance(*four).reshape(-1, count) - thick[:, None])
+        return np.concatenate(found).T
 
     @cached_property
     def named(self) -> list[tuple[str, str]]:
