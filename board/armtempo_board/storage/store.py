@@ -337,7 +337,7 @@ class Store:
     def _check_motion(self, file_name: str, crc: int) -> None:
         try:
             found = self._guard(motion_file.stated_crc, self._path(file_name), self._size_of(file_name))
-        except motion_file.MotionError:
+        except ValueError:  # MotionError
             raise Refused(codes.BAD_CHECKSUM)
         if found != crc:
             raise Refused(codes.BAD_CHECKSUM)
@@ -362,7 +362,7 @@ class Store:
         size = self._size_of(file_name)
         try:
             return self._guard(motion_file.MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
-        except motion_file.MotionError:
+        except ValueError:  # MotionError
             if not self._is_sequence(file_name):
                 raise Refused(codes.BAD_RECORD)
             raise Refused(codes.IS_SEQUENCE if features.SEQUENCES else codes.NEEDS_FIRMWARE)
