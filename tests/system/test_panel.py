@@ -92,7 +92,7 @@ def page(window: Any, panel: Panel) -> Any:
 
 
 def show(page: Any, tab: str) -> None:
-    """Go to a tab, also where notifications cover it."""
+    """Go to a tab, also if notifications cover it."""
     page.get_by_role("tab", name=tab).dispatch_event("click")
 
 
