@@ -2,7 +2,7 @@
 
 For MicroPython's own firmware, in whose flash they have no room otherwise; ``boot.py`` imports it. The file begins with
 the length of its index in two bytes, then the index, a line "PACKAGE/MODULE OFFSET" for each, the package without
-"armtempo_", the offset below 0 where the module is not deflated. It is written by ``deploy/archive.py`` on the host.
+"armtempo_", the offset below 0 if the module is not deflated. It is written by ``deploy/archive.py`` on the host.
 """
 
 import sys
@@ -42,7 +42,7 @@ class Archive:
         """The same."""
 
     def stat(self, path: str) -> "tuple[int, ...]":
-        """Whether a module or a folder is there; OSError."""
+        """Status of a module or folder; raises OSError if it does not exist."""
         if self.seek(path):
             return (_REGULAR,) + (0,) * 9
         if self.find(path[_BEFORE:] + "/") < 0:
@@ -61,7 +61,7 @@ class Archive:
         return deflate.DeflateIO(file, deflate.ZLIB, 0, True)
 
     def seek(self, path: str) -> int:
-        """Where a module begins, 0: it is not there."""
+        """Offset of a module; 0: it does not exist."""
         name = path[_BEFORE : -len(_ENDING)] + " "
         at = self.find(name)
         if at < 0 or not path.endswith(_ENDING):
@@ -70,7 +70,7 @@ class Archive:
         return int(self.index[begin : self.index.find(b"\n", begin)])
 
     def find(self, text: str) -> int:
-        """Where a line of the index begins so, or -1."""
+        """Place of a line of the index with this beginning, or -1."""
         at = self.index.find(b"\n" + text.encode())
         return at + 1 if at >= 0 else -1
 

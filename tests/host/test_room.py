@@ -78,7 +78,7 @@ def test_motions_in_random_rooms_agree_with_dense_samples() -> None:
 
 
 def test_links_do_not_touch_each_other() -> None:
-    """A planar arm folds its third link towards its first: accepted where all sampled points are apart."""
+    """A planar arm folds its third link towards its first: accepted if all sampled points are apart."""
     seed, refused = 5, 0
     rng = np.random.default_rng(seed)
     links = (
@@ -115,7 +115,7 @@ def test_a_plan_names_link_obstacle_depth_time_and_via_points() -> None:
 
 @pytest.mark.slow
 def test_a_free_path_goes_around_what_is_between_its_via_points() -> None:
-    """Over a box, as seen by dense samples; where walls leave no way, it is refused as before."""
+    """Over a box, as seen by dense samples; if walls leave no way, it is refused as before."""
     via = [[20, -60, 40], [160, -60, 40], [100, -90, 20]]
     job = Job("over", via_deg=via, stops=(Stop(1, 0.5),), path="free", refine=5, starts=1)
     arm = thick(PAPER, 20.0, ArmRoom((replace(FEEDER, high_mm=(50.0, 400.0, 250.0)),)))

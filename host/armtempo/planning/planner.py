@@ -31,7 +31,7 @@ _LINE_REFINE = 4
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     """A motion through the job's via points, from rest to rest, as short as the search finds it.
 
-    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where
+    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError if
     job and arm do not fit each other, PlanError if there is no motion under these limits and ranges; what
     ``progress`` raises ends the planning.
     """

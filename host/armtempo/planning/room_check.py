@@ -2,7 +2,7 @@
 
 At a time in the middle of a stretch the distances of all links from all obstacles, and from each other, are computed
 exactly. Until either end of the stretch no point of a link moves farther than the speeds of the joints before it times
-their reach to it, times half the stretch. Where that might touch something, the stretch is halved.
+their reach to it, times half the stretch. If that might touch something, the stretch is halved.
 """
 
 from __future__ import annotations
@@ -243,7 +243,7 @@ def touch_of(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None
 def check(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, through: bool = False) -> None:
     """Raises PlanError if a motion leaves the room, naming what touches what, and when.
 
-    ``speeds_deg_s``: as for ``first_touch``, where they are known; ``through``: the message names via points too.
+    ``speeds_deg_s``: as for ``first_touch``, if they are known; ``through``: the message names via points too.
     """
     touch = touch_of(arm, trajectory, speeds_deg_s)
     if touch is None:

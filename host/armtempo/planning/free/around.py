@@ -28,7 +28,7 @@ _SHORTCUTS = 100
 _ASIDE_DEG = 90.0
 """Postures are drawn up to so far beyond both via points."""
 _CLEAR_MM = 10.0
-"""The way keeps so far from everything, so that the path may cut its corners; less where a via point is nearer."""
+"""The way keeps so far from everything, so that the path may cut its corners; less if a via point is nearer."""
 _SAMPLE_MM = 8.0
 """Between postures that are looked at, no link moves farther."""
 _MOST_SAMPLES = 300
