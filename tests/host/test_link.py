@@ -597,6 +597,21 @@ def test_a_board_is_closed_between_the_commands_of_other_threads(tmp_path: Path)
         client.hello()
 
 
+def test_who_waits_for_a_cable_does_not_open_a_port_that_was_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armtempo.robot.board.TURN_S", 0.01)
+    pipe = Pipe(tmp_path / "flash")
+    client = connect(pipe)
+    client.session.reopen = lambda: pipe
+    with client.session.turns:
+        closing = Thread(target=Board(client, "pipe").close)
+        closing.start()
+        closing.join()
+        with pytest.raises(LinkError, match="the board on pipe was closed"):
+            client.session.reconnect(LinkError("the cable is out"))
+
+
 def test_a_port_that_was_closed_meanwhile_is_a_broken_one() -> None:
     host, device = os.openpty()
     port = SerialTransport(os.ttyname(device), exclusive=False)

@@ -83,7 +83,7 @@ class Relay:
 class ReplayTransport:
     """A transport whose board says what a recorded board said.
 
-    The host must say the same as in the recording (same session number, see Session); LinkError where
+    The host must say the same as in the recording (same session number, see Session); LinkError if
     it says something else or the recording is at its end.
     """
 

@@ -14,7 +14,7 @@ from tests.system.replays import Replay
 
 JOINTS = range(3)
 EDGE_TICKS = 2.0
-"""How far an edge may be from the exact crossing where the joint is fast."""
+"""How far an edge may be from the exact crossing if the joint is fast."""
 COMPUTED_TICKS = 0.01
 """What the exact crossing itself may be off by: bisection in doubles over up to 2e9 ticks."""
 FAST_STEPS_S = 50.0

@@ -86,7 +86,7 @@ class BrakeTimes:
 def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
     """The shortest times that keep EXCESS times the limits, one of ``limits`` for each joint, to 2 %.
 
-    Speed never rises. Found on a grid of starts and times, and looked at again on a finer one. Raises InputError where
+    Speed never rises. Found on a grid of starts and times, and looked at again on a finer one. Raises InputError if
     the motion itself exceeds EXCESS times the limits.
     """
     ramps = _Ramps(trajectory, np.array([limit.values for limit in limits]))
@@ -138,7 +138,7 @@ def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array, shape: int) 
 
 
 def _lift(table: Array, place: Array, needed: Array) -> None:
-    """Lengthen the entries where the table between them is less than ``needed``, by as little as will do."""
+    """Lengthen the entries if the table between them is less than ``needed``, by as little as will do."""
     part = np.minimum(place.astype(int), len(table) - 2)
     weight = place - part
     while True:

@@ -10,7 +10,7 @@ from armtempo.basics.arrays import Array
 
 
 def box_distance(start: Array, end: Array, low: Sequence[float], high: Sequence[float]) -> Array:
-    """Distance of segments (N, 3) to (N, 3) from a box: (N,); negative where it is inside.
+    """Distance of segments (N, 3) to (N, 3) from a box: (N,); negative if it is inside.
 
     Along a segment the squared distance is convex, and a parabola between the places where it crosses the plane of a
     face, so its least is at a crossing or an apex. Inside, minus the way out at the deepest of these places counts.

@@ -169,7 +169,7 @@ def _check_path(job: Job) -> None:
 def is_wide(via: tuple[float, ...] | Pose) -> bool:
     """Whether a free path may pass next to it: a pose with more tolerance than counts as reached anyway.
 
-    Only where nothing or all is asked of the orientation; other poses are passed where the inverse puts them.
+    Only if nothing or all is asked of the orientation; other poses are passed where the inverse puts them.
     """
     return (
         isinstance(via, Pose)

@@ -11,7 +11,7 @@ For any multipliers n >= 0, m = m+ - m-, l = l+ - l- of these, all x that keep t
     D = integral of  min over x > 0 of (w x^(-1/2) + c x)  -  n V^2 - (m+ + m-) A
     w = 1 - sum of J (l+ + l-),    c = sum of n q'^2 + (m q'' - m' q') / 2 + (q' l'' - q'' l') / 2
 
-by weak duality and integration by parts (the ends give nothing where the path starts and ends at rest). The minimum is
+by weak duality and integration by parts (the ends give nothing if the path starts and ends at rest). The minimum is
 3 / 4^(1/3) w^(2/3) c^(1/3): D is concave in the multipliers, and the interior-point method finds about the best of
 those that are splines on cells of u: l quadratic, m linear, n constant. Whatever it finds, ``dual_value.value`` bounds
 D from below.

@@ -96,7 +96,7 @@ def _least(w: Array, c: Array) -> Array:
 def _highest_x(cells: Cells) -> Array:
     """The most that x can be on each cell, (N,), infinite if no simple reason bounds it.
 
-    A joint's speed limit; where a joint turns in the cell, its acceleration limit: v^2 <= 2 A |dq| from there; at an
+    A joint's speed limit; if a joint turns in the cell, its acceleration limit: v^2 <= 2 A |dq| from there; at an
     end at rest, its jerk limit: v <= J / 2 (6 dq / J)^(2/3) from there.
     """
     speed, acceleration, jerk = cells.limits.T

@@ -18,7 +18,7 @@ SAMPLES = 16
 """Parts of a path segment between the grid points at which the search evaluates the limits; the finished plan is
 checked without a grid."""
 _PENALTY = 30.0
-"""Seconds that the penalty of Eq. (21) charges where a limit is exceeded by as much again."""
+"""Seconds that the penalty of Eq. (21) charges if a limit is exceeded by as much again."""
 _TINY = 1e-300
 """Avoids 0 / 0 if a joint does not move."""
 

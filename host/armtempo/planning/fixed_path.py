@@ -22,7 +22,7 @@ from armtempo.splines import bspline, time_axis
 _ROUNDS = 12
 """Solves, each at the peaks that the one before showed between its points."""
 _PARTS, _LEAST_PARTS, _POINTS = 64, 4, 2000
-"""Points of a path segment, shared by its time segments, but at least this many in each of those; fewer where there
+"""Points of a path segment, shared by its time segments, but at least this many in each of those; fewer if there
 would be more than _POINTS."""
 _PEAK_THRESHOLD = 0.95
 """Peaks from this part of a limit on become points."""

@@ -53,7 +53,7 @@ def search(
 ) -> Found:
     """Intervals (n,) by the job's optimiser, for joints on one axis with control points (n + degree, J).
 
-    Where the result ends at bounds that follow from the job, they are widened and it continues from anew; at
+    If the result ends at bounds that follow from the job, they are widened and it continues from anew; at
     bounds that the job gives, that is only said. Gradients start within the bounds and may leave them.
     """
     box = bounds_s(angle_points_deg, job.degree, limits)
@@ -127,7 +127,7 @@ def gradient(
 def _held(x: Array, box: Array, relative: bool) -> np.ndarray:
     """Indices of the intervals x (n,) that the bounds hold back.
 
-    With ``relative`` only their ratios count: where all of x can be scaled away from the bounds, none is held.
+    With ``relative`` only their ratios count: if all of x can be scaled away from the bounds, none is held.
     """
     low, high = x / box[:, 0], box[:, 1] / x
     if not relative:

@@ -22,7 +22,7 @@ _ROUNDED = 1.0 - 1e-9
 _MOST_CELLS, _LEAST_CELLS = 16, 4
 """Cells in a segment of the path."""
 _WORK = 10_000
-"""Fewer cells where segments times the square of the joints' number would be more than this."""
+"""Fewer cells if segments times the square of the joints' number would be more than this."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
     found = []
     angle_points_deg = (
         angle_points_deg - angle_points_deg[0]
-    )  # exact where the way is short: then it counts most
+    )  # exact if the way is short: then it counts most
     for joint, limit in enumerate(limits):
         reached = turns(angle_points_deg[:, joint], degree)
         found.append(Floor(_ROUNDED * rest_to_rest.floor_s(reached, limit, from_rest=degree == 5), "rests"))
@@ -56,7 +56,7 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
 
 
 def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> float:
-    """By duality, on more cells where few prove nothing; 0 if that does not help."""
+    """By duality, on more cells if few prove nothing; 0 if that does not help."""
     stage("proving the floor")
     segments = len(angle_points_deg) - degree
     parts = min(max(_WORK // (segments * len(limits) ** 2), _LEAST_CELLS), _MOST_CELLS)
@@ -126,7 +126,7 @@ def of_vias(
 def _turning(angles: Array, rests: bool) -> Array:
     """First and last of the angles and those between where their direction changes.
 
-    Where the joint does not rest at the last, that is left out.
+    If the joint does not rest at the last, that is left out.
     """
     kept = [float(angles[0])]
     for angle in angles[1:]:

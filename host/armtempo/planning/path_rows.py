@@ -1,6 +1,6 @@
 """Inequalities of a time axis along a fixed path that keep speed, acceleration and jerk at points of u within limits.
 
-Only rows that could be reached are watched: at a point, t' bounds the speed of one joint first, and where one joint's
+Only rows that could be reached are watched: at a point, t' bounds the speed of one joint first, and if one joint's
 acceleration bounds t'', or its jerk t''', it bounds what those of the others can become.
 """
 
@@ -17,7 +17,7 @@ from armtempo.planning.collocation import Points
 from armtempo.planning.variables import Index, MotionVariables, derivative_matrix, time_basis
 
 _PEAK_THRESHOLD = 0.8
-"""Rows are watched where their ratio could come to this part of the limit."""
+"""Rows are watched if their ratio could come to this part of the limit."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_way import ToolWay
 from armtempo.planning import checks, room_check, through_plan
-from armtempo.planning.free import free_plan
+from armtempo.planning.free import around
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
@@ -31,7 +31,7 @@ _LINE_REFINE = 4
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     """A motion through the job's via points, from rest to rest, as short as the search finds it.
 
-    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where
+    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError if
     job and arm do not fit each other, PlanError if there is no motion under these limits and ranges; what
     ``progress`` raises ends the planning.
     """
@@ -39,7 +39,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     holding = arm.holding(job.holds)
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
-    way = free_plan.motion if checks.is_free(job) else through_plan.motion
+    way = around.motion if checks.is_free(job) else through_plan.motion
     if checks.leads_tool(job):
         from armtempo.planning.line import line_plan  # here, because most jobs need no kinematics
 

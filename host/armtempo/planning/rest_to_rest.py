@@ -69,7 +69,7 @@ def _ramp(speed: float, limits: Limits, from_rest: bool) -> tuple[float, float]:
 def needed_s(via_deg: Array, limits: Array) -> Array:
     """About what J joints take between neighbouring via points (n + 1, J), from rest to rest: (n,).
 
-    ``limits``: (J, 3). Where the joints hardly move, at least a part of the mean.
+    ``limits``: (J, 3). If the joints hardly move, at least a part of the mean.
     """
     ways = np.abs(np.diff(via_deg, axis=0))
     speed, acceleration, jerk = limits.T

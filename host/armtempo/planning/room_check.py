@@ -2,7 +2,7 @@
 
 At a time in the middle of a stretch the distances of all links from all obstacles, and from each other, are computed
 exactly. Until either end of the stretch no point of a link moves farther than the speeds of the joints before it times
-their reach to it, times half the stretch. Where that might touch something, the stretch is halved.
+their reach to it, times half the stretch. If that might touch something, the stretch is halved.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ _STRETCH_S = 0.25
 """Stretches of time at first."""
 _CLOSE_MM = 0.01
 """What comes nearer than this counts as touching: nearer, the proof gives up."""
+_DEEPER_MM = 0.5
+"""What touches at the start may do so by this much more; less would take many halvings to prove."""
 _MOST = 4000
 """Stretches looked at at once."""
 
@@ -144,15 +146,18 @@ class Bodies:
     def distances(self, driven_deg: Array) -> Array:
         """Of postures (N, J): moving segments from obstacles, then pairs from each other; less their radii, (N, M)."""
         starts, ends = self.ends(driven_deg)
-        found = [
-            box_distance(starts[segment], ends[segment], box.low_mm, box.high_mm) - self.radius_mm[segment]
-            for segment in self.moves
-            for box in self.obstacles
-        ]
-        for one, other in self.pairs:
-            apart = segment_distance(starts[one], ends[one], starts[other], ends[other])
-            found.append(apart - self.radius_mm[one] - self.radius_mm[other])
-        return np.stack(found, axis=1)
+        count, found = len(driven_deg), []
+        if self.obstacles and len(self.moves):
+            flat = starts[self.moves].reshape(-1, 3), ends[self.moves].reshape(-1, 3)
+            away = np.stack([box_distance(*flat, box.low_mm, box.high_mm) for box in self.obstacles])
+            away = away.reshape(len(self.obstacles), -1, count) - self.radius_mm[self.moves, None]
+            found.append(np.swapaxes(away, 0, 1).reshape(-1, count))
+        if self.pairs:
+            one, other = np.array(self.pairs).T
+            four = (each.reshape(-1, 3) for each in (starts[one], ends[one], starts[other], ends[other]))
+            thick = self.radius_mm[one] + self.radius_mm[other]
+            found.append(segment_distance(*four).reshape(-1, count) - thick[:, None])
+        return np.concatenate(found).T
 
     @cached_property
     def named(self) -> list[tuple[str, str]]:
@@ -191,14 +196,14 @@ def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
 def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch | None:
     """What touches in a motion, None if it is proven that nothing does.
 
-    ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep: so an
-    arm can be moved out.
+    ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep, or go
+    ``_DEEPER_MM`` deeper: so an arm can be moved out.
     """
     bodies = Bodies(arm)
     if not bodies.named:
         return None
     start = bodies.distances(trajectory(np.zeros(1)))[0]
-    allowed = np.minimum(start - 2.0 * _CLOSE_MM, 0.0)
+    allowed = np.where(start < 2.0 * _CLOSE_MM, start - _DEEPER_MM, 0.0)
     shrink = bodies.speeds_mm_s(speeds_deg_s)
     count = max(1, int(np.ceil(trajectory.duration_s / _STRETCH_S)))
     half = 0.5 * trajectory.duration_s / count
@@ -238,7 +243,7 @@ def touch_of(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None
 def check(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, through: bool = False) -> None:
     """Raises PlanError if a motion leaves the room, naming what touches what, and when.
 
-    ``speeds_deg_s``: as for ``first_touch``, where they are known; ``through``: the message names via points too.
+    ``speeds_deg_s``: as for ``first_touch``, if they are known; ``through``: the message names via points too.
     """
     touch = touch_of(arm, trajectory, speeds_deg_s)
     if touch is None:

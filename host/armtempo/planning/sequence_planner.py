@@ -32,7 +32,7 @@ _SAME_STEPS = 1 / 128
 def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
     """All motions of a sequence, equal ones once, and the rows that the board goes through.
 
-    Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or the
+    Raises InputError, naming file and step, if a motion begins elsewhere than the one before it ends or the
     sequence has no effect; PlanError if a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)

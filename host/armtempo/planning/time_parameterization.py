@@ -53,7 +53,7 @@ class Timed:
     searched_s: float
     """Motion time by the search alone."""
     optimum_s: float
-    """No axis nearby with as many variables takes less, where gradients were used; else 0."""
+    """No axis nearby with as many variables takes less, if gradients were used; else 0."""
     found: Result
     starts_s: Array
     """Motion time that each start of a gradient search led to; else empty."""
@@ -108,7 +108,7 @@ def _longest_s(timed: Sequence[Timed]) -> float:
 
 
 def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
-    """The axis that the search finds, polished where no finer one follows."""
+    """The axis that the search finds, polished if no finer one follows."""
     stage("searching")
     rng = np.random.default_rng([job.seed, group.joints[0]])
     found = interval_search.search(group.angle_points_deg, group.limits, job, rng, stages.within)

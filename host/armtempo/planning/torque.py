@@ -64,7 +64,7 @@ class MotorTorques:
     needed_nm: Array
     """At the motors' shafts, (N, J)."""
     held_nm: Array
-    """(N, J); not a number where the arm file does not say."""
+    """(N, J); not a number if the arm file does not say."""
 
     @property
     def margin(self) -> Array:
@@ -88,7 +88,7 @@ class MotorTorques:
 def held_nm(joint: DrivenJoint, motor_rad_s: ArrayLike) -> Array:
     """Torque that a motor holds at speeds of its shaft (N,): of its curve, 0 beyond it; else as in the virtual arm.
 
-    There it falls to 0.71 of the holding torque at the corner speed. Not a number where the arm file says neither.
+    There it falls to 0.71 of the holding torque at the corner speed. Not a number if the arm file says neither.
     """
     speed, model = np.abs(np.asarray(motor_rad_s, dtype=float)), joint.model
     if joint.motor.curve_rpm_nm:
@@ -131,7 +131,7 @@ def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan
     """The fastest plan found in which each motor holds ``ENOUGH`` times what it needs, each millisecond.
 
     Speed limits stay; the plan's arm has the limits that it was planned with. Raises InputError for an arm without
-    ``dynamics`` or without the torque of a motor, PlanError where slower motions do not help; else as ``planner.plan``.
+    ``dynamics`` or without the torque of a motor, PlanError if slower motions do not help; else as ``planner.plan``.
     """
     held = [held_nm(joint, 0.0) for joint in arm.driven]
     if np.any(np.isnan(held)) or not any(joint.dynamics for joint in arm.joints):

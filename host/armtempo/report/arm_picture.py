@@ -11,6 +11,7 @@ from armtempo.kinematics import Geometry, all_frames, forward
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm
 from armtempo.model.room import FAR_MM, ArmRoom
+from armtempo.planning.room_check import Bodies
 from armtempo.report.drawing import PAGE_COLOUR
 from armtempo.report.plots import COLOURS, new_figure
 
@@ -23,6 +24,7 @@ _LOWEST_DEG, _HIGHEST_DEG = 15.0, 65.0
 HOME, LOW, HIGH, GROUND = "#333333", "#1f77b4", "#d95f02", "#9a9a9a"
 _MOST_COLUMNS = 4
 _ARC_POINTS = 60
+_CAPSULE_ALPHA = 0.15
 _TICK = 0.08
 """Length of the tool's x axis, as a share of the arm's height and width."""
 
@@ -110,6 +112,7 @@ def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) 
     """The home posture; ``seen``: which of x, y, z go to the right and up."""
     _draw(axis, arm, np.array(arm.all_home_deg), np.eye(3)[list(seen)], HOME, size)
     _draw_room(axis, arm, seen)
+    _draw_capsules(axis, arm, seen)
     if seen[1] == 2:
         axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
     axis.set_xlabel(f"{'xyz'[seen[0]]} (mm)")
@@ -131,6 +134,19 @@ def _draw_room(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
         for end in (room.low_mm[place], room.high_mm[place]):
             if abs(end) < FAR_MM:
                 draw(end, color=HIGH, linewidth=1.0, zorder=0)
+
+
+def _draw_capsules(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
+    """The capsules of the home posture's links, which are seen as segments with round ends."""
+    bodies = Bodies(arm)
+    half = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ARC_POINTS)
+    for radius, start, end in zip(bodies.radius_mm, *bodies.ends(np.array([arm.home_deg])), strict=True):
+        if radius:
+            way = (end - start)[0, list(seen)]
+            turn = half + np.arctan2(way[1], way[0])
+            round_end = radius * np.column_stack([np.cos(turn), np.sin(turn)])
+            edge = np.concatenate([end[0, list(seen)] + round_end, start[0, list(seen)] - round_end])
+            axis.fill(*edge.T, color=HOME, alpha=_CAPSULE_ALPHA, linewidth=0.0, zorder=0)
 
 
 def _joint(axis: Axes, arm: Arm, index: int, size: float) -> None:

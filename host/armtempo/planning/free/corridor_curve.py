@@ -37,7 +37,7 @@ class CorridorTime:
 def curve(arm: Arm, job: Job, progress: Progress) -> list[CorridorTime]:
     """The job's motion time on the spline, in ever wider corridors, and free.
 
-    In mm of the tool where the job has ``corridor_mm``, else in degrees of any joint. The widest corridor is as wide as
+    In mm of the tool if the job has ``corridor_mm``, else in degrees of any joint. The widest corridor is as wide as
     a path uses that none holds back. With stops there is no motion on the spline
     itself, nor in the narrowest corridors. Errors as in
     ``planner.plan``; InputError if the path is not free.

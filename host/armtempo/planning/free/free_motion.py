@@ -37,7 +37,7 @@ _AWAY = 1.01
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
 """Weight of steps between time differences in the first solve, for one segment and via point; part of it later."""
 _LEAST_STEP = 1e-3
-"""Least difference of time control points, as a part of their mean: where time nearly stands still, what rounding does
+"""Least difference of time control points, as a part of their mean: if time nearly stands still, what rounding does
 to the angles is divided by its cube."""
 _FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
 _AGAIN = Schedule(first_barrier=1e-3, last_barrier=1e-4, curvature=False)
@@ -46,7 +46,7 @@ _ROUNDED = 1e-10
 _AT_END = 1e-6
 """A via point this near to the end of a range, as a part of what its joint turns, is at it."""
 _NEAR = 1e-5
-"""Solves end where their points miss no more than this of a limit."""
+"""Solves end if their points miss no more than this of a limit."""
 
 
 class Tolerance(NamedTuple):
@@ -139,7 +139,7 @@ class FreeMotion:
     def slower(self, factor: float) -> FreeMotion:
         """The same with time scaled, but not in dwells, which the one difference that acts on them alone makes up for.
 
-        Where that would have to be below 0, the dwell lasts longer.
+        If that would have to be below 0, the dwell lasts longer.
         """
         differences = self.differences_s * factor
         weights = np.convolve(np.ones(DWELL_SEGMENTS), mean_slopes(DEGREE))
@@ -253,7 +253,7 @@ class Improver:
         return best
 
     def _inside(self, motion: FreeMotion, within: FreeMotion) -> FreeMotion:
-        """The motion, drawn towards one within the bounds where meeting via points to the last digit moved it out."""
+        """The motion, drawn towards one within the bounds if meeting via points to the last digit moved it out."""
         found, safe = (self._beyond(each) for each in (motion, within))
         out = found > _ROUNDED
         if not out.any():
@@ -314,7 +314,7 @@ def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bo
     """``x`` changed so that the equalities hold, with the least third differences of the change.
 
     With ``smooth`` the least of the angles themselves, whatever they were between the via points. Raises PlanError
-    where the equalities contradict each other.
+    if the equalities contradict each other.
     """
     control = np.concatenate([variables.angle_index(joint) for joint in range(variables.joints)])
     starts = np.concatenate([variables.angle_index(joint)[:-3] for joint in range(variables.joints)])

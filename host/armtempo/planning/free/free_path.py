@@ -23,7 +23,7 @@ _PIECES, _LEAST, _MOST = 28, 56, 224
 _FEW = 5
 """Segments for each stretch if there are more stretches than _MOST allows."""
 _EVEN_PIECES = 24
-"""Segments for each stretch where all have the same number."""
+"""Segments for each stretch if all have the same number."""
 _ROUNDS = 3
 _SPREAD = 0.5
 """Random starts share time out by factors of this standard deviation of their logarithm."""
@@ -38,7 +38,7 @@ class Effort:
     """How much work is put into a free path."""
 
     pieces: int | None
-    """Segments between any two via points; None: as many as shorten the motion, more where more time passes."""
+    """Segments between any two via points; None: as many as shorten the motion, more if more time passes."""
     most: int
     """Segments that the record can hold."""
     starts: int
@@ -60,7 +60,7 @@ class Shortest:
 def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     """The fastest motion that meets the demand, from several starts.
 
-    Where via points have tolerances it comes from the one that passes them exactly, so it is never slower. Raises
+    If via points have tolerances it comes from the one that passes them exactly, so it is never slower. Raises
     PlanError if no start keeps ranges and corridor.
     """
     if demand.tolerances:
@@ -93,7 +93,7 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
 
 
 def automatic_pieces(stretches: int, most: int) -> int:
-    """Segments between any two of the via points where all have the same number."""
+    """Segments between any two of the via points if all have the same number."""
     return max(min(_EVEN_PIECES, most // stretches), LEAST_PIECES)
 
 
@@ -154,7 +154,7 @@ def _tightened(demand: Demand) -> Demand:
 
 
 def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
-    """The motion drawn towards the spline through the via points, where its deviation is not proven to be allowed."""
+    """The motion drawn towards the spline through the via points, if its deviation is not proven to be allowed."""
     if not np.isfinite(demand.corridor_mm) or demand.tool is None:
         return motion
     middle = bspline.refined(bspline.fit(demand.via_deg, DEGREE), int(motion.layout.pieces[0]), DEGREE)

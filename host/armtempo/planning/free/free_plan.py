@@ -190,7 +190,7 @@ def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[S
 def _kept(arm: Arm, trajectory: Trajectory) -> Trajectory:
     """The same, slower by the little that rounding of its control points may have done to its limits.
 
-    Where a small move is told by the last digits of its angles, the new times are rounded otherwise than the old: then
+    If a small move is told by the last digits of its angles, the new times are rounded otherwise than the old: then
     it is made slower again, by more each time.
     """
     for margin in _MARGINS:

@@ -1,4 +1,4 @@
-"""Motions for a free path to start from: through all via points, at rest where asked, within ranges and corridor."""
+"""Motions for a free path to start from: through all via points, at rest if asked, within ranges and corridor."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _met(demand: Demand, layout: Layout, points: Array, differences_s: Array, sm
 
 
 def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
-    """The motion, moved where it must be to keep ranges and corridor."""
+    """The motion, moved if it must be to keep ranges and corridor."""
     layout, size = motion.layout, demand.size_deg
     low, high = bounds(demand, layout)
     points = motion.angle_points_deg.copy()

@@ -5,7 +5,7 @@ Way s(u) and time t(u) are uniform quintic B-splines. The differences of their c
     of t:  h h h h   h h h h  H1 H2 ...  h h h h   h h h h
     of s:  0 0 0 0   v times those of t            0 0 0 0
 
-so each end is at rest, the speed rises over 4 h as a B-spline's sum does, and where all differences that count have the
+so each end is at rest, the speed rises over 4 h as a B-spline's sum does, and if all differences that count have the
 ratio v it is v exactly, however long the intervals H are. On a ramp the acceleration is v/h times the cubic basis
 spline, whose largest value is 2/3, the jerk v/h² times its derivative, at most 2/3 too.
 """
@@ -60,7 +60,7 @@ class WayLaw:
 def law(length: float, limits: WayLimits, longest: float = math.inf, short_ramps: bool = False) -> WayLaw:
     """The law for a way of ``length`` > 0; no interval H of it is longer than ``longest`` of the way.
 
-    ``short_ramps``: no interval h either, for which the speed is lower where it has to be.
+    ``short_ramps``: no interval h either, for which the speed is lower if it has to be.
     """
     least = 2 * _RAMP
     speed = limits.speed

@@ -25,7 +25,7 @@ from armtempo.splines import bspline, extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 SPEED = 0.25
-"""Of the arm's speed limits, where nothing else is asked for."""
+"""Of the arm's speed limits, if nothing else is asked for."""
 SLOWEST = 0.01
 RAMP = 0.5
 """Of the acceleration and jerk limits, what a jog uses itself: the rest is for braking at any moment."""
@@ -47,7 +47,7 @@ class JogMove:
     joint: int | None = None
     """Place among the driven joints, from 0."""
     axis: str = ""
-    """Of AXES, where it is no joint."""
+    """Of AXES, if it is no joint."""
     about: bool = False
     """Turn the tool about the axis instead of moving it along."""
 
@@ -100,8 +100,8 @@ def move_of(
 def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: float = SPEED) -> JogMotion:
     """The jog from rest at ``here_deg`` (J,), at ``speed`` of the arm's speed limits.
 
-    It ends at the end of a range at the latest, before it would leave the arm's room, and a line of the tool where the
-    arm cannot follow it. Raises InputError for a move that is none, or where there is no way to go.
+    It ends at the end of a range at the latest, before it would leave the arm's room, and a line of the tool if the
+    arm cannot follow it. Raises InputError for a move that is none, or if there is no way to go.
     """
     start = np.array(here_deg, dtype=float)
     if not SLOWEST <= speed <= 1.0:
@@ -188,7 +188,7 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
 def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
     """Where a joint is to end, on a whole step within its range if that is what ends it, and why there.
 
-    InputError where it cannot move that way.
+    InputError if it cannot move that way.
     """
     low, high = joint.range_deg
     wanted = here + by
@@ -226,7 +226,7 @@ def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tup
 
 
 def _line(arm: Arm, start: Array, move: JogMove) -> ToolLine:
-    """The line of the tool; InputError where there is no such axis, or the arm cannot be at ``start``."""
+    """The line of the tool; InputError if there is no such axis, or the arm cannot be at ``start``."""
     if move.axis not in AXES:
         raise InputError(f"there is no axis {move.axis!r}", f"give one of {', '.join(AXES)}")
     point_to_point.posture(start, arm)

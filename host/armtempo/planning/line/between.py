@@ -30,7 +30,7 @@ class Between:
     arrivals: tuple[int, ...]
     """Segments before each of its via points."""
     floor: Floor | None = None
-    """Of any motion through them; None where the path is fixed."""
+    """Of any motion through them; None if the path is fixed."""
 
     @property
     def segments(self) -> int:

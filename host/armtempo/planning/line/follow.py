@@ -1,6 +1,6 @@
 """The joints' angles along a way of the tool, each posture next to the one before.
 
-The arm stays in its branch, or passes a singular posture where the tool's way leads through it; where the joints cannot
+The arm stays in its branch, or passes a singular posture where the tool's way leads through it; if the joints cannot
 follow, the error says at which place and why.
 """
 
@@ -35,7 +35,7 @@ _DROPPED = 1e-9
 _SINGULAR = 0.02
 """Least singular value of the Jacobian, lengths as parts of the reach: below, a posture is called singular."""
 _STRAIGHT = 0.05
-"""rad; where a joint's turn by so much changes the branch, that part of the arm is straight."""
+"""rad; if a joint's turn by so much changes the branch, that part of the arm is straight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,8 @@ class Followed:
 def follow(course: Course, start_deg: Array, end_deg: Array | None = None) -> Followed:
     """The postures from ``start_deg`` (J,) on, which is at its start.
 
-    An arm that can take many postures at a place goes over evenly to ``end_deg``, where that is given. Raises
-    PlanError, naming the place, where a joint leaves its range or cannot follow.
+    An arm that can take many postures at a place goes over evenly to ``end_deg``, if that is given. Raises
+    PlanError, naming the place, if a joint leaves its range or cannot follow.
     """
     tool = Tool(course.arm, list(range(len(course.arm.driven))), start_deg)
     length, step = course.path.length, 1.0 / STEPS

@@ -70,7 +70,7 @@ class LinePath:
     knots: tuple[int, ...]
     """Segments before each stretch, and all."""
     arrivals: tuple[int, ...]
-    """Segments before each via point; where a corner is cut, nearly."""
+    """Segments before each via point; if a corner is cut, nearly."""
 
     def deviation(self, number: int, led: Led) -> LineDeviation:
         """How far the tool leaves its way in a stretch at most."""

@@ -41,7 +41,7 @@ _REFINE_FACTOR = 8
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     """The motion through via angles (n + 1, J), the tool led as the job asks.
 
-    Raises PlanError, naming via points and place, where the arm cannot follow, or the tool is not proven to stay near
+    Raises PlanError, naming via points and place, if the arm cannot follow, or the tool is not proven to stay near
     its way.
     """
     stage("following the tool's way")
@@ -143,7 +143,7 @@ def _best_axis(
 
 
 def _watched(path: LinePath, tool: Tool, limits: ToolLimits, refine: int) -> Along | None:
-    """The way of the tool, where it has limits."""
+    """The way of the tool, if it has limits."""
     if not limits.any:
         return None
     pieces = bspline.subdivide(bspline.polynomials(path.angle_points_deg, DEGREE), refine)
@@ -151,7 +151,7 @@ def _watched(path: LinePath, tool: Tool, limits: ToolLimits, refine: int) -> Alo
 
 
 def _levels(most: int) -> list[int]:
-    """Refinements to go through, each only where the one before saved enough."""
+    """Refinements to go through, each only if the one before saved enough."""
     return [1, min(_REFINE_FACTOR, most)][: min(most, 2)]
 
 
@@ -185,7 +185,7 @@ def _asked(job: Job, via: int) -> tuple[float, float]:
 
 
 def _tool_limits(job: Job, path: LinePath) -> ToolLimits:
-    """The tool's limits on each segment; where a corner is cut, its segments keep those of both ways."""
+    """The tool's limits on each segment; if a corner is cut, its segments keep those of both ways."""
     segments = path.knots[-1]
     limits = np.full((2, segments), np.inf)
     for via, (first, last) in enumerate(pairwise(path.arrivals), 1):

@@ -25,7 +25,7 @@ _CUT = 0.5
 
 @dataclass(frozen=True)
 class Stretch:
-    """Via points ``first`` to ``last``, at both of which the motion rests; ``ways`` where the tool is led."""
+    """Via points ``first`` to ``last``, at both of which the motion rests; ``ways`` if the tool is led."""
 
     first: int
     last: int

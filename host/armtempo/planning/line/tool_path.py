@@ -1,6 +1,6 @@
 """The way that a job asks of the tool between two rests: straight lines, arcs, and corners that are cut.
 
-A place on it is the way to it in mm, ``way``; where the tool only turns, in degrees.
+A place on it is the way to it in mm, ``way``; if the tool only turns, in degrees.
 """
 
 from __future__ import annotations
