@@ -30,6 +30,8 @@ _STRETCH_S = 0.25
 """Stretches of time at first."""
 _CLOSE_MM = 0.01
 """What comes nearer than this counts as touching: nearer, the proof gives up."""
+_DEEPER_MM = 0.5
+"""What touches at the start may do so by this much more; less would take many halvings to prove."""
 _MOST = 4000
 """Stretches looked at at once."""
 
@@ -194,14 +196,14 @@ def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
 def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch | None:
     """What touches in a motion, None if it is proven that nothing does.
 
-    ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep: so an
-    arm can be moved out.
+    ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep, or go
+    ``_DEEPER_MM`` deeper: so an arm can be moved out.
     """
     bodies = Bodies(arm)
     if not bodies.named:
         return None
     start = bodies.distances(trajectory(np.zeros(1)))[0]
-    allowed = np.minimum(start - 2.0 * _CLOSE_MM, 0.0)
+    allowed = np.where(start < 2.0 * _CLOSE_MM, start - _DEEPER_MM, 0.0)
     shrink = bodies.speeds_mm_s(speeds_deg_s)
     count = max(1, int(np.ceil(trajectory.duration_s / _STRETCH_S)))
     half = 0.5 * trajectory.duration_s / count
