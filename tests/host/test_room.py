@@ -17,6 +17,7 @@ from armtempo.model.parts import NOTHING, Load
 from armtempo.model.room import FAR_MM, ArmRoom, KeepOut, read
 from armtempo.model.sequence import Sequence
 from armtempo.model.steps import Goto, Hold
+from armtempo.model.tool_way import ToolWay
 from armtempo.planning import planner, point_to_point, room_check, sequence_planner
 from armtempo.planning.capsules import box_distance, segment_distance
 from armtempo.planning.jog import jog_motion
@@ -127,6 +128,11 @@ def test_a_free_path_goes_around_what_is_between_its_via_points() -> None:
     assert spline.via_segments is not None
     assert len(spline.via_segments) == 3
     np.testing.assert_allclose(plan.trajectory(np.array(spline.via_times_s)), via, atol=1e-6)
+    seam = replace(
+        job, via=(*job.via[:2], (165.0, -50.0, 30.0)), stops=(), ways=(ToolWay(2, line=True),), refine=3
+    )
+    led = planner.plan(arm, seam)
+    assert dense_least(arm, led.trajectory, 2000) > 0.0
     wall = replace(FEEDER, low_mm=(-50.0, 20.0, -FAR_MM), high_mm=(50.0, FAR_MM, FAR_MM))
     with pytest.raises(PlanError, match=OVER):
         planner.plan(replace(arm, room=ArmRoom((wall,))), job)

@@ -11,7 +11,7 @@ from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import checks
-from armtempo.planning.free import free_plan
+from armtempo.planning.free import around
 from armtempo.planning.line.stretches import Stretch
 from armtempo.planning.lower_bounds import Floor
 from armtempo.splines import bspline
@@ -66,7 +66,7 @@ def _free(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progre
         speed_mm_s=None,
         acceleration_mm_s2=None,
     )
-    planned = free_plan.motion(arm, alone, via_deg, progress)
+    planned = around.motion(arm, alone, via_deg, progress)
     joints = planned.trajectory.joints
     points = np.stack([joint.angle_points_deg for joint in joints], axis=1)
     search = planned.searches[0]
