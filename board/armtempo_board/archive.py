@@ -2,7 +2,7 @@
 
 For MicroPython's own firmware, in whose flash they have no room otherwise; ``boot.py`` imports it. The file begins with
 the length of its index in two bytes, then the index, a line "PACKAGE/MODULE OFFSET" for each, the package without
-"armtempo_", the offset below 0 where the module is not deflated. It is written by ``deploy/archive.py`` on the host.
+"armtempo_", the offset below 0 if the module is not deflated. It is written by ``deploy/archive.py`` on the host.
 """
 
 import sys

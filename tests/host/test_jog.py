@@ -191,7 +191,7 @@ def test_a_line_ends_before_a_singular_posture() -> None:
 def test_a_line_that_the_joints_cannot_follow_is_made_shorter(
     by: float, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And says so, where nothing else has ended it before."""
+    """And says so, if nothing else has ended it before."""
     lengths: list[float] = []
     on_line = jog_motion._on_line
 

@@ -18,7 +18,7 @@ from armtempo.new_arm import joint_entry
 from armtempo.new_arm.joint_entry import JointEntry
 
 _SETTINGS = """\
-# What commands in this folder use where an option does not say otherwise; 'armtempo config' shows it.
+# What commands in this folder use if an option does not say otherwise; 'armtempo config' shows it.
 arm = "arm.toml"
 job = "first.toml"
 port = {port}

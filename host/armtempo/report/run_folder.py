@@ -3,7 +3,7 @@
 ::
 
     run.json          what ran, when, on which board; how each repetition ended; the columns' meaning
-    trajectory.json   the plan, where it is known
+    trajectory.json   the plan, if it is known
     arm.json          else the arm
     motion.bin        what the board replayed
     samples-01.csv    one file a repetition, one line a sample (columns: see ``columns``)
@@ -62,7 +62,7 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
         "index": "number of the sample in its repetition, from 0",
         "ticks": f"motion clock of the board, ticks of 1/{limits.TICK_HZ} s",
         "time_s": "the same in seconds",
-        "path_s": "the motion's own time in seconds: behind the clock where the speed was below 100 %",
+        "path_s": "the motion's own time in seconds: behind the clock if the speed was below 100 %",
     }
     for number, joint in enumerate(joints, start=1):
         found |= {
