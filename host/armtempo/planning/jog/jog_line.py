@@ -42,6 +42,10 @@ _PARALLEL = 0.99
 _HALVINGS = 8
 _STEPS_TO_JUDGE = 3
 _SMALL_RAD = 1e-5
+_SINGULAR = 1e-3
+"""Singular values of the Jacobian below this, relative to the largest, are 0."""
+_MISSED = 0.01
+"""Part of a motion along the axis that the joints may leave out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +118,10 @@ class ToolLine:
 
     @cached_property
     def _is_singular(self) -> bool:
-        """Whether the tool can move in fewer directions than from postures nearby."""
+        """Whether the joints move the tool along the axis from postures nearby, but not from here."""
         moving = list(self.arm.driven_indices)
 
-        def directions(angles: Array) -> int:
+        def leads(angles: Array) -> bool:
             pose = forward(self._solver.geometry, angles)
             columns = []
             for joint in moving:
@@ -125,11 +129,15 @@ class ToolLine:
                 turned[joint] += _SMALL_RAD
                 change = (forward(self._solver.geometry, turned) - pose) / _SMALL_RAD
                 columns.append(np.append(change[:3, 3] / self.reach_mm, change[:3, :3] if self.about else ()))
-            return int(np.linalg.matrix_rank(np.array(columns), tol=1e-3))
+            turn = np.cross(self.direction, pose[:3, :3], axisb=0, axisc=0)
+            wanted = np.append(np.zeros(3), turn) if self.about else self.direction
+            matrix = np.array(columns).T
+            speeds = np.linalg.lstsq(matrix, wanted, rcond=_SINGULAR)[0]
+            return bool(np.linalg.norm(matrix @ speeds - wanted) < _MISSED)
 
         nearby = self._start.copy()
         nearby[moving] += np.radians(5.0) * np.arange(1, len(moving) + 1)
-        return directions(self._start) < directions(nearby)
+        return leads(nearby) and not leads(self._start)
 
     def _turns(self, fixed: tuple[str, ...]) -> bool:
         """Whether a rotation about the axis changes the kept part of the orientation."""
