@@ -4,20 +4,20 @@ import gc
 import sys
 
 OFTEN = 64
-SELDOM = 16  # where memory is not short and time is: a collection takes 5 ms
+SELDOM = 16  # if memory is not short and time is: a collection takes 5 ms
 _SEQUENCE = "sequence"  # how the names of the modules begin that only sequences need
 _keeps = False
 _NOT_ALWAYS = """
     pins registers arm_setup run_start start_check motion_check rate_check override time_law interval_steps
     cubics endpoints next_motion arm_check motion_file engine_memory room backup_sram armtempo_shared.motion
     bezier_weights store store_commands measured_rates command_rows armrecord table program_hash basis output_setup
-    start_up set_up
+    set_up
 """
-"""Modules; the last two are those of the compact form that hold what is called at rest only."""
+"""Modules; the last one is that of the compact form that holds what is called at rest only."""
 
 
 def keep_code(keeps: bool) -> None:
-    """Whether code stays that has been loaded, as a motion begins sooner then; where memory is not short.
+    """Whether code stays that has been loaded, as a motion begins sooner then; if memory is not short.
 
     ``forget`` and ``tidy`` do nothing then, and the heap is collected seldom. Not while a motion runs.
     """

@@ -3,10 +3,10 @@
 A motion from the arm file to the report::
 
     arm = armtempo.Arm.load("my_arm.toml")          # or Arm.paper(), the shipped one
-    job = armtempo.Job.load("my_job.toml", arm)     # or Job("mine", via_deg=[[0, -60, 40], [30, -20, 10]])
-    plan = armtempo.plan(arm, job)                  # plan.trajectory(time_s, order), plan.total_s, plan.save(…)
+    job = armtempo.Job.load("my_job.toml", arm)     # or Job("mine", via_deg=[[0, -60, 40], …])
+    plan = armtempo.plan(arm, job)                  # plan.trajectory(time_s), plan.save(…)
     with armtempo.connect("/dev/ttyACM0") as board: # or "sim", a virtual board
-        board.home(arm)                             # declares that the arm is at home; nothing moves
+        board.home(arm)                             # says that it is there; nothing moves
         run = board.run(plan, repeat=3)
     run.report()                                    # run.samples: a structured array
 
@@ -121,7 +121,7 @@ if TYPE_CHECKING:
     from armtempo.model.tool_pose import Pose
     from armtempo.model.tool_way import ToolWay
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
-    from armtempo.ports.listing import find_ports
+    from armtempo.ports.board_port import find_ports
     from armtempo.report.sequence_reader import SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
@@ -144,7 +144,7 @@ _HOMES = {
     ),
     "armtempo.kinematics.many": ("inverse_many",),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
-    "armtempo.ports.listing": ("find_ports",),
+    "armtempo.ports.board_port": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job", "Stop"),
     "armtempo.model.outputs": ("Input", "Output"),

@@ -9,7 +9,7 @@ from typing import Any
 from armtempo import optimise
 from armtempo.basics import part
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
-from armtempo.optimise.parameters import Number, Parameter
+from armtempo.optimise.task import Number, Parameter
 
 FOLDER = Path(__file__).parent
 

@@ -132,7 +132,7 @@ class MotionHead:
         """The entry for a change of speed that begins at a time of the motion; its length is linear between two.
 
         ``at``, and how long the motion lasts, in a unit of which that is less than 8192, so all are small integers of
-        the board: ``at`` rounded down, ``duration`` up. What is between two entries is taken up to 2 units later where
+        the board: ``at`` rounded down, ``duration`` up. What is between two entries is taken up to 2 units later if
         the next one is longer.
         """
         parts = (REST_ENTRIES if to_rest else OTHER_ENTRIES) - 1

@@ -12,7 +12,7 @@ from armtempo.cli import main, state
 from armtempo.diagnosis import machine
 from armtempo.diagnosis.finding import Level
 from armtempo.link.program_version import own_crc
-from armtempo.ports.listing import Port
+from armtempo.ports.board_port import Port
 from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
 from click.testing import CliRunner

@@ -14,7 +14,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.basics.settings import ProjectSettings
 from armtempo.ports import claim, claim_file, names, quick_stop
 from armtempo.ports.caller import Ownership, ownership
-from armtempo.ports.lines import Message
+from armtempo.ports.messages import Message
 from armtempo.ports.server import Server
 
 PORT = "/dev/q"

@@ -11,7 +11,7 @@ import pytest
 from armtempo.basics.settings import NAMES, OPTIONS, ProjectSettings, variable_of
 from armtempo.cli import main
 from armtempo.ports import board_port
-from armtempo.ports.listing import Port
+from armtempo.ports.board_port import Port
 from click.testing import CliRunner, Result
 
 SEED = 1301

@@ -15,8 +15,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Dynamics, Joint, JointModel, Load
 from armtempo.model.plan import Plan
-from armtempo.planning import by_torque, planner, torque
-from armtempo.planning.line.line_move import slower
+from armtempo.planning import planner, torque
+from armtempo.planning.planner import slower
 from armtempo.report import run_report, text_summary
 
 DATA = Path(__file__).parents[1] / "data"
@@ -203,7 +203,7 @@ def test_plans_by_torque_leave_each_motor_what_is_prudent(monkeypatch: pytest.Mo
         return replace(plan, arm=arm, trajectory=faster)
 
     monkeypatch.setattr(planner, "plan", planned)
-    found = by_torque.plan(plan.arm, plan.job)
+    found = torque.plan_by_torque(plan.arm, plan.job)
     least = torque.least_margin(found.arm, found.trajectory)
     assert least is not None
     assert torque.ENOUGH <= least.margin < 1.02 * torque.ENOUGH
@@ -212,12 +212,12 @@ def test_plans_by_torque_leave_each_motor_what_is_prudent(monkeypatch: pytest.Mo
         one.limits.speed_deg_s for one in plan.arm.driven
     ]
     strong = weighty(((0.0, 20.0), (6000.0, 20.0)))
-    assert by_torque.plan(strong.arm, plan.job).total_s == pytest.approx(plan.total_s / fastest)
+    assert torque.plan_by_torque(strong.arm, plan.job).total_s == pytest.approx(plan.total_s / fastest)
     weak = weighty(((0.0, 0.1), (6000.0, 0.1)))
     with pytest.raises(PlanError, match="slower motions do not help: joint 2: at"):
-        by_torque.plan(weak.arm, plan.job)
+        torque.plan_by_torque(weak.arm, plan.job)
     with pytest.raises(InputError, match="cannot be planned by torque"):
-        by_torque.plan(Arm.paper(), plan.job)
+        torque.plan_by_torque(Arm.paper(), plan.job)
 
 
 def test_check_tells_of_odd_bodies() -> None:

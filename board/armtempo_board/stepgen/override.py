@@ -72,7 +72,9 @@ class Override:
         at = self._motion_kiticks + since // PERMILLE * self.rate + since % PERMILLE * self.rate // PERMILLE
         motion = self._motion
         units: int = motion.ramp(at >> (self._shift - 10), self._parts, True) & _RAMP_LENGTH
-        grid = ((units << motion.ramp_bits - 6) + PERMILLE - 1) // PERMILLE  # RAMP_GRID_TICKS are 1000 << 6
+        grid: int = (
+            (units << motion.ramp_bits - 6) + PERMILLE - 1
+        ) // PERMILLE  # RAMP_GRID_TICKS are 1000 << 6
         return self._real_kiticks + since + (125 * grid >> 1)
 
     def _thousands(self, from_ticks: int) -> int:
@@ -114,7 +116,7 @@ class Override:
         time_law.to_motion_time(self.law, sample, at)
 
     def end_ticks(self) -> int:
-        """Real time at which the motion ends: of the ramp's end, where it ends within; LONGEST_RUN_TICKS: never."""
+        """Real time at which the motion ends: of the ramp's end, if it ends within; LONGEST_RUN_TICKS: never."""
         left = max(self._duration_ticks - self._motion_ticks, 0)
         if left and not self.rate:
             return LONGEST_RUN_TICKS

@@ -11,7 +11,7 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.settings import ProjectSettings, Setting
 from armtempo.cli import options, results
 from armtempo.ports import board_port
-from armtempo.ports.listing import find_ports
+from armtempo.ports.board_port import find_ports
 from armtempo.ports.names import SIM
 
 

@@ -13,8 +13,8 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
 from armtempo.diagnosis import figures
 from armtempo.new_arm import folder as project_folder
-from armtempo.new_arm import given_geometry, joint_entry, questions
-from armtempo.new_arm.given_geometry import ArmText
+from armtempo.new_arm import joint_entry, questions
+from armtempo.new_arm.folder import ArmText
 from armtempo.new_arm.questions import Answers
 
 
@@ -88,19 +88,19 @@ def _given_arm(
     name: str, like: str | None, urdf: Path | None, joints: tuple[str, ...], modified: bool
 ) -> ArmText:
     if like:
-        return given_geometry.from_shipped(like)
+        return project_folder.from_shipped(like)
     if urdf:
-        return given_geometry.from_urdf(urdf)
-    return given_geometry.from_joints(
+        return project_folder.from_urdf(urdf)
+    return project_folder.from_joints(
         name, [joint_entry.parse(text, n) for n, text in enumerate(joints, 1)], modified
     )
 
 
 def _arm_of(name: str, answers: dict[str, str]) -> ArmText:
     if answers["arm"] != "own":
-        return given_geometry.from_shipped(answers["arm"])
+        return project_folder.from_shipped(answers["arm"])
     modified = answers["convention"] == questions.MODIFIED
-    return given_geometry.from_joints(name, questions.joints(answers), modified)
+    return project_folder.from_joints(name, questions.joints(answers), modified)
 
 
 def draft_path(folder: Path) -> Path:

@@ -17,9 +17,9 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import is_sequence
-from armtempo.planning import by_torque, checks
+from armtempo.planning import checks, torque
 from armtempo.planning.free.corridor_curve import unit_of
-from armtempo.report import corridor_plot, drawing, text_summary
+from armtempo.report import drawing, plots, text_summary
 from armtempo.robot import engine_room
 
 
@@ -144,7 +144,7 @@ def _plans(arm: Arm, job: Job, split: bool, use_torque: bool) -> list[Plan]:
     """The plan of the job, or the plans of its parts; checked to fit the board."""
     with ProgressBar("planning") as progress:
         if use_torque:
-            plans = [by_torque.plan(arm, job, progress)]
+            plans = [torque.plan_by_torque(arm, job, progress)]
         else:
             plans = pipeline.split(arm, job, progress) if split else [pipeline.plan(arm, job, progress)]
     for plan in plans:
@@ -184,13 +184,13 @@ def _write_curve(arm: Arm, job: Job, target: Path, force: bool, as_json: bool) -
     with ProgressBar("planning") as progress:
         points = pipeline.corridor_curve(arm, job, progress)
     unit = unit_of(job)
-    replace_text(table, corridor_plot.csv(points, unit))
+    replace_text(table, plots.corridor_csv(points, unit))
     written = [str(table)]
     try:
-        drawing.save(corridor_plot.figure(points, unit, job.name), picture)
+        drawing.save(plots.corridors(points, unit, job.name), picture)
         written.append(str(picture))
     except MissingPackageError as error:
         results.show_error(error, "no plot")
     curve = [{f"corridor_{unit}": point.corridor, "duration_s": point.total_s} for point in points]
-    lines = [*corridor_plot.lines(points, unit), f"written: {', '.join(written)}"]
+    lines = [*plots.corridor_lines(points, unit), f"written: {', '.join(written)}"]
     results.show(as_json, {"files": written, "curve": curve}, lines)

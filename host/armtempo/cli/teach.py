@@ -14,7 +14,7 @@ from armtempo.basics.settings import ARM, ProjectSettings, nothing_set
 from armtempo.cli import chosen, jog, keys, options
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
-from armtempo.model import job_text, posture, posture_text, shipped
+from armtempo.model import posture, shipped, taught
 from armtempo.model.arm import Arm
 from armtempo.robot.board import Board
 
@@ -92,8 +92,8 @@ def _own_arm_file(arm_path: Path | None, name: str) -> Path:
 def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> None:
     arm = board.arm
     assert arm is not None  # it was configured
-    angles_deg = posture_text.digits(arm, board.posture_deg().tolist())
-    posture_text.save(file, arm, name, angles_deg, replace_old)
+    angles_deg = taught.digits(arm, board.posture_deg().tolist())
+    taught.save(file, arm, name, angles_deg, replace_old)
     words = ", ".join(
         f"{joint.name} {angle:.12g}°" for joint, angle in zip(arm.driven, angles_deg, strict=True)
     )
@@ -155,7 +155,7 @@ class TaughtPoints:
 
     def take(self) -> str:
         """Store the arm's position; returns a message."""
-        point = posture_text.digits(self._arm, self.where().tolist())
+        point = taught.digits(self._arm, self.where().tolist())
         if problem := self._arm.angles_problem(point):
             return f"not taken: {problem}"
         if self.points_deg and point == self.points_deg[-1]:
@@ -172,7 +172,7 @@ class TaughtPoints:
 
     def save(self, file: Path) -> None:
         """Write the job; raises InputError for fewer than two points."""
-        text = job_text.of_points(job_text.name_of(file), self.points_deg)
+        text = taught.of_points(taught.name_of(file), self.points_deg)
         replace_text(file, text)
         click.echo(
             f"written: {file}, {len(self.points_deg)} via points; 'armtempo plan --job {file}' plans it"

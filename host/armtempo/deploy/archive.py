@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 _WINDOW_BITS = 10
 """Memory that the board needs while it imports a module: 1 KB and 1.4 KB for the decoder."""
 _WIDE_BITS = 13
-"""The same where there is plenty: 8 KB."""
+"""The same if there is plenty: 8 KB."""
 
 
 def pack(files: Mapping[str, bytes], wide: Collection[str], plain: Collection[str]) -> bytes:

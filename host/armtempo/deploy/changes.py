@@ -44,7 +44,7 @@ class Change:
 
 
 def check_suitable(found: Survey) -> None:
-    """LinkError, with the reason, where the program cannot run on this firmware."""
+    """LinkError, with the reason, if the program cannot run on this firmware."""
     check_version(found.firmware_crc)
     if "STM32F4" not in found.machine:
         raise LinkError(

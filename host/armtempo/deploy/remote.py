@@ -54,7 +54,7 @@ class Survey:
 
 
 class Remote:
-    """One board by its port; raises LinkError, with the end of mpremote's output, where a step fails."""
+    """One board by its port; raises LinkError, with the end of mpremote's output, if a step fails."""
 
     def __init__(self, port: str) -> None:
         self.port = port
@@ -62,7 +62,7 @@ class Remote:
     def run(self, *commands: Sequence[str]) -> str:
         """Run mpremote's commands one after the other in one session; gives what they print.
 
-        A board that is just being reset takes no prompt's keys: where mpremote has not got in, it tries once more.
+        A board that is just being reset takes no prompt's keys: if mpremote has not got in, it tries once more.
         """
         try:
             return "".join(self.lines(*commands))

@@ -57,7 +57,7 @@ def of(arm: Arm) -> tuple[JointFigures, ...]:
 
 
 def table(joints: Sequence[JointFigures]) -> list[str]:
-    """Lines for people; none where nothing is driven."""
+    """Lines for people; none if nothing is driven."""
     return aligned([_HEAD, *map(_row, joints)], _WIDTHS) if joints else []
 
 

@@ -108,13 +108,13 @@ class Choice:
 
     @property
     def beyond(self) -> float:
-        """By how much the branch that is least out of reach is so; inf where none is."""
+        """By how much the branch that is least out of reach is so; inf if none is."""
         if not any(math.isinf(each.outside_rad) for each in self.candidates):
             return math.inf
         return self.wrist.beyond
 
     def of_nearer_poses(self, previous: Sequence[float], by: float) -> list[list[float]]:
-        """Postures, (joints,) each, with the tool moved a little outwards or inwards: where the pose is on a border."""
+        """Postures, (joints,) each, with the tool moved a little outwards or inwards: if the pose is on a border."""
         x, y, z = self.wrist.position
         z -= self.shape.height
         found = []

@@ -69,7 +69,7 @@ class Constraint:
     axes: tuple[Vector, Vector, Vector]
     """x, y, z of the tool that the target's matrix shows."""
     partly: Component | Direction | None
-    """What is asked of the orientation, where that is not all of it (or nothing)."""
+    """What is asked of the orientation, if that is not all of it (or nothing)."""
 
     @classmethod
     def of(cls, target: Pose) -> Constraint:

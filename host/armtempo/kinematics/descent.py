@@ -28,7 +28,7 @@ ENOUGH = 1e-20
 """Cost that ends the descent: errors of 1e-10 of the tolerances."""
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-4, 1e-10, 1e8
-"""In units of the largest second derivative: at the start; where steps succeed; where even tiny steps do not."""
+"""In units of the largest second derivative: at the start; if steps succeed; if even tiny steps do not."""
 
 LONGEST_STEP_RAD = 1.0
 """Farther the linear model says nothing."""
@@ -91,7 +91,7 @@ def descend(problem: PoseProblem, start_rad: Sequence[float]) -> Posture:
 def most_swing(problem: PoseProblem, angles_rad: Sequence[float], cost: float) -> Array:
     """Largest change of each moving joint that costs at most ``cost``, to first order: (moving,), in rad.
 
-    At a posture that meets the target; inf where that is singular.
+    At a posture that meets the target; inf if that is singular.
     """
     rows, _ = _system(problem, _posture(problem, list(angles_rad)))
     size = len(rows)

@@ -84,14 +84,14 @@ def base_turn(shape: Shape, x: T, y: T, forward: T) -> Pair[T]:
 
 
 def to_shoulder(shape: Shape, forward: T, z: T) -> Pair[T]:
-    """The wrist centre seen from the shoulder, in the arm's plane: outwards, and up (where sign1 is positive)."""
+    """The wrist centre seen from the shoulder, in the arm's plane: outwards, and up (if sign1 is positive)."""
     return forward - shape.shoulder, shape.sign1 * (z - shape.height)
 
 
 def triangle(functions: Functions[T], shape: Shape, r: T) -> Pair[T]:
     """Eq. (7): angle by which the elbow is bent, and the product that all sines of the triangle share.
 
-    The half-angle form keeps the full accuracy where the elbow is stretched or folded, where the arc cosines
+    The half-angle form keeps the full accuracy if the elbow is stretched or folded, where the arc cosines
     of the paper lose half the digits.
     """
     opened = functions.sqrt((shape.farthest - r) * (shape.farthest + r))

@@ -102,7 +102,7 @@ class Geometry:
 
     @cached_property
     def moving(self) -> Geometry:
-        """That of the joints of ``core`` alone; itself where these are all."""
+        """That of the joints of ``core`` alone; itself if these are all."""
         if self.core == slice(0, self.joints):
             return self
         first, end = self.core.start, self.core.stop

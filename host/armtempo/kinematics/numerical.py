@@ -97,7 +97,7 @@ class NumericalSolutions:
     solutions: tuple[NumericalSolution, ...]
     """Each meets the target within its tolerances; those that can be used first, nearest first."""
     nearest: NumericalSolution
-    """The chosen one; where none can be used, the posture within the ranges that misses the target by least."""
+    """The chosen one; if none can be used, the posture within the ranges that misses the target by least."""
     starts: int
     """Postures started from."""
 
@@ -160,7 +160,7 @@ def descents(
 
 
 def _starts(arm: MovingArm, previous: list[float], seed: int) -> Iterator[list[float]]:
-    """The previous posture, then random ones: within the ranges, or within a turn where a range is wider."""
+    """The previous posture, then random ones: within the ranges, or within a turn if a range is wider."""
     yield previous
     rng = np.random.default_rng(seed)
     ends = [(low, min(high, low + math.tau)) for low, high in arm.bounds]

@@ -102,7 +102,7 @@ def inverse(
     ``near_deg``, (joints,) or (J,), is the posture to stay near to; None: home. A whole pose of an arm of the
     closed form's class has eight solutions, some perhaps rejected. Any other arm or pose gets what a numerical
     search finds with the joints that have a motor, perhaps nothing: of a pose that asks for fewer numbers than joints
-    move the one that the search comes to first, else all, but at most 16 where one turns into the next, as at a
+    move the one that the search comes to first, else all, but at most 16 if one turns into the next, as at a
     singular pose. Raises InputError for a matrix that is not a pose.
     """
     solver = _solver(arm)
@@ -147,7 +147,7 @@ def _solver(arm: Arm | Path | str) -> PoseSolver:
 def _within_tolerance(
     solver: PoseSolver, choice: Choice, given: Pose | None, near: Sequence[float]
 ) -> list[NumericalSolution]:
-    """Postures in range near to the exact ones, where a joint is so little out of range, or the pose out of reach,
+    """Postures in range near to the exact ones, if a joint is so little out of range, or the pose out of reach,
     that the tolerance may make up for it."""
     tolerance_mm, tolerance_deg = (
         (given.tolerance_mm, given.tolerance_deg) if given else (TOLERANCE_MM, TOLERANCE_DEG)

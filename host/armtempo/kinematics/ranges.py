@@ -81,7 +81,7 @@ class Ranges:
         return self.fitted(angles, previous)[0]
 
     def fitted(self, angles: Sequence[float], previous: Sequence[float]) -> tuple[list[float], float]:
-        """The same, and how far the joint that is farthest outside is so then; 0 where all are inside."""
+        """The same, and how far the joint that is farthest outside is so then; 0 if all are inside."""
         found, most = [], 0.0
         for angle, (low, high, near), before in zip(angles, self._whole, previous, strict=True):
             if not (low <= angle <= high and -near < angle - before < near):

@@ -63,7 +63,7 @@ class WristCentre:
 
     @property
     def beyond(self) -> float:
-        """By how much the way of turning the base that is least out of reach is so; inf where none is."""
+        """By how much the way of turning the base that is least out of reach is so; inf if none is."""
         if math.isnan(self._from_shoulder[0]):
             return abs(self.shape.offset) - math.hypot(*self.position[:2])
         gaps = [max(r - self.shape.farthest, self.shape.nearest - r) for r in self._from_shoulder]
@@ -100,7 +100,7 @@ def _in_offset(shape: Shape, planar: float, unit: str) -> Rejection:
 
 
 def _outer_line(shape: Shape, z: float) -> int:
-    """Line 2 or 3 of Eq. (3) where the wrist centre is too low or too high for any distance from axis 1."""
+    """Line 2 or 3 of Eq. (3) if the wrist centre is too low or too high for any distance from axis 1."""
     highest = math.sqrt(max(shape.farthest**2 - shape.shoulder**2, 0.0))
     if z <= shape.height - highest:
         return 2

@@ -48,7 +48,7 @@ class Shape:
     bend: float
     """Angle of L34 against the elbow's x axis, in rad: arctan(d4 / a3) of Eq. (7), with its signs."""
     turn2: float
-    """Half a turn where a2 is negative, else 0."""
+    """Half a turn if a2 is negative, else 0."""
     sign1: float
     sign2: float
     """+1 if alpha2 is 0, -1 if it is half a turn."""

@@ -1,4 +1,4 @@
-"""From a target to angles, whatever the arm: by the closed form where it serves, else numerically.
+"""From a target to angles, whatever the arm: by the closed form if it serves, else numerically.
 
 ``PoseSolver.nearest`` is for loops that follow a moving target (a jog in tool space): one answer, near to where
 the arm is. ``PoseSolver.solve`` finds all postures and says why some are not to be had.
@@ -40,7 +40,7 @@ class Nearest:
     miss: Miss
     """How far the tool then is from the target, in mm and deg."""
     change_rad: float
-    """Largest change of a joint from the start: where it is large, the arm would change its branch."""
+    """Largest change of a joint from the start: if it is large, the arm would change its branch."""
     reason: str
     """Why not; empty with success."""
     method: str
@@ -58,9 +58,9 @@ class Answer:
 
     target: Pose
     choice: Choice | None
-    """The eight solutions of the closed form, where it was asked."""
+    """The eight solutions of the closed form, if it was asked."""
     search: NumericalSolutions | None
-    """What the numerical search found, where it was asked, or where none of the eight can be used."""
+    """What the numerical search found, if it was asked, or if none of the eight can be used."""
     angles_rad: tuple[float, ...]
     """(joints,): the posture chosen; without success the one that comes nearest to the target."""
     tool: Array
@@ -151,8 +151,8 @@ class PoseSolver:
     def solve(self, target: Pose, previous_rad: Sequence[float], numerically: bool = False) -> Answer:
         """All postures that meet ``target``, the one nearest to ``previous_rad``, (joints,), chosen.
 
-        A whole pose is solved by the closed form where it serves the arm, unless ``numerically``, with all joints
-        moving. Otherwise the joints with a motor move, and all only where a whole pose needs them.
+        A whole pose is solved by the closed form if it serves the arm, unless ``numerically``, with all joints
+        moving. Otherwise the joints with a motor move, and all only if a whole pose needs them.
         """
         previous = self._checked(previous_rad)
         choice = None

@@ -35,7 +35,7 @@ _LOCKED_DEG = 0.001
 
 
 def driver(table: Table | None) -> Driver:
-    """[driver]; errors of this and the other functions: InputError, naming file, key and value."""
+    """[driver]. All functions here raise InputError, with file, key and value."""
     return part.read(Driver, table) if table else Driver()
 
 
@@ -66,7 +66,7 @@ def joint(table: Table, number: int) -> Joint:
         raise table.fail("limits", "a table with speed_deg_s, acceleration_deg_s2 and jerk_deg_s3")
     encoder = _encoder(table.table("encoder"))
     if encoder is not None and motor is None:
-        raise table.fail("motor", "given where there is an encoder")
+        raise table.fail("motor", "only allowed with an encoder")
     found = Joint(
         name=table.text("name", f"joint {number}"),
         d_mm=table.number("d_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
@@ -120,12 +120,12 @@ def _home(table: Table, low: float, high: float) -> float:
 
 
 def _locked(table: Table) -> tuple[float, float]:
-    """The range of a joint that ``fixed_deg`` locks: just about that angle."""
+    """The narrow range of a joint that ``fixed_deg`` locks."""
     angle = table.number("fixed_deg", least=1 - MAX_ANGLE_DEG, most=MAX_ANGLE_DEG - 1)
     table.known("range_deg", "limits")
     for key in ("motor", "home_deg"):
         if table.has(key):
-            raise table.fail(key, "left out where fixed_deg locks the joint")
+            raise table.fail(key, "left out if fixed_deg locks the joint")
     return angle - _LOCKED_DEG, angle + _LOCKED_DEG
 
 

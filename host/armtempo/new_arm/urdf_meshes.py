@@ -37,7 +37,7 @@ def of_rows(chain: Chain, fit: Fit, urdf: Path) -> dict[int, Array]:
 def radii_mm(chain: Chain, fit: Fit, urdf: Path) -> dict[int, float]:
     """Radii of rows, from 1, about whose d and a the links' shapes for collision are, or those that are seen.
 
-    A triangle is within a capsule where its corners are; constant rows carry what the one before them does. Rows
+    A triangle is within a capsule if its corners are; constant rows carry what the one before them does. Rows
     without shapes are left out. InputError for a mesh that cannot be read.
     """
     frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))

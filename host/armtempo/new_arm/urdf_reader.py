@@ -25,7 +25,7 @@ CONTINUOUS_DEG = (-180.0, 180.0)
 """Range that a continuous joint gets: a URDF gives it none."""
 
 _WHEEL_JOINTS = 2
-"""An axle with its steering; a chain of so few joints is an arm only where each has limits."""
+"""An axle with its steering; a chain of so few joints is an arm only if each has limits."""
 _REASONS = {
     "prismatic": "it slides, and an arm file describes turning joints only",
     "floating": "it is free in all directions, and a motor turns about one axis",

@@ -1,9 +1,9 @@
-"""How long a motion takes to brake to rest, or to change its speed otherwise, by where on its path that begins.
+"""The time for braking to rest, or for another change of speed, as a function of the time at which it begins.
 
-The board lets the motion's own time run at another rate, so the arm stays on its path: in the brake time the rate goes
-from r0 to r1, by the law in ``armtempo_board/stepgen/time_law.py``. Braking and pauses are r1 = 0, and their ramps have
-that of the shapes in RAMP_SHAPES with which they are shortest from where they begin; other changes of speed have times
-of their own, and one shape.
+The board lets the motion's own time run at another rate, so the arm stays on its path: in the brake time the
+rate goes from r0 to r1, by the law in ``armtempo_board/stepgen/time_law.py``. Braking and pauses have r1 = 0,
+and those of RAMP_SHAPES that make them shortest from where they begin; other changes of speed have separate
+times, and one fixed shape.
 """
 
 from __future__ import annotations
@@ -31,9 +31,8 @@ from armtempo.model.parts import Limits
 from armtempo.splines.trajectory import Trajectory
 
 EXCESS = 1.25
-"""Multiple of the acceleration and jerk limits that braking and changes of speed may reach. Within the
-limits themselves a motion that is already at them could only brake very slowly: braking adds to the acceleration and
-jerk of the path."""
+"""Multiple of the acceleration and jerk limits that braking and changes of speed may reach. A motion at its
+limits could brake only very slowly within them, as braking adds to the acceleration and jerk of the path."""
 
 Rates = tuple[tuple[float, float], ...]
 Shapes = NDArray[np.int64]
@@ -49,8 +48,8 @@ OTHERS: Rates = (
     (0.9, 0.2),
     (0.2, 0.9),
 )
-"""Rates before and after, for which the times are found; between others less is needed. The first one of TO_REST and
-the first two of OTHERS need most; to rest, 0.5 does, where the motion ends within a ramp from 1."""
+"""Rates before and after for which the times are computed; all others need less. The first of TO_REST and the
+first two of OTHERS need the most; from 0.5 to rest does where the motion ends within a ramp from 1."""
 _WORST_TO_REST = TO_REST[:3:2]
 _WORST_OTHERS = OTHERS[:2]
 
@@ -82,11 +81,11 @@ class BrakeTimes:
     unit_bits: int
 
     def rest_s(self, time_s: float | Array) -> Array:
-        """How long braking takes from a time of the motion on."""
+        """Brake time from given times of the motion, seconds, of the same shape."""
         return self._at(self.to_rest, time_s)
 
     def change_s(self, time_s: float | Array) -> Array:
-        """How long another change of speed takes."""
+        """Duration of other changes of speed from given times of the motion, seconds."""
         return self._at(self.others, time_s)
 
     def _at(self, table: Array, time_s: float | Array) -> Array:
@@ -110,10 +109,10 @@ class BrakeTimes:
 
 
 def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
-    """The shortest times that keep EXCESS times the limits, one of ``limits`` for each joint, to 2 %.
+    """The shortest times (within 2 %) that keep EXCESS times the ``limits`` of each joint.
 
-    Speed never rises. Found on a grid of starts and times, and looked at again on a finer one. Raises InputError where
-    the motion itself exceeds EXCESS times the limits.
+    Speed never rises. Computed on a grid of starts and times, and checked on a finer one. Raises InputError
+    if the motion itself exceeds EXCESS times the limits.
     """
     ramps = _Ramps(trajectory, np.array([limit.values for limit in limits]))
     if ramps.worst_of_motion > EXCESS:
@@ -208,7 +207,7 @@ def _lift(table: Array, needed: Array) -> None:
 
 
 class _Ramps:
-    """Acceleration and jerk of a motion while its rate changes, over their limits (J, 3)."""
+    """Acceleration and jerk of a motion during changes of its rate, relative to the limits (J, 3)."""
 
     def __init__(self, trajectory: Trajectory, allowed: Array) -> None:
         self._phases = _PHASES
@@ -216,7 +215,7 @@ class _Ramps:
         self._allowed = allowed
         time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
         # speeds, accelerations and jerks over their limits' units; rest after the end
-        # (3, J, T): what is computed for each time is together, which NumPy goes through quickest
+        # (3, J, T): the time axis last, which is fastest in NumPy
         self._motion = np.stack([trajectory(time, order).T for order in (1, 2, 3)])
         self.worst_of_motion = float(np.max(np.abs(self._motion[1:]) / allowed.T[1:, :, None]))
 

@@ -2,11 +2,10 @@
 
 ::
 
-    names.py, listing.py  names of ports, and the ports of this machine
-    board_port.py  which of them is meant if none is given
+    names.py      names of ports
+    board_port.py  the ports of this machine, and which is meant if none is given
     claim.py      the file that says which program has a port and where that program listens
-    lines.py      messages over a socket, one line of JSON each
-    requests.py   the requests and their fields
+    messages.py   messages over a socket, one line of JSON each; the requests and their fields
     server.py     the owner's end: answers requests, publishes samples and events
     caller.py     the other end: finds the owner, asks, subscribes
     quick_stop.py  the beginning of ``armtempo stop``, which asks it before the rest is imported

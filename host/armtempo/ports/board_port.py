@@ -2,17 +2,48 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 from armtempo.basics.errors import InputError
 from armtempo.basics.settings import PORT, ProjectSettings, Setting, nothing_set
 from armtempo.ports import claim
 from armtempo.ports.caller import Ownership, ownership
-from armtempo.ports.listing import find_ports
 from armtempo.ports.names import SIM
 
+_VENDOR = 0xF055
+_PRODUCTS = range(0x9800, 0x980B)
+"""USB ids of MicroPython on an STM32 (its ports/stm32/mpconfigboard_common.h)."""
 ONLY_BOARD = "the only board plugged in"
 ONLY_OPEN = "the only port that an armtempo program has open"
 UNASKED = (ONLY_BOARD, ONLY_OPEN)
 """Sources of a default port; such a choice is printed."""
+
+
+@dataclass(frozen=True)
+class Port:
+    """One serial port."""
+
+    device: str
+    description: str
+    board: bool
+    """Whether its USB ids are those of MicroPython on an STM32."""
+
+
+def find_ports() -> list[Port]:
+    """All serial ports, likely boards first."""
+    from serial.tools import list_ports  # imported here: it takes a while, and most commands get their port
+
+    found = [
+        Port(info.device, _describe(info), info.vid == _VENDOR and info.pid in _PRODUCTS)
+        for info in list_ports.comports()
+    ]
+    return sorted(found, key=lambda port: (not port.board, port.device))
+
+
+def _describe(info: Any) -> str:
+    text = info.product or info.description or ""
+    return "" if text == "n/a" else str(text)
 
 
 def choose(given: str | None = None, others: bool = False) -> Setting:

@@ -7,13 +7,12 @@ import socket
 import time
 from collections.abc import Iterator
 from enum import Enum
-from types import TracebackType
 from typing import Any, Self
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortGivenUpError
 from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
-from armtempo.ports.lines import LineReader, Message, to_line
+from armtempo.ports.messages import LineReader, Message, to_line
 
 HUNG_S = 2.0
 """A program that has not answered ``hello`` for this long counts as hanging."""
@@ -117,9 +116,7 @@ class Caller:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.close()
 
     def _send(self, line: bytes) -> None:

@@ -18,8 +18,7 @@ from threading import Lock, Thread
 from armtempo.basics.errors import ArmtempoError, BoardError, LinkError, PortError
 from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
-from armtempo.ports.lines import LineReader, Message, to_line
-from armtempo.ports.requests import REQUESTS, Fields, check, is_id
+from armtempo.ports.messages import REQUESTS, Fields, LineReader, Message, check, is_id, to_line
 
 Handler = Callable[[Message], Message]
 """Answers one request; an ArmtempoError is sent as an answer too."""

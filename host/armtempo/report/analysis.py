@@ -10,7 +10,7 @@ from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.report import stretched
+from armtempo.report import replayed
 from armtempo.report.differentiation import of_curves
 from armtempo.report.run_folder import COMPLETE
 from armtempo.report.run_reader import RepetitionData
@@ -42,7 +42,7 @@ class Curves:
     theory: Array
     shown: Array
     path_s: Array
-    """(K,), the motion's own time; less than ``times_s`` where the speed was below 100 %."""
+    """(K,), the motion's own time; less than ``times_s`` if the speed was below 100 %."""
     measured: NDArray[np.bool_]
 
 
@@ -65,7 +65,7 @@ def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Cur
         raise ValueError("no samples to analyse")
     times: Array = np.arange(count, dtype=np.float64) * SAMPLE_S
     measured = np.any([~np.isnan(one.angle_deg).all(axis=0) for one in repetitions], axis=0)
-    paths = [stretched.path_times(one, times) for one in repetitions]
+    paths = [replayed.path_times(one, times) for one in repetitions]
     path_s = max(paths, key=lambda path: float(path[-1]))
     each = np.stack(
         [
@@ -74,7 +74,7 @@ def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Cur
             if _same_speed(one, path, path_s)
         ]
     )
-    theory: Array = stretched.theory(trajectory, times, path_s)
+    theory: Array = replayed.theory(trajectory, times, path_s)
     shown = of_curves(theory[0], SAMPLE_S, ended=True)
     present = np.sum(~np.isnan(each), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):

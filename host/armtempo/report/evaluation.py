@@ -12,7 +12,7 @@ from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
-from armtempo.report import analysis, peaks, replayed, run_reader, stretched
+from armtempo.report import analysis, peaks, replayed, run_reader
 from armtempo.report.run_folder import COMPLETE
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
@@ -22,7 +22,7 @@ from armtempo.splines.trajectory import Trajectory
 class Evaluation:
     """A run with its motion, its curves and what is wrong with its files.
 
-    ``plan`` is None for a motion that only the board had; ``arm`` too where the folder does not say.
+    ``plan`` is None for a motion that only the board had; ``arm`` too if the folder does not say.
     """
 
     run: run_reader.RunData
@@ -108,7 +108,7 @@ def complaints(run: run_reader.RunData) -> list[str]:
             found.append(f"{repetition.file}: samples {first} to {last} are missing")
         if np.any(steps <= 0):
             found.append(f"{repetition.file}: the sample count starts again in the middle (a reset?)")
-        if words := stretched.note(repetition):
+        if words := replayed.speed_note(repetition):
             found.append(words)
         if repetition.state != COMPLETE:
             end = repetition.time_s[-1]

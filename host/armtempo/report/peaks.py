@@ -9,7 +9,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.model.parts import Limits
-from armtempo.report import stretched
+from armtempo.report import replayed
 from armtempo.report.analysis import SAMPLE_S, Curves
 from armtempo.report.differentiation import noise, of_curves, quantisation_sigma, weights
 from armtempo.splines.trajectory import Trajectory
@@ -36,7 +36,7 @@ class LimitCheck:
 
     @property
     def verdict(self) -> str:
-        """KEPT, WITHIN or EXCEEDED only where 3 sigma more or less change nothing, else UNDECIDED; NOT_MEASURED."""
+        """KEPT, WITHIN or EXCEEDED only if 3 sigma more or less change nothing, else UNDECIDED; NOT_MEASURED."""
         if np.isnan(self.peak):
             return NOT_MEASURED
         lowest, highest = self.peak - 3.0 * self.sigma, self.peak + 3.0 * self.sigma
@@ -64,7 +64,7 @@ def limit_checks(
     sigmas = np.fmax(rounding, _scatter(error - smooth[0]))
     times = np.arange(0.0, found.times_s[-1] + _PEAK_STEP_S / 2, _PEAK_STEP_S)
     path_s = np.interp(times, found.times_s, found.path_s)
-    theory = stretched.theory(trajectory, times, path_s)
+    theory = replayed.theory(trajectory, times, path_s)
     peaks = [
         [_peak(theory[order, :, joint] + _interpolated(smooth[order, :, joint], times)) for order in (1, 2)]
         for joint in range(len(limits))

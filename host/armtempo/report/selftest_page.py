@@ -21,7 +21,7 @@ _KINDS = {Level.GOOD: GOOD, Level.ERROR: BAD, Level.NOTE: OPEN}
 
 
 def check_free(folder: Path, force: bool) -> None:
-    """InputError where ``folder`` has a self-test already, unless ``force``, or where it cannot be made."""
+    """InputError if ``folder`` has a self-test already, unless ``force``, or if it cannot be made."""
     there = [name for name in (JSON, HTML) if (folder / name).exists()]
     if there and not force:
         raise InputError(

@@ -31,7 +31,7 @@ _FLOORS = {
 }
 """What ``Search.floor_kind`` means."""
 _WORTH_SAYING = 0.03
-"""A free path is named where it might save more than this part of the motion time."""
+"""A free path is named if it might save more than this part of the motion time."""
 
 
 def lines(plan: Plan) -> list[str]:
@@ -137,7 +137,7 @@ def _polished(search: Search) -> str:
 
 
 def _free_path(plan: Plan) -> list[str]:
-    """What a free path could save at most; nothing where that is little or the job gives the path."""
+    """What a free path could save at most; nothing if that is little or the job gives the path."""
     job, total_s = plan.job, plan.trajectory.duration_s
     if job.path != "through" or checks.leads_tool(job):
         return []

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from armtempo_shared import limits
+from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
@@ -13,7 +15,9 @@ from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
-from armtempo.planning import point_to_point, room_check
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
+from armtempo.planning import point_to_point, room_check, via_points
 from armtempo.ports.names import is_sim
 from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
@@ -21,6 +25,10 @@ from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import TEMPORARY, SampleSink, raise_fault, replay, store
 from armtempo.splines.trajectory import Trajectory
+
+Where = Plan | EncodedMotion | SequencePlan | Path | str | ArrayLike
+"""A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
+(or of its file) or sequence."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +67,11 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
         found = point_to_point.straight(name, here_deg, target_deg, arm, pace.speed)
         room_check.check(arm, found)
         return found
-    from armtempo.planning.line import line_move  # imported here, because it loads the whole planner
+    from armtempo.planning import planner  # imported here, because it loads everything that plans
 
     target = point_to_point.posture(target_deg, arm)
-    trajectory = line_move.straight_line(arm, here_deg.tolist(), target.tolist())
-    return replace(line_move.slower(trajectory, pace.speed), name=name)
+    trajectory = planner.straight_line(arm, here_deg.tolist(), target.tolist())
+    return replace(planner.slower(trajectory, pace.speed), name=name)
 
 
 def go_back(client: Client, motion: EncodedMotion, stop: StopRequest) -> None:
@@ -120,3 +128,22 @@ class StartPosition:
                 go_to(self.client, arm, start_deg, stop)
         elif start_deg is not None and not arm_state.is_at(self.client, arm, start_deg):
             raise LinkError(f"the arm is not at the start of {name}", advice)
+
+
+def posture_deg(where: Where, arm: Arm) -> Array:
+    """The driven joints' angles of a posture, degrees (J,); for a sequence without motions: the home posture.
+
+    Raises InputError for an unknown name, or a posture that does not fit the arm.
+    """
+    if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
+        where = Plan.load(where)
+    if isinstance(where, Plan):
+        return where.trajectory(0.0)
+    if isinstance(where, EncodedMotion):
+        return where.start_deg
+    if isinstance(where, SequencePlan):
+        start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
+        return point_to_point.posture(start_deg, where.arm)
+    if isinstance(where, str):
+        return via_points.posture_deg(arm, arm.posture(where))
+    return point_to_point.posture(where, arm)

@@ -19,8 +19,7 @@ from armtempo.link.board_messages import Done, Event, Fault, Sample
 from armtempo.link.traffic import Chunk
 from armtempo.model.arm import Arm
 from armtempo.ports import claim, names
-from armtempo.ports.lines import Message
-from armtempo.ports.requests import TOPICS
+from armtempo.ports.messages import TOPICS, Message
 from armtempo.ports.server import Server
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.speed import change_speed

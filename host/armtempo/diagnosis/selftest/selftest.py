@@ -1,4 +1,4 @@
-"""The order of a self-test. Drivers stay off: where ENABLE is not at its inactive level, nothing is done."""
+"""The order of a self-test. Drivers stay off: if ENABLE is not at its inactive level, nothing is done."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ SILENT = "silence"
 def run(client: Client, progress: Progress | None = None) -> SelfTest:
     """Test the board of ``client``, which runs the program again afterwards; its positions are unknown then.
 
-    Raises LinkError, with nothing done, where something moves, a fault is pending, the drivers are on, or the program
-    is not a part of the firmware; LinkError also where the board falls silent in a part, which it names.
+    Raises LinkError, with nothing done, if something moves, a fault is pending, the drivers are on, or the program
+    is not a part of the firmware; LinkError also if the board falls silent in a part, which it names.
     """
     info = client.info
     found = SelfTest(info.board_id[:UNIQUE_ID_DIGITS], info.virtual, info.program_crc)
@@ -82,7 +82,7 @@ def _same_room(before: int, after: int) -> Measurement:
         f"{before}, {after} bytes",
         "the same",
         before == after,
-        "reset the board; where it is so each time, please report it",
+        "reset the board; if it is so each time, please report it",
     )
 
 
@@ -162,7 +162,7 @@ def _check_drivers(prompt: Prompt, found: SelfTest) -> None:
 def _hung(part: str) -> Measurement:
     return Measurement(
         board_part.BOARD, "the self-test before", f"the board hung in {part!r} and was reset", "", Level.NOTE,
-        f"where it hangs in {part!r} again, please report it with the output",
+        f"if it hangs in {part!r} again, please report it with the output",
     )  # fmt: skip
 
 
@@ -199,7 +199,7 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
 
 
 def _part(prompt: Prompt, found: SelfTest, part: str, *files: str, **arguments: Any) -> Measured | None:
-    """What a part gave; None, with a line about it, where its code raised."""
+    """What a part gave; None, with a line about it, if its code raised."""
     stage(part)
     try:
         measured = prompt.measure(*files, **arguments)
@@ -215,7 +215,7 @@ def _failed(part: str, error: LinkError) -> Measurement:
 
 
 def _is_still(prompt: Prompt, found: SelfTest) -> bool:
-    """Whether no encoder turns with the first steps: where ENABLE is wired or named wrong, nothing else is made."""
+    """Whether no encoder turns with the first steps: if ENABLE is wired or named wrong, nothing else is made."""
     arguments = _arguments(motion.gentle(found.data[DRIVERS]["joints"]), found)
     measured = _part(prompt, found, "encoders", "engine", "encoders", **arguments)
     if measured is None:

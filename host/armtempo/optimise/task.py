@@ -1,4 +1,4 @@
-"""What all searches share: the task, counted evaluations, the best point so far, the history."""
+"""What all searches share: the task, parameters by name, counted evaluations, the best point so far, the history."""
 
 from __future__ import annotations
 
@@ -10,8 +10,54 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress
 
+Value = float | str
 Function = Callable[[Array], Array]
 """Values (N,) of points (N, d)."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number from ``least`` to ``most``, a whole one if the default is an int."""
+
+    default: float
+    least: float
+    most: float
+    meaning: str
+
+    @property
+    def allowed(self) -> str:
+        """The range in words."""
+        kind = "a whole number" if isinstance(self.default, int) else "a number"
+        return f"{kind} from {self.least:g} to {self.most:g}"
+
+    def admits(self, value: object) -> bool:
+        """Whether ``value`` is of the kind and in the range."""
+        if isinstance(value, bool) or not isinstance(
+            value, int if isinstance(self.default, int) else int | float
+        ):
+            return False
+        return self.least <= value <= self.most
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """One of several words."""
+
+    default: str
+    words: tuple[str, ...]
+    meaning: str
+
+    @property
+    def allowed(self) -> str:
+        """The words."""
+        return "one of " + ", ".join(repr(word) for word in self.words)
+
+    def admits(self, value: object) -> bool:
+        """Whether ``value`` is one of the words."""
+        return value in self.words
+
+
+Parameter = Number | OneOf
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,14 @@
-"""Writing a posture into the text of an arm file: one table is added or replaced, everything else is unchanged."""
+"""What was taught, as text: a posture in an arm file, of which everything else is unchanged; a job of via points."""
 
 from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+from armtempo_shared.limits import MAX_NAME
 
 from armtempo.basics.atomic_file import replace_text, why
 from armtempo.basics.errors import InputError
@@ -15,13 +18,21 @@ from armtempo.model.arm import Arm
 _HEADER = re.compile(r"\s*\[\[?[\w.\"' -]+\]\]?\s*(#.*)?")
 _ANGLES = re.compile(r"(?m)^(\s*angles_deg\s*=\s*)\[[^\]]*\]")
 _MARK = "\ufeff"
+_HEAD = """\
+# Via points that were taught with 'armtempo teach'; every key: armtempo help files
+name = "{name}"
+"""
+_VIA = """
+[[via]]
+angles_deg = [{angles}]
+"""
 
 
 def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool) -> None:
-    """Write ``[posture.NAME]`` into the file of ``arm``, whole or not at all, with its comments and layout kept.
+    """Write ``[posture.NAME]`` into the file of ``arm``, atomically, keeping its comments and layout.
 
-    InputError if the name is none, the arm cannot take it, the file has this posture and ``replace`` is false,
-    or it cannot be read, written, or changed in this one place.
+    Raises InputError if the name is invalid, the arm cannot take the posture, the file has it and ``replace``
+    is false, or the file cannot be read, written, or changed in this one place.
     """
     if problem := named.name_problem(name):
         raise InputError(f"posture {name!r}: {problem}", "choose another name")
@@ -42,7 +53,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
 
 
 def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
-    """The angles with as few digits as still mean the same steps, and within their ranges."""
+    """The angles with the fewest digits that give the same steps, within their ranges."""
     found = []
     for joint, angle in zip(arm.driven, angles_deg, strict=True):
         low, high = joint.range_deg
@@ -53,7 +64,7 @@ def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
 
 
 def with_posture(text: str, name: str, angles_deg: list[float], path: Path) -> str:
-    """The text of an arm file with the posture in it; InputError if that would change anything else."""
+    """The text of an arm file with the posture; raises InputError if that would change anything else."""
     end = "\r\n" if "\r\n" in text else "\n"
     values = f"[{', '.join(f'{angle:.12g}' for angle in angles_deg)}]"
     before = _parsed(text, path)
@@ -82,7 +93,7 @@ def _changed(text: str, name: str, values: str, end: str) -> str:
 
 
 def _place(lines: list[str], name: str) -> tuple[int, int] | None:
-    """Where the table is: the line of its header, and the line after it; None if there is none."""
+    """The first line of the table, and the line after its last; None if there is no such table."""
     header = re.compile(rf"\s*\[\s*posture\s*\.\s*[\"']?{re.escape(name)}[\"']?\s*\]\s*(#.*)?")
     heads = [number for number, line in enumerate(lines) if header.fullmatch(line.rstrip("\r\n"))]
     for head in heads[:1]:
@@ -102,7 +113,7 @@ def _is_whole(lines: list[str]) -> bool:
 
 
 def _replaced(table: list[str], values: str, end: str) -> list[str]:
-    """The lines of a table with other values; comments before, after and next to them stay."""
+    """The lines of a table with new values; comments are kept."""
     text = "".join(table)
     keys = tomllib.loads(text.replace("\r\n", "\n"))
     if [*keys] == ["angles_deg"]:
@@ -123,3 +134,22 @@ def _parsed(text: str, path: Path) -> dict[str, Any]:
         return _content(text)
     except ValueError as error:
         raise InputError(f"{path}: not valid TOML: {error}", "correct that place") from None
+
+
+def name_of(path: Path) -> str:
+    """A valid job name made from the file's name."""
+    name = "".join(
+        letter if letter.isascii() and (letter.isalnum() or letter in "-_") else "-" for letter in path.stem
+    )
+    return name[:MAX_NAME].strip("-") or "taught"
+
+
+def of_points(name: str, points_deg: Sequence[Sequence[float]]) -> str:
+    """The text of a job through via points, each (J,) in degrees; raises InputError for fewer than two."""
+    if len(points_deg) < 2:
+        raise InputError(
+            f"{len(points_deg)} via point{'' if len(points_deg) == 1 else 's'} are no motion, so no job was written",
+            "store at least 2 points with different postures",
+        )
+    vias = [_VIA.format(angles=", ".join(f"{angle:.12g}" for angle in row)) for row in points_deg]
+    return "".join([_HEAD.format(name=name), *vias])
