@@ -2,7 +2,7 @@
 
 ::
 
-    app/       the main loop, what the host's commands do, what the board tells, the start
+    app/       the main loop, the host's commands, events, the start
     link/      frames from and to the serial port
     storage/   records in flash
     motion/    one motion: checked, started, served, stopped
@@ -10,7 +10,7 @@
     hardware/  timers, DMA, pins, interrupts
 
 Each imports only from those below it, and from the modules next to the packages. The functions here are for
-``boot.py``, ``main.py`` and the prompt; nothing in the packages uses them.
+``boot.py``, ``main.py`` and the prompt; the packages do not use them.
 """
 
 TYPE_CHECKING = False
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def load_program() -> "Any":
-    """Import the program, which takes most of the chip's heap; where that fails, the traceback says why."""
+    """Import the program, which takes most of the chip's heap; prints a traceback if that fails."""
     from armtempo_board import heap
 
     heap.collect_often()
@@ -29,7 +29,7 @@ def load_program() -> "Any":
 
 
 def start() -> None:
-    """Run the program until a host asks for the prompt; where it ends by itself the traceback waits for that too."""
+    """Run the program until a host asks for the prompt; after an exception the traceback waits for that too."""
     program = load_program()
     try:
         program.main()
@@ -41,7 +41,7 @@ def start() -> None:
 
 
 def keep_watchdog_fed() -> None:
-    """Feed a watchdog that runs since before a soft reset, as nothing else does now."""
+    """Feed a watchdog that was started before a soft reset."""
     from armtempo_board.app import watchdog
 
     if watchdog.running():
@@ -49,7 +49,7 @@ def keep_watchdog_fed() -> None:
 
 
 def replay(name: str = "") -> None:
-    """Run a stored motion without a host, the default where no name is given; see ``app/standalone.py``."""
+    """Run a stored motion (default: the default motion) without a host; see ``app/standalone.py``."""
     from armtempo_board.app import standalone
 
     standalone.replay(name)

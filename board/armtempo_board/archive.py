@@ -2,7 +2,7 @@
 
 For MicroPython's own firmware, in whose flash they have no room otherwise; ``boot.py`` imports it. The file begins with
 the length of its index in two bytes, then the index, a line "PACKAGE/MODULE OFFSET" for each, the package without
-"armtempo_", the offset below 0 where the module is not deflated. It is written by ``deploy/archive.py`` on the host.
+"armtempo_", the offset below 0 if the module is not deflated. It is written by ``deploy/archive.py`` on the host.
 """
 
 import sys
@@ -26,11 +26,14 @@ _ENDING = ".mpy"
 
 
 class Archive:
-    """As MicroPython wants a file system, as far as imports need it."""
+    """As MicroPython wants a file system, as far as imports need it.
+
+    The names of the rest are such as MicroPython has anyway: others would take heap.
+    """
 
     def __init__(self) -> None:
         with open(_FILE, "rb") as file:
-            self._index = file.read(int.from_bytes(file.read(_LENGTH_BYTES), "little"))
+            self.index = file.read(int.from_bytes(file.read(_LENGTH_BYTES), "little"))
 
     def mount(self, readonly: bool, mkfs: bool) -> None:
         """Nothing to do."""
@@ -39,16 +42,16 @@ class Archive:
         """The same."""
 
     def stat(self, path: str) -> "tuple[int, ...]":
-        """Whether a module or a folder is there; OSError."""
-        if self._offset(path):
+        """Status of a module or folder; raises OSError if it does not exist."""
+        if self.seek(path):
             return (_REGULAR,) + (0,) * 9
-        if self._find(path[_BEFORE:] + "/") < 0:
+        if self.find(path[_BEFORE:] + "/") < 0:
             raise OSError(_ENOENT)
         return (_FOLDER,) + (0,) * 9
 
     def open(self, path: str, mode: str) -> "Any":
         """A module's bytes."""
-        offset = self._offset(path)
+        offset = self.seek(path)
         if not offset:
             raise OSError(_ENOENT)
         file = open(_FILE, "rb")  # noqa: SIM115  the import closes it
@@ -57,18 +60,18 @@ class Archive:
             return file
         return deflate.DeflateIO(file, deflate.ZLIB, 0, True)
 
-    def _offset(self, path: str) -> int:
-        """Where a module begins, 0: it is not there."""
+    def seek(self, path: str) -> int:
+        """Offset of a module; 0: it does not exist."""
         name = path[_BEFORE : -len(_ENDING)] + " "
-        at = self._find(name)
+        at = self.find(name)
         if at < 0 or not path.endswith(_ENDING):
             return 0
         begin = at + len(name)
-        return int(self._index[begin : self._index.find(b"\n", begin)])
+        return int(self.index[begin : self.index.find(b"\n", begin)])
 
-    def _find(self, text: str) -> int:
-        """Where a line of the index begins so, or -1."""
-        at = self._index.find(b"\n" + text.encode())
+    def find(self, text: str) -> int:
+        """Place of a line of the index with this beginning, or -1."""
+        at = self.index.find(b"\n" + text.encode())
         return at + 1 if at >= 0 else -1
 
 

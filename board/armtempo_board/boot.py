@@ -1,4 +1,4 @@
-"""Becomes ``/flash/boot.py``: USB shows a serial port only, so that no host writes the flash."""
+"""Becomes ``/flash/boot.py``: USB has a serial port only, so that no host writes to the flash."""
 
 import pyb
 
@@ -13,5 +13,5 @@ try:
     from armtempo_board import keep_watchdog_fed
 
     keep_watchdog_fed()
-except Exception:  # not, or not wholly, deployed
+except Exception:  # not deployed, or incomplete
     pass

@@ -10,10 +10,10 @@ from micropython import const
 
 _OFFSET_BITS = const(15)
 _OFFSET_MASK = const((1 << 15) - 1)
-_CRC_INIT = const(16)  # index in the table: what a crc begins with, and is inverted with
+_CRC_INIT = const(16)  # index in the table: initial value and final xor of a crc
 _CRC_BYTES = const(4)
 _NIBBLE = const(15)
-_RESIDUE = const(0x2144DF1C)  # the crc32 of anything with its crc32 after it
+_RESIDUE = const(0x2144DF1C)  # the crc32 of any data followed by its crc32
 _BYTES_OF_TICKS = const(16)
 _BYTES_OF_STEPS = const(4)
 _BYTES_OF_U32 = const(4)
@@ -26,9 +26,9 @@ COMMANDED = const(4)
 their counts."""
 
 APPEND = const(0)
-"""Last argument of ``apply_crc``: write the crc after the data."""
+"""Last argument of ``apply_crc``: append the crc to the data."""
 CHECK = const(4)
-"""The same: compare with the crc after the data."""
+"""Last argument of ``apply_crc``: compare with the crc after the data."""
 
 
 def _crc_table() -> array:
@@ -55,7 +55,8 @@ def pack_offsets(first: int, second: int) -> int:
 def apply_crc(table: ptr32, data: ptr8, offsets: int, present: int) -> int:
     """Compute the crc32 of data[start:end]; ``offsets``: start and end.
 
-    APPEND: write it after the data, little endian. CHECK: 1 where the four bytes after the data are it, else 0.
+    APPEND: write it after the data, little endian. CHECK: return 1 if the four bytes after the data are equal
+    to it, else 0.
     """
     at = offsets & _OFFSET_MASK
     end = (offsets >> _OFFSET_BITS) + present
@@ -89,7 +90,7 @@ def copy(target: ptr8, source: ptr8, offsets: int, count: int) -> object:
 
 @micropython.viper
 def equal(one: ptr8, other: ptr8, offsets: int, count: int) -> int:
-    """1 where ``count`` bytes are the same, else 0; ``offsets``: in one and in other."""
+    """1 if ``count`` bytes are equal, else 0; ``offsets``: in one and in other."""
     at = offsets & _OFFSET_MASK
     distance = (offsets >> _OFFSET_BITS) - at
     end = at + count
@@ -124,7 +125,7 @@ def sample_to_wire(target: ptr8, sample: ptr8, offsets: int, joints: int) -> obj
 
 
 def u32(data: "bytes | bytearray", at: int) -> int:
-    """The unsigned word at data[at:at+4]; allocates only where it is 2**30 or more."""
+    """The unsigned word at data[at:at+4]; allocates only if it is 2**30 or more."""
     value = 0
     at += _BYTES_OF_U32
     for _ in range(_BYTES_OF_U32):

@@ -4,7 +4,7 @@ from armtempo_shared.messages import NO_JOINT
 
 
 class Refused(Exception):
-    """``code`` of ``armtempo_shared.codes``, the joint that it is about (NO_JOINT: none) and a value."""
+    """A refusal: ``code`` of ``armtempo_shared.codes``, the joint (or NO_JOINT) and a value."""
 
     def __init__(self, code: int, joint: int = NO_JOINT, value: int = 0) -> None:
         super().__init__(code)

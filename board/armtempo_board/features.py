@@ -1,7 +1,7 @@
-"""What the program can do beyond one motion at a time.
+"""Features of the program beyond one motion at a time.
 
-All of it in the firmware. In files on MicroPython's own firmware there is no heap for more, so they are made without
-(``deploy/program_files.py`` on the host), and a command that needs more is refused.
+The program in the firmware has all of them. In files on MicroPython's own firmware there is not enough heap,
+so they are left out (``deploy/program_files.py`` on the host), and their commands are refused.
 """
 
 SEQUENCES = True

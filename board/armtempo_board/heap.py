@@ -4,24 +4,22 @@ import gc
 import sys
 
 OFTEN = 64
-SELDOM = 16  # where memory is not short and time is: a collection takes 5 ms
+SELDOM = 16  # if memory is not short and time is: a collection takes 5 ms
 _SEQUENCE = "sequence"  # how the names of the modules begin that only sequences need
-_LEAST_HELD = 1_000
-_held: "list[bytearray]" = []
 _keeps = False
 _NOT_ALWAYS = """
     pins registers arm_setup run_start start_check motion_check rate_check override time_law interval_steps
     cubics endpoints next_motion arm_check motion_file engine_memory room backup_sram armtempo_shared.motion
     bezier_weights store store_commands measured_rates command_rows armrecord table program_hash basis output_setup
-    start_up set_up
+    set_up
 """
-"""Modules; the last two are those of the compact form that hold what is called at rest only."""
+"""Modules; the last one is that of the compact form that holds what is called at rest only."""
 
 
 def keep_code(keeps: bool) -> None:
-    """Whether code stays that has been loaded, as a motion begins sooner then; where memory is not short.
+    """Whether code stays that has been loaded, as a motion begins sooner then; if memory is not short.
 
-    ``forget``, ``tidy`` and ``hold`` do nothing then, and the heap is collected seldom. Not while a motion runs.
+    ``forget`` and ``tidy`` do nothing then, and the heap is collected seldom. Not while a motion runs.
     """
     global _keeps
     _keeps = keeps
@@ -37,22 +35,6 @@ def collect_often(parts: int = OFTEN) -> None:
     if hasattr(gc, "threshold"):
         parts = min(parts, SELDOM) if _keeps else parts
         gc.threshold((gc.mem_free() + gc.mem_alloc()) // parts if parts else -1)
-
-
-def hold(size: int) -> None:
-    """Keep a piece of the heap free of what stays, for the code that a motion needs; as large as there is, at most."""
-    release()
-    while size >= _LEAST_HELD and not _keeps:
-        try:
-            _held.append(bytearray(size))
-            return
-        except MemoryError:
-            size -= _LEAST_HELD // 4
-
-
-def release() -> None:
-    """Give it up."""
-    _held.clear()
 
 
 def tidy() -> None:

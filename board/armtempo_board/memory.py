@@ -1,4 +1,4 @@
-"""Memory that is taken once, in some blocks, and handed out in parts again and again."""
+"""Memory that is allocated once, in blocks, and divided again for each engine."""
 
 from array import array
 
@@ -13,9 +13,9 @@ _PIECE_WORDS = const(64)
 
 
 class Memory:
-    """``blocks``: words of 32 bits in each. MemoryError where the heap has one of them not in one piece.
+    """``blocks``: 32-bit words of each. Raises MemoryError if the heap has no such block.
 
-    ``address``: where other memory is, of ``words``, that the processor alone reaches.
+    ``address``: of ``words`` words of other memory, which only the processor can access.
     """
 
     def __init__(self, blocks: "list[int]", address: int = 0, words: int = 0) -> None:
@@ -27,15 +27,15 @@ class Memory:
         self._used = 0
 
     def release(self) -> None:
-        """Take all parts back; who has one uses it no more."""
+        """Take all parts back; they must not be used any more."""
         for number in range(len(self._taken)):
             self._taken[number] = 0
         self._used = 0
 
     def take_for_processor(self, words: int) -> "memoryview[int]":
-        """As ``take``, of the memory that the processor alone reaches while it has that many.
+        """As ``take``, from the memory that only the processor can access while it has enough.
 
-        On MicroPython it is no memoryview, which there is of the heap's words only: it has neither length nor slices.
+        On MicroPython the part is not a memoryview (only the heap has those): it has neither length nor slices.
         """
         begin = self._used
         if begin + words > self._words:
@@ -47,7 +47,8 @@ class Memory:
         return part  # type: ignore[no-any-return]
 
     def take(self, words: int) -> "memoryview[int]":
-        """A part of that many words, signed, all 0, from the first block that has them; MemoryError where none has."""
+        """A part of ``words`` signed words, all 0, from the first block with enough; raises MemoryError if
+        none has."""
         for number, block in enumerate(self._blocks):
             begin = self._taken[number]
             end = begin + words
@@ -60,12 +61,12 @@ class Memory:
 
 
 def bytes_behind(part: "Any", first: int, words: int) -> bytearray:
-    """The bytes of a part of that many words, from the word ``first`` on."""
+    """The bytes of a part of ``words`` words, from the word ``first`` on."""
     return uctypes.bytearray_at(uctypes.addressof(part) + 4 * first, 4 * (words - first))
 
 
 def _zeros(words: int) -> "array[int]":
-    """It grows in place: made of a buffer, it would need its size twice."""
+    """An array of zeros, grown in place: made from a buffer, it would need twice the memory."""
     block = array("i")
     for begin in range(0, words, _PIECE_WORDS):
         block.extend(array("i", bytes(4 * min(_PIECE_WORDS, words - begin))))

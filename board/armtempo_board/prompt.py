@@ -1,4 +1,5 @@
-"""Whether MicroPython's prompt is asked for: a Ctrl-C (of mpremote, or typed twice) that is no noise, in no frame."""
+"""Detects a request for MicroPython's prompt: a Ctrl-C (from mpremote, or typed twice) outside of frames, not
+noise."""
 
 import os
 import time
@@ -16,7 +17,7 @@ _FIRST = const(0)
 
 
 class PromptRequest:
-    """Looks at the bytes outside of frames; ``clear`` it at each good frame."""
+    """Examines the bytes outside of frames; call ``clear`` at each valid frame."""
 
     def __init__(self) -> None:
         self._controls = 0  # CR and Ctrl-C since the last good frame; -1: other bytes among them
@@ -24,15 +25,15 @@ class PromptRequest:
         self._control_ms = 0
 
     def clear(self) -> None:
-        """A frame has come."""
+        """A valid frame was received."""
         self._controls = 0
         self._interrupt = False
 
     def comes(self, byte: int, now_ms: "Any") -> bool:
-        """Whether the prompt is asked for. ``byte``: one that came; -1: none did.
+        """Whether the prompt is requested. ``byte``: a received byte; -1: none.
 
-        After quiet only CR and Ctrl-C came; three in a row count at once, also right after a frame. mpremote sends
-        Ctrl-A after them, once, and the prompt is to get it.
+        After a silence only CR and Ctrl-C may come; three in a row count at once, also right after a frame.
+        mpremote sends one Ctrl-A after them, which the prompt must get.
         """
         quiet = time.ticks_diff(now_ms, self._control_ms) >= _QUIET_MS
         if byte < 0:
@@ -42,7 +43,7 @@ class PromptRequest:
             self._control_ms = now_ms
             self._count(byte, quiet)
         if self._controls >= needed and self._interrupt:
-            self._controls = -1  # told once; one that comes while something moves is not kept
+            self._controls = -1  # reported once; a request during a motion is dropped
             return True
         return False
 
@@ -55,7 +56,7 @@ class PromptRequest:
 
 
 def wait() -> None:
-    """Wait until somebody asks for the prompt: there, what is in a host's frames would be acted on as what is typed."""
+    """Wait for a request for the prompt, which would execute bytes of a host's frames as typed input."""
     import pyb
 
     port = pyb.USB_VCP()

@@ -1,23 +1,23 @@
 """Time-optimal B-spline motions for stepper arms on an STM32F407 with MicroPython.
 
-The library, in the order in which a motion goes through it::
+A motion from the arm file to the report::
 
     arm = armtempo.Arm.load("my_arm.toml")          # or Arm.paper(), the shipped one
-    job = armtempo.Job.load("my_job.toml", arm)     # or Job("mine", via_deg=[[0, -60, 40], [30, -20, 10]])
-    plan = armtempo.plan(arm, job)                  # plan.trajectory(time_s, order), plan.total_s, plan.save(…)
+    job = armtempo.Job.load("my_job.toml", arm)     # or Job("mine", via_deg=[[0, -60, 40], …])
+    plan = armtempo.plan(arm, job)                  # plan.trajectory(time_s), plan.save(…)
     with armtempo.connect("/dev/ttyACM0") as board: # or "sim", a virtual board
-        board.home(arm)                             # "the arm is in its home posture"; nothing moves
+        board.home(arm)                             # says that it is there; nothing moves
         run = board.run(plan, repeat=3)
     run.report()                                    # run.samples: a structured array
 
-Public is what ``__all__`` names, and what the objects' own docstrings describe. Angles are in degrees, times in
-seconds, lengths in mm. Arrays with an entry for each driven joint are said to have the shape (J,). Names are
-imported when they are first used, so that ``import armtempo`` by itself loads neither numpy nor scipy.
+The public names are those in ``__all__``. Angles are in degrees, times in seconds, lengths in mm; J is the
+number of driven joints. Names are imported at their first use, so ``import armtempo`` loads neither numpy nor
+scipy.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
+TYPE_CHECKING = False  # as in "typing", whose import takes longer than the rest of a stop
 
 __all__ = [
     "Arm",
@@ -31,6 +31,7 @@ __all__ = [
     "Dynamics",
     "Encoder",
     "Goto",
+    "Hold",
     "Input",
     "InputError",
     "Job",
@@ -38,6 +39,7 @@ __all__ = [
     "LimitSwitches",
     "Limits",
     "LinkError",
+    "Load",
     "MissingPackageError",
     "Motor",
     "Output",
@@ -100,23 +102,33 @@ if TYPE_CHECKING:
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
-    from armtempo.model.parts import Driver, Dynamics, Encoder, Joint, Limits, LimitSwitches, Motor, Safety
+    from armtempo.model.parts import (
+        Driver,
+        Dynamics,
+        Encoder,
+        Joint,
+        Limits,
+        LimitSwitches,
+        Load,
+        Motor,
+        Safety,
+    )
     from armtempo.model.plan import Plan
     from armtempo.model.posture import ArmPosture
     from armtempo.model.sequence import Sequence
     from armtempo.model.sequence_plan import SequencePlan
-    from armtempo.model.steps import Count, Goto, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
+    from armtempo.model.steps import Count, Goto, Hold, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
     from armtempo.model.tool_pose import Pose
     from armtempo.model.tool_way import ToolWay
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
-    from armtempo.ports.listing import find_ports
+    from armtempo.ports.board_port import find_ports
+    from armtempo.report.sequence_reader import SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
     from armtempo.robot.run import Run
     from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
-    from armtempo.runs.sequence_reader import SequenceRun
     from armtempo.splines.spline import Spline
     from armtempo.splines.trajectory import Trajectory
 
@@ -132,7 +144,7 @@ _HOMES = {
     ),
     "armtempo.kinematics.many": ("inverse_many",),
     "armtempo.kinematics.of_arm": ("forward", "inverse"),
-    "armtempo.ports.listing": ("find_ports",),
+    "armtempo.ports.board_port": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job", "Stop"),
     "armtempo.model.outputs": ("Input", "Output"),
@@ -143,6 +155,7 @@ _HOMES = {
         "Joint",
         "LimitSwitches",
         "Limits",
+        "Load",
         "Motor",
         "Safety",
     ),
@@ -150,6 +163,7 @@ _HOMES = {
     "armtempo.model.steps": (
         "Count",
         "Goto",
+        "Hold",
         "Repeat",
         "RunMotion",
         "SetOutput",
@@ -169,17 +183,17 @@ _HOMES = {
     "armtempo.robot.run": ("Run",),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
-    "armtempo.runs.sequence_reader": ("SequenceRun",),
+    "armtempo.report.sequence_reader": ("SequenceRun",),
     "armtempo.splines.spline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }
 _MODULES = ("deploy", "optimise", "simulator")
-"""Packages that are public as a whole; their own ``__all__`` says what of them."""
+"""Public subpackages; their ``__all__`` lists their public names."""
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
-    """A public name, imported when it is first used (PEP 562)."""
+    """A public name, imported at its first use (PEP 562)."""
     from importlib import import_module
 
     if name in _MODULES:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import _signal  # built in; ``signal`` imports much, in which a Ctrl-C would be a traceback
+import _signal  # built in; during the long import of ``signal`` a Ctrl-C would print a traceback
 import os
 import sys
 
@@ -10,19 +10,19 @@ from armtempo.basics.errors import INTERRUPTED
 
 
 def _end(*signalled: object) -> None:
-    """At once: nothing is open yet, and what is being imported may swallow an exception."""
+    """Exit at once: nothing is open yet, and an import may swallow an exception."""
     os.write(2, b"armtempo: interrupted\n")
     os._exit(INTERRUPTED)
 
 
 def main() -> None:
-    """The command; ``armtempo.cli`` takes Ctrl-C over when a subcommand begins."""
+    """Run the command; ``armtempo.cli`` handles Ctrl-C once a subcommand begins."""
     if (
         _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler
     ):  # it may be ignored, in the background
         _signal.signal(_signal.SIGINT, _end)
     if sys.argv[1:2] == ["stop"]:
-        from armtempo.project import quick_stop
+        from armtempo.ports import quick_stop
 
         quick_stop.send(sys.argv[2:])
     from armtempo.cli import main as command

@@ -5,11 +5,11 @@
     plan     arm and job -> Plan              planning: via angles, path, time axes, checks
     load     trajectory file -> Plan          model.plan
     run      Plan -> records -> board         records.encode, link, robot.stored_motion; there evaluator, rings, timers
-             board -> samples -> run folder   link.follow, runs.run_folder
-    report   run folder -> page and figures   runs.analysis, report
+             board -> samples -> run folder   link.follow, report.run_folder
+    report   run folder -> page and figures   report
 
-Each stage takes the result of the one before and nothing else, so a chain can begin and end anywhere: a plan can
-be kept in a file, a motion on the board, a run in its folder.
+Each stage needs only the result of the previous one, and each result can be stored: a plan in a file, a
+motion on the board, a run in its folder.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from armtempo.planning.free import corridor_curve as corridors
 from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.records import encode
 from armtempo.report import comparison, sequence_report, text_summary
+from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
-from armtempo.runs.sequence_reader import SequenceRun
 
 __all__ = [
     "compare",
@@ -52,12 +52,12 @@ __all__ = [
 
 @checked
 def plan(arm: Arm | Path | str, job: Job | Path | str, progress: Progress | None = None) -> Plan:
-    """The motion through the job's via points, from rest to rest, as short as the search finds it.
+    """Plan the shortest motion that the job's search finds through its via points, from rest to rest.
 
-    ``arm``, ``job``: or their files, or the name of an arm that ships.
+    ``arm``, ``job``: objects or files; ``arm`` also the name of a shipped arm.
 
-    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError if job and
-    arm do not fit each other, PlanError if there is no motion under these limits and ranges.
+    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError if job
+    and arm do not fit each other, PlanError if there is no motion within the limits and ranges.
     """
     arm = Arm.of(arm)
     return planner.plan(arm, Job.of(job, arm), progress)
@@ -67,17 +67,17 @@ def plan(arm: Arm | Path | str, job: Job | Path | str, progress: Progress | None
 def plan_sequence(
     arm: Arm | Path | str, sequence: Sequence | Path | str, progress: Progress | None = None
 ) -> SequencePlan:
-    """A sequence, or that of a file, every motion planned from where the one before it ends; errors as in
+    """Plan all motions of a sequence (or of its file), each from the end of the one before; raises as
     ``sequence_planner.plan``."""
     arm = Arm.of(arm)
     return sequence_planner.plan(arm, Sequence.of(sequence, arm), progress)
 
 
 def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
-    """Plans of the job's parts from rest to rest, each short enough for the board; one where the whole is.
+    """Plan the job in parts from rest to rest, each short enough for the board; one part if the whole job is.
 
-    On the spline through the via points, which rests at its ends only, a part for each stretch between stops. Raises
-    PlanError if a part is still too long or there is no stop; else as ``plan``.
+    For the spline through the via points, which rests only at its ends, there is one part for each section
+    between stops. Raises PlanError if a part is still too long or there is no stop; otherwise as ``plan``.
     """
     if checks.is_free(job) or not job.stops:
         whole = planner.plan(arm, job, progress)
@@ -90,7 +90,7 @@ def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
 
 
 def corridor_curve(arm: Arm, job: Job, progress: Progress | None = None) -> list[CorridorTime]:
-    """Motion time against corridor, for a job whose path is free; see ``planning.corridor_curve.curve``."""
+    """Motion time as a function of the corridor, for a job with a free path; see ``planning.corridor_curve.curve``."""
     return corridors.curve(arm, job, progress or (lambda _done, _whole: None))
 
 
@@ -103,8 +103,8 @@ def summary(plan: Plan) -> list[str]:
 def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:
     """The plan of a trajectory file.
 
-    ``altered``: also of one that was altered after it had been written. Raises InputError if the file is none,
-    damaged or altered, or was planned for a different arm than ``arm``.
+    ``altered``: accept a file that was altered after it had been written. Raises InputError if it is no
+    trajectory file, is damaged or altered, or was planned for another arm than ``arm``.
     """
     found = Plan.load(path, altered)
     if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
@@ -123,24 +123,24 @@ def run(
     progress: Progress | None = None,
     watcher: Watcher | None = None,
 ) -> Run:
-    """Replay a plan on the board of ``port`` (as for ``connect``) and record it: ``Board.run`` with a connection of
-    its own.
+    """Replay and record a plan on the board of ``port`` (as in ``connect``): opens the port, calls
+    ``Board.run``, closes it.
     """
     with connect(port, plan.arm) as board:
         return board.run(plan, repeat, out, progress, watcher)
 
 
 def report(run: Run | SequenceRun) -> Path:
-    """Write report.html, of a motion with its figures, into the run folder; gives the page. Errors as in
+    """Write report.html (for a motion, also its figures) into the run folder; returns the page. Raises as
     ``Run.report``."""
     return sequence_report.write(run.path) if isinstance(run, SequenceRun) else run.report()
 
 
 @checked
 def compare(folders: abc.Sequence[Path | str], page: Path | str | None = None) -> Path:
-    """Write one page that compares recorded runs, by default next to the first; gives the page.
+    """Write one page that compares recorded runs, by default next to the first; returns the page.
 
-    A folder that cannot be read is named there. Raises RunFolderError if fewer than two can be read.
+    The page names folders that cannot be read. Raises RunFolderError if fewer than two can be read.
     """
     paths = [Path(folder) for folder in folders]
     if not paths:

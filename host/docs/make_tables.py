@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from armtempo import optimise
-from armtempo.formats import part
-from armtempo.model.parts import Driver, Encoder, JointModel, Motor, Safety
-from armtempo.optimise.parameters import Number, Parameter
+from armtempo.basics import part
+from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
+from armtempo.optimise.task import Number, Parameter
 
 FOLDER = Path(__file__).parent
 
@@ -79,6 +79,7 @@ TABLES = {
         "keys of safety": _keys(Safety, "[safety]"),
         "keys of motor": _keys(Motor, "motor"),
         "keys of encoder": _keys(Encoder, "encoder"),
+        "keys of load": _keys(Load, "[load.NAME]"),
     },
     "virtual-board.md": {"keys of model": _keys(JointModel, "model")},
 }

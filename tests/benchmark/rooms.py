@@ -1,23 +1,28 @@
 """Random motions in random rooms, checked against dense samples by code of its own.
 
-    python -m tests.benchmark.rooms [--first 0] [--count 1000]
+    python -m tests.benchmark.rooms [--first 0] [--count 1000] [--free]
 
-Straight motions of arms that ship, links of random radii, boxes and walls. Distances are taken at 1500 times of each
+Straight motions of arms that ship, links and loads of random radii, boxes. Distances are taken at 1500 times of each
 motion between points on the links and the boxes; what moves less than that between samples is allowed for. Exits with 1
-where a motion is accepted that touches, or more than 2 % are refused that do not.
+where a motion is accepted that touches, or more than 2 % are refused that do not. With --free those that touch are
+planned with path = "free" instead, from where nothing touches to where nothing does.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
+from armtempo.basics.errors import PlanError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.parts import Load
 from armtempo.model.room import ArmRoom, KeepOut
-from armtempo.planning import point_to_point, room_check
+from armtempo.planning import planner, point_to_point, room_check
 from armtempo.splines.trajectory import Trajectory
 
 ARMS = ("parol6", "ar4", "thor", "community", "moveo", "scara", "paper")
@@ -43,14 +48,19 @@ def random_room(seed: int) -> tuple[Arm, Trajectory]:
             boxes.append(KeepOut(f"box {number}", tuple(centre - half), tuple(centre + half)))
         radius = float(rng.choice([0.0, 0.01, 0.04])) * reach
         joints = tuple(replace(joint, radius_mm=radius) for joint in arm.joints)
-        arm = replace(arm, joints=joints, room=ArmRoom(tuple(boxes)))
+        load = None
+        if rng.random() < 0.5:
+            figures = reach * rng.uniform(0.0, (0.05, 0.2))
+            centre = tuple(map(float, 0.1 * reach * rng.uniform(-1.0, 1.0, 3)))
+            load = Load("random", 0.0, *map(float, figures), "xyz"[rng.integers(3)], centre)
+        arm = replace(arm, joints=joints, room=ArmRoom(tuple(boxes)), held=load)
         if not room_check.posture_touches(arm, start):
             return arm, point_to_point.straight("random", start, end, arm)
     raise AssertionError("no posture is free")
 
 
 def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
-    """Least distance of the links from the boxes at this many times, less the radius."""
+    """Least distance of the links, and of what is held, from the boxes at this many times, less the radius."""
     driven = trajectory(np.linspace(0.0, trajectory.duration_s, count))
     angles = np.tile([joint.home_deg for joint in arm.joints], (count, 1)).astype(float)
     angles[:, list(arm.driven_indices)] = driven
@@ -74,6 +84,10 @@ def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
         pose[:, :3, 1] = np.cos(alpha) * across + np.sin(alpha) * z
         pose[:, :3, 2] = np.cos(alpha) * z - np.sin(alpha) * across
         pose[:, :3, 3] = out[:, :, -1]
+    if load := arm.held:
+        held = np.tile(np.array(load.centre_mm)[:, None], (1, _POINTS))
+        held["xyz".index(load.along)] += load.length_mm * (part - 0.5)
+        least = min(least, _least(arm, pose[:, :3, :3] @ held + pose[:, :3, 3:]) - load.radius_mm)
     return least
 
 
@@ -92,7 +106,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--free", action="store_true")
     options = parser.parse_args()
+    if options.free:
+        return _free(range(options.first, options.first + options.count))
     counts = {"free": 0, "touching": 0, "touching, but accepted": 0, "refused wrongly": 0}
     for seed in range(options.first, options.first + options.count):
         arm, trajectory = random_room(seed)
@@ -108,6 +125,32 @@ def main() -> int:
             )
     print(", ".join(f"{count} {what}" for what, count in counts.items()))
     return int(counts["touching, but accepted"] > 0 or counts["refused wrongly"] > 0.02 * options.count)
+
+
+def _free(seeds: range) -> int:
+    """Plan around what is in the way."""
+    counts, seconds = {"around": 0, "refused": 0, "touching, but accepted": 0}, []
+    for seed in seeds:
+        arm, trajectory = random_room(seed)
+        via = trajectory(np.array([0.0, trajectory.duration_s]))
+        if not room_check.touch_of(arm, trajectory) or room_check.posture_touches(arm, via[1]):
+            continue
+        begun = time.process_time()
+        try:
+            plan = planner.plan(replace(arm, loads=(arm.held,) * bool(arm.held)), _job(arm, via))
+            kind = "around" if dense_least(arm, plan.trajectory, 1500) > 0.0 else "touching, but accepted"
+        except PlanError as error:
+            kind = "refused"
+            print(f"seed {seed}: {arm.name}: {error.problem}", flush=True)
+        seconds.append(time.process_time() - begun)
+        counts[kind] += 1
+    print(", ".join(f"{count} {what}" for what, count in counts.items()))
+    print(f"CPU seconds a plan: median {np.median(seconds):.2f}, longest {max(seconds):.2f}")
+    return int(counts["touching, but accepted"] > 0)
+
+
+def _job(arm: Arm, via: np.ndarray) -> Job:
+    return Job("free", via_deg=via.tolist(), path="free", holds=arm.held.name if arm.held else "")
 
 
 if __name__ == "__main__":

@@ -16,9 +16,9 @@ import time
 from pathlib import Path
 
 from armtempo.deploy.firmware import frozen
+from armtempo.diagnosis.selftest import motion, prompt, rate_part
 from armtempo.model.arm import Arm
 from armtempo.records import encode
-from armtempo.selftest import motion, prompt, rate_part
 from armtempo_shared import armrecord
 
 from tests.benchmark import firmware

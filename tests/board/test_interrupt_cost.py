@@ -6,7 +6,7 @@ import re
 from array import array
 
 import pytest
-from armtempo.selftest.board_part import EMITTED
+from armtempo.diagnosis.selftest.board_part import EMITTED
 
 from tests import interpreters, slack
 from tests.benchmark import freeze

@@ -15,8 +15,7 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
 from armtempo.records import encoded_motion
-from armtempo.report import arm_figure, drawing, plots
-from armtempo.runs import run_folder
+from armtempo.report import arm_picture, drawing, plots, run_folder
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 
 
@@ -47,7 +46,7 @@ def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures take most of a page's time; a test of what it says in words has them left empty."""
     for module, names in (
         (plots, ("tracking", "errors", "convergence", "overlay")),
-        (arm_figure, ("postures",)),
+        (arm_picture, ("postures",)),
     ):
         for name in names:
             monkeypatch.setattr(module, name, lambda *_: None)

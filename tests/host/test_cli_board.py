@@ -19,8 +19,8 @@ from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
+from armtempo.report import run_reader
 from armtempo.robot import connect
-from armtempo.runs import reader
 from click.testing import CliRunner, Result
 
 from tests.inprocess import Pipe
@@ -99,7 +99,7 @@ def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     output = run("run", file).output
     assert "samples-01.csv: complete" in output
     assert "12 samples" in output
-    found = reader.load(Path("runs/small-001"))
+    found = run_reader.load(Path("runs/small-001"))
     assert len(found.repetitions[0].index) == 12
     assert found.trajectory_path is not None
     assert (Path("runs/small-001") / "motion.bin").read_bytes()[:4] == b"ATM3"
@@ -133,7 +133,7 @@ def test_fault_during_a_run(run: Run, file: str, pipe: Pipe, monkeypatch: pytest
     monkeypatch.setattr(engine, "advance", stall)
     output = run("run", file, code=1).output
     assert "stall or slip) (joint 2)" in output
-    assert reader.load(Path("runs/small-001")).repetitions[0].state == "fault"
+    assert run_reader.load(Path("runs/small-001")).repetitions[0].state == "fault"
     assert "fault     following" in run("status").output
     assert "a fault is pending" in run("run", file, code=1).output
     assert "cleared: following" in run("clear").output
@@ -160,7 +160,7 @@ def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
     output = run("run", file, code=130).output
     assert "interrupted" in output
     assert engine.calls[-len(calls) :] == calls
-    found = reader.load(Path("runs/small-001")).repetitions[0]
+    found = run_reader.load(Path("runs/small-001")).repetitions[0]
     assert found.state == "interrupted"
     assert len(found.index)
 

@@ -218,17 +218,17 @@ def test_a_class_that_would_read_its_own_instead_of_the_module_s_is_refused() ->
 
 def test_methods_that_are_called_at_rest_are_imported_for_the_call(run) -> None:  # type: ignore[no-untyped-def]
     sources = {module: textwrap.dedent(text) for module, text in SOURCES.items()}
-    at_rest = {"rarely": ["made.shapes.Square.__init__"]}
+    at_rest = ["made.shapes.Square.__init__"]
     names = {"total", "hidden", "listed", "table", "state", "_first", "_second"}
     made = compact(sources, "made.main", {"made.main"}, names, at_rest=at_rest)
-    assert "join" in made.sources["made.rarely"]
+    assert "join" in made.sources["made.set_up"]
     assert "join" not in made.sources["made.core"]
     for words in ("total()", "table()"):
         assert run(made.sources, words) == run(SOURCES, words)
-    (moved,) = [found for (module, _), found in made.functions.items() if module == "rarely"]
+    (moved,) = [found for (module, _), found in made.functions.items() if module == "set_up"]
     assert [one.label for one in moved] == ["shapes.Square.__init__"]
     with pytest.raises(ValueError, match=r"Square\.gone"):
-        compact(sources, "made.main", {"made.main"}, names, at_rest={"rarely": ["made.shapes.Square.gone"]})
+        compact(sources, "made.main", {"made.main"}, names, at_rest=["made.shapes.Square.gone"])
 
 
 def test_attributes_that_no_object_has_together_share_a_name() -> None:

@@ -14,7 +14,7 @@ from armtempo.planning import planner
 from armtempo.planning.free import corridor, corridor_curve
 from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.planning.tool import Tool
-from armtempo.report import corridor_plot
+from armtempo.report import plots
 
 from tests.host import problems
 
@@ -53,10 +53,10 @@ def test_with_a_stop_narrow_corridors_hold_no_motion() -> None:
 @pytest.mark.slow
 def test_the_curve_names_both_its_ends() -> None:
     points = [CorridorTime(0.0, 4.0), CorridorTime(1.0, 3.0), CorridorTime(2.0, 2.8), CorridorTime(None, 2.5)]
-    axes = corridor_plot.figure(points, "deg", "bend").axes[0]
+    axes = plots.corridors(points, "deg", "bend").axes[0]
     found = {line.get_label(): list(line.get_ydata()) for line in axes.get_lines()}
     assert found == {"in a corridor": [3.0, 2.8], "on the spline": [4.0, 4.0], "free": [2.5, 2.5]}
-    assert corridor_plot.csv(points, "deg").splitlines()[1:] == ["0.0,4.0", "1.0,3.0", "2.0,2.8", ",2.5"]
+    assert plots.corridor_csv(points, "deg").splitlines()[1:] == ["0.0,4.0", "1.0,3.0", "2.0,2.8", ",2.5"]
 
 
 @pytest.mark.parametrize("away_deg", [0.003, 0.3, 10.0])

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.cli import main
+from armtempo.cli import main, state
 from armtempo.diagnosis import machine
 from armtempo.diagnosis.finding import Level
-from armtempo.ports.listing import Port
+from armtempo.link.program_version import own_crc
+from armtempo.ports.board_port import Port
 from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
 from click.testing import CliRunner
@@ -52,7 +53,7 @@ def test_a_sound_board_has_nothing_wrong() -> None:
 @pytest.mark.parametrize(
     ("change", "level", "words", "cure"),
     [
-        ({"program_current": False}, Level.ERROR, "differs from", "armtempo deploy"),
+        ({"program_current": False}, Level.ERROR, "differs from", "armtempo flash"),
         ({"fault": "estop"}, Level.ERROR, "estop", "armtempo clear"),
         (
             {"arm_problem": "not used: the record is damaged"},
@@ -71,6 +72,13 @@ def test_what_is_wrong_with_a_board(change: dict[str, object], level: Level, wor
     assert [item.level for item in found] == [level]
     assert words in found[0].what
     assert cure in found[0].next_step
+
+
+def test_another_version_of_the_program_is_told_with_both_and_what_to_do() -> None:
+    other = replace(STATE, program_current=False)
+    said = "\n".join(state.lines(other))
+    assert f"{other.program_crc:08x}" in said
+    assert f"installed here is {own_crc():08x}: 'armtempo flash'" in said
 
 
 def test_a_board_that_does_not_answer() -> None:

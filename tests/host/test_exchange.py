@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics import number_table
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.formats import number_table
-from armtempo.model import exchange, shipped, thinning, via_table
+from armtempo.model import exchange, shipped, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from click.testing import CliRunner
@@ -142,13 +142,13 @@ def test_a_path_without_times_is_thinned_where_asked(tmp_path: Path) -> None:
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), 91.0])
 def test_an_impossible_tolerance_is_refused(tolerance: float) -> None:
     with pytest.raises(InputError, match=r"a tolerance of .* is not allowed"):
-        thinning.thinned(np.zeros((3, 2)), tolerance)
+        via_table.thinned(np.zeros((3, 2)), tolerance)
 
 
 def test_what_cannot_be_thinned_to_a_motion_is_refused() -> None:
     noise = np.random.default_rng(12).normal(size=(700, 3))
     with pytest.raises(InputError, match=r"more than 513 via points are needed"):
-        thinning.thinned(noise, 0.001, np.arange(700.0))
+        via_table.thinned(noise, 0.001, np.arange(700.0))
 
 
 def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,7 +160,8 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = run(main, ["import", "feed.csv", "--name", "again"])
     assert made.exit_code == 0, made.output
     assert re.match(
-        r"15 lines thinned to \d+ via points: .* within 0.1 deg; the times are planned anew\n", made.output
+        r"15 lines reduced to \d+ via points: .* within 0.1 deg; 'armtempo plan' computes new times\n",
+        made.output,
     )
     assert Job.load("again.toml", ARM).timing == "shared"
     assert run(main, ["import", "feed.csv", "--name", "again"]).exit_code == 0  # the same content

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.model.job import Job
-from armtempo.planning import interval_search, limit_ratios, planner, time_parameterization
+from armtempo.planning import interval_search, limit_rows, planner, time_parameterization
 from armtempo.planning.fixed_path import FixedPath
 from armtempo.planning.path_rows import Rows
 from armtempo.planning.time_parameterization import Group
@@ -31,15 +31,15 @@ def point(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_derivatives_of_the_ratios_are_theirs(seed: int) -> None:
     angle, time, limits = point(seed)
     weights = np.random.default_rng(seed).normal(0, 1, (3, 3, 2))
-    gradient = limit_ratios.gradient(angle, time, limits)
-    curvature = limit_ratios.curvature(angle, time, limits, weights)
+    gradient = limit_rows.gradient(angle, time, limits)
+    curvature = limit_rows.curvature(angle, time, limits, weights)
     step = 1e-6
     for number in range(6):
         moved = []
         for sign in (1, -1):
             one, two = angle.copy(), time.copy()
             (one if number < 3 else two)[number % 3] += sign * step
-            moved.append((limit_ratios.ratios(one, two, limits), limit_ratios.gradient(one, two, limits)))
+            moved.append((limit_rows.ratios(one, two, limits), limit_rows.gradient(one, two, limits)))
         slope = (moved[0][0] - moved[1][0]) / (2 * step)
         assert gradient[:, number] == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(gradient).max())
         bend = np.einsum("lpj,lvpj->vpj", weights, (moved[0][1] - moved[1][1]) / (2 * step))
@@ -124,7 +124,7 @@ def test_refined_shared_timing(refine: int | str, most_s: float) -> None:
 
 @pytest.mark.slow
 def test_more_refinement_is_never_slower() -> None:
-    """Also where it is no multiple of what came before."""
+    """Also if it is no multiple of what came before."""
     totals = [refined([0, 1, 2], "shared", refine)[0] for refine in (1, 2, 3, 8)]
     assert np.all(np.diff(totals) < 0)
 
@@ -239,14 +239,12 @@ def rows_at(angle: np.ndarray, joint: int, kind: int, sign: float, limits: np.nd
 def test_rows_of_a_path_are_its_ratios_and_have_their_derivatives(kind: int) -> None:
     angle, time, limits = point(kind)
     rows = rows_at(angle, 1, kind, -1.0, limits)
-    assert rows.ratios(time) == pytest.approx(
-        -limit_ratios.ratios(angle, time, limits)[kind, :, 1], rel=1e-12
-    )
+    assert rows.ratios(time) == pytest.approx(-limit_rows.ratios(angle, time, limits)[kind, :, 1], rel=1e-12)
     gradient, weights = rows.gradient(time), np.array([2.0, -1.0, 0.5])
-    assert gradient == pytest.approx(-limit_ratios.gradient(angle, time, limits)[kind, 3:, :, 1], rel=1e-12)
+    assert gradient == pytest.approx(-limit_rows.gradient(angle, time, limits)[kind, 3:, :, 1], rel=1e-12)
     spread = np.zeros((3, 3, 2))
     spread[kind, :, 1] = -weights
-    whole = limit_ratios.curvature(angle, time, limits, spread)[3:, 3:, :, 1]
+    whole = limit_rows.curvature(angle, time, limits, spread)[3:, 3:, :, 1]
     for (row, column), bent in rows.curvature(time, weights).items():
         assert bent == pytest.approx(whole[row, column], rel=1e-9, abs=1e-12)
 
@@ -262,7 +260,7 @@ def test_no_row_that_is_left_out_can_be_reached_before_those_that_are_watched(se
         moved = np.repeat(time[:, :, None], 401, axis=2)
         moved[kind] += np.linspace(-20, 20, 401) if kind else np.linspace(-0.9, 20, 401)
         flat, own = moved.reshape(3, -1), rows.kinds[kind]
-        every = np.abs(limit_ratios.ratios(np.repeat(angle, 401, axis=1), flat, limits)[kind]).max(axis=1)
+        every = np.abs(limit_rows.ratios(np.repeat(angle, 401, axis=1), flat, limits)[kind]).max(axis=1)
         inside = np.ones((40, 401), dtype=bool)
         for step in range(401):
             ratios = rows.ratios(moved[:, rows.point, step])[own]

@@ -107,7 +107,7 @@ def test_angles_out_of_range_are_shown_with_a_note() -> None:
         (("1,2,nan",), "the angles: 'nan' is not a finite number"),
         (("P99",), "has no via point P99\nhint: give one of P0 to P6"),
         (("none.json",), "none.json: no such file"),
-        (("0,0,0", "--arm", "none.toml"), "none.toml: no such file"),
+        (("0,0,0", "--arm", "none.toml"), "none.toml: neither a file"),
     ],
 )
 def test_wrong_input_ends_with_2_and_one_clear_message(arguments: tuple[str, ...], words: str) -> None:

@@ -1,4 +1,4 @@
-"""Floors: closed forms, no plan beats them, and how near they are where the least time is known."""
+"""Floors: closed forms, no plan beats them, and how near they are if the least time is known."""
 
 from __future__ import annotations
 

@@ -1,22 +1,37 @@
-"""Commands, runs and their samples over a good line, against the board's own link, store and commands."""
+"""Commands, runs and samples over a good line and a broken one; refusals in words; the traffic log."""
 
 from __future__ import annotations
 
+import os
 import random
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from threading import Event, Thread
+from typing import Any
 
 import pytest
-from armtempo.basics.errors import BoardError, LinkError
-from armtempo.link import Client
+from armtempo.basics.errors import BoardError, InputError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.link import Client, traffic
+from armtempo.link.board_messages import Sample
 from armtempo.link.client import harmless_number
-from armtempo.link.follow import Follower
+from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.refusal import refusal
 from armtempo.link.session import Session
+from armtempo.link.transport import SerialTransport
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion
+from armtempo.robot.board import Board
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
+from armtempo_shared.limits import MAX_MOTION_BYTES
+from armtempo_shared.meanings import VALUES
 
 from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, started
+from tests.system.relay import ReplayTransport
+
+NUMBERS = sorted(VALUES.keys() - {"too_fast", "too_long", "pin_taken"})
+"""Names of codes whose number is said as the table of meanings has it."""
 
 
 @pytest.mark.slow
@@ -171,7 +186,7 @@ def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(pipe.app.controller.board.engine, "freeze", lambda: None)
     begin_s = pipe.clock()
     pipe.run_samples = 10_000
-    with pytest.raises(LinkError, match="does not; switch off"):
+    with pytest.raises(LinkError, match="still moves; switch off"):
         stored_motion.stop(board, now=False)
     assert pipe.clock() - begin_s < 15.0
 
@@ -283,3 +298,328 @@ def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     assert not said or "messages arrived damaged (" in said
     assert indices == sorted(set(indices))
     assert (tmp_path / "flash" / "feed.atm").read_bytes() in (old, new)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_every_number_is_said_with_what_it_is(name: str) -> None:
+    code = wire.ERROR_CODES[name]
+    _, meaning, cure = wire.ERRORS[code]
+    error = refusal("no", code, 1, 4711)
+    assert error.code == code
+    assert str(error) == f"no: {meaning} (joint 2) [{VALUES[name]}: 4711]; {cure}"
+
+
+def test_a_pin_is_named_with_what_can_hold_it() -> None:
+    code = wire.ERROR_CODES["pin_taken"]
+    assert "(joint 2) [PE9: encoder 1]; give another pin" in str(refusal("no", code, 1, 0x49))
+    assert "[PA0: the button, STEP of channel 6]" in str(refusal("no", code))
+    assert "[PE12: ENABLE of the drivers]" in str(refusal("no", code, value=0x4C))
+    assert "[PD0: it, or its timer, has another output or input already]" in str(
+        refusal("no", code, value=0x30)
+    )
+
+
+def test_a_limit_of_the_arm_is_not_taken_for_one_of_the_board() -> None:
+    code = wire.ERROR_CODES["too_fast"]
+    assert "speed limit in the arm file that the board has (joint 2) [steps/s needed: 395]; " in str(
+        refusal("no", code, 1, 395)
+    )
+    assert "together need more steps per second than the board can make [steps/s needed: 3950]; " in str(
+        refusal("no", code, 255, 3950)
+    )
+
+
+def test_what_has_no_number_or_joint_says_none() -> None:
+    assert str(refusal("no", wire.ERROR_CODES["not_moving"])) == "no: nothing is moving; no action needed"
+    assert "error 200, unknown to this version [7]" in str(refusal("no", 200, value=7))
+
+
+@pytest.mark.parametrize(
+    ("joint", "value", "words"),
+    [
+        (255, MAX_MOTION_BYTES, "it takes 16384 bytes at most"),
+        (0, 1 << 38, "its numbers reach 274877906944"),
+    ],
+)
+def test_a_motion_that_does_not_fit_says_by_how_much(joint: int, value: int, words: str) -> None:
+    text = str(refusal("no", wire.ERROR_CODES["too_long"], joint, value))
+    assert f"[{words}]; lower refine, use shared timing or fewer via points, or split it" in text
+
+
+def test_a_record_larger_than_the_board_takes(tmp_path: Path) -> None:
+    board, _ = ready(Pipe(tmp_path / "flash"))
+    with pytest.raises(BoardError, match=r"refused 'put_begin'.*\[it takes 16384 bytes at most"):
+        board.upload("big", bytes(MAX_MOTION_BYTES + 1))
+
+
+def test_a_command_for_which_the_board_has_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is answered by its own code."""
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+
+    def short_of_memory(self: Any, name: str) -> Any:
+        raise MemoryError
+
+    monkeypatch.setattr(pipe._later["armtempo_board.storage.store"].Store, "motion", short_of_memory)
+    with pytest.raises(BoardError, match=r"refused 'start'.*ran out of memory in this command"):
+        board.start("feed", wire.record_crc(data))
+
+
+def test_recorded_traffic_replays(tmp_path: Path) -> None:
+    path = tmp_path / "traffic.log"
+    pipe = Pipe(tmp_path / "flash")
+    with traffic.LogFile(path) as log:
+        logged = traffic.LoggedTransport(pipe, log)
+        seen = [Client(Session(logged, pipe.clock), 1).hello()]
+    path.write_text(path.read_text(encoding="utf-8") + "0.1\t<\tcut", encoding="utf-8")
+    replayed = Client(Session(ReplayTransport(traffic.read_log(path))), 1)
+    assert replayed.hello() == seen[0]
+    with pytest.raises(LinkError, match="replay"):
+        replayed.status()
+    assert f"ok hello protocol={wire.PROTOCOL_VERSION}" in path.read_text(encoding="utf-8")
+
+
+def test_traffic_log_refuses_other_files(tmp_path: Path) -> None:
+    path = tmp_path / "x.log"
+    with pytest.raises(InputError, match="cannot be read"):
+        list(traffic.read_log(path))
+    path.write_text("something\n")
+    with pytest.raises(InputError, match="not a traffic log"):
+        list(traffic.read_log(path))
+    path.write_text(f"{traffic.HEADER}\n1.0\t!\t00\t\n")
+    with pytest.raises(InputError, match="line 2"):
+        list(traffic.read_log(path))
+
+
+def test_every_message_has_words() -> None:
+    for entry in wire.COMMAND.values():
+        payload = bytes(64) if entry[4] else bytes(len(wire.encode(entry, [0] * len(entry[3]))))
+        assert entry[0] in traffic.describe(traffic.TO_BOARD, 1, entry[1], payload)
+    assert "unknown" in traffic.describe(traffic.FROM_BOARD, 1, 0xEE, b"")
+    assert "malformed" in traffic.describe(traffic.FROM_BOARD, 1, wire.EVENT["done"][1], b"x")
+
+
+def test_a_log_on_a_full_disk_is_cut_short_and_the_traffic_goes_on(tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():  # not on every system
+        return
+    pipe = Pipe(tmp_path / "flash")
+    with pytest.raises(InputError, match="cut short: No space left"), traffic.LogFile(full) as log:  # noqa: PT012
+        board = Client(Session(traffic.LoggedTransport(pipe, log), pipe.clock), 1)
+        board.hello()
+        board.status()
+    with pytest.raises(InputError, match="cannot be written"):
+        traffic.LogFile(tmp_path)
+
+
+def prepared(pipe: Pipe) -> tuple[Client, MotionKey]:
+    """A board with known positions and a motion."""
+    board, data = ready(pipe)
+    return board, MotionKey("feed", wire.record_crc(data))
+
+
+def replay(
+    board: Client, stored: MotionKey, at_20: Callable[[], None], stop: StopRequest | None = None
+) -> tuple[RunEnd, list[int]]:
+    """Run it; ``at_20`` is called with the sample number 20."""
+    indices: list[int] = []
+
+    def take(sample: Sample, duration_s: float) -> None:
+        indices.append(sample.index)
+        if sample.index == 20:
+            at_20()
+
+    return stored_motion.replay(board, stored, stop or StopRequest(), take), indices
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trouble", ["unplug_for", "silence_for"])
+def test_trouble_is_told_once_and_its_end_once(tmp_path: Path, trouble: str) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, stored = prepared(pipe)
+    told: list[str] = []
+    board.session.tell = told.append
+    end, indices = replay(board, stored, lambda: getattr(pipe, trouble)(9.0))
+    assert [text.rsplit(" ", 1)[1] for text in told] == ["back", "again"]
+    assert indices == list(range(pipe.run_samples))
+    assert end.samples_lost == 0
+
+
+@pytest.mark.slow
+def test_a_board_that_stays_silent_is_given_up_after_a_minute(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, stored = prepared(pipe)
+    told: list[str] = []
+    board.session.tell = told.append
+    begin_s = pipe.clock()
+    with pytest.raises(LinkError, match="did not answer"):
+        replay(board, stored, lambda: pipe.silence_for(1e6))
+    assert len(told) == 1
+    assert 60 < pipe.clock() - begin_s < 80
+
+
+@pytest.mark.slow
+def test_another_board_at_the_same_port_gets_no_command(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, stored = prepared(pipe)
+
+    def swap() -> None:
+        pipe.unplug_for(1.0)
+        pipe.swap_board(b"another")
+        pipe.app.controller.board.engine.moving = True
+
+    with pytest.raises(LinkError, match=r"another board is on pipe now \(another, before") as caught:
+        replay(board, stored, swap)
+    assert "the last sample" in str(caught.value)
+    assert pipe.app.controller.board.engine.calls == []  # above all no stop
+
+
+@pytest.mark.slow
+def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = prepared(pipe)
+    pipe.unplug_for(1.0)
+    pipe.swap_board(pipe.app.controller.board.board_id)
+    with pytest.raises(OtherBoardError, match="restarted"):
+        board.home([1, 2, 3])
+    assert "home" not in pipe.app.controller.board.engine.calls
+    assert board.session.reopen is not None
+
+
+def test_a_command_under_way_is_answered_after_the_greeting(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = prepared(pipe)
+    pipe.unplug_for(1.0)
+    assert board.find("feed") is not None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trouble", ["unplug_for", "silence_for"])
+def test_a_wanted_stop_shortens_the_waiting(tmp_path: Path, trouble: str) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, stored = prepared(pipe)
+    stop = StopRequest()
+
+    def interrupt() -> None:
+        getattr(pipe, trouble)(1e6)
+        stop.wanted = True
+
+    begin_s = pipe.clock()
+    words = {"unplug_for": "no stop could be sent", "silence_for": "told to stop but still moves"}
+    with pytest.raises(LinkError, match=words[trouble]):
+        replay(board, stored, interrupt, stop)
+    assert pipe.clock() - begin_s < 20.0
+
+
+@pytest.mark.slow
+def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, data = ready(pipe)
+    told: list[str] = []
+    board.session.tell = told.append
+    run = board.start("feed", wire.record_crc(data)).run
+    indices = []
+    follower = Follower(board, run)
+    for sample in follower.samples():
+        indices.append(sample.index)
+        if sample.index in (20, 40):
+            pipe.unplug_for(1.5)
+    assert indices == list(range(pipe.run_samples))
+    assert [text.split()[0] for text in told] == ["the", "connected"] * 2
+
+
+@pytest.mark.slow
+def test_cable_out_during_an_upload(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = ready(pipe)
+    data = random_motion(random.Random(7), segments=60)
+    board.upload("feed", data, lambda done, whole: pipe.unplug_for(0.7))
+    assert board.fetch("feed") == data
+
+
+def test_cable_that_stays_out(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, _ = ready(pipe)
+    pipe.unplug_for(1000.0)
+    begin_s = pipe.clock()
+    with pytest.raises(LinkError, match="unplugged"):
+        board.status()
+    assert 50 < pipe.clock() - begin_s < 70
+
+
+@pytest.mark.slow
+def test_board_that_started_anew_is_found_out(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    with pytest.raises(LinkError, match="restarted during the motion"):
+        replay(*prepared(pipe), pipe.start_board)
+
+
+def test_silent_board_is_reported_in_time(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board = connect(pipe)
+    pipe._send = lambda way, frame: None  # type: ignore[method-assign]
+    begin_s = pipe.clock()
+    with pytest.raises(NoAnswerError, match="did not answer 'status'"):
+        board.status()
+    assert pipe.clock() - begin_s < 4.0
+
+
+@pytest.mark.slow
+def test_a_cable_that_is_out_does_not_keep_who_wants_an_end(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    stop = StopRequest()
+    ended_s = [0.0]
+
+    def unplug() -> None:
+        pipe.unplug_for(1000.0)
+        stop.wanted = True
+        ended_s[0] = pipe.clock()
+
+    with pytest.raises(LinkError, match="no stop could be sent"):
+        replay(*prepared(pipe), unplug, stop)
+    assert pipe.clock() - ended_s[0] < 10.0
+
+
+def test_a_board_is_closed_between_the_commands_of_other_threads(tmp_path: Path) -> None:
+    client = connect(Pipe(tmp_path / "flash"))
+    closed = Event()
+    stack = ExitStack()
+    stack.callback(closed.set)
+    board = Board(client, "pipe", stack)
+    with client.session.turns:
+        closing = Thread(target=board.close)
+        closing.start()
+        assert not closed.wait(0.05)
+        client.hello()
+    closing.join()
+    assert closed.is_set()
+    with pytest.raises(LinkError, match="the board on pipe was closed"):
+        client.hello()
+
+
+def test_who_waits_for_a_cable_does_not_open_a_port_that_was_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armtempo.robot.board.TURN_S", 0.01)
+    pipe = Pipe(tmp_path / "flash")
+    client = connect(pipe)
+    client.session.reopen = lambda: pipe
+    with client.session.turns:
+        closing = Thread(target=Board(client, "pipe").close)
+        closing.start()
+        closing.join()
+        with pytest.raises(LinkError, match="the board on pipe was closed"):
+            client.session.reconnect(LinkError("the cable is out"))
+
+
+def test_a_port_that_was_closed_meanwhile_is_a_broken_one() -> None:
+    host, device = os.openpty()
+    port = SerialTransport(os.ttyname(device), exclusive=False)
+    port.close()
+    port._serial.is_open = True  # as another thread sees it that is just within a call
+    with pytest.raises(LinkError, match="broke"):
+        port.write(b"x")
+    with pytest.raises(LinkError, match="broke"):
+        port.read(0.0)
+    os.close(host)
+    os.close(device)

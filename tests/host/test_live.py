@@ -1,4 +1,4 @@
-"""What a run under way shows: the bar's text, and the window where there is a display."""
+"""What a run under way shows: the bar's text, and the window if there is a display."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from armtempo.cli.live import Live
 from armtempo.cli.progress import ProgressBar
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.records import encoded_motion
+from armtempo.report import run_folder
 from armtempo.report.live_plot import LivePlot
-from armtempo.runs import run_folder
-from armtempo.runs.run_folder import RunFolder
+from armtempo.report.run_folder import RunFolder
 
 from tests.host.made_runs import shipped_plan
 

@@ -14,7 +14,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.sequence import Sequence
 from armtempo.new_arm import folder as project_folder
-from armtempo.new_arm import given_geometry, joint_entry
+from armtempo.new_arm import joint_entry
 from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
@@ -54,7 +54,7 @@ def test_an_own_arm_of_four_joints_is_planned_at_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", list(shipped.files()))
 def test_the_first_job_of_every_arm_that_ships_is_within_its_ranges(name: str, tmp_path: Path) -> None:
-    project_folder.write(tmp_path / name, given_geometry.from_shipped(name), "sim:board")
+    project_folder.write(tmp_path / name, project_folder.from_shipped(name), "sim:board")
     arm = Arm.load(tmp_path / name / "arm.toml")
     job = Job.load(tmp_path / name / "first.toml", arm)
     sequence = Sequence.load(tmp_path / name / "sequence.toml", arm)
@@ -146,17 +146,17 @@ def test_questions_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_name_with_quotes_stays_one_line_and_control_characters_are_refused() -> None:
-    text = given_geometry.from_joints('a"', [joint_entry.JointEntry("b'\\")])
+    text = project_folder.from_joints('a"', [joint_entry.JointEntry("b'\\")])
     assert text.arm.name == 'a"'
     assert text.arm.driven[0].name == "b'\\"
     with pytest.raises(InputError, match="control characters"):
-        given_geometry.from_joints("a\n", [joint_entry.JointEntry("b")])
+        project_folder.from_joints("a\n", [joint_entry.JointEntry("b")])
 
 
 def test_nothing_is_left_where_it_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
-        project_folder.write(tmp_path / "file" / "x", given_geometry.from_shipped("paper"), "sim")
+        project_folder.write(tmp_path / "file" / "x", project_folder.from_shipped("paper"), "sim")
 
 
 def interview(folder: Path, monkeypatch: pytest.MonkeyPatch, answers: list[str], *options: str) -> Result:
@@ -238,7 +238,7 @@ def test_modified_rows_bring_the_tool_where_craigs_do() -> None:
     pose = np.eye(4)
     for d, a, alpha, theta in rows:
         pose = pose @ turned(0, alpha) @ shifted(0, a) @ turned(2, theta) @ shifted(2, d)
-    made = given_geometry.from_joints("craig", joints, modified=True).arm
+    made = project_folder.from_joints("craig", joints, modified=True).arm
     np.testing.assert_allclose(of_arm.forward(made, [0.0] * 4), pose, atol=1e-9)
 
 

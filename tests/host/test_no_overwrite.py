@@ -6,9 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.formats.atomic_file import replace_text
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -141,7 +141,7 @@ def test_what_the_system_refuses_is_said_without_a_traceback(monkeypatch: pytest
 
     monkeypatch.setattr(planner, "plan", full)
     result = CliRunner().invoke(main, ["plan"])
-    assert (result.exit_code, result.output.split("ship with armtempo\n")[1]) == (
+    assert (result.exit_code, result.output.split("shipped feeding job and arm\n")[1]) == (
         1,
         "armtempo: somewhere: No space left on device\n"
         "hint: check the path, its permissions and the room on the disk\n",

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from armtempo import optimise
 from armtempo.basics.errors import InputError
-from armtempo.optimise import cs, genes, iaga, swarm
-from armtempo.optimise.parameters import Number
-from armtempo.optimise.tracker import Array, Task
+from armtempo.optimise import cs, ga, iaga, swarm
+from armtempo.optimise.task import Array, Number, Task
 from armtempo.planning.fitness import Fitness
 
 from tests.host import problems
@@ -171,20 +170,20 @@ def test_every_parameter_may_go_to_its_ends(algorithm: str) -> None:
 
 def test_decoding_spreads_over_the_bounds() -> None:
     zeros, ones = np.zeros((1, 3, 12), dtype=bool), np.ones((1, 3, 12), dtype=bool)
-    assert np.array_equal(genes.decode(zeros, BOUNDS), BOUNDS[None, :, 0])
-    assert genes.decode(ones, BOUNDS) == pytest.approx(BOUNDS[None, :, 1], rel=1e-15)
+    assert np.array_equal(ga.decode(zeros, BOUNDS), BOUNDS[None, :, 0])
+    assert ga.decode(ones, BOUNDS) == pytest.approx(BOUNDS[None, :, 1], rel=1e-15)
     first_bit = zeros.copy()
     first_bit[0, 1, 0] = True
-    point = genes.decode(first_bit, BOUNDS)[0]
+    point = ga.decode(first_bit, BOUNDS)[0]
     assert point[1] == pytest.approx(0.5 + 2.5 * 2048 / 4095)
     assert point[0] == -1.0
 
 
 def test_crossover_swaps_tails_of_pairs_only() -> None:
     rng = np.random.default_rng(5)
-    parents = genes.random_bits(rng, 5, 2, 8)
-    assert np.array_equal(genes.crossover(parents, rng, 0.0), parents)
-    children = genes.crossover(parents, rng, 1.0).reshape(5, -1)
+    parents = ga.random_bits(rng, 5, 2, 8)
+    assert np.array_equal(ga.crossover(parents, rng, 0.0), parents)
+    children = ga.crossover(parents, rng, 1.0).reshape(5, -1)
     flat = parents.reshape(5, -1)
     assert np.array_equal(children[4], flat[4]), "the odd one has no partner"
     for one in (0, 2):
@@ -200,15 +199,15 @@ def test_crossover_swaps_tails_of_pairs_only() -> None:
 
 def test_roulette_favours_merit() -> None:
     rng = np.random.default_rng(6)
-    chosen = genes.roulette(np.repeat([0.0, 1.0, 3.0], 4000), rng) // 4000
+    chosen = ga.roulette(np.repeat([0.0, 1.0, 3.0], 4000), rng) // 4000
     counts = np.bincount(chosen, minlength=3) / 12000
     assert counts[0] == 0.0
     assert counts[2] == pytest.approx(0.75, abs=0.02)
 
 
 def test_merits_fall_by_rank() -> None:
-    assert genes.merits(np.array([2.0, np.inf, 5.0])).tolist() == [2.0, 0.0, 1.0]
-    assert genes.merits(np.array([1e9, -3.0, 4.0, 4.1, 1e10])).tolist() == [0.5, 2.0, 1.5, 1.0, 0.0]
+    assert ga.merits(np.array([2.0, np.inf, 5.0])).tolist() == [2.0, 0.0, 1.0]
+    assert ga.merits(np.array([1e9, -3.0, 4.0, 4.1, 1e10])).tolist() == [0.5, 2.0, 1.5, 1.0, 0.0]
 
 
 def test_adaptive_rate_protects_the_best() -> None:

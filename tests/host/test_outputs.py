@@ -16,7 +16,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.boards import BOARDS, TIMER_OUTPUTS
 from armtempo.model.outputs import Input
 from armtempo.records import encode
-from armtempo.robot import arm_difference
+from armtempo.robot import arm_state
 from armtempo_shared import armrecord
 
 from tests.host import arm_files
@@ -273,13 +273,13 @@ def test_difference_in_words(tmp_path: Path) -> None:
     arm = arm_files.load(tmp_path, ALL)
     old = encode.arm_record(arm)
     fewer = encode.arm_record(replace(arm, outputs=arm.outputs[:2]))
-    assert arm_difference.describe(old, fewer) == "other outputs"
-    assert arm_difference.describe(old, encode.arm_record(Arm.paper())) == "other outputs; inputs"
-    assert "keeps the position" in arm_difference.consequence(old, fewer)
+    assert arm_state.difference(old, fewer) == "other outputs"
+    assert arm_state.difference(old, encode.arm_record(Arm.paper())) == "other outputs; inputs"
+    assert "keeps the position" in arm_state.consequence(old, fewer)
 
 
 def test_placing_takes_the_timer_that_is_free(tmp_path: Path) -> None:
-    """PB8 has TIM10 and TIM4; PA6 TIM13, and TIM3 where no encoder has it."""
+    """PB8 has TIM10 and TIM4; PA6 TIM13, and TIM3 if no encoder has it."""
     arm = arm_files.load(tmp_path, GRIPPER + GRIPPER.replace("gripper", "hand").replace("PB8", "PA6") + DOOR)
     assert {name: place.timer for name, place in pin_use.timer_outputs(arm).items()} == {
         "gripper": 10,

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from armtempo.kinematics import chain
 from armtempo.paper import searches
-from armtempo.report import arm_figure, drawing, html_page, plan_section, plots
-from armtempo.runs import analysis
+from armtempo.report import analysis, arm_picture, drawing, html_page, plan_section, plots
 
 from tests.host.made_runs import shipped_plan
 
@@ -36,7 +35,7 @@ def test_labels_of_the_arms_figure_are_inside_of_it(turn_deg: float) -> None:
     turn = np.radians(turn_deg)
     about_z = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
     chains = chain.chains_mm(plan.arm, plan.via_deg) @ about_z
-    drawn = arm_figure.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times) @ about_z)
+    drawn = arm_picture.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times) @ about_z)
     drawn.draw_without_rendering()
     (axis,) = drawn.axes
     for part in (axis.xaxis, axis.yaxis, axis.zaxis):
@@ -75,7 +74,9 @@ def figure(name: str) -> str:
         "errors": lambda: plots.errors(seen, names),
         "overlay": lambda: plots.overlay({"one": (times, theory[:, :, 0], times)}),
         "convergence": lambda: plots.convergence({"one": np.arange(9.0)}),
-        "postures": lambda: arm_figure.postures(chains, chain.tool_path_mm(plan.arm, plan.trajectory, times)),
+        "postures": lambda: arm_picture.postures(
+            chains, chain.tool_path_mm(plan.arm, plan.trajectory, times)
+        ),
         "searches": lambda: searches.figure(searches.rows(runs)),
     }
     return drawing.inline_svg(drawn[name](), name, "what it shows")

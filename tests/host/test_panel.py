@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.basics.errors import InputError, LinkError
+from armtempo.basics.errors import InputError, LinkError, PortInUseError
 from armtempo.kinematics import Geometry, all_frames
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.model import mesh_files, shipped
@@ -350,7 +350,7 @@ def test_steps_are_edited_and_comments_stay(steps: SequenceDesk) -> None:
 
 def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceDesk) -> None:
     steps.delete(3)
-    with pytest.raises(InputError, match="repeat has no end"):
+    with pytest.raises(InputError, match="repeat without an end"):
         steps.save()
     assert steps.file is not None
     assert steps.file.read_text() == SEQUENCE
@@ -360,7 +360,7 @@ def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceDesk) -> None:
 
 def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_path: Path) -> None:
     board = Board()
-    answers = [LinkError("the board runs another program"), board]
+    answers = [LinkError("the board runs another program"), PortInUseError("in use by another"), board]
 
     def connect(sink: object) -> Board:
         answer = answers.pop(0)
@@ -374,11 +374,16 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
     assert "another program" in made.why_not(ME, Needs.BOARD)
     with pytest.raises(LinkError, match="another program"):
         made.board.list()
-    deployed = threading.Event()
-    made.do("deploy", ME, lambda: made.without_board(deployed.set), Needs.IDLE)
-    wait(lambda: not made.busy)
-    assert deployed.is_set()
+    deployed: list[int] = []
+    for trouble in ("in use by another", ""):
+        made.do("deploy", ME, lambda: made.without_board(lambda: deployed.append(1)), Needs.IDLE)
+        wait(lambda: not made.busy)
+        assert made.trouble == trouble
+    assert len(deployed) == 2
     assert made.board is board  # type: ignore[comparison-overlap]
+    board.client.session.tell("the cable is out; waiting for it to come back")
+    assert "cable" in made.why_not(ME, Needs.BOARD)
+    assert "cable" in made.log.last[-1]
     made.close()
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from armtempo.paper import motions, postures, printed, searches
-from armtempo.paper.claims import BETTER, DIFFERS, SAME, compared
+from armtempo.paper.printed import BETTER, DIFFERS, SAME, compared
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("paper")]  # what they share is made once
 

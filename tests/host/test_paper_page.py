@@ -11,8 +11,8 @@ import pytest
 from armtempo.basics.errors import LinkError
 from armtempo.model.parts import Limits
 from armtempo.paper import experiment, motions, searches, sheet
-from armtempo.paper.claims import DIFFERS, SAME
 from armtempo.paper.experiment import CUBIC, QUINTIC, UNOPTIMISED, Series
+from armtempo.paper.printed import DIFFERS, SAME
 from armtempo.report import drawing
 from armtempo.report.evaluation import evaluate
 from armtempo.robot.stop_request import StopRequest

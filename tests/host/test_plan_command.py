@@ -141,8 +141,8 @@ def test_too_little_memory_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     result = run("--job", "move.toml")
     assert (result.exit_code, result.output) == (
         1,
-        "armtempo: this takes more memory than there is: Unable to allocate 44.7 GiB\n"
-        "hint: close other programs, or ask for less: lower refine, a smaller population\n",
+        "armtempo: not enough memory: Unable to allocate 44.7 GiB\n"
+        "hint: close other programs, or lower refine or the population\n",
     )
 
 

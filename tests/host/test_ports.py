@@ -12,11 +12,11 @@ from armtempo import deploy
 from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseError
 from armtempo.cli import main
 from armtempo.deploy import program_files
-from armtempo.link import diagnose, transport
+from armtempo.link import connect, transport
 from armtempo.link.transport import SerialTransport
+from armtempo.ports import board_port, names
 from armtempo.ports import claim as claims
-from armtempo.ports import listing, names
-from armtempo.ports.listing import find_ports
+from armtempo.ports.board_port import find_ports
 from click.testing import CliRunner
 
 
@@ -54,7 +54,7 @@ class Silent:
     ],
 )
 def test_what_else_sits_on_a_port(answer: bytes, words: str) -> None:
-    assert words in str(diagnose.explain(Silent(answer), b""))
+    assert words in str(connect.explain(Silent(answer), b""))
 
 
 class Prompt(Silent):
@@ -66,7 +66,7 @@ class Prompt(Silent):
 
 
 def test_a_program_that_mpremote_has_ended_needs_a_reset_only() -> None:
-    said = str(diagnose.explain(Prompt(), b""))
+    said = str(connect.explain(Prompt(), b""))
     assert "mpremote connect there reset" in said
     assert "reset button" in said
 
@@ -100,7 +100,7 @@ def test_port_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_found_ports_put_boards_first() -> None:
-    found = listing.find_ports()
+    found = board_port.find_ports()
     assert [port.board for port in found] == sorted([port.board for port in found], reverse=True)
 
 

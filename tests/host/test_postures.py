@@ -13,7 +13,7 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.cli.posture import NamedPosture
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import arm_json, posture_text, shipped
+from armtempo.model import arm_json, shipped, taught
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner, via_points
@@ -50,9 +50,9 @@ def test_a_posture_is_read_and_found_by_name(tmp_path: Path) -> None:
     ("more", "said"),
     [
         ("[posture.home]\nangles_deg = [0, 0, 0]", "posture.home: 'home' is the posture"),
-        ("[posture.P1]\nangles_deg = [0, 0, 0]", "posture.P1: 'P1' means a via point"),
-        ("[posture.nan]\nangles_deg = [0, 0, 0]", "posture.nan: 'nan' is no name"),
-        ("[posture.'1st']\nangles_deg = [0, 0, 0]", "posture.1st: '1st' is no name"),
+        ("[posture.P1]\nangles_deg = [0, 0, 0]", "posture.P1: 'P1' is the name of a job's via point"),
+        ("[posture.nan]\nangles_deg = [0, 0, 0]", "posture.nan: 'nan' is not a valid name"),
+        ("[posture.'1st']\nangles_deg = [0, 0, 0]", "posture.1st: '1st' is not a valid name"),
         ("[posture.park]\nangles_deg = [0, 0]", "posture.park.angles_deg"),
         ("[posture.park]\nangles_deg = [0, 500, 0]", "posture.park: joint 2: 500 degrees is outside"),
         ("[posture.park]\nangle_deg = [0, 0, 0]", "posture.park: exactly one of"),
@@ -127,11 +127,11 @@ def test_a_new_posture_is_put_behind_and_the_rest_stays(tmp_path: Path) -> None:
     path = written(tmp_path, "# the end")
     before = path.read_text()
     arm = Arm.load(path)
-    posture_text.save(path, arm, "park", [0.0, -60.0, 40.5], replace=False)
+    taught.save(path, arm, "park", [0.0, -60.0, 40.5], replace=False)
     assert path.read_text() == before + "\n\n[posture.park]\nangles_deg = [0, -60, 40.5]\n"
     assert Arm.load(path).posture("park").where == (0.0, -60.0, 40.5)
     with pytest.raises(InputError, match="has a posture 'park'"):
-        posture_text.save(path, arm, "park", [1.0, -60.0, 40.5], replace=False)
+        taught.save(path, arm, "park", [1.0, -60.0, 40.5], replace=False)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_a_new_posture_is_put_behind_and_the_rest_stays(tmp_path: Path) -> None:
     ],
 )
 def test_only_the_one_table_changes(old: str, new: str) -> None:
-    assert posture_text.with_posture(old, "park", [7.0, 8.5, -9.0], Path("arm.toml")) == new
+    assert taught.with_posture(old, "park", [7.0, 8.5, -9.0], Path("arm.toml")) == new
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def test_only_the_one_table_changes(old: str, new: str) -> None:
 )
 def test_a_layout_that_cannot_be_changed_safely_is_left_alone(text: str) -> None:
     with pytest.raises(InputError, match="cannot be changed here") as refused:
-        posture_text.with_posture(text, "park", [7.0, 8.5, -9.0], Path("arm.toml"))
+        taught.with_posture(text, "park", [7.0, 8.5, -9.0], Path("arm.toml"))
     assert "[posture.park] angles_deg = [7, 8.5, -9]" in str(refused.value)
 
 
@@ -186,7 +186,7 @@ def test_random_files_change_in_the_one_table_only() -> None:
         text = "".join([parts[0], *rng.sample(parts[1:], len(parts) - 1)])
         name = rng.choice(["park", "new"])
         angles = [round(rng.uniform(-90, 90), 3) for _ in range(3)]
-        after = posture_text.with_posture(text, name, angles, Path("arm.toml"))
+        after = taught.with_posture(text, name, angles, Path("arm.toml"))
         expected = tomllib.loads(text)
         expected["posture"][name] = {"angles_deg": angles}
         assert tomllib.loads(after) == expected
@@ -209,7 +209,7 @@ def test_the_digits_written_mean_the_same_steps() -> None:
             for j in arm.driven
         ]
         angles = [count / joint.steps_per_deg for count, joint in zip(steps, arm.driven, strict=True)]
-        found = posture_text.digits(arm, angles)
+        found = taught.digits(arm, angles)
         assert [
             round(angle * joint.steps_per_deg) for angle, joint in zip(found, arm.driven, strict=True)
         ] == steps
@@ -218,5 +218,5 @@ def test_the_digits_written_mean_the_same_steps() -> None:
 def test_an_arm_that_ships_is_not_written_to() -> None:
     result = CliRunner().invoke(main, ["teach", "--posture", "park", "--arm", "ar4", "--port", "sim"])
     assert result.exit_code == 2
-    assert "ships with armtempo" in result.output
+    assert "belongs to armtempo" in result.output
     assert "armtempo new FOLDER --like ar4" in result.output

@@ -122,6 +122,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "to": 1.0,
         "input": "x",
         "counter": "x",
+        "load": "nothing",
         "limits": limits,
         "motor": motor,
         "channel": 1,

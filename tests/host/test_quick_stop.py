@@ -11,12 +11,11 @@ from pathlib import Path
 
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.ports import claim, claim_file, names
+from armtempo.basics.settings import ProjectSettings
+from armtempo.ports import claim, claim_file, names, quick_stop
 from armtempo.ports.caller import Ownership, ownership
-from armtempo.ports.lines import Message
+from armtempo.ports.messages import Message
 from armtempo.ports.server import Server
-from armtempo.project import quick_stop
-from armtempo.project.settings import ProjectSettings
 
 PORT = "/dev/q"
 HEAVY = (
@@ -197,7 +196,7 @@ def test_a_socket_has_a_path_that_the_system_takes(
 
 def test_nothing_heavy_is_imported_for_it() -> None:
     code = (
-        f"import sys; before = set(sys.modules); import armtempo.__main__, armtempo.project.quick_stop as quick; "
+        f"import sys; before = set(sys.modules); import armtempo.__main__, armtempo.ports.quick_stop as quick; "
         f"quick.send(['--port', 'x']); print([name for name in {HEAVY} if name in set(sys.modules) - before])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

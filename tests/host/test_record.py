@@ -11,7 +11,7 @@ import pytest
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model.arm import Arm
-from armtempo.runs import reader, run_folder
+from armtempo.report import run_folder, run_reader
 
 SCALES = run_folder.scales(Arm.paper())
 
@@ -38,7 +38,7 @@ def test_whole_run(tmp_path: Path) -> None:
             for index in range(5):
                 file.append(sample(index))
             file.repetition.end(run_folder.COMPLETE, "", 33_600_000, sample(4).positions, ())
-    found = reader.load(run.path)
+    found = run_reader.load(run.path)
     assert [(part.file, part.state) for part in found.repetitions] == [
         ("samples-01.csv", "complete"),
         ("samples-02.csv", "complete"),
@@ -61,9 +61,9 @@ def test_interrupted_run_keeps_what_arrived(tmp_path: Path, error: type[BaseExce
     run = folder(tmp_path)
     with pytest.raises(error), run.begin_repetition() as file:  # noqa: PT012
         file.append(sample(0))
-        assert len(reader.load(run.path).repetitions[0].index) == 1  # readable in the middle
+        assert len(run_reader.load(run.path).repetitions[0].index) == 1  # readable in the middle
         raise error
-    found = reader.load(run.path).repetitions[0]
+    found = run_reader.load(run.path).repetitions[0]
     assert (found.state, found.index.tolist()) == (state, [0])
 
 
@@ -74,7 +74,7 @@ def test_half_a_line_is_dropped(tmp_path: Path) -> None:
         file.append(sample(1))
     path = run.path / "samples-01.csv"
     path.write_text(path.read_text()[:-9])
-    assert reader.load(run.path).repetitions[0].index.tolist() == [0]
+    assert run_reader.load(run.path).repetitions[0].index.tolist() == [0]
 
 
 def test_folders_never_collide(tmp_path: Path) -> None:
@@ -87,16 +87,16 @@ def test_folders_never_collide(tmp_path: Path) -> None:
 
 def test_damaged_folders_are_named(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="not a run folder"):
-        reader.load(tmp_path)
+        run_reader.load(tmp_path)
     run = folder(tmp_path)
     with run.begin_repetition() as file:
         file.append(sample(0))
     meta_path = run.path / run_folder.META
     meta = json.loads(meta_path.read_text())
     (run.path / "samples-01.csv").write_text("index,time_s\nx,0\n")
-    assert "damaged" in reader.load(run.path).repetitions[0].problem
+    assert "damaged" in run_reader.load(run.path).repetitions[0].problem
     (run.path / "samples-01.csv").unlink()
-    assert "missing" in reader.load(run.path).repetitions[0].problem
+    assert "missing" in run_reader.load(run.path).repetitions[0].problem
     for change, words in (
         ({"version": 99}, "version 99"),
         ({"format": "other"}, "not the description"),
@@ -104,10 +104,10 @@ def test_damaged_folders_are_named(tmp_path: Path) -> None:
     ):
         meta_path.write_text(json.dumps(meta | change))
         with pytest.raises(RunFolderError, match=words):
-            reader.load(run.path)
+            run_reader.load(run.path)
     meta_path.write_text("{")
     with pytest.raises(RunFolderError, match="damaged"):
-        reader.load(run.path)
+        run_reader.load(run.path)
 
 
 def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
         file._file = full.open("w", encoding="utf-8", newline="")
         file._csv = csv.writer(file._file)
         file.append(sample(1))
-    found = reader.load(run.path).repetitions[0]
+    found = run_reader.load(run.path).repetitions[0]
     assert (found.state, found.index.tolist()) == (run_folder.BROKEN, [0])
 
 

@@ -19,7 +19,7 @@ from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
 from armtempo.report import comparison, plots, run_report, verdict
 from armtempo.report.evaluation import evaluate
-from armtempo.runs.run_folder import MOTION
+from armtempo.report.run_folder import MOTION
 from click.testing import CliRunner
 
 from tests import browser
@@ -178,7 +178,7 @@ def test_an_arm_without_encoders_gets_a_report_of_what_is_known(tmp_path: Path) 
 
 
 def limited(joints: Sequence[Joint], limits: Sequence[Limits]) -> Iterator[Joint]:
-    """The joints with other limits where they are driven."""
+    """The joints with other limits if they are driven."""
     left = iter(limits)
     for joint in joints:
         yield replace(joint, limits=next(left)) if joint.motor else joint

@@ -7,14 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.basics import toml_table
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.diagnosis.arm_check import check_arm
-from armtempo.formats import toml_table
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
+from armtempo.model.job import Job, Stop
+from armtempo.model.parts import NOTHING, Load
 from armtempo.model.room import FAR_MM, ArmRoom, KeepOut, read
-from armtempo.planning import planner, point_to_point, room_check
+from armtempo.model.sequence import Sequence
+from armtempo.model.steps import Goto, Hold
+from armtempo.model.tool_way import ToolWay
+from armtempo.planning import planner, point_to_point, room_check, sequence_planner
 from armtempo.planning.capsules import box_distance, segment_distance
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
@@ -75,7 +79,7 @@ def test_motions_in_random_rooms_agree_with_dense_samples() -> None:
 
 
 def test_links_do_not_touch_each_other() -> None:
-    """A planar arm folds its third link towards its first: accepted where all sampled points are apart."""
+    """A planar arm folds its third link towards its first: accepted if all sampled points are apart."""
     seed, refused = 5, 0
     rng = np.random.default_rng(seed)
     links = (
@@ -106,10 +110,32 @@ def test_links_do_not_touch_each_other() -> None:
 def test_a_plan_names_link_obstacle_depth_time_and_via_points() -> None:
     job = Job("over", via_deg=[[20, -60, 40], [90, -60, 40], [160, -60, 40]], refine=1, iterations=2)
     assert planner.plan(PAPER, job)
-    with pytest.raises(
-        PlanError, match=r"over: the link of joint . is .* mm inside of feeder \(at .* s, between P0 and P1\)"
-    ):
+    with pytest.raises(PlanError, match=OVER):
         planner.plan(thick(PAPER, 20.0, ArmRoom((FEEDER,))), job)
+
+
+@pytest.mark.slow
+def test_a_free_path_goes_around_what_is_between_its_via_points() -> None:
+    """Over a box, as seen by dense samples; if walls leave no way, it is refused as before."""
+    via = [[20, -60, 40], [160, -60, 40], [100, -90, 20]]
+    job = Job("over", via_deg=via, stops=(Stop(1, 0.5),), path="free", refine=5, starts=1)
+    arm = thick(PAPER, 20.0, ArmRoom((replace(FEEDER, high_mm=(50.0, 400.0, 250.0)),)))
+    plan = planner.plan(arm, job)
+    assert "the path goes around feeder" in plan.notes
+    assert dense_least(arm, plan.trajectory, 2000) > 0.0
+    assert plan.searches[0].floor_s <= plan.total_s < 10.0
+    spline = plan.trajectory.joints[0]
+    assert spline.via_segments is not None
+    assert len(spline.via_segments) == 3
+    np.testing.assert_allclose(plan.trajectory(np.array(spline.via_times_s)), via, atol=1e-6)
+    seam = replace(
+        job, via=(*job.via[:2], (165.0, -50.0, 30.0)), stops=(), ways=(ToolWay(2, line=True),), refine=3
+    )
+    led = planner.plan(arm, seam)
+    assert dense_least(arm, led.trajectory, 2000) > 0.0
+    wall = replace(FEEDER, low_mm=(-50.0, 20.0, -FAR_MM), high_mm=(50.0, FAR_MM, FAR_MM))
+    with pytest.raises(PlanError, match=OVER):
+        planner.plan(replace(arm, room=ArmRoom((wall,))), job)
 
 
 @pytest.mark.slow
@@ -126,6 +152,30 @@ def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it() -> None:
     assert room_check.posture_touches(arm, inside)
     out = point_to_point.straight("out", inside, start, arm)
     assert room_check.touch_of(arm, out) is None
+
+
+@pytest.mark.slow
+def test_what_the_tool_holds_keeps_to_the_room_from_the_step_on_that_says_so() -> None:
+    """Below the tool of the turning arm, which is 79 mm above the box."""
+    cup = Load("cup", radius_mm=10.0, length_mm=100.0, along="x", centre_mm=(0.0, 0.0, 30.0))
+    arm = replace(thick(PAPER, 20.0, None), loads=(cup,))
+    start, end = (20.0, -60.0, 40.0), (160.0, -60.0, 40.0)
+    low = room_check.Bodies(arm.holding("cup")).ends(np.array([[90.0, -60.0, 40.0]]))
+    box = KeepOut("box", (-150.0, 60.0, -FAR_MM), (150.0, 400.0, float(low[0][-1, 0, 2]) - 15.0))
+    assert room_check.Bodies(arm).ends(np.array([start]))[0].shape == (12, 1, 3)
+    for top, refused in ((0.0, False), (10.0, True)):
+        raised = replace(box, high_mm=(150.0, 400.0, box.high_mm[2] + top))
+        there = replace(arm, room=ArmRoom((raised,)))
+        touch = room_check.touch_of(there.holding("cup"), point_to_point.straight("over", start, end, arm))
+        assert (touch is not None) == refused
+    for line in (False, True):
+        with pytest.raises(PlanError, match="the load cup is"):
+            goto.motion(there.holding("cup"), np.array(start), np.array(end), goto.MovePace(line=line))
+    steps = (Goto(start), Goto(end), Hold("cup"), Goto(start))
+    with pytest.raises(PlanError, match="goto: the load cup is"):
+        sequence_planner.plan(there, Sequence("carry", steps))
+    found = sequence_planner.plan(there, Sequence("carry", (*steps[:3], Hold(NOTHING), steps[3])))
+    assert found.loads == ("", "nothing")
 
 
 def test_check_names_postures_that_touch() -> None:
@@ -165,12 +215,27 @@ def test_what_a_room_may_not_say(old: str, new: str, message: str) -> None:
         read(toml_table.parse(FILE.replace(old, new), "arm.toml"))
 
 
-def test_an_arm_file_has_radii_and_room(tmp_path: Path) -> None:
+def test_an_arm_file_has_radii_room_and_loads(tmp_path: Path) -> None:
     text = Path(PAPER.source).read_text(encoding="utf-8")
     file = tmp_path / "arm.toml"
     file.write_text(
-        text.replace("d_mm", "radius_mm = 12\nd_mm", 1) + "\n[room]\nfloor_mm = -5\n", encoding="utf-8"
+        text.replace("d_mm", "radius_mm = 12\nd_mm", 1)
+        + "\n[room]\nfloor_mm = -5\n[load.cup]\nradius_mm = 30\ncentre_mm = [0, 0, 40]\n",
+        encoding="utf-8",
     )
     arm = Arm.load(file)
     assert arm.room == ArmRoom(low_mm=(-FAR_MM, -FAR_MM, -5.0))
     assert arm.joints[0].radius_mm == 12.0
+    assert arm.holding("cup").held == Load("cup", radius_mm=30.0, centre_mm=(0.0, 0.0, 40.0))
+    job = 'name = "j"\nvia_deg = [[0, 0, 0], [1, 1, 1]]\nholds = '
+    assert Job.of_table(toml_table.parse(job + '"cup"', "job.toml"), arm).holds == "cup"
+    with pytest.raises(InputError, match=r"job\.toml: holds: .* no load 'cub'; did you mean 'cup'"):
+        Job.of_table(toml_table.parse(job + '"cub"', "job.toml"), arm)
+    text = file.read_text(encoding="utf-8")
+    for old, new, message in (
+        (".cup", f".{NOTHING}", "means no load"),
+        ("s_mm = 30", "s_mm = -1", "radius_mm = -1 is not"),
+    ):
+        file.write_text(text.replace(old, new), encoding="utf-8")
+        with pytest.raises(InputError, match=message):
+            Arm.load(file)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.report import sequence_report
+from armtempo.report.sequence_reader import RowPassed, SequenceRun
+from armtempo.report.sequence_report import LegResult
 from armtempo.report.verdict import BAD, GOOD, OPEN, Verdict
-from armtempo.runs.leg_results import LegResult
-from armtempo.runs.sequence_reader import RowPassed, SequenceRun
 
 JOINT = "waist"
 

@@ -8,10 +8,10 @@ import random
 from pathlib import Path
 
 import pytest
+from armtempo.basics.settings import NAMES, OPTIONS, ProjectSettings, variable_of
 from armtempo.cli import main
-from armtempo.ports.listing import Port
-from armtempo.project import board_port
-from armtempo.project.settings import NAMES, OPTIONS, ProjectSettings, variable_of
+from armtempo.ports import board_port
+from armtempo.ports.board_port import Port
 from click.testing import CliRunner, Result
 
 SEED = 1301
@@ -144,7 +144,7 @@ def test_a_job_without_an_arm_is_not_planned() -> None:
     Path("job.toml").write_text('name = "j"\nvia_deg = [[0,0,0],[1,1,1]]\n')
     done = run("plan", "--job", "job.toml")
     assert done.exit_code == 2
-    assert "which arm" in done.stderr
+    assert "no arm is set" in done.stderr
     assert not list(Path().glob("*.json"))
 
 

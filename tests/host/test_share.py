@@ -24,8 +24,7 @@ from armtempo.link.turns import Turns
 from armtempo.ports import caller, claim
 from armtempo.ports.caller import Caller, Ownership, ownership
 from armtempo.ports.claim import PortClaim
-from armtempo.ports.lines import LineReader, Message
-from armtempo.ports.requests import REQUESTS, Field, check
+from armtempo.ports.messages import REQUESTS, Field, LineReader, Message, check
 from armtempo.ports.server import Server
 from armtempo.robot import stored_motion
 from armtempo.robot.shared_board import SharedBoard

@@ -92,6 +92,7 @@ def test_every_command_has_its_section(site: Path) -> None:
     page = (site / "host" / "docs" / "commands.html").read_text(encoding="utf-8")
     for name in main.list_commands(click.Context(main)):
         assert f'<section id="{name}">' in page, name
+    assert "<td><p></p></td>" not in page
 
 
 def test_every_code_of_the_board_is_listed(site: Path) -> None:

@@ -17,24 +17,20 @@ ROOT = Path(__file__).parents[2]
 HOST = ROOT / "host" / "armtempo"
 SHARED = ROOT / "shared" / "armtempo_shared"
 ORDER = (
-    "basics",  # errors, the array type, progress
-    "formats",  # TOML tables, JSON, text tables, whole files
-    "ports",  # names of serial ports; the program that has one answers others
-    "project",  # armtempo.toml, variables; which board is meant
+    "basics",  # errors, the array type, progress, files of every kind, settings
+    "ports",  # names of serial ports, which is meant; the program that has one answers others
     "splines",  # B-splines, the time axis, trajectories, bounds of their extremes
     "optimise",  # population searches
     "model",  # arm, job, pose, plan, and their files
     "kinematics",  # forward, inverse, choice
     "planning",  # from a job to a plan
     "records",  # arm and motion as the board takes them
-    "diagnosis",  # what looks wrong about an arm, a job, this machine
     "new_arm",  # a folder for a new arm, also from a robot description
     "simulator",  # the virtual board
     "link",  # port, session, commands, samples of a run
     "deploy",  # the board program onto a board
-    "runs",  # run folders and what the samples say
-    "report",  # pages, plots, tables
-    "selftest",  # a board measures itself
+    "diagnosis",  # what looks wrong about an arm, a job, this machine; a board measures itself
+    "report",  # run folders, what the samples say; pages, plots, tables
     "robot",  # a board in use: home, go, run, stop
     "pipeline",  # plan, load, run, report
     "paper",  # its tables and figures, repeated

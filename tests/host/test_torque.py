@@ -13,10 +13,10 @@ from armtempo.kinematics.dynamics import GRAVITY_M_S2, joint_torques
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.model.parts import Dynamics, Joint, JointModel
+from armtempo.model.parts import Dynamics, Joint, JointModel, Load
 from armtempo.model.plan import Plan
-from armtempo.planning import by_torque, planner, torque
-from armtempo.planning.line.line_move import slower
+from armtempo.planning import planner, torque
+from armtempo.planning.planner import slower
 from armtempo.report import run_report, text_summary
 
 DATA = Path(__file__).parents[1] / "data"
@@ -130,6 +130,20 @@ def test_power_is_the_change_of_energy_and_what_friction_takes(name: str) -> Non
         assert power - lost == pytest.approx(change_of_energy, rel=1e-5, abs=1e-5)
 
 
+def test_a_load_weighs_as_a_row_of_its_own_would() -> None:
+    arm = loaded("ar4")
+    load = Load(
+        "part", 0.7, centre_mm=(10.0, -20.0, 40.0), inertia_kg_m2=(0.02, 0.03, 0.04, 1e-3, 2e-3, 3e-3)
+    )
+    body = Dynamics(load.mass_kg, load.centre_mm, load.inertia_kg_m2)
+    still = Joint("load", 0.0, 0.0, 0.0, 0.0, (-0.001, 0.001), dynamics=body)
+    motion = np.random.default_rng(SEED).uniform(-2.0, 2.0, (3, 20, len(arm.joints)))
+    found = joint_torques(replace(arm, loads=(load,)).holding("part"), *motion)
+    with_row = np.concatenate([motion, np.zeros((3, 20, 1))], axis=2)
+    wanted = joint_torques(replace(arm, joints=(*arm.joints, still)), *with_row)[:, :-1]
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
 def weighty(curve: tuple[tuple[float, float], ...] = ((0.0, 0.5), (60.0, 0.4))) -> Plan:
     """A plan of the paper's arm, the masses only in joint 2's link."""
     plan = Plan.load(DATA / "trajectory_before_tolerances.json")
@@ -189,7 +203,7 @@ def test_plans_by_torque_leave_each_motor_what_is_prudent(monkeypatch: pytest.Mo
         return replace(plan, arm=arm, trajectory=faster)
 
     monkeypatch.setattr(planner, "plan", planned)
-    found = by_torque.plan(plan.arm, plan.job)
+    found = torque.plan_by_torque(plan.arm, plan.job)
     least = torque.least_margin(found.arm, found.trajectory)
     assert least is not None
     assert torque.ENOUGH <= least.margin < 1.02 * torque.ENOUGH
@@ -198,12 +212,12 @@ def test_plans_by_torque_leave_each_motor_what_is_prudent(monkeypatch: pytest.Mo
         one.limits.speed_deg_s for one in plan.arm.driven
     ]
     strong = weighty(((0.0, 20.0), (6000.0, 20.0)))
-    assert by_torque.plan(strong.arm, plan.job).total_s == pytest.approx(plan.total_s / fastest)
+    assert torque.plan_by_torque(strong.arm, plan.job).total_s == pytest.approx(plan.total_s / fastest)
     weak = weighty(((0.0, 0.1), (6000.0, 0.1)))
     with pytest.raises(PlanError, match="slower motions do not help: joint 2: at"):
-        by_torque.plan(weak.arm, plan.job)
+        torque.plan_by_torque(weak.arm, plan.job)
     with pytest.raises(InputError, match="cannot be planned by torque"):
-        by_torque.plan(Arm.paper(), plan.job)
+        torque.plan_by_torque(Arm.paper(), plan.job)
 
 
 def test_check_tells_of_odd_bodies() -> None:

@@ -15,6 +15,7 @@ import trimesh
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
 from armtempo.kinematics import Geometry, all_frames, forward, of_arm
+from armtempo.kinematics.chain import outline_mm
 from armtempo.kinematics.dynamics import joint_torques
 from armtempo.kinematics.shape import refusals
 from armtempo.model import mesh_files
@@ -22,8 +23,10 @@ from armtempo.model.arm import Arm
 from armtempo.new_arm import urdf_fitting as fitting
 from armtempo.new_arm import urdf_reader as reader
 from armtempo.new_arm import urdf_rows as dh
+from armtempo.planning.capsules import point_distance
 from click.testing import CliRunner
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 pytestmark = pytest.mark.slow
 
@@ -47,9 +50,9 @@ def about(axis: Array, angle: float) -> Array:
     return pose
 
 
-def tool_pose(path: Path, angles: dict[str, float]) -> Array:
-    """The pose of link ``tool`` in mm, straight from the XML."""
-    pose, link = np.eye(4), "tool"
+def tool_pose(path: Path, angles: dict[str, float], link: str = "tool") -> Array:
+    """The pose of a link in mm, straight from the XML."""
+    pose = np.eye(4)
     above = {joint.find("child").get("link"): joint for joint in ElementTree.parse(path).iter("joint")}  # type: ignore[union-attr]
     while link in above:
         joint = above[link]
@@ -84,7 +87,7 @@ def imported(tmp_path: Path, name: str, *options: str) -> tuple[Path, str]:
     ],
 )
 def test_the_written_arm_stands_where_the_urdf_does(tmp_path: Path, name: str, joints: str) -> None:
-    """With constant rows only where base or tool need them."""
+    """With constant rows only if base or tool need them."""
     out, said = imported(tmp_path, name)
     assert "worst error at 100 random postures" in said
     arm = Arm.read(out)
@@ -115,6 +118,7 @@ def test_the_links_shapes_move_with_their_rows(tmp_path: Path) -> None:
     urdf.write_text(text.format("package://arm/foot.stl"))
     done = CliRunner().invoke(main, command)
     assert "wrote 2 meshes" in done.output
+    assert "1 of 6 rows have a radius_mm" in done.output
     assert "already exists" in CliRunner().invoke(main, command).output
     mine = tmp_path / "arm-meshes" / "mine.stl"
     mine.write_text("not of this arm")
@@ -134,6 +138,44 @@ def test_the_links_shapes_move_with_their_rows(tmp_path: Path) -> None:
         np.abs(at_tool - (10, 20, 30)).reshape(-1, 3), np.tile((10, 20, 30), (36, 1)), atol=0.1
     )
     np.testing.assert_allclose(mesh_files.read(files[0]).max(axis=(0, 1)), (1010, 1020, 1030), atol=1e-3)
+
+
+def test_capsules_of_rows_contain_the_shapes_for_collision(tmp_path: Path) -> None:
+    """A tilted tin on each link, of the last one within the tool's row; wherever the arm is."""
+    urdf, out = tmp_path / "thick.urdf", tmp_path / "arm.toml"
+    shape = '<{0}><origin xyz="0.01 0.02 0.03" rpy="0.3 0.2 0"/><geometry>{1}</geometry></{0}>'.format
+    tin = shape("collision", '<cylinder radius="0.02" length="0.1"/>')
+    seen = shape("visual", '<box size="9 9 9"/>')
+    plain = (FOLDER / "four_skew.urdf").read_text()
+    text = re.sub(r'<link name="(l\d|tool)"/>', rf'<link name="\1">{seen}{tin}</link>', plain)
+    urdf.write_text(text)
+    done = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
+    assert "5 of 6 rows have a radius_mm" in done.output, done.output
+    arm = Arm.read(out)
+    rng = np.random.default_rng(SEED)
+    angles = np.array([0.0 if joint.name in ("base", "tool") else rng.uniform(-3, 3) for joint in arm.joints])
+    moved = {joint.name: angle for joint, angle in zip(arm.joints, angles, strict=True)}
+    points = outline_mm(arm, np.degrees(angles))
+    turn = Rotation.from_euler("xyz", [0.3, 0.2, 0.0]).as_matrix()
+    tin_mm = 1e3 * trimesh.creation.cylinder(0.02, 0.1).vertices @ turn.T + (10, 20, 30)
+    for number, link in enumerate(("l1", "l2", "l3", "l4"), 1):
+        pose = tool_pose(urdf, moved, link)
+        at = tin_mm @ pose[:3, :3].T + pose[:3, 3]
+        rows = [number, number + 1] if link == "l4" else [number]
+        least = np.min(
+            [
+                point_distance(at, points[None, part], (points[part + 1] - points[part])[None])
+                - arm.joints[row].radius_mm
+                for row in rows
+                for part in (2 * row, 2 * row + 1)
+            ],
+            axis=0,
+        )
+        assert (-0.3 if link != "l4" else -99.0) < least.max() < 0.01, link
+    urdf.write_text(text.replace('<cylinder radius="0.02" length="0.1"/>', '<mesh filename="gone.stl"/>'))
+    done = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out), "--force"])
+    assert "0 of 6 rows have a radius_mm" in done.output
+    assert "# No link has a radius_mm, as not all shapes are known" in out.read_text()
 
 
 def test_ranges_are_the_urdfs_and_never_wider(tmp_path: Path) -> None:
@@ -189,7 +231,7 @@ def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
 
 REFUSED = [
     ("two_ends", [], ["choose with --tip", ": tool (j1, j2, j3), l2 (j1, j2), camera (j1, j2), l1 (j1)\n"]),
-    ("wheel", [], ["'wheel' turn without end, as wheels do"]),
+    ("wheel", [], ["turning without end, as wheels do: 'wheel';"]),
     ("gripper", ["--tip", "right_finger"], ["joint 'right': it mimics 'left'"]),
     ("gripper", ["--tip", "thumb"], ["has no link 'thumb' for --tip", "left_finger"]),
     ("gripper", ["--base", "hand", "--tip", "l1"], ["no chain leads from link 'hand' to 'l1'"]),

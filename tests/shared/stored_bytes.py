@@ -15,7 +15,7 @@ from typing import Any
 from zlib import crc32
 
 from armtempo.link.board_messages import Positions, Sample
-from armtempo.runs import run_folder
+from armtempo.report import run_folder
 from armtempo_shared import armrecord, motion, sequence, wire
 
 RAMPS = tuple(range(1, 33)), tuple(range(1000, 65000, 2000)), motion.EVEN_RAMP

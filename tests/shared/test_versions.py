@@ -7,7 +7,7 @@ from pathlib import Path
 from armtempo.model import arm_json, sequence_plan
 from armtempo.model import plan as plan_file
 from armtempo.ports import claim_file
-from armtempo.runs import run_folder, sequence_folder
+from armtempo.report import run_folder, sequence_folder
 from armtempo_shared import armrecord, codes, meanings, messages, wire
 from armtempo_shared.table import rows
 

@@ -13,8 +13,8 @@ from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
+from armtempo.report import run_reader
 from armtempo.robot.connect import connect
-from armtempo.runs import reader
 from armtempo.simulator import edgelog
 from armtempo.splines.trajectory import JointSpline
 
@@ -38,7 +38,7 @@ class Replay:
     plan: Plan
     pins: dict[str, edgelog.Edges]
     """Per pin its edges since power-up, in ticks of the motion clock."""
-    samples: reader.RepetitionData
+    samples: run_reader.RepetitionData
     repetition: dict[str, Any]
     """What run.json says of it."""
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 from armtempo.model.plan import Plan
+from armtempo.report import run_reader
+from armtempo.report.run_folder import MOTION
 from armtempo.report.run_report import PAGE
-from armtempo.runs import reader
-from armtempo.runs.run_folder import MOTION
 
 from tests import interpreters
 from tests.system import commandline
@@ -45,7 +45,7 @@ def test_it_succeeds(demo: tuple[Ended, Path]) -> None:
 
 def test_its_run_folder_is_whole(demo: tuple[Ended, Path]) -> None:
     done, folder = demo
-    run = reader.load(folder)
+    run = run_reader.load(folder)
     assert [repetition.state for repetition in run.repetitions] == ["complete"]
     assert (folder / MOTION).stat().st_size > 0
     assert Plan.load(folder / "trajectory.json").job.name == "feed"
@@ -86,7 +86,9 @@ def test_its_trajectory_file_runs_again(demo: tuple[Ended, Path]) -> None:
     _, folder = demo
     again = commandline.run("run", folder / "trajectory.json", folder=folder.parent.parent)
     assert again.exit_code == 0, again.errors
-    first, second = (reader.load(folder.with_name(name)).repetitions[0] for name in ("feed-001", "feed-002"))
+    first, second = (
+        run_reader.load(folder.with_name(name)).repetitions[0] for name in ("feed-001", "feed-002")
+    )
     assert first.commanded_steps[-1].tolist() == second.commanded_steps[-1].tolist()
 
 
@@ -97,5 +99,5 @@ def test_without_matplotlib_it_says_what_is_missing_and_keeps_the_run(tmp_path: 
     done = commandline.run("demo", folder=tmp_path, PYTHONPATH=str(blocked))
     assert done.exit_code == 0, done.errors
     done.said("no report", "matplotlib", "pip install 'armtempo[plot]'", "armtempo report")
-    assert reader.load(tmp_path / "runs" / "feed-001").repetitions[0].state == "complete"
+    assert run_reader.load(tmp_path / "runs" / "feed-001").repetitions[0].state == "complete"
     assert "joint 1" in done.output

@@ -71,9 +71,9 @@ def test_steps_by_the_command_line() -> None:
         assert where(port)[1] >= -170.0
         assert "end of its range" in jogged(port, "--joint", "2", "--by", "-1", code=2)
         for wrong in (("--joint", "2"), ("--by", "2"), ("--joint", "2", "--axis", "x", "--by", "1")):
-            assert "goes with --by" in jogged(port, *wrong, code=2)
+            assert "--by needs" in jogged(port, *wrong, code=2)
         assert "cannot turn the tool" in jogged(port, "--about", "x", "--by", "5", code=2)
-        assert "need a terminal" in jogged(port, code=2)
+        assert "needs a terminal" in jogged(port, code=2)
 
 
 @pytest.mark.parametrize("kind", KINDS)

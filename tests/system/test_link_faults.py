@@ -14,8 +14,8 @@ from armtempo.link.follow import Follower
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encoded_motion
+from armtempo.report import run_folder, run_reader
 from armtempo.robot import arm_state, stored_motion
-from armtempo.runs import reader, run_folder
 from armtempo.simulator import LaunchOptions, launch
 
 from tests import interpreters
@@ -44,7 +44,7 @@ def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
         output = armtempo("run", file, "--port", relay.port, cwd=tmp_path)
     assert "complete" in output
     assert to_board.hits + from_board.hits > 0
-    samples = reader.load(tmp_path / "runs" / "small-001").repetitions[0]
+    samples = run_reader.load(tmp_path / "runs" / "small-001").repetitions[0]
     assert samples.index.tolist() == list(range(len(samples.index)))
     assert samples.state == run_folder.COMPLETE
 
@@ -62,7 +62,7 @@ def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
     assert process.returncode == 0, out + error
     assert "waiting for it to come back" in error
     assert "complete" in out
-    samples = reader.load(tmp_path / "runs" / "small-001").repetitions[0]
+    samples = run_reader.load(tmp_path / "runs" / "small-001").repetitions[0]
     assert samples.index.tolist() == list(range(len(samples.index)))
     assert samples.time_s[-1] > 3.0
 
@@ -91,7 +91,7 @@ def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
         process.terminate()
         out, error = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 130, out + error
-    assert len(reader.load(tmp_path / "runs" / "small-001").repetitions[0].index) >= 4
+    assert len(run_reader.load(tmp_path / "runs" / "small-001").repetitions[0].index) >= 4
 
 
 # a host that is busy for a moment: the virtual board does not run away from it

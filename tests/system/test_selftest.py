@@ -16,11 +16,11 @@ import pytest
 from armtempo import connect
 from armtempo.basics.errors import ArmtempoError, LinkError
 from armtempo.diagnosis.finding import Level
+from armtempo.diagnosis.selftest import board_part, prompt, rate_part
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Driver, JointModel, LimitSwitches, Safety
 from armtempo.records import encode
 from armtempo.robot import motor_test
-from armtempo.selftest import board_part, prompt, rate_part
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
 from armtempo_shared import codes
@@ -229,6 +229,25 @@ BROKEN = (
 )
 
 
+@pytest.mark.parametrize("interpreter", [one for one in interpreters.AVAILABLE if one != "micropython-arm"])
+def test_a_part_leaves_nothing_at_the_prompt(
+    interpreter: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program that continues after it has its heap as before, also if the part raises."""
+    (tmp_path / "common.py").write_text("import gc\ndef note(number): return number\ntell = print\n")
+    (tmp_path / "cycles.py").write_text("data = bytearray(10)\ndef measure(by): return 1 // by\n")
+    monkeypatch.setattr(prompt, "_FOLDER", tmp_path)
+    monkeypatch.setattr(prompt.Prompt, "_run", lambda _, part, code: code)
+    there = prompt.Prompt(None)
+    script = tmp_path / "script.py"
+    runs = "".join(
+        f"try: exec({there.measure('cycles', by=by)!r})\nexcept ZeroDivisionError: print(0)\n"
+        for by in (1, 0)
+    )
+    script.write_text(f"first = None\nfirst = sorted(globals())\n{runs}print(sorted(globals()) == first)\n")
+    assert interpreters.run(interpreter, script).split() == ["1", "0", "True"]
+
+
 @pytest.mark.parametrize(("faults", "wrong"), BROKEN, ids=("pins", "stream and cable", "clock"))
 def test_what_is_wrong_is_named(
     tmp_path: Path, faults: tuple[InjectedFault, ...], wrong: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
@@ -320,7 +339,7 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert found.data["arm_file"] == ["joint 1: encoder: direction = 1"]
     lines = {line.what: (line.verdict, line.measured.split(",")[0]) for line in found.lines}
     assert lines == {
-        "joint 1: direction": (Level.GOOD, "as the arm file has it"),
+        "joint 1: direction": (Level.GOOD, "as in the arm file"),
         "joint 1: encoder": (Level.ERROR, "-9 counts for 28 steps"),
         "the switch at the low end of joint 1": (Level.GOOD, "stopped the joint"),
         "the switch at the high end of joint 1": (Level.ERROR, "not seen"),

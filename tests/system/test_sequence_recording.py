@@ -11,7 +11,7 @@ import pytest
 from armtempo.basics.errors import LinkError, RunFolderError
 from armtempo.link.board_messages import SequenceState
 from armtempo.report import sequence_report
-from armtempo.runs.leg_results import results
+from armtempo.report.sequence_report import results
 from armtempo.simulator import LaunchOptions, launch
 
 from tests import interpreters

@@ -145,4 +145,4 @@ def test_two_parts_are_placed(tmp_path: Path) -> None:
 def test_it_is_for_a_virtual_board(tmp_path: Path) -> None:
     done = commandline.run("demo", "--pick-and-place", "--port", "/dev/ttyACM0", folder=tmp_path)
     assert done.exit_code == 2
-    done.said("this demo is for a virtual board")
+    done.said("--pick-and-place needs a virtual board")

@@ -10,10 +10,9 @@ import pytest
 from armtempo.basics.errors import BoardError, InputError
 from armtempo.link.board_messages import Sample
 from armtempo.planning import brake_time
-from armtempo.report import run_report
+from armtempo.report import replayed, run_report
 from armtempo.robot.recording import Watcher
 from armtempo.robot.run import Run
-from armtempo.runs import stretched
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared.motion import EVEN_RAMP
 
@@ -88,7 +87,7 @@ def test_changes_and_a_pause_while_it_runs(plan: armtempo.Plan, tmp_path: Path) 
     resting = np.sum(np.diff(run.samples["path_s"]) == 0.0)
     assert resting > 10
     (repetition,) = run.repetitions
-    assert "ran between 0 and" in stretched.note(repetition)
+    assert "ran between 0 and" in replayed.speed_note(repetition)
     assert run.report().is_file()
 
 

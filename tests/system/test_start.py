@@ -22,7 +22,7 @@ pytestmark = pytest.mark.xdist_group("start")  # what they share is made once
 COMMAND = (sys.executable, "-X", "importtime", "-c", "from armtempo.__main__ import main; main()", "plan")
 SHORT = ("--iterations", "1", "--population", "4")
 ENDLESS = ("--iterations", "1000000")
-SAID = "no arm and no job given; using the feeding job and the arm that ship with armtempo\n"
+SAID = "no arm and no job given; using the shipped feeding job and arm\n"
 MOMENTS = 8
 SEED = 20266
 

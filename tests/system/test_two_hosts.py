@@ -167,7 +167,7 @@ def test_a_program_that_died_gives_the_port_free(tmp_path: Path) -> None:
         owner.wait()
         stopped = commandline.run("stop", "--port", port, folder=tmp_path)
         assert stopped.exit_code == 0, stopped.errors
-        stopped.said("has ended without giving up", "may still move")
+        stopped.said("has ended without closing", "may still run")
         assert "state     moving" not in stopped.output
 
 

@@ -13,7 +13,7 @@ import serial
 from armtempo.basics.errors import LinkError
 from armtempo.cli.virtual_board import virtual_board
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
-from armtempo.simulator.temporary_folder import PREFIX, TemporaryFolder
+from armtempo.simulator.launcher import PREFIX, TemporaryFolder
 
 from tests import interpreters
 from tests.system import commandline

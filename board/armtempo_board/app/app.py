@@ -1,11 +1,11 @@
-"""The main loop of the board program: from the serial link over commands and controller to events and back.
+"""The main loop of the board program: serial link, commands, controller, events.
 
 ::
 
     link ─▶ commands ─▶ controller ─▶ store, engine
     link ◀─ events ◀─── controller ◀─ samples
 
-Whatever goes wrong in it freezes the engine and becomes a fault that stays until the host clears it.
+An exception freezes the engine and becomes a fault, which is pending until the host clears it.
 """
 
 import io
@@ -22,15 +22,15 @@ from armtempo_board.app.controller import Controller
 from armtempo_board.app.events import Events
 from armtempo_board.link.serial_link import SerialLink
 
-_EXTRA_SERVICES_PER_TURN = const(3)  # of the engine, while something moves
-_SPARE_BYTES = const(512)  # kept for telling of a failure: a traceback, and its end for the host
-_MOST_FAILURES = const(10)  # turns of the loop that fail one after the other; then the program gives up
+_EXTRA_SERVICES_PER_TURN = const(3)  # calls of the engine, during a motion
+_SPARE_BYTES = const(512)  # reserved for reporting an exception: a traceback, and its end for the host
+_MOST_FAILURES = const(10)  # consecutive failing turns of the loop after which the program ends
 
 
 class App:
-    """Puts the parts together; ``stream`` is the serial port, ``root`` the folder of the store.
+    """The parts of the program; ``stream``: the serial port, ``root``: the folder of the store.
 
-    ``fault``: what is pending from the start, 0 for none.
+    ``fault``: code of a fault that is pending from the start, 0 for none.
     """
 
     def __init__(self, stream: object, root: str, program_crc: int = 0, fault: int = 0) -> None:
@@ -38,19 +38,19 @@ class App:
         self.controller = Controller(Board(root, program_crc, fault))
         self.commands = Commands(self.controller, self.link)
         self.events = Events(self.controller, self.link)
-        self.turns = self._failed = 0  # turns of the loop, and the last of them that failed
+        self.turns = self._failed = 0  # number of turns, and number of the last one that failed
         self._failures = 0
         self._spare: "bytearray | None" = bytearray(_SPARE_BYTES)
         self.controller.configure()
 
     def enter(self) -> None:
-        """The program begins, perhaps again after it was left."""
+        """The program starts, or continues after it was left for the prompt."""
         self.commands.leaving = False
         self.commands.greeted = False
         self.link.forget()
 
     def left(self) -> int:
-        """Whether a host has asked for the REPL, and the reply is out."""
+        """Whether a host has asked for the REPL, and the reply was sent."""
         return self.commands.leaving and self.link.idle()
 
     def turn(self) -> None:
@@ -87,7 +87,7 @@ class App:
             self.commands.leaving = True
 
     def fail(self, error: "BaseException") -> None:
-        """Freeze and keep the fault; raises where one turn after the other fails."""
+        """Freeze and note the fault; raises the error again after too many consecutive failures."""
         again = (self.turns - self._failed) & 0xFFFF <= 1
         self._failures = self._failures + 1 if again else 1
         self._failed = self.turns
@@ -104,7 +104,7 @@ class App:
 
 
 def _traceback(error: "BaseException") -> str:
-    """The end of it, as it says what is wrong."""
+    """The end of the traceback, which has the exception."""
     text = io.StringIO()
     sys.print_exception(error, text)
     text.seek(max(0, text.tell() - MAX_PAYLOAD))

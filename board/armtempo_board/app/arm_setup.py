@@ -1,7 +1,7 @@
-"""Takes an arm record: judges it, makes the engine for it, or says why not. Imported for that and given up after it.
+"""Checks an arm record and makes the engine for it, or refuses it. Imported for that and unloaded afterwards.
 
-Step by step, so that never more than one of store, check and engine needs memory. Each step is a function of its own
-(``_step``): what its frame leaves on the stack would keep its modules in memory.
+Store, check and engine never need memory at the same time. Each step is a separate function (``_step``), as
+references in a stack frame would keep its modules in memory.
 """
 
 import gc
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 
 def take_stored(board: "Board") -> None:
-    """Take the stored arm record; without one, or where it cannot be used, the board stays unconfigured.
+    """Use the stored arm record; without one, or if it is invalid, the board stays unconfigured.
 
-    What is in the flash never keeps the program from starting: ``arm_problem`` says what is wrong with it.
+    An invalid record does not keep the program from starting: ``arm_problem`` says what is wrong.
     """
     board.arm_waits = False
     board.arm_problem = board.arm_value = 0
@@ -43,7 +43,7 @@ def take_stored(board: "Board") -> None:
 
 
 def take_new(board: "Board") -> None:
-    """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
+    """Use the uploaded arm record; if it is invalid, raises Refused and keeps the present one."""
     board.arm_waits = False
     try:
         record = _step(_checked, board, _step(_new, board))
@@ -60,7 +60,7 @@ def take_new(board: "Board") -> None:
 
 
 def _step(function: "Callable[..., Any]", board: "Board", *arguments: object) -> "Any":
-    """One of the functions below; what it imports is given up."""
+    """Call one of the functions below, then unload its modules."""
     try:
         return function(board, *arguments)
     finally:
@@ -88,7 +88,7 @@ def _decide(board: "Board", is_fit: bool) -> None:
 
 
 def _checked(board: "Board", data: bytes) -> "Record":
-    """An arm record that can be taken, unpacked; else Refused."""
+    """The unpacked arm record; raises Refused if it is invalid."""
     from armtempo_board.motion import arm_check  # here, so that it can be forgotten
 
     return arm_check.checked(data, board.workspace.room)
@@ -100,7 +100,7 @@ def _take(board: "Board", record: "Record") -> None:
         return
     all_but_limits, stops = _facts(record)
     known, steps = 0, []
-    if board.engine and all_but_limits == board.all_but_limits:  # the same arm: it is where it was
+    if board.engine and all_but_limits == board.all_but_limits:  # the same arm: positions stay known
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
     _drop_engine(board)
@@ -122,7 +122,7 @@ def _take(board: "Board", record: "Record") -> None:
 
 
 def _facts(record: "Record") -> "tuple[int, int]":
-    """What makes two records the same arm, and whether it stops where the host is silent."""
+    """The record's identity of the arm, and whether it stops if the host is silent."""
     from armtempo_shared import armrecord  # here, so that it can be forgotten
 
     head, joints, _, _, _ = record
@@ -136,7 +136,7 @@ def _share_room(board: "Board", joints: int) -> None:
 
 
 def _drop_engine(board: "Board") -> None:
-    """Before another takes its place: the heap is to be as it was without one."""
+    """Drop the engine before another is made, so that the heap is as before the first."""
     if board.engine:
         board.engine.close()
     if features.OUTPUTS and board.outputs:
@@ -150,7 +150,7 @@ def _drop_engine(board: "Board") -> None:
 
 
 def drop_outputs(board: "Board") -> None:
-    """Safe values, then release pins and timers."""
+    """Set outputs to their safe values, then release pins and timers."""
     outputs = board.outputs
     outputs.safe()
     for held in outputs.held:

@@ -1,4 +1,4 @@
-"""What the board has and knows: its store, its arm and the engine for it, faults. Nothing here moves anything."""
+"""The board's state: store, arm, engine, faults. Nothing here moves anything."""
 
 import gc
 import os
@@ -23,13 +23,11 @@ if TYPE_CHECKING:
 
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _BOOT_BYTES = const(4)
-MOTION_CODE_BYTES = const(14_500)
-"""The large pieces of the code that only a motion needs."""
 NEVER_MS = const((1 << 30) - 1)
 
 
 class Board:
-    """``root``: the folder of the store. ``fault``: what is pending from the start, 0 for none."""
+    """``root``: the folder of the store. ``fault``: code of a fault that is pending from the start, 0 for none."""
 
     def __init__(self, root: str, program_crc: int, fault: int) -> None:
         from armtempo_shared.table import offset  # here, so that it can be forgotten
@@ -47,21 +45,23 @@ class Board:
         self.rows: "dict[int, Any]" = {}  # and their commands
         self.program_crc = program_crc
         self.board_id = board_id()
-        self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")  # another number after each power-up
+        self.boot = int.from_bytes(
+            os.urandom(_BOOT_BYTES), "little"
+        )  # a different number after each power-up
         self.joints = 0
         self.arm_crc = 0
-        self.all_but_limits = 0  # of the arm record: what makes two of them the same arm
-        self.arm_waits = False  # an arm record has been stored, and is to be taken
-        self.arm_problem = 0  # code: why the stored arm record is not in force (0: it is, or there is none),
+        self.all_but_limits = 0  # of the arm record: identity of the arm
+        self.arm_waits = False  # an arm record was uploaded and is still to be used
+        self.arm_problem = 0  # code: why the stored arm record is not used (0: it is used, or there is none),
         self.arm_value = 0  # and its value
-        self.silence_ms = NEVER_MS  # of the host, after which a run is stopped
+        self.silence_ms = NEVER_MS  # of the host's silence, after which a run is stopped
         self.raw = array("i", [0] * COMMANDED)  # a sample of the arm
         self.pending = fault
 
-    # the store, which is there only while it is needed: its code takes memory that a motion needs
+    # the store, loaded only while needed: its code takes memory that a motion needs
 
     def store(self) -> "Any":
-        """The store; an upload that is under way keeps it."""
+        """The store, loaded if needed; an upload in progress keeps it."""
         if self._store is None:
             heap.forget()
             from armtempo_board.storage import store
@@ -70,47 +70,35 @@ class Board:
         return self._store
 
     def forget_store(self) -> None:
-        """Give up an upload that is under way."""
+        """Abort an upload in progress, and unload the store."""
         if self._store is not None:
             self._store.abandon()
             self.drop_store()
 
     def drop_store(self) -> None:
-        """What is in the flash of an upload stays."""
+        """Unload the store; keep the files of an upload in progress."""
         self._store = None
 
     def make_engine(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
-        """For an arm, as ``armrecord.unpack`` gives it.
-
-        Where memory is short, what stays lies next to pieces that a motion's code needs.
-        """
+        """For an arm, as ``armrecord.unpack`` gives it."""
         gc.collect()
-        if self.workspace.is_short:
-            heap.hold(MOTION_CODE_BYTES)
-        try:
-            self.engine = Engine(EngineParts(head, joints, self.workspace))
-        except MemoryError:  # rather an arm whose motions may be refused for want of a large piece than none
-            heap.release()
-            gc.collect()
-            self.engine = Engine(EngineParts(head, joints, self.workspace))
-        finally:
-            heap.release()
+        self.engine = Engine(EngineParts(head, joints, self.workspace))
 
-    # what it knows
+    # state
 
     def engine_room(self) -> int:
-        """Bytes that an engine can have (``armtempo_shared.engine_memory``)."""
+        """Bytes available for an engine (``armtempo_shared.engine_memory``)."""
         return int(self.workspace.room)
 
     def check_ready(self) -> None:
-        """Refuses while a fault is pending or no arm is configured."""
+        """Raise Refused while a fault is pending or no arm is configured."""
         if self.fault():
             raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
         if not self.engine:
             raise Refused(codes.UNCONFIGURED)
 
     def known(self) -> int:
-        """One bit per joint: its position is known."""
+        """One bit per joint, set if its position is known."""
         return self.engine.known if self.engine else 0
 
     def everyone(self) -> int:
@@ -122,17 +110,18 @@ class Board:
         return self.pending or (self.engine.fault if self.engine else 0)
 
     def fault_joint(self) -> int:
-        """The joint that the fault is about, or whose switch ended the last motion, a homing one; or NO_JOINT."""
+        """The joint of the fault, or the joint whose switch ended the last homing motion; or NO_JOINT."""
         return int(self.engine.fault_joint) if self.engine and not self.pending else NO_JOINT
 
     def clear(self) -> None:
-        """Clear what is pending; the cause must be gone."""
+        """Clear the pending fault; its cause must be gone."""
         if self.engine and not self.engine.clear():
             raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
         self.pending = 0
 
     def put_snapshot(self, target: bytearray, ticks_at: int, joints_at: int) -> int:
-        """Write motion clock, commanded steps and counts of this moment as the wire has them; bytes of the joints."""
+        """Write the present motion clock, steps and counts in wire format; returns the number of bytes of the
+        joints."""
         if not self.engine:
             return 0
         self.engine.snapshot(self.raw)
@@ -141,5 +130,5 @@ class Board:
 
 
 def board_id() -> bytes:
-    """The chip's number, and its firmware."""
+    """The chip's unique number, and the name of its firmware."""
     return b"".join([b"%02x" % byte for byte in machine.unique_id()]) + b" " + sys.version.encode()

@@ -1,4 +1,4 @@
-"""The replay button, or a level on its pin: high starts the default motion."""
+"""The replay button (or a high level on its pin): starts the default motion."""
 
 import time
 
@@ -9,21 +9,21 @@ _STEADY_MS = const(30)
 
 
 class Button:
-    """``pressed`` is True once for each press that lasts long enough."""
+    """``pressed`` returns True once for each press that lasts long enough."""
 
     def __init__(self) -> None:
         from armtempo_board.hardware import pins  # here, so that it can be forgotten
 
         self._pin = Pin(pins.BUTTON, Pin.IN, Pin.PULL_DOWN)
-        self._high = True  # a level that is high from the start is no press
+        self._high = True  # a level that is high at the start is not a press
         self._changed_ms = time.ticks_ms()
 
     def held(self) -> bool:
-        """Whether it is down now."""
+        """Whether the button is down."""
         return bool(self._pin.value())
 
     def pressed(self) -> bool:
-        """Whether it went down and has been steady since."""
+        """Whether the button has been pressed, debounced; True once per press."""
         now_ms = time.ticks_ms()
         if self.held() == self._high:
             self._changed_ms = now_ms

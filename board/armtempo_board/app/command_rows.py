@@ -1,6 +1,6 @@
-"""How each command is written, from the message table; imported when one comes that is not taken while a motion runs.
+"""Formats of the commands, from the message table; imported for commands that are refused during a motion.
 
-Forgotten before a motion, as the rows need heap.
+Unloaded before a motion, as the rows need heap.
 """
 
 from armtempo_board import heap
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def by_number() -> "dict[int, Any]":
-    """Of each command its name, the formats of its fields and of its answer's, and its tail."""
+    """For each command: its name, the formats of its fields and of its answer's fields, and its tail."""
     from armtempo_shared.table import rows  # here, so that it can be forgotten at once
 
-    kept: "dict[str, str]" = {}  # one string for all that are equal, to save heap
+    kept: "dict[str, str]" = {}  # equal strings are shared to save heap
     found = {}
     for (name, number, fields, _, tail), (_, _, values, _, _) in zip(rows("C"), rows("A")):
         found[number] = name, kept.setdefault(fields, fields), kept.setdefault(values, values), tail

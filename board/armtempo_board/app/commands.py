@@ -1,9 +1,9 @@
-"""What the board does for each command of the message table; refusals are raised as ``Refused``.
+"""Executes the commands of the message table; refusals are raised as ``Refused``.
 
-While a motion runs only the commands of ``_WHILE_MOVING`` and those of ``Board.rows`` are taken, and all of them
-but ``hello``, ``stop`` and ``speed`` allocate nothing. Those about the store and the drivers are in
-``store_commands.py``, which is imported when one comes; those about outputs and inputs in ``output_commands.py``, which
-is there for arms that have any, and the one about sequences in ``sequence_command.py``, once one has been started.
+During a motion only the commands of ``_WHILE_MOVING`` and ``Board.rows`` are accepted; of these, all but
+``hello``, ``stop`` and ``speed`` allocate nothing. Commands of the store and the drivers are in
+``store_commands.py``, imported when needed; of outputs and inputs in ``output_commands.py``, loaded for arms
+that have them; of sequences in ``sequence_command.py``, loaded when a sequence is started.
 """
 
 from struct import calcsize, pack_into, unpack_from
@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
     from armtempo_board.link.serial_link import SerialLink
 
-_WHILE_MOVING = ("hello", "status", "stop", "samples", "hold", "speed")  # as far as the program has them
+_WHILE_MOVING = ("hello", "status", "stop", "samples", "hold", "speed")  # if the program has them
 _STORE = range(0x10, 0x20)  # numbers of the commands in store_commands.py,
 _DRIVERS = const(0x29)  # and of one more
 _BYTES_PER_POSITION = const(4)
 _BYTES_OF_INDEX = const(4)  # of a sample
 _ANSWER_AT = const(6)  # in a reply: its payload begins with the command's number
-# a row of the commands: what acts on it, formats of its fields and of its answer's, its tail
+# a row of a command: its function, the formats of its fields and of its answer's fields, its tail
 _HANDLER = const(0)
 _FIELDS = const(1)
 _ANSWER = const(2)
@@ -47,7 +47,7 @@ _UNKNOWN = codes.UNKNOWN_COMMAND if features.ALL else codes.NEEDS_FIRMWARE
 
 
 class Commands:
-    """Acts on the frame in ``link.reader`` and leaves the reply with the link."""
+    """Executes the command in ``link.reader`` and gives the reply to the link."""
 
     def __init__(self, controller: "Controller", link: "SerialLink") -> None:
         from armtempo_shared.table import offset, rows  # here, so that they can be forgotten
@@ -72,7 +72,7 @@ class Commands:
         (_, self._ok, _, _, _), (_, self._error, self._error_fields, _, _) = rows("R")
 
     def act(self) -> None:
-        """Act on one command."""
+        """Execute one command."""
         number = self.link.reader.data[NUMBER_AT]
         try:
             self._dispatch(number)
@@ -113,7 +113,7 @@ class Commands:
         self.link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
 
     def _row(self, number: int) -> tuple:
-        """Of a command that is not taken while a motion runs."""
+        """The row of a command that is refused during a motion."""
         from armtempo_board.app.command_rows import ROWS  # here, so that it can be forgotten
 
         name, fields, values, tail = ROWS[number]
@@ -133,37 +133,37 @@ class Commands:
         pack_into(self._error_fields, self.link.reply, PAYLOAD_AT, number, code, joint, value)
         self.link.answer(self._error, calcsize(self._error_fields))
 
-    # for those who act on a command
+    # for the functions of commands
 
     def fields(self, row: tuple) -> tuple:
         """The fields of the command in the reader."""
         return unpack_from(row[_FIELDS], self.link.reader.data, PAYLOAD_AT)
 
     def tail(self, row: tuple, length: int) -> bytes:
-        """What comes after its fields."""
+        """The bytes after its fields."""
         return bytes(self.link.reader.data[PAYLOAD_AT + calcsize(row[_FIELDS]) : PAYLOAD_AT + length])
 
     def text(self, row: tuple, length: int) -> str:
-        """The same as text; refuses what is none."""
+        """The tail as text; raises Refused if it is not valid UTF-8."""
         try:
             return self.tail(row, length).decode()
         except UnicodeError:
             raise Refused(codes.MALFORMED)
 
     def reply(self, row: tuple, *values: int) -> int:
-        """Put the fields of the answer into the reply; their size."""
+        """Put the fields of the answer into the reply; returns their size."""
         pack_into(row[_ANSWER], self.link.reply, _ANSWER_AT, *values)
         return calcsize(row[_ANSWER])
 
     def reply_tail(self, size: int, tail: bytes) -> int:
-        """Put the tail of the answer after fields of ``size`` bytes; the size of all."""
+        """Put the tail of the answer after fields of ``size`` bytes; returns the total size."""
         self.link.reply[_ANSWER_AT + size : _ANSWER_AT + size + len(tail)] = tail
         return size + len(tail)
 
     # commands by their names: the session
 
     def hello(self, row: tuple, length: int) -> int:
-        """A host begins a session: what the board is."""
+        """Begin a session; answers with the board's identity."""
         protocol, session = self.fields(row)
         if protocol != PROTOCOL_VERSION:
             raise Refused(codes.PROTOCOL, value=PROTOCOL_VERSION)
@@ -202,7 +202,7 @@ class Commands:
         self.board.forget_store()
 
     def status(self, row: tuple, length: int) -> int:
-        """What it does, and where the joints stand."""
+        """Answer with state and joint positions."""
         board, controller = self.board, self.controller
         reply = self.link.reply
         samples = board.samples
@@ -227,13 +227,13 @@ class Commands:
         return size + board.put_snapshot(reply, self._ticks_at, _ANSWER_AT + size)
 
     def leave(self, row: tuple, length: int) -> None:
-        """The REPL is wanted."""
+        """Leave the program for the REPL."""
         self.leaving = True
 
     # motion
 
     def home(self, row: tuple, length: int) -> None:
-        """Declare where joints stand."""
+        """Declare positions of joints."""
         (mask,) = self.fields(row)
         joints = self.board.joints
         self.board.check_ready()
@@ -245,7 +245,7 @@ class Commands:
 
     def start(self, row: tuple, length: int) -> int:
         """Start a stored motion."""
-        self.controller.tidy()  # before anything of the command lies where the motion's code is to be
+        self.controller.tidy()  # before objects of the command occupy the place of the motion's code
         flags, crc = self.fields(row)
         name = self.text(row, length)
         self.controller.begin(name, flags, crc)
@@ -261,7 +261,7 @@ class Commands:
     if features.SPEED:
 
         def speed(self, row: tuple, length: int) -> None:
-            """Another speed: of what moves, or of the next run."""
+            """Change the speed of the running motion, or of the next run."""
             (rate,) = self.fields(row)
             if not (rate in (0, RESUME) or SLOWEST_PERMILLE <= rate <= PERMILLE):
                 raise Refused(codes.MALFORMED)
@@ -270,7 +270,7 @@ class Commands:
     if features.JOG:
 
         def hold(self, row: tuple, length: int) -> int:
-            """A held run is still wanted."""
+            """Hold a held run."""
             if not self.controller.moving():
                 raise Refused(codes.NOT_MOVING)
             self.controller.hold()
@@ -281,7 +281,7 @@ class Commands:
         self.board.clear()
 
     def samples(self, row: tuple, length: int) -> int:
-        """Acknowledge samples, and ask for some again."""
+        """Acknowledge samples, and request some again."""
         data = self.link.reader.data
         samples = self.board.samples
         acknowledged = u32(data, PAYLOAD_AT)

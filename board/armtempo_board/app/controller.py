@@ -1,11 +1,11 @@
-"""What the board does with its arm: starts, speeds and stops runs, keeps their samples.
+"""Starts and stops runs, changes their speed, keeps their samples.
 
 ::
 
     store ─▶ Motion ─▶ engine (step generator, rings, DMA, pins) ─▶ samples
 
-It knows no link and no messages. Commands, the button and the prompt call it; events read it. States and timings:
-shared/docs/protocol.md.
+It is independent of link and messages. Commands, the button and the prompt call it; events read it. States
+and timings: shared/docs/protocol.md.
 """
 
 import gc
@@ -17,7 +17,6 @@ from armtempo_shared.messages import RESUME, SAMPLE_BRAKING, START_HELD, START_H
 from micropython import const
 
 from armtempo_board import features, heap
-from armtempo_board.app.board import MOTION_CODE_BYTES
 from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
@@ -32,29 +31,29 @@ _PERMILLE = const(1000)
 
 
 class Controller:
-    """Of a board."""
+    """Controls the arm of a board."""
 
     def __init__(self, board: "Board") -> None:
         self.board = board
-        self.sequence: "Any" = None  # the one under way
+        self.sequence: "Any" = None  # the present run
         self.free_flash = 0
         self.free_heap = 0
         self.run_number = 0
         self.duration_ticks = 0
-        self.done = False  # a run has ended without a fault, and the host has not been told
-        self.running = False  # a run has begun and its end has not been noticed
+        self.done = False  # a run has ended without a fault, not yet reported to the host
+        self.running = False  # a run has begun, its end has not been detected
         self._braking = False
         self._can_brake = False  # the motion can come to rest along its path
-        self._next_rate = _PERMILLE  # of the next run that a host starts
+        self._next_rate = _PERMILLE  # rate of the next run that a host starts
         self._by_host = False  # the run was started by a command
         self._held = 0  # the run continues only while the host says hold,
         self._hold_ms: "Any" = 0  # which it did then
-        self._assumed = 0  # joints whose position a homing motion took for granted
+        self._assumed = 0  # joints whose position a homing motion assumed
 
     # the loop
 
     def service(self, silent_ms: int) -> None:
-        """Keep steps and samples coming; notice the end of a run, or that the host was silent for too long."""
+        """Serve the engine and the samples; detect the end of a run, and a silent host."""
         board = self.board
         board.engine.service()
         self._collect()
@@ -81,7 +80,7 @@ class Controller:
                 self.sequence.go_on()
 
     def refill(self) -> None:
-        """What cannot wait for the end of longer work while something moves."""
+        """Serve the engine during longer work while a motion runs."""
         if self.board.engine:
             self.board.engine.refill()
 
@@ -93,7 +92,7 @@ class Controller:
     def _end(self) -> None:
         self._collect()
         self._withdraw_assumed()
-        if not features.SEQUENCES or not self.sequence:  # its next motion comes at once
+        if not features.SEQUENCES or not self.sequence:  # its next motion starts at once
             heap.collect_often()
         self.running = False
         self._braking = False
@@ -101,7 +100,7 @@ class Controller:
             self.done = True
 
     def fail(self) -> None:
-        """The program has failed: freeze, and INTERNAL is the pending fault."""
+        """After an exception: freeze, and set the fault INTERNAL."""
         board = self.board
         board.pending = codes.INTERNAL
         if features.OUTPUTS and board.outputs:
@@ -111,7 +110,7 @@ class Controller:
             self._withdraw_assumed()
 
     def halt(self) -> None:
-        """Freeze what still moves, outputs to their safe values; the position stays known."""
+        """Freeze a running motion, set outputs to their safe values; the position stays known."""
         if features.SEQUENCES and self.sequence:
             self.sequence.stopping = True
         board = self.board
@@ -121,40 +120,41 @@ class Controller:
             board.engine.freeze()
 
     def moving(self) -> bool:
-        """Whether steps may still come; a sequence has more to come while it waits."""
+        """Whether there may be more steps; True while a sequence waits."""
         engine = self.board.engine
         return engine is not None and (engine.moving or (features.SEQUENCES and self.sequence is not None))
 
-    # what commands, button and prompt ask for
+    # called by commands, button and prompt
 
     def configure(self) -> None:
-        """Take the stored arm record, if there is one that can be taken."""
+        """Use the stored arm record, if there is a valid one."""
         from armtempo_board.app import arm_setup  # here, so that it can be forgotten
 
         arm_setup.take_stored(self.board)
 
     def take_new_arm(self) -> None:
-        """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
+        """Take the arm record that was uploaded; Refused if it cannot be, and the one in force stays that."""
         from armtempo_board.app import arm_setup  # here, so that it can be forgotten
 
         arm_setup.take_new(self.board)
 
     def home(self, mask: int, steps: "Sequence[int]") -> None:
-        """Declare where the joints of ``mask`` stand; ``steps`` has a number for every joint."""
+        """Declare the positions of the joints in ``mask``; ``steps`` has an entry for every joint."""
         from armtempo_board.app import run_start  # here, so that it can be forgotten
 
         run_start.home(self.board, mask, steps)
 
     def load(self, name: str, crc: "int | None" = None) -> "MotionFile":
-        """The stored motion, checked as far as its head and checksum go, or refused."""
+        """The stored motion, with head and checksum checked; raises Refused."""
         from armtempo_board.app import run_start  # here, so that it can be forgotten
 
         return run_start.opened(self.board, name, crc)
 
     def _assume(self, motion: "MotionFile", unknown: int) -> int:
-        """A homing motion may begin anywhere; joints that are not known to stand there are unknown after it.
+        """Assume that the joints are at the start of a homing motion; those of unknown position are unknown
+        after it too.
 
-        Returns a bit for each joint that moves.
+        Returns one bit per joint that moves.
         """
         from armtempo_board.app import run_start  # here, so that it can be forgotten
 
@@ -162,13 +162,13 @@ class Controller:
         return run_start.moving(motion)
 
     def tidy(self) -> None:
-        """Free what only the last commands needed: what comes then lies close to what stays."""
+        """Free what only the last commands needed, so that new objects lie close to the permanent ones."""
         self.board.forget_store()
         heap.tidy()
 
     def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
-        """Start a stored motion or sequence, or refuse. ``crc``: of the record that the host means; None: there is no
-        host.
+        """Start a stored motion or sequence, or raise Refused. ``crc``: of the record that the host expects;
+        None: no host.
         """
         board = self.board
         board.check_ready()
@@ -183,7 +183,7 @@ class Controller:
         if features.SPEED and self._by_host:
             rate = self._next_rate
             self.forget_speed()
-        if not name:  # there is no default
+        if not name:  # no default is set
             raise Refused(codes.NOT_FOUND)
         if features.SEQUENCES and self._is_sequence(name):
             self._new_sequence(name, crc, rate, flags)
@@ -213,8 +213,6 @@ class Controller:
         """
         heap.collect_often(heap.OFTEN if self.board.workspace.is_short else heap.SELDOM)
         self.tidy()
-        if self.board.workspace.is_short:
-            heap.hold(MOTION_CODE_BYTES)  # before anything that the start needs can lie there
         try:
             motion = self.load(name, crc)
             self.tidy()
@@ -224,12 +222,10 @@ class Controller:
             self._withdraw_assumed()
             heap.collect_often()
             raise
-        finally:
-            heap.release()
         self.start_loaded(motion, flags)
 
     def start_loaded(self, motion: "MotionFile", flags: int) -> None:
-        """Start what the engine has loaded; ``flags`` as for ``begin``."""
+        """Start the motion that the engine has loaded; ``flags`` as for ``begin``."""
         self.board.samples.clear()
         self.done = False
         self.duration_ticks = self.board.engine.rates.duration_ticks
@@ -250,7 +246,7 @@ class Controller:
             self._assumed = 0
 
     def stop(self, now: int) -> None:
-        """Brake along the path; freeze where ``now``, or where the motion has no way to. A sequence ends there."""
+        """Brake along the path (``now``, or without brake times: freeze); ends a sequence."""
         if features.SEQUENCES and self.sequence:
             self.sequence.stopping = True
             if not self.board.engine.moving:
@@ -265,7 +261,8 @@ class Controller:
     if features.SPEED:
 
         def change_speed(self, rate: int) -> None:
-            """``rate`` thousandths (0: pause, RESUME: as before) for what moves, or for a host's next run."""
+            """Set the rate of the running motion, or of a host's next run, in thousandths (0: pause, RESUME:
+            end of the pause)."""
             if self.moving():
                 (self.sequence or self.board.engine).change_rate(rate)
             elif rate in (0, RESUME):
@@ -274,25 +271,27 @@ class Controller:
                 self._next_rate = rate
 
         def forget_speed(self) -> None:
-            """The next run begins as planned again: what a host wanted for it is used up, or that host is gone."""
+            """Reset the rate of the next run: the host's value was used, or that host is gone."""
             self._next_rate = _PERMILLE
 
-    def hold(self) -> None:
-        """A held run is still wanted."""
-        self._hold_ms = time.ticks_ms()
+    if features.JOG:
+
+        def hold(self) -> None:
+            """A held run is still wanted."""
+            self._hold_ms = time.ticks_ms()
 
     def measure_free(self) -> None:
-        """Bring ``free_flash`` and ``free_heap`` up to date; costs milliseconds, so not while moving."""
+        """Update ``free_flash`` and ``free_heap``; takes milliseconds, so not during a motion."""
         if not self.moving():
             self.free_flash = self.board.store().free()
             self.free_heap = _free_heap()
 
     def speed(self) -> int:
-        """The rate that is wanted of the motion's own time, in thousandths; 0 in a pause."""
+        """Requested rate of the motion's own time, in thousandths; 0 in a pause."""
         return self.board.engine.rates.wanted if self.moving() else self._next_rate
 
     def rest_ms(self) -> int:
-        """In how many milliseconds what moves rests after a stop, now or before; 0: at once."""
+        """Milliseconds until rest after a stop, given earlier or now; 0: at once."""
         engine = self.board.engine
         return engine.rest_ms() if engine and engine.moving else 0
 

@@ -1,4 +1,4 @@
-"""What the board sends unasked: samples, then the end of the run or its fault; notices."""
+"""The board's events: samples, then the end of the run or its fault; notices."""
 
 from struct import calcsize, pack_into
 
@@ -16,7 +16,7 @@ _BYTES_PER_JOINT = const(8)
 
 
 class Events:
-    """Hands the link what is waiting, as the link has room."""
+    """Gives pending events to the link when it has room."""
 
     def __init__(self, controller: "Controller", link: "SerialLink") -> None:
         from armtempo_shared.table import offset, rows  # here, so that it can be forgotten
@@ -26,31 +26,31 @@ class Events:
         self._link = link
         found = {name: (number, layout) for name, number, layout, _, _ in rows("E")}
         self._sample, self._sample_layout = found["sample"]
-        self._slot_at = offset("E", "sample", "ticks")  # of what the sample buffer keeps
+        self._slot_at = offset("E", "sample", "ticks")  # of a sample in the buffer
         self._done = found["done"] + (offset("E", "done", "ticks"),)
         self._fault = found["fault"] + (offset("E", "fault", "ticks"),)
         self._notice_number, _ = found["notice"]
-        self._noted = 0  # the fault that was noted last
+        self._noted = 0  # the last noted fault
         self._fault_waits = False
         self._notice = b""
 
     def note_fault(self, code: int) -> None:
-        """Called every turn with the pending fault (0: none); each is sent once."""
+        """Called every turn with the pending fault (0: none), which is sent once."""
         if code != self._noted:
             self._noted = code
             self._fault_waits = code != 0
 
     def note(self, text: str) -> None:
-        """Keep the end of a text for the host, as it says what is wrong; until that is sent, others are dropped."""
+        """Keep the end of a text, which has the error, for the host; drops others until it is sent."""
         self.note_bytes(text.encode()[-MAX_PAYLOAD:])
 
     def note_bytes(self, text: bytes) -> None:
-        """The same of at most MAX_PAYLOAD bytes; allocates nothing."""
+        """As ``note``, for at most MAX_PAYLOAD bytes; allocates nothing."""
         if not self._notice:
             self._notice = text
 
     def push(self) -> bool:
-        """Hand the link what is waiting and has room, one sample at most; whether there was one."""
+        """Give pending events to the link, at most one sample; returns whether there was a sample."""
         if features.SEQUENCES and self._controller.sequence:
             self._controller.sequence.tell(self._link)
         if self._push_sample():
@@ -90,7 +90,8 @@ class Events:
         return self._link.room(calcsize(layout) + _BYTES_PER_JOINT * self._board.joints)
 
     def _put(self, event: "tuple[int, str, int]", *values: int) -> None:
-        """``values``: of the event's fields; both times, which are 0 there, and the joints are put in here."""
+        """Put an event; ``values``: its fields, with 0 for the two times, which are filled in here, as the
+        joints are."""
         number, layout, ticks_at = event
         link = self._link
         at = link.payload()

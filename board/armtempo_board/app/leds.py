@@ -8,7 +8,7 @@ _LED_OF_STATE = bytes((_ORANGE, _ORANGE, _GREEN, _BLUE, _BLUE, _RED))
 
 
 class Leds:
-    """Lights the LED of the state; touches the pins only where the state has changed."""
+    """Lights the LED of the state; writes to the pins only if the state has changed."""
 
     def __init__(self) -> None:
         from armtempo_board.hardware import pins  # here, so that it can be forgotten

@@ -1,7 +1,7 @@
-"""The commands about outputs and inputs, for an arm that has any; they allocate nothing.
+"""The commands for outputs and inputs, for an arm that has any; they allocate nothing.
 
-The functions act on a command as those of ``store_commands.py`` do; the code of a refusal comes back as
-a negative number.
+The functions execute a command as those of ``store_commands.py``; the code of a refusal is returned as a
+negative number.
 """
 
 from struct import pack_into
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armtempo_board.app.board import Board
 
     class Caller(Protocol):
-        """What is asked of the caller, see ``commands.Commands``."""
+        """The caller's interface, see ``commands.Commands``."""
 
         board: Board
         link: Any
@@ -43,7 +43,7 @@ def output(commands: "Caller", row: tuple, length: int) -> int:
 
 
 def inputs_and_outputs(commands: "Caller", row: tuple, length: int) -> int:
-    """What the inputs are, and what the outputs are set to."""
+    """Answer with the levels of the inputs and the values of the outputs."""
     reply = commands.link.reply
     reply[_ANSWER_AT] = commands.board.inputs.levels
     size = _LEVELS_BYTES

@@ -1,4 +1,4 @@
-"""Makes the outputs and inputs of an arm; only needed then, so it is forgotten after it."""
+"""Makes the outputs and inputs of an arm; unloaded afterwards."""
 
 from array import array
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def attach(board: "Board", outputs: "Rows", inputs: "Rows") -> None:
-    """Give the board the outputs, with their safe values, the inputs, and the commands about them.
+    """Give the board the outputs, with their safe values, the inputs, and their commands.
 
     ``outputs``, ``inputs``: rows of the arm record (``armrecord.OUTPUT``, ``INPUT``).
     """
@@ -38,7 +38,7 @@ def attach(board: "Board", outputs: "Rows", inputs: "Rows") -> None:
 
 
 def outputs_of(table: "Rows") -> "Outputs":
-    """All take their safe values."""
+    """The outputs of an arm, set to their safe values."""
     from armtempo_board.hardware import pins
     from armtempo_board.hardware.outputs import Outputs
 
@@ -61,7 +61,7 @@ def outputs_of(table: "Rows") -> "Outputs":
 def _driven(
     pin: Pin, row: "dict[str, int]", level: int, timers: "dict[int, Timer]"
 ) -> "Callable[[int], Any]":
-    """What takes the level or pulse width; a bound method, made once, as that allocates."""
+    """The function that sets level or pulse width; a bound method, made once, as that allocates."""
     if not row["timer"]:
         pin.init(Pin.OUT_PP, value=level)
         return pin.value
@@ -73,7 +73,7 @@ def _driven(
 
 
 def inputs_of(table: "Rows") -> "DigitalInputs":
-    """Each has the level that it has now."""
+    """The inputs of an arm, with their present levels."""
     from armtempo_board.hardware import pins
     from armtempo_board.hardware.digital_inputs import DigitalInputs
 

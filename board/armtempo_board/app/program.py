@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 ROOT = "/flash/armtempo"
 _CTRL_C = const(3)
 _EXCEPTION_BUFFER = const(100)
-_EIGHTH_TURN = const(7)  # while joints move, LEDs, watchdog and button come in every eighth turn only
+_EIGHTH_TURN = const(7)  # during a motion, LEDs, watchdog and button are served only in every eighth turn
 
 app: "Any" = None
-"""The program's App; it is kept when the program is left for the REPL."""
+"""The program's App; kept when the program is left for the REPL."""
 
 
 def main(root: str = ROOT) -> None:
@@ -53,7 +53,7 @@ def main(root: str = ROOT) -> None:
 
 
 def _build(port: "pyb.USB_VCP", root: str) -> App:
-    """The App; what only its set-up needs is forgotten again, to save heap."""
+    """Make the App; unload the modules that only its set-up needs, to save heap."""
     from armtempo_shared.program_hash import program_crc  # here, so that it can be forgotten
 
     crc = program_crc(armtempo_board.__file__, armtempo_shared.__file__)
@@ -69,7 +69,7 @@ def _build(port: "pyb.USB_VCP", root: str) -> App:
 
 
 def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
-    """Turn the loop until a host asks for the REPL. Whatever ends it, nothing keeps moving then."""
+    """Run the loop until a host asks for the REPL. Stops the motion however it ends."""
     try:
         while True:
             app.turn()
@@ -84,15 +84,13 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
 
 
 def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
-    """LEDs, watchdog, button."""
+    """Serve LEDs, watchdog and button."""
     controller = app.controller
     if controller.running and app.turns & _EIGHTH_TURN:
         return
     leds.show(controller.state())
     watchdog.feed()
-    pressed = (
-        button.pressed()
-    )  # a press while something moves does nothing, then or later; a sequence it stops
+    pressed = button.pressed()  # a press during a motion is ignored, but it stops a sequence
     if features.SEQUENCES and pressed and controller.sequence:
         controller.stop(0)
     if controller.moving():

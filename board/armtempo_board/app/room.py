@@ -1,7 +1,7 @@
-"""How the heap is shared out when the program starts: to the engine, to samples, to the rest.
+"""Division of the heap at the program's start: engine, samples, the rest.
 
-The rest are link and commands, the modules that come and go (storage, commands about the store, the check of a motion),
-and what these need while they are at work: docs/memory.md.
+The rest is for link and commands, for the modules that are loaded and unloaded (storage, commands of the
+store, the check of a motion), and for their objects: docs/memory.md.
 """
 
 import gc
@@ -12,7 +12,7 @@ from armtempo_board import heap
 from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 29_300  # bytes of heap for the rest; what is to spare: docs/memory.md
+_RESERVE = 25_900  # bytes of heap for the rest; what is to spare: docs/memory.md
 _USUAL_JOINTS = 3
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;
@@ -21,7 +21,7 @@ _STEP_WORDS = 64
 
 
 def workspace() -> "Workspace":
-    """For the largest arm that fits."""
+    """Memory for the largest arm that fits."""
     address = backup_sram.find()
     heap.forget("registers")
     gc.collect()
@@ -36,9 +36,9 @@ def workspace() -> "Workspace":
 
 
 def share(workspace: "Workspace", joints: int) -> None:
-    """Make the memory for an engine of that many joints, whose objects take of the room too; nobody uses it now.
+    """Make the memory for an engine of ``joints`` joints, whose objects need part of the room; it must be unused.
 
-    What the heap no longer has in one piece, the engine goes without, until the program starts again.
+    If the heap no longer has blocks large enough, the engine gets less memory until the next start.
     """
     words = engine_memory.room_words(joints, workspace.room)
     while workspace.memory.size != words:
@@ -52,13 +52,13 @@ def share(workspace: "Workspace", joints: int) -> None:
 
 
 def sample_bytes() -> int:
-    """For the memory of samples."""
+    """Bytes for the memory of samples."""
     gc.collect()
     free = _free()
     return min(max(free // _SAMPLES_SHARE, _LEAST_SAMPLES), _MOST_SAMPLES) if free else _MOST_SAMPLES
 
 
 def _free() -> int:
-    """0 where it is not known."""
+    """Free heap, bytes; 0 if not known."""
     free = getattr(gc, "mem_free", None)
     return int(free()) if free else 0

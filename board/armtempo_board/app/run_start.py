@@ -1,4 +1,4 @@
-"""Before a run: what is asked for is opened, and where a homing motion begins. Given up before anything moves."""
+"""Opens and checks a motion before a run; positions for homing motions. Unloaded before anything moves."""
 
 import gc
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def opened(board: "Board", name: str, crc: "int | None") -> "MotionFile":
-    """The stored motion, checked as far as its head and checksum go, or Refused; ``crc``: see ``Controller.begin``."""
+    """The stored motion, with head and checksum checked; raises Refused. ``crc``: see ``Controller.begin``."""
     store = board.store()
-    gc.collect()  # what stays while it runs is to lie low
+    gc.collect()  # objects that stay during the run should lie at low addresses
     return checked(board, store.motion(name), crc)
 
 
 def checked(board: "Board", motion: "MotionFile", crc: "int | None") -> "MotionFile":
-    """The motion, if it is the one that is meant, and for the board's arm; else Refused."""
+    """The motion; raises Refused if it is another than expected, or not for the board's arm."""
     if crc is not None and motion.crc != crc:
         raise Refused(codes.BAD_CHECKSUM)
     if motion.arm_crc != board.arm_crc:
@@ -35,7 +35,7 @@ def checked(board: "Board", motion: "MotionFile", crc: "int | None") -> "MotionF
 
 
 def assume(board: "Board", motion: "MotionFile", unknown: int) -> int:
-    """Declare that the joints stand where a homing motion begins; those that are not known to (one bit per joint).
+    """Declare that the joints are at the start of a homing motion; returns those not known to be (one bit per joint).
 
     ``unknown``: joints of unknown position.
     """
@@ -49,7 +49,7 @@ def assume(board: "Board", motion: "MotionFile", unknown: int) -> int:
 
 
 def moving(motion: "MotionFile") -> int:
-    """One bit per joint that is elsewhere at the end of a motion than at its start."""
+    """One bit per joint whose end position differs from its start."""
     found = 0
     for joint in range(motion.joints):
         if endpoints.at_start(motion, joint) != endpoints.at_end(motion, joint):

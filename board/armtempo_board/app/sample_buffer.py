@@ -16,7 +16,7 @@ _BYTES_PER_JOINT = const(8)
 
 
 class SampleBuffer:
-    """First in, first out; where the memory ends the oldest is dropped, and counted in ``lost``."""
+    """A FIFO; if it is full the oldest sample is dropped and counted in ``lost``."""
 
     def __init__(self, memory: int, flags_at: int) -> None:
         """``memory``: bytes to keep samples in; ``flags_at``: bytes of a sample before its flags."""
@@ -25,7 +25,7 @@ class SampleBuffer:
         self.configure(0)
 
     def configure(self, joints: int) -> None:
-        """Samples of that many joints from now on."""
+        """Use samples of ``joints`` joints from now on."""
         self.size = self.flags_at + 1 + _BYTES_PER_JOINT * joints
         self._joints = joints
         self._capacity = len(self._buffer) // self.size
@@ -41,7 +41,7 @@ class SampleBuffer:
         self._again_end = 0  # up to here
 
     def add(self, raw: "array[int]", flags: int) -> None:
-        """Keep one: ``raw`` as the engine fills it; ``flags`` of the sample event."""
+        """Store a sample: ``raw`` as filled by the engine; ``flags`` of the sample event."""
         if self.next - self.first == self._capacity:
             self.first += 1
             self.lost += 1
@@ -53,11 +53,11 @@ class SampleBuffer:
         self.next += 1
 
     def acknowledge(self, index: int) -> None:
-        """All before ``index`` have arrived; what was never sent cannot have."""
+        """Drop all samples before ``index``, if they were sent."""
         self.first = max(self.first, min(index, self.sent))
 
     def skip(self) -> None:
-        """A new host: it asks for what it wants of the older ones."""
+        """For a new host: do not send older samples unless it requests them."""
         self.sent = self.next
         self._again = self._again_end = 0
 
@@ -74,7 +74,7 @@ class SampleBuffer:
         return self.sent if self.sent < self.next else -1
 
     def take(self, index: int, target: bytearray, at: int) -> None:
-        """Copy the sample ``waiting`` named to target[at:]; it counts as sent."""
+        """Copy the sample ``index`` (from ``waiting``) to target[at:]; it counts as sent."""
         copy(target, self._buffer, pack_offsets(at, index % self._capacity * self.size), self.size)
         if index == self.sent:
             self.sent += 1

@@ -1,8 +1,7 @@
-"""A sequence that prepares its next motion while one moves, so that it begins as soon as that has ended.
+"""A sequence that prepares its next motion during the running one, to start it without delay.
 
-Only where the heap has room for it, which is decided when the sequence begins; else the next motion is opened and
-loaded between the two. Not among the compiled files that ``armtempo deploy`` makes: next to them there is no room for
-sequences.
+Used if the heap has room when the sequence begins; otherwise the next motion is opened and loaded between two
+motions. Not part of the program in files, which has no room for sequences.
 """
 
 import gc
@@ -32,20 +31,20 @@ if TYPE_CHECKING:
 _OP, _NUMBER = const(0), const(1)  # of a row
 _NONE = const(-1)
 _BESIDE_BYTES = const(16_500)
-"""Of heap: 5 700 for what else the motions need, the rest for what piles up between two collections."""
+"""Free heap needed: 5 700 bytes for the motions' other needs, the rest for garbage between two collections."""
 
 
 class AheadSequencer(Sequencer):
     """See ``Sequencer`` for its arguments."""
 
     _prepared: "NextMotion | None" = None  # None: the heap has no room
-    _is_full = False  # it had, and has none any more
-    _work: "Iterator[None] | None" = None  # what is left to do for the next motion
-    _prepared_index = _running_index = _NONE  # the motion that is prepared, and the one that was begun last
-    _at_rate = 0  # it is prepared for
+    _is_full = False  # the heap has no more room
+    _work: "Iterator[None] | None" = None  # remaining work for the next motion
+    _prepared_index = _running_index = _NONE  # the prepared motion, and the motion that was begun last
+    _at_rate = 0  # rate for which it is prepared
 
     def begin(self) -> None:
-        """As of a ``Sequencer``; here it is decided whether motions are prepared."""
+        """As ``Sequencer.begin``; decides whether motions are prepared."""
         from armtempo_shared.engine_memory import ahead_bytes  # here, so that it can be forgotten
 
         super().begin()
@@ -57,26 +56,27 @@ class AheadSequencer(Sequencer):
         try:
             ends = array("i", [MOST_STEPS] * (self._record.motions * joints))
             self._prepared = NextMotion(controller.board.engine)
-            self._ends = ends  # where each motion was seen to end, steps; MOST_STEPS: not yet
-        except MemoryError:  # it is not in one piece
+            self._ends = ends  # observed end of each motion, steps; MOST_STEPS: not yet
+        except MemoryError:  # the heap has no such block
             self._prepared = None
 
     def prepare(self) -> None:
-        """Called while a motion moves: continue with the next one, as far as there is time."""
+        """Called during a motion: continue preparing the next one, if there is time."""
         self._replan_if_rate_changed()
         if self._work and self._prepared and not self.stopping and self._prepared.has_time():
             self._do_slice()
             self._controller.board.engine.refill()
 
     def go_on(self) -> None:
-        """See ``Sequencer``; in a wait there is time, too."""
+        """See ``Sequencer``; also prepares during a wait."""
         super().go_on()
         self._replan_if_rate_changed()
         if self._work and not self._controller.board.engine.moving:
             self._do_slice()
 
     def _do_slice(self) -> None:
-        """A piece of the work. What is refused is given up, and looked at again between the motions."""
+        """Do a slice of the work. After a refusal the preparation ends; the motion is then opened between the
+        motions."""
         work: "Any" = self._work
         try:
             next(work)
@@ -89,12 +89,12 @@ class AheadSequencer(Sequencer):
             self._is_full = True
 
     def _replan_if_rate_changed(self, number: int = _NONE) -> None:
-        """The rate may have been changed; ``number`` as in ``_plan``."""
+        """Plan again if the rate has changed; ``number`` as in ``_plan``."""
         if self._running_index != _NONE and self._at_rate != self._rate:
             self._plan(number)
 
     def _plan(self, number: int = _NONE) -> None:
-        """Prepare the motion ``number``; _NONE: the one that comes next from here."""
+        """Prepare the motion ``number``; _NONE: the next one in the sequence."""
         place = Place()
         place.copy(self._place)  # now: the work may begin when it has gone on
         self._prepared_index = _NONE
@@ -102,14 +102,14 @@ class AheadSequencer(Sequencer):
         self._work = self._pieces(place, number) if self._prepared and not self._is_full else None
 
     def _drop(self) -> None:
-        """What was prepared is not meant any more."""
+        """Drop the prepared motion."""
         self._work = None
         self._prepared_index = _NONE
         if self._prepared:
             self._prepared.close()
 
     def _pieces(self, place: Place, number: int) -> "Iterator[None]":
-        """See ``NextMotion.pieces``; the others as in ``_plan``."""
+        """See ``NextMotion.pieces``; ``number`` as in ``_plan``."""
         if number == _NONE:
             number = yield from self._search(place)
         if number != _NONE and self._prepared:
@@ -117,7 +117,7 @@ class AheadSequencer(Sequencer):
             self._prepared_index = number
 
     def _search(self, place: Place) -> "Generator[None, None, int]":
-        """The motion that comes next, without anything being done on the way; _NONE: none, or too far away."""
+        """Find the next motion, without executing the rows before it; _NONE: none, or too far away."""
         record = self._record
         for _ in range(sequence.MAX_ROWS):
             yield
@@ -135,7 +135,7 @@ class AheadSequencer(Sequencer):
         return checked(board, store.Store(board.root, recover=False).motion(name), crc)
 
     def _stands_at(self, motion: "MotionHead", joint: int) -> int:
-        """Where a joint will stand before it, in steps."""
+        """Position of a joint before the motion, in steps."""
         engine = self._controller.board.engine
         if not engine.moving:
             return int(engine.commanded(joint))
@@ -143,7 +143,7 @@ class AheadSequencer(Sequencer):
         return endpoints.start_offset(motion, joint, 0) if end == MOST_STEPS else end
 
     def _move(self, number: int) -> None:
-        """Begin a motion: the one that is prepared, where that is what is wanted."""
+        """Begin a motion; uses the prepared one if it is the right one."""
         self._note_end()
         self._replan_if_rate_changed(number)
         while self._work:  # nothing moves now
@@ -160,7 +160,7 @@ class AheadSequencer(Sequencer):
         self._plan()
 
     def _note_end(self) -> None:
-        """Where the motion before ended: a posture between two steps leads to either."""
+        """Note the end position of the last motion: a posture between two steps can end at either."""
         if self._running_index != _NONE and self._prepared:
             joints = self._controller.board.joints
             for joint in range(joints):

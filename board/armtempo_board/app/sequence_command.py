@@ -1,6 +1,4 @@
-"""What is reported of the sequence, for a board on which one has been started: asked for, and row by row; it allocates
-nothing.
-"""
+"""Reports of a sequence: answers to commands, and events of its rows. Loaded once one is started; allocates nothing."""
 
 from array import array
 from struct import calcsize, pack_into
@@ -16,7 +14,7 @@ if TYPE_CHECKING:
 
 _ANSWER = const(2)  # of a command's row: the format of its answer
 _ANSWER_AT = const(6)  # in a reply
-_MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
+_MOST = const(0x3FFFFFFF)  # largest value of a counter; a larger number would need memory
 ENDING, CODE, STEP, ROW, CYCLE, PASSED, RUN, VALUE = (
     const(0),
     const(1),
@@ -27,11 +25,11 @@ ENDING, CODE, STEP, ROW, CYCLE, PASSED, RUN, VALUE = (
     const(6),
     const(7),
 )
-"""Places in what is told: as the messages ``sequence`` and ``row`` name it."""
+"""Indices in ``told``: the fields of the messages ``sequence`` and ``row``."""
 
 
 class SequenceCommand:
-    """``told``: state of the sequence, or how it ended; ``name``: which it is; ``counters``: their names."""
+    """``told``: state of the sequence, or how it ended; ``name``: its name; ``counters``: names of its counters."""
 
     def __init__(self, told: "array[int]", name: bytes, counters: "list[bytes]") -> None:
         from armtempo_shared.table import rows  # here, so that it can be forgotten
@@ -40,7 +38,7 @@ class SequenceCommand:
         self._name = name
         self._counters = counters
         self._counts = array("i", [0] * len(counters))
-        self._sent = 0  # rows that were reported to the host
+        self._sent = 0  # number of rows reported to the host
         for event, number, layout, _, _ in rows("E"):
             if event == "row":
                 self._number = number
@@ -48,19 +46,19 @@ class SequenceCommand:
                 self._size = calcsize(layout)
 
     def attach(self, commands: "dict[int, Any]") -> None:
-        """Put what it answers among the commands that the board knows."""
+        """Add its commands to the board's commands."""
         from armtempo_shared.table import rows  # here, so that it can be forgotten
 
         for (name, number, fields, _, tail), (_, _, answer, _, _) in zip(rows("S"), rows("T")):
             commands[number] = (getattr(self, name), fields, answer, tail)
 
     def count(self, number: int) -> int:
-        """One more of a counter; how many there are then."""
+        """Increment a counter; returns its value."""
         self._counts[number] = (self._counts[number] + 1) & _MOST
         return self._counts[number]
 
     def sequence(self, commands: "Any", row: tuple, length: int) -> int:
-        """Its state: bytes of the answer."""
+        """Answer with its state; returns the size of the answer."""
         told = self._told
         reply = commands.link.reply
         pack_into(
@@ -69,7 +67,7 @@ class SequenceCommand:
         return self._named(reply, row, self._name)
 
     def counter(self, commands: "Any", row: tuple, length: int) -> int:
-        """The value of a counter: bytes of the answer."""
+        """Answer with the value of a counter; returns the size of the answer."""
         index = commands.link.reader.data[PAYLOAD_AT]
         count = len(self._counts)
         is_one = index < count
@@ -83,7 +81,7 @@ class SequenceCommand:
         return size + len(name)
 
     def tell(self, link: "Any") -> None:
-        """Send the event of the row that has begun, once, as soon as there is room."""
+        """Send the event of the row that has begun, once, when there is room."""
         told = self._told
         passed = told[PASSED]
         if passed == self._sent or not link.room(self._size):

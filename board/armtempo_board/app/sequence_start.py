@@ -1,6 +1,5 @@
-"""Before a sequence starts: everything that it names is there, and each motion begins where the one before it ends.
-
-Imported for that and given up before anything moves.
+"""Checks before the start of a sequence: everything that it names exists, and each motion begins at the end
+of the one before. Unloaded before anything moves.
 """
 
 from armtempo_shared import codes, sequence
@@ -21,9 +20,9 @@ _NONE = -1
 
 
 def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, flags: int) -> Sequencer:
-    """The sequence ``name``, ready for its first row, or Refused.
+    """The sequence ``name``, ready for its first row; raises Refused.
 
-    ``crc`` as for ``Controller.begin``; no ``flags`` are meant for a sequence.
+    ``crc`` as for ``Controller.begin``; ``flags`` must be 0.
     """
     if flags:
         raise Refused(codes.IS_SEQUENCE)
@@ -42,19 +41,19 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, fla
 
 
 def _kind(controller: "Runner") -> "type[Sequencer]":
-    """One that prepares the next motion, where there is memory for it."""
+    """The class that prepares motions, if the program has it."""
     if not controller.board.workspace.is_short:
         try:
             from armtempo_board.app.sequence_ahead import AheadSequencer  # here, so that it can be forgotten
 
             return AheadSequencer
-        except ImportError:  # it is not among compiled files
+        except ImportError:  # not part of the program in files
             pass
     return Sequencer
 
 
 class _Ends:
-    """Where a motion of the sequence begins and ends, and by how much the arm is ``away`` from its beginning."""
+    """Start and end of a motion, and the arm's distance (``away``) from its start."""
 
     def __init__(self, controller: "Runner", record: "SequenceFile", index: int) -> None:
         name, crc = record.motion(index)
@@ -73,14 +72,14 @@ class _Ends:
         ]
 
     def check_follows(self, before: "_Ends", step: int) -> None:
-        """Refused where it begins elsewhere than ``before`` ends; 1/64 of a step is rounding."""
+        """Raise Refused if its start differs from the end of ``before`` by more than 1/64 step (rounding)."""
         for joint, start in enumerate(self.first):
             if abs(start - before.last[joint]) > 1:
                 raise Refused(codes.LEG_ELSEWHERE, joint, step)
 
 
 def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[_Ends]") -> None:
-    last = _NONE  # motion that was run last
+    last = _NONE  # the last motion
     firsts: "list[int]" = []  # the first motion in each repeat that has begun
     board = controller.board
     outputs = len(board.outputs.values) if board.outputs else 0
@@ -90,7 +89,7 @@ def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[_Ends]
         if op == sequence.MOVE:
             if last == _NONE:
                 for joint, away in enumerate(ends[number].away):
-                    if away:  # the arm is elsewhere
+                    if away:  # the arm is not at the start
                         raise Refused(codes.WRONG_START, joint, away)
             else:
                 ends[number].check_follows(ends[last], step)

@@ -1,6 +1,6 @@
-"""A sequence under way: step by step between motions, in the program's loop, never in an interrupt.
+"""Runs a sequence: executes its rows between motions, in the main loop.
 
-Imported when a sequence starts and given up when it has ended. ``sequence_start`` has found everything that it names.
+Imported when a sequence starts and unloaded after its end. ``sequence_start`` has checked everything that it names.
 """
 
 import gc
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from armtempo_board.storage.sequence_file import SequenceFile
 
     class Runner(Protocol):
-        """What is asked of who runs the motions, see ``controller.Controller``."""
+        """Interface of the object that runs the motions, see ``controller.Controller``."""
 
         board: Board
         sequence: Any
@@ -49,21 +49,21 @@ if TYPE_CHECKING:
 
 
 _OP, _NUMBER, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(3), const(4)  # of a row
-_START_BYTES = const(22_000)  # of heap for the start of a motion; some of it in large pieces (docs/memory.md)
+_START_BYTES = const(22_000)  # heap for the start of a motion, partly in large blocks (docs/memory.md)
 _MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
 
 
 class Place:
-    """A place in the rows: ``next`` is the row that comes, after repeats that have begun."""
+    """A place in the rows: ``next`` is the next row, within the repeats that have begun."""
 
     def __init__(self) -> None:
         self.next = 0
-        self._first = array("i", [0] * sequence.MAX_NESTING)  # of each repeat that has begun: its first row
+        self._first = array("i", [0] * sequence.MAX_NESTING)  # first row of each repeat that has begun
         self._left = array("i", [0] * sequence.MAX_NESTING)  # passes left, 0: for ever
         self._depth = 0
 
     def copy(self, other: "Place") -> None:
-        """Be at the same place."""
+        """Move to the same place as ``other``."""
         self.next = other.next
         self._depth = other._depth
         for depth in range(self._depth):
@@ -71,14 +71,14 @@ class Place:
             self._left[depth] = other._left[depth]
 
     def go_on(self, row: "tuple[int, ...]") -> None:
-        """After the row that came."""
+        """Move to the place after ``row``."""
         self.next += 1
         op = row[_OP]
         if op == sequence.REPEAT:
             self._first[self._depth] = self.next
             self._left[self._depth] = row[_AMOUNT]
             self._depth += 1
-        elif op == sequence.END:  # from the first row of the repeat again, or on
+        elif op == sequence.END:  # from the first row of the repeat again, or after it
             inner = self._depth - 1
             left = self._left[inner] - 1
             if left:  # below 0: for ever
@@ -89,13 +89,13 @@ class Place:
 
 
 class Sequencer:
-    """``told`` is its state, also after its end; its places are in ``sequence_command``."""
+    """``told`` is its state, also after its end; indices are in ``sequence_command``."""
 
     def __init__(self, controller: "Runner", record: "SequenceFile", name: bytes, rate: int) -> None:
         self._controller = controller
         self._record = record
-        self._rate = rate  # of the motions' own time, in thousandths
-        self._row: "tuple[int, ...]" = (0, 0, 0, 0, 0)  # the one under way
+        self._rate = rate  # rate of the motions' own time, in thousandths
+        self._row: "tuple[int, ...]" = (0, 0, 0, 0, 0)  # the present row
         self._place = Place()  # after it
         self._checked = 0  # motions whose splines were checked in this run
         self.told = array("i", [sequence.RUNNING] + [0] * VALUE)
@@ -106,7 +106,7 @@ class Sequencer:
         self.tell = self._command.tell
 
     def begin(self) -> None:
-        """From the next turn on; Refused where the heap has no room for a motion as well."""
+        """Begin with the next turn; raises Refused if the heap has no room for a motion."""
         controller = self._controller
         controller.tidy()
         free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES
@@ -118,7 +118,7 @@ class Sequencer:
         self._command.attach(controller.board.rows)
 
     def change_rate(self, rate: int) -> None:
-        """As the engine's; of the motions to come too, and while none moves."""
+        """As ``Engine.change_rate``, also for the following motions."""
         engine = self._controller.board.engine
         if engine.moving:
             engine.change_rate(rate)
@@ -129,10 +129,10 @@ class Sequencer:
             self._rate = rate
 
     def prepare(self) -> None:
-        """Called while a motion moves: nothing is prepared here, see ``sequence_ahead``."""
+        """Called during a motion; does nothing here, see ``sequence_ahead``."""
 
     def go_on(self) -> None:
-        """Called while nothing moves: end, wait on, or do what the next row says."""
+        """Called while nothing moves: end, continue to wait, or execute the next row."""
         controller = self._controller
         if controller.board.fault():
             return self._end(sequence.FAULTED, controller.board.fault())
@@ -150,8 +150,8 @@ class Sequencer:
             return self._end(sequence.REFUSED, codes.FLASH_ERROR)
 
     def _check(self) -> None:
-        """Check the splines of a motion before any moves, once in a run: neither its record, whose checksum is compared
-        each time, nor the arm can change meanwhile.
+        """Check the splines of a motion once, before any moves: its record (its checksum is compared each
+        time) and the arm cannot change during the sequence.
         """
         from armtempo_board.motion.start_check import check_splines  # here, so that it can be forgotten
 
@@ -170,13 +170,13 @@ class Sequencer:
         self._checked += 1
 
     def _do(self) -> None:
-        """What the next row says."""
+        """Execute the next row."""
         self._row = self._record.row(self._place.next)
         self.told[STEP] = self._row[_STEP_OF_ROW]
         self.told[ROW] = self._place.next
         self.told[VALUE] = 0
         self._place.go_on(self._row)
-        self._since_ms = time.ticks_ms()  # the row's begin
+        self._since_ms = time.ticks_ms()  # start time of the row
         op, number, value, _, _ = self._row
         if op == sequence.MOVE:
             self._move(number)
@@ -200,7 +200,7 @@ class Sequencer:
             engine.skip_check = False
 
     def _is_over(self) -> bool:
-        """Whether the row under way is done; a motion is, as nothing moves."""
+        """Whether the present row is done; a motion is, as nothing moves."""
         op, number, value, amount, _ = self._row
         if op != sequence.WAIT and op != sequence.WAIT_INPUT:
             return True

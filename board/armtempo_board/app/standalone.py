@@ -21,19 +21,19 @@ _ONLY = const(0)
 
 
 class _Nobody:
-    """Takes the place of the serial port, which the REPL uses."""
+    """Replaces the serial port, which the REPL uses."""
 
     def readinto(self, *arguments: object) -> None:
-        """Nothing comes."""
+        """No input."""
 
-    write = readinto  # and nothing is taken
+    write = readinto  # and no output
 
 
 def replay(name: str = "", root: str = program.ROOT) -> None:
-    """Run a stored motion, the default where no name is given, and print how it ended.
+    """Run a stored motion (default: the default motion), and print how it ended.
 
-    Where the position is unknown the arm must stand where the motion begins: calling this declares it.
-    Ctrl-C brakes, a second one freezes.
+    If the position is unknown, the arm must be at the start of the motion: calling this declares it. Ctrl-C
+    brakes, a second one freezes.
     """
     nobody = _Nobody()
     app = program.app = program.app or App(nobody, root)
@@ -41,7 +41,7 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
     board = controller.board
     port, app.link.stream = app.link.stream, nobody
     watchdog = Watchdog()
-    micropython.kbd_intr(-1)  # KeyboardInterrupt could come in the midst of anything
+    micropython.kbd_intr(-1)  # KeyboardInterrupt could occur anywhere
     try:
         _begin(controller, name or board.store().default())
         _follow(app, controller, watchdog)
@@ -86,7 +86,7 @@ def _follow(app: "App", controller: "Controller", watchdog: "Watchdog") -> None:
 
 
 def _name(code: int) -> str:
-    """Of a refusal or fault, as in ``codes``."""
+    """Name of a refusal or fault, from ``codes``."""
     for name in dir(codes):
         if getattr(codes, name) == code:
             return name.lower()

@@ -1,7 +1,8 @@
-"""What the board does for each command about the store, and about the drivers; refusals are raised as ``Refused``.
+"""Executes the commands for the store and the drivers; refusals are raised as ``Refused``.
 
-Each function has the name of its command. ``commands``: gives the command's fields and takes its answer; ``row``: the
-command's row in the table of ``Commands``; ``length``: bytes of its payload. It returns the bytes of its answer.
+Each function has the name of its command. ``commands``: has the command's fields and takes its answer;
+``row``: the command's row in the table of ``Commands``; ``length``: bytes of its payload. It returns the size
+of its answer.
 """
 
 from armtempo_shared import codes
@@ -43,20 +44,20 @@ def put_begin(commands: "Caller", row: tuple, length: int) -> None:
 
 
 def put_data(commands: "Caller", row: tuple, length: int) -> int:
-    """Add a piece to it."""
+    """Add a piece to the upload."""
     (offset,) = commands.fields(row)
     return commands.reply(row, commands.board.store().write(offset, commands.tail(row, length)))
 
 
 def put_commit(commands: "Caller", row: tuple, length: int) -> None:
-    """Check it and put it in place; an arm record is taken when this has returned."""
+    """Check the upload and store it; an arm record is used after this has returned."""
     (crc,) = commands.fields(row)
     board = commands.board
     board.arm_waits = board.store().commit(crc) == ARM_RECORD_NAME
 
 
 def list(commands: "Caller", row: tuple, length: int) -> int:
-    """One of the stored motions and sequences, and how many there are."""
+    """Answer with one of the stored motions and sequences, and their number."""
     (index,) = commands.fields(row)
     store = commands.board.store()
     names = store.names()
@@ -91,7 +92,7 @@ def rename(commands: "Caller", row: tuple, length: int) -> None:
 
 
 def get(commands: "Caller", row: tuple, length: int) -> int:
-    """A piece of a record."""
+    """Answer with a piece of a record."""
     offset, wanted = commands.fields(row)
     fixed = commands.reply(row, 0)
     wanted = min(wanted, MAX_PAYLOAD - _NUMBER_BYTES - fixed)
@@ -101,12 +102,12 @@ def get(commands: "Caller", row: tuple, length: int) -> int:
 
 
 def set_default(commands: "Caller", row: tuple, length: int) -> None:
-    """Make a motion the one that the button starts."""
+    """Set the motion that the button starts."""
     commands.board.store().set_default(commands.text(row, length))
 
 
 def drivers(commands: "Caller", row: tuple, length: int) -> None:
-    """The motors' current on or off."""
+    """Switch the motors' current on or off."""
     (on,) = commands.fields(row)
     board = commands.board
     board.check_ready()

@@ -1,7 +1,7 @@
-"""The watchdog: resets the chip when the loop hangs.
+"""The watchdog: resets the chip if the main loop hangs.
 
-The hardware cannot be stopped once it is started. So a timer feeds it from when the program is left for the REPL;
-``boot.py`` does the same after a soft reset.
+The hardware cannot be stopped once started. So a timer feeds it after the program is left for the REPL, and,
+by ``boot.py``, after a soft reset.
 """
 
 import machine
@@ -18,7 +18,7 @@ _kept = None
 
 
 class Watchdog:
-    """Starts with the loop, not before: a program that fails before that leaves a usable REPL."""
+    """Starts with the loop, so that a program that fails earlier leaves a usable REPL."""
 
     def __init__(self) -> None:
         self._watchdog = machine.WDT(timeout=_TIMEOUT_MS)
@@ -27,12 +27,12 @@ class Watchdog:
             _kept.deinit()
 
     def leave(self) -> None:
-        """Feed it from a timer interrupt from now on."""
+        """From now on, feed it from a timer interrupt."""
         keep_fed()
 
 
 def has_reset() -> bool:
-    """Whether it made the last reset."""
+    """Whether it caused the last reset."""
     return machine.reset_cause() == machine.WDT_RESET
 
 

@@ -1,9 +1,9 @@
 """The backup SRAM of the STM32F405 and F407: 4 KB of memory that MicroPython leaves to programs.
 
-RM0090 2.3 (memory map) and 5.1.2 (battery backup domain). It keeps its content over a reset, which nobody here relies
-on. It is on the bus of the peripherals (AHB1), not with the memories that DMA is meant to read: no ring of edge times
-lies in it. The processor may take a cycle or two more for an access than to its main memory: not measured on a chip.
-Accesses are aligned, as they must be in the address range of peripherals.
+RM0090 2.3 (memory map) and 5.1.2 (battery backup domain). It keeps its content over a reset, which is not
+used here. It is on the bus of the peripherals (AHB1), where DMA does not read memory, so no ring of edge
+times is in it. An access may take a cycle or two longer than to main memory (not measured on a chip).
+Accesses must be aligned, as in the address range of peripherals.
 """
 
 import stm
@@ -17,9 +17,9 @@ _PROBED = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, PROCESSOR_WORDS - 1)  # wor
 
 
 def find() -> int:
-    """Its address, ready to be used; 0 if it does not keep what is written to it.
+    """Switch it on; returns its address, or 0 if it does not keep what is written to it.
 
-    A chip without it is not asked: there the access itself would fail.
+    Not called on a chip without it, where the access itself would fail.
     """
     from armtempo_board.hardware import registers  # here, so that it can be forgotten
 

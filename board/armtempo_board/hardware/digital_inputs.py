@@ -1,4 +1,4 @@
-"""The arm's inputs: levels that have been steady for their debounce time. Reading them allocates nothing."""
+"""The arm's inputs, debounced. Reading them allocates nothing."""
 
 import time
 
@@ -18,21 +18,21 @@ _NUMBERS = const(3)
 
 
 class DigitalInputs:
-    """``numbers``: of each pin its active level, its debounce time, and a word in which it notes when it changed."""
+    """``numbers``: for each pin its active level, its debounce time, and a word for the time of its last change."""
 
     def __init__(self, pins: "list[Pin]", numbers: "array[int]") -> None:
         self.levels = 0
-        """One bit per input: it is active."""
+        """One bit per input, set if it is active."""
         self.count = len(pins)
         self._pins = pins
         self._numbers = numbers
 
     def level(self, number: int) -> int:
-        """1 where input ``number`` (from 0) is active, debounced."""
+        """1 if input ``number`` (from 0) is active, debounced."""
         return self.levels >> number & 1
 
     def poll(self, now_ms: int) -> None:
-        """Look at the pins; call it every few milliseconds. A level counts when it has been steady."""
+        """Read the pins; call it every few milliseconds."""
         numbers = self._numbers
         at = 0
         for number in range(len(self._pins)):

@@ -29,7 +29,7 @@ class EncoderInput:
         self.take(isr.read_counter(self.address))
 
     def take(self, counter: int) -> None:
-        """Count up to a reading of the counter; readings come in their order."""
+        """Update the count from a reading of the counter; readings must be in their order."""
         moved = (counter - self._last) & 0xFFFF
         if moved >= 0x8000:
             moved -= 0x10000
@@ -37,17 +37,17 @@ class EncoderInput:
         self.counts += -moved if self._inverted else moved
 
     def declare(self, counts: int) -> None:
-        """The encoder is at ``counts``."""
+        """Set the count to ``counts``."""
         self.update()
         self.counts = counts
 
 
 class NoEncoder:
-    """A joint without one: always 0."""
+    """For a joint without an encoder: always 0."""
 
     counts = 0
 
     def take(self, number: int = 0) -> None:
-        """Nothing to read, to count or to declare."""
+        """Does nothing."""
 
     update = declare = take

@@ -1,10 +1,10 @@
 """E-stop and limit switches: hard interrupts that freeze the outputs; and the ENABLE output.
 
-The interrupts' callback (``isr.freezer``) only stops the outputs and releases the drivers. Which switch it was, and so
-which fault, the main loop notes when it finds the outputs frozen. Switches on other pins have no interrupt:
-``poll_home`` looks at them while a homing motion runs. How long it takes from the edge to frozen outputs:
-docs/hardware.md. The pull resistors draw towards the tripped level, so a switch that opens when it trips also trips
-when its wire breaks.
+The interrupts' callback (``isr.freezer``) only stops the outputs and releases the drivers. The main loop
+determines the switch and the fault when it finds the outputs frozen. Switches on other pins have no
+interrupt: ``poll_home`` reads them during a homing motion. Time from the edge to frozen outputs:
+docs/hardware.md. The pull resistors pull to the tripped level, so a normally closed switch also trips when
+its wire breaks.
 """
 
 import micropython
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Inputs:
-    """``head`` and ``joints``: the arm record's; ``sampler`` has the memory that the interrupts share."""
+    """``head`` and ``joints``: of the arm record; ``sampler`` has the memory that the interrupts share."""
 
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", sampler: Sampler) -> None:
         from armtempo_shared import armrecord  # here, so that it can be forgotten
@@ -68,7 +68,7 @@ class Inputs:
         mode = ExtInt.IRQ_RISING if level else ExtInt.IRQ_FALLING
         pull = Pin.PULL_UP if level else Pin.PULL_DOWN
         pin = Pin(name, Pin.IN, pull=pull)
-        ExtInt(pin, mode, pull, None)  # removes an earlier engine's callback: a line takes only one
+        ExtInt(pin, mode, pull, None)  # removes an earlier engine's callback, as a line has only one
         ExtInt(pin, mode, pull, self._freeze)  # type: ignore[arg-type]  # what it returns does not matter
         return pin
 
@@ -100,14 +100,14 @@ class Inputs:
         return isr.FIRST_LINE + (line - isr.SOFTWARE_LINE) * isr.LINE_WORDS
 
     def _set_line(self, line: int, levels: int, mask: int) -> None:
-        """What the interrupt of a line freezes at; it may come in between."""
+        """Set the condition at which the interrupt of a line freezes; the interrupt may occur during this."""
         at = self._line_at(line)
         self._block[at + isr.LINE_MASK] = 0
         self._block[at + isr.LINE_LEVELS] = levels
         self._block[at + isr.LINE_MASK] = mask
 
     def watch(self, moving: int) -> None:
-        """A switch stops joints only while they move: ``moving`` has a bit for each that may."""
+        """Let switches stop the ``moving`` joints (one bit per joint)."""
         for _, _, line in self._limits:
             levels = mask = 0
             for pair_line, bit, level, joint in self._towards:
@@ -120,12 +120,12 @@ class Inputs:
             self._set_line(line, levels, mask)
 
     def trip_estop(self) -> None:
-        """As the E-stop's interrupt does."""
+        """Do what the E-stop's interrupt does."""
         self._trip(self._estop_line)
 
     @micropython.viper
     def freeze(self) -> object:
-        """Stop all outputs now; interrupts call it too."""
+        """Stop all outputs; also called by interrupts."""
         trip = self._trip
         trip(isr.SOFTWARE_LINE)
 
@@ -136,17 +136,18 @@ class Inputs:
         enable_irq(before)
 
     def thaw(self) -> None:
-        """The outputs may move again."""
+        """Allow motion again."""
         self._block[isr.FROZEN] = 0
 
     def poll(self) -> None:
-        """A switch that tripped before the joint turned towards it: its interrupt came too early."""
+        """Freeze at a switch that tripped before the joint turned towards it, whose interrupt was too early."""
         for pin, level, line in self._limits:
             if pin.value() == level:
                 self._trip(line)
 
     def poll_home(self, moving: int) -> None:
-        """Freeze where a switch without interrupt is tripped, and one of the ``moving`` joints (bits) heads for it."""
+        """Freeze if a switch without an interrupt is tripped and one of the ``moving`` joints (bits) moves
+        towards it."""
         levels = isr.output_levels(self._port)
         for pin, active, bit, level, joint in self._polled:
             if moving >> joint & 1 and (levels & bit != 0) == level and pin.value() == active:
@@ -154,7 +155,8 @@ class Inputs:
                 self.freeze()
 
     def note_trip(self) -> bool:
-        """Note the fault of a switch that tripped since the last call, the E-stop's above all. Whether it was that."""
+        """Note the fault of a switch that tripped since the last call, the E-stop first; returns whether it
+        was the E-stop."""
         for _, _, line in self._limits:
             if self._has_tripped(line):
                 isr.set_fault(self._block, codes.LIMIT_SWITCH, self._joint_towards(line))
@@ -173,14 +175,14 @@ class Inputs:
 
     def _joint_towards(self, line: int) -> int:
         """The first joint that moves towards a switch."""
-        levels = isr.output_levels(self._port)  # DIR is not turned after a freeze
+        levels = isr.output_levels(self._port)  # DIR does not change after a freeze
         for pair_line, bit, level, joint in self._towards:
             if pair_line == line and (levels & bit != 0) == level:
                 return joint
         return NO_JOINT
 
     def estop_active(self) -> bool:
-        """Whether the E-stop is tripped at this moment."""
+        """Whether the E-stop is tripped."""
         return self._estop is not None and self._estop.value() == self._estop_level
 
     def enable(self, on: bool) -> None:

@@ -15,19 +15,19 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-_QUIET_MS = const(50)  # a frame that stays incomplete for so long is given up
+_QUIET_MS = const(50)  # time after which an incomplete frame is dropped
 _ATTEMPTS = const(8)  # reads and rejected frames in one poll: bounds its time
 _PIECE = const(64)  # bytes read at once
 _FIRST = const(0)
 
 
 class FrameReader:
-    """``poll`` until it says True; then the frame is in ``data``."""
+    """Call ``poll`` until it returns True; then the frame is in ``data``."""
 
     def __init__(self) -> None:
         self.data = bytearray(MAX_PAYLOAD + OVERHEAD)
-        self.bad = 0  # runs of bytes that were passed over
-        self.outside = -1  # last byte that came outside of any frame; -1: none in this poll
+        self.bad = 0  # number of skipped runs of bytes
+        self.outside = -1  # last byte received outside of a frame; -1: none in this poll
         self._filled = 0
         self._whole = 0  # length of the whole frame in data, 0: none
         self._skipping = False
@@ -39,11 +39,11 @@ class FrameReader:
         return self._whole - OVERHEAD
 
     def empty(self) -> bool:
-        """Whether no part of a frame waits for its rest."""
+        """Whether there is no incomplete frame."""
         return self._filled == 0
 
     def poll(self, stream: "Any", now_ms: "Any") -> bool:
-        """Whether a whole frame with the right check is in ``data``, until the next poll."""
+        """Whether a complete, valid frame is in ``data``, until the next poll."""
         self.outside = -1
         if self._whole:
             self._drop(self._whole)
@@ -58,7 +58,7 @@ class FrameReader:
         return False
 
     def _missing(self) -> int:
-        """Bytes still needed to judge the frame that begins at data[0]."""
+        """Bytes missing in the frame that begins at data[0]."""
         if self._filled < PAYLOAD_AT:
             return 1 if self._filled == 0 else PAYLOAD_AT - self._filled
         length = self._announced()
@@ -82,7 +82,7 @@ class FrameReader:
         return True
 
     def _read(self, stream: "Any", missing: int, now_ms: "Any") -> bool:
-        """Take up to ``missing`` bytes; False where none are there."""
+        """Read up to ``missing`` bytes; returns False if there are none."""
         count = stream.readinto(self._piece, min(missing, _PIECE))
         if not count:
             if self._filled and time.ticks_diff(now_ms, self._heard_ms) >= _QUIET_MS:
@@ -105,7 +105,7 @@ class FrameReader:
             self.bad += 1
 
     def _reject(self) -> None:
-        """What begins at data[0] is no frame: continue at the next SYNC after it."""
+        """There is no frame at data[0]: continue at the next SYNC."""
         self._skip()
         at = 1
         while at < self._filled and self.data[at] != SYNC:

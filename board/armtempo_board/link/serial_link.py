@@ -1,6 +1,6 @@
 """The board's end of the serial link: commands in, replies and events out. It never waits and never allocates.
 
-Where a host stops reading, ``out`` fills up. Then the reply waits in ``reply``, events wait where they come from,
+If a host stops reading, ``out`` fills up. Then the reply waits in ``reply``, events wait at their sources,
 and the main loop continues.
 """
 
@@ -24,14 +24,14 @@ _CRC = const(4)  # bytes
 
 
 class SerialLink:
-    """``poll`` gives commands; ``answer`` and ``event`` queue frames; ``flush`` hands them to the port."""
+    """``poll`` reads commands; ``answer`` and ``event`` queue frames; ``flush`` writes them to the port."""
 
     def __init__(self, stream: "Any") -> None:
         self.stream = stream
         self.reader = FrameReader()
         self.reply = bytearray(MAX_PAYLOAD + OVERHEAD)
         self.out = bytearray(_OUT_SIZE)
-        self.heard_ms: "Any" = 0  # when the last good frame came
+        self.heard_ms: "Any" = 0  # time of the last valid frame
         self.escape = False  # Ctrl-C outside of any frame asks for the REPL
         self._begin = 0
         self._end = 0
@@ -42,7 +42,7 @@ class SerialLink:
         self._prompt = PromptRequest()
 
     def poll(self) -> bool:
-        """Whether a command that has not been acted on is in ``reader.data``."""
+        """Whether a new command is in ``reader.data``."""
         now_ms = time.ticks_ms()
         reader = self.reader
         if not reader.poll(self.stream, now_ms):
@@ -54,11 +54,11 @@ class SerialLink:
         if self._repeated():
             self._reply_waits = True
             return False
-        return not self._reply_waits  # an answer still waits for room: the host repeats its command
+        return not self._reply_waits  # an answer is still waiting for room: the host repeats its command
 
     def answer(self, number: int, size: int) -> None:
         """Send the reply whose payload of ``size`` bytes is in ``reply``."""
-        self._reply_size = 0  # should this fail, the host's repeat is acted on
+        self._reply_size = 0  # if this fails, the host's repeated command is executed
         self._remember()
         sequence = self.reader.data[SEQUENCE_AT]
         self._reply_size = self._finish(self.reply, 0, sequence, number, size)
@@ -79,7 +79,7 @@ class SerialLink:
         self._events = (self._events + 1) & 0xFF
 
     def flush(self) -> None:
-        """Hand to the port what it takes."""
+        """Write as much to the port as it accepts."""
         self._queue_reply()
         if self._begin == self._end:
             return
@@ -90,12 +90,12 @@ class SerialLink:
                 self._begin = self._end = 0
 
     def forget(self) -> None:
-        """A new host: drop what was meant for the old one."""
+        """For a new host: drop the frames for the old one."""
         self._begin = self._end = 0
         self._reply_waits = False
 
     def idle(self) -> bool:
-        """Whether nothing is under way in either direction."""
+        """Whether no frame is in progress in either direction."""
         return self._begin == self._end and not self._reply_waits and self.reader.empty()
 
     def _finish(self, buffer: bytearray, start: int, sequence: int, number: int, size: int) -> int:

@@ -1,1 +1,1 @@
-"""One motion: checked, loaded, started, kept supplied with steps, stopped, and sampled on its way."""
+"""One motion: check, load, start, serve, stop, samples."""

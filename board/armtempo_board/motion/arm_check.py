@@ -1,4 +1,4 @@
-"""Is an arm record fit to be taken? Judged before the one that is in force is released."""
+"""Checks an arm record before the present one is released."""
 
 from armtempo_shared import armrecord, codes, engine_memory
 from armtempo_shared.limits import MAX_ENCODERS
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 def checked(data: bytes, room_bytes: int) -> "Record":
     """(head, joints, crc32, outputs, inputs) of an arm record, as ``armrecord`` unpacks them.
 
-    ``room_bytes``: what an engine can have. Refused: BAD_RECORD where it is damaged, of another
-    version, or names what the board does not have; PIN_TAKEN where an output, input or polled switch has what is taken;
-    NO_ROOM with the bytes needed.
+    ``room_bytes``: available for an engine. Raises Refused: BAD_RECORD if it is damaged, of another version,
+    or names something that the board does not have; PIN_TAKEN if the pin or timer of an output, input or
+    polled switch is in use; NO_ROOM with the bytes needed.
     """
     try:
         head, joints, crc = armrecord.unpack(data)
@@ -62,12 +62,12 @@ def _is_polled(switch: int) -> bool:
 
 
 def _check_pins(head: "dict[str, int]", joints: "Rows", outputs: "Rows", inputs: "Rows") -> None:
-    """Pins and timers of outputs, inputs and polled switches: each once, and none that the engine takes."""
+    """Check that pins and timers of outputs, inputs and polled switches are different, and not used by the engine."""
     switches = [row[side] for row in joints for side in ("limit_low", "limit_high")]
     polled = [{"pin": switch - armrecord.POLLED} for switch in switches if _is_polled(switch)]
     if not outputs and not inputs and not polled:
         return
-    timers = [2, 5, 6]  # the counters of STEP, and what fills their rings
+    timers = [2, 5, 6]  # the counters of STEP, and the timer that fills their rings
     taken = ["", pins.ENABLE, pins.BUTTON] + list(pins.LEDS)
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         taken.append(pins.ESTOP)

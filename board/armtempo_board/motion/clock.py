@@ -1,4 +1,4 @@
-"""The motion clock: TIM2 in 64 bits. TIM5, which counts the other rings' edges, starts and stops with it."""
+"""The motion clock: TIM2 extended to 64 bits. TIM5, for the other rings, starts and stops with it."""
 
 import time
 
@@ -13,21 +13,21 @@ _START_CHECKS = const(5)
 
 
 class MotionClock:
-    """``epoch`` * 2**32 + ``counter_kiticks`` * 1024 ticks is when it was read last (``kiticks``)."""
+    """``epoch`` * 2**32 + ``counter_kiticks`` * 1024 ticks: its time at the last reading (``kiticks``)."""
 
     def __init__(self) -> None:
         self.epoch = 0
         self.counter_kiticks = 0
 
     def set(self, ticks: int) -> None:
-        """Stand at a time, negative before time 0."""
+        """Set the time; negative before time 0."""
         mem32[stm.TIM2 + 4 * isr.CNT] = ticks & 0xFFFFFFFF
         mem32[stm.TIM5 + 4 * isr.CNT] = ticks & 0xFFFFFFFF
         self.epoch = ticks >> 32
         self.counter_kiticks = isr.counter_kiticks(stm.TIM2)
 
     def start(self) -> bool:
-        """Let it run; whether both counters do, and agree."""
+        """Start both counters; returns whether they agree."""
         before_kiticks = isr.counter_kiticks(stm.TIM2)
         mem32[stm.TIM2 + 4 * isr.CR1] = 1
         time.sleep_us(_START_US)
@@ -37,7 +37,7 @@ class MotionClock:
         return False
 
     def stop(self) -> None:
-        """Let it stand, with the timer that fills the rings and the compare interrupt."""
+        """Stop it, the timer that fills the rings, and the compare interrupt."""
         mem32[stm.TIM6] = 0
         mem32[stm.TIM2 + 4 * isr.DIER] = 0
         mem32[stm.TIM2 + 4 * isr.CR1] = 0
@@ -52,7 +52,7 @@ class MotionClock:
         return (self.epoch << 22) + low
 
     def ticks(self) -> int:
-        """Its time in ticks, 64 bits; negative before time 0. It counts as not read."""
+        """Its time in ticks, 64 bits; negative before time 0. Does not count as a reading."""
         counter = mem32[stm.TIM2 + 4 * isr.CNT] & 0xFFFFFFFF
         epoch = self.epoch + (1 if counter >> 10 < self.counter_kiticks else 0)
         return int((epoch << 32) + counter)

@@ -1,4 +1,4 @@
-"""Where a motion begins and when it ends, from its control points in exact integers."""
+"""Start and end of a motion, from its control points in exact integers."""
 
 from armtempo_shared.basis import BASIS, FACTORIAL
 from armtempo_shared.limits import STEP_FRACTION_BITS, TICK_FRACTION_BITS
@@ -29,9 +29,9 @@ def duration_ticks(motion: "MotionHead") -> int:
 
 
 def start_offset(motion: "MotionHead", joint: int, position_steps: int) -> int:
-    """0 if the joint is at the motion's start, else how many steps the start is away (not 0).
+    """0 if the joint is at the motion's start, else the distance of the start in steps (not 0).
 
-    Within half a step and 1/64 counts as standing there: the step generator takes it from that.
+    A distance up to half a step and 1/64 counts as 0: the step generator allows for it.
     """
     total, parts = _at_node(motion, motion.angle_offset(joint), 0)
     one = parts << STEP_FRACTION_BITS
@@ -42,12 +42,12 @@ def start_offset(motion: "MotionHead", joint: int, position_steps: int) -> int:
 
 
 def at_start(motion: "MotionHead", joint: int) -> int:
-    """Where the joint begins, in 1/64 step, rounded down."""
+    """Start of the joint, in 1/64 step, rounded down."""
     return _at_64th(motion, joint, 0)
 
 
 def at_end(motion: "MotionHead", joint: int) -> int:
-    """Where it ends, in 1/64 step, rounded down."""
+    """End of the joint, in 1/64 step, rounded down."""
     return _at_64th(motion, joint, motion.segments)
 
 

@@ -1,14 +1,15 @@
 """One motion at a time: from its splines to the pins, and back to samples.
 
-``load`` checks a motion and fills the rings. ``start`` lets the counters run. ``service`` keeps steps ready for the
-interrupt that fills the rings; call it every few milliseconds until ``moving`` is False. Then ``fault`` says why the
-motion ended. After any stop ``commanded`` is exact for every joint whose bit in ``known`` is set:
+``load`` checks a motion and fills the rings. ``start`` starts the counters. ``service`` computes steps for
+the interrupt that fills the rings; call it every few milliseconds until ``moving`` is False. Then ``fault``
+has the reason of the end. After any stop ``commanded`` is exact for every joint whose bit in ``known`` is
+set:
 
 =====================  =============================================================
 end, brake, freeze     known: each pulse that has begun is finished, and all are counted
 limit switch           the same
 underrun               the same: the ring stops, no wrong step is made
-E-stop                 known, but unknown where the arm record releases the drivers
+E-stop                 known, but unknown if the arm record releases the drivers
 following error        unknown for the joint that was lost
 wrong steps            unknown for the joint that made others than its record has
 DIR turned too late    unknown for all joints
@@ -41,7 +42,7 @@ LEAD_TICKS = const(1680000)
 """Time from the start of the counters to time 0: 20 ms, in which drivers switch on and DIR settles."""
 
 _PREFILLS = const(32)
-_ROUNDS = const(8)  # of filling the queues, before other work gets its turn
+_ROUNDS = const(8)  # rounds of filling the queues before other work
 _PERMILLE = const(1000)
 _KITICKS_PER_32_MS = const(2625)
 _MOST_KITICKS = const(5_000_000)  # a minute
@@ -53,7 +54,7 @@ _CHECK_INTERRUPT = const(2)
 
 
 class Engine:
-    """Drives the arm whose ``parts`` it gets. Nothing moves, drivers are off."""
+    """Drives an arm with the given ``parts``. At first nothing moves, and drivers are off."""
 
     def __init__(self, parts: "EngineParts") -> None:
         self.feeder = parts.feeder
@@ -74,13 +75,13 @@ class Engine:
         self.known = 0
         self._watched_joint = self._background_task = 0
         self._homing = 0  # one bit per joint that moves in a homing motion
-        self._in_service = False  # service() or refill() is at work, or has not come to its end
-        self.skip_check = False  # the next motion was checked before, and nothing has changed since
+        self._in_service = False  # service() or refill() is running, or did not reach its end
+        self.skip_check = False  # the next motion was already checked, and nothing has changed since
 
     # between motions
 
     def home(self, mask: int, steps: "list[int]") -> None:
-        """The joints of ``mask`` stand at ``steps`` (one number for every joint)."""
+        """Set the positions of the joints in ``mask`` to ``steps`` (an entry for every joint)."""
         for number, joint in enumerate(self.drives):
             if mask >> number & 1:
                 joint.declare(steps[number])
@@ -88,13 +89,13 @@ class Engine:
         self.known |= mask
 
     def drivers(self, on: int) -> None:
-        """The drivers on, or off: then the arm can be moved by hand, and only its encoders know where to."""
+        """Switch the drivers on or off; off, the arm can be moved by hand, and only the encoders follow it."""
         self.inputs.enable(on != 0)
         if not on:
             self.known = 0
 
     def clear(self) -> bool:
-        """Clear the fault, unless its cause is still there; True where it is cleared."""
+        """Clear the fault, unless its cause persists; returns whether it is cleared."""
         if self.moving or self.inputs.estop_active():
             return False
         self.block[isr.FAULT] = 0
@@ -103,7 +104,7 @@ class Engine:
         return True
 
     def _watch_idle(self) -> None:
-        """While nothing moves: follow the encoders, and look at the E-stop."""
+        """While nothing moves: read the encoders and the E-stop."""
         for encoder in self._encoders:
             encoder.update()
         if self.inputs.estop_active():
@@ -113,7 +114,7 @@ class Engine:
             self._take_fault()
 
     def _note_trip(self) -> None:
-        """A switch may have tripped: know of it, and that an E-stop released the drivers."""
+        """Note a switch that may have tripped, and that an E-stop released the drivers."""
         if self.inputs.note_trip() and self.inputs.releases:
             self.known = 0
 
@@ -124,15 +125,15 @@ class Engine:
     # before a motion
 
     def load(self, motion: "MotionHead", rate: int = _PERMILLE, ready: "Any" = None, homing: int = 0) -> None:
-        """Check a motion and fill the rings; Refused where something is wrong.
+        """Check a motion and fill the rings; raises Refused.
 
-        ``rate``, in thousandths: how fast the motion's own time is to run. ``ready``: the ``NextMotion`` that has it
-        loaded already. ``homing``: one bit per joint that moves in a homing motion; a switch of these ends it without a
-        fault, and ``fault_joint`` says whose.
+        ``rate``: of the motion's own time, in thousandths. ``ready``: the ``NextMotion`` that has loaded it.
+        ``homing``: one bit per joint that moves in a homing motion; a switch of these ends it without a
+        fault, and ``fault_joint`` has the joint.
         """
         if self.moving:
             raise Refused(codes.BUSY)
-        self.inputs.thaw()  # before it looks: a switch that trips from here on is found now or freezes the motion
+        self.inputs.thaw()  # before the check: a switch that trips from here on is detected now or freezes the motion
         self._watch_idle()
         if self.fault:
             raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
@@ -159,19 +160,15 @@ class Engine:
             gc.collect()
 
     def _override(self, rate: int, motion: "MotionHead") -> "Any":
-        """Check the motion; the law of its time, with the code that only a motion needs."""
+        """Check the motion; returns its time law, after loading the code for motions."""
         from armtempo_board.motion import start_check  # here, so that it can be forgotten
 
         limits = None if self.skip_check else self.limits
         duration_ticks = start_check.check_start(motion, self.drives, limits, self.known)
         del start_check
-        heap.release()
         heap.tidy()
-        try:
-            from armtempo_board.stepgen.override import Override
-        except MemoryError:  # what the first attempt left free lies otherwise
-            gc.collect()
-            from armtempo_board.stepgen.override import Override
+        from armtempo_board.stepgen.override import Override
+
         override = Override()
         override.begin(rate, motion, duration_ticks)
         if override.end_ticks() > LONGEST_RUN_TICKS:
@@ -179,7 +176,7 @@ class Engine:
         return override
 
     def start(self) -> None:
-        """Let the counters run."""
+        """Start the counters."""
         self.moving = True
         if not self.clock.start():
             self._fail(codes.START_FAILED, NO_JOINT)
@@ -187,13 +184,13 @@ class Engine:
     # while it moves
 
     def service(self) -> None:
-        """Keep the queues filled, convert samples, look for faults. An exception in it leaves the position unknown."""
+        """Fill the queues, convert samples, check for faults. After an exception in it the position is unknown."""
         self._in_service = True
         self._service()
         self._in_service = False
 
     def refill(self) -> None:
-        """Keep the queues filled and nothing else: for between other work, as full ones last a few milliseconds."""
+        """Only fill the queues; called during other work, as full queues last a few milliseconds."""
         if self.moving and not self.block[isr.FROZEN]:
             self._in_service = True
             self._refill_queues()
@@ -221,12 +218,12 @@ class Engine:
             self.block[isr.TURN_LATE] = 1
         if self.block[isr.TURN_LATE]:
             self._fail(codes.INTERNAL, NO_JOINT)
-        elif self._has_ended() and self.moving:  # not where an encoder has just ended it
+        elif self._has_ended() and self.moving:  # not if an encoder has just ended it
             self._check_end()
             self._finish(self.rates.duration_ticks)
 
     def _refill_queues(self) -> bool:
-        """Keep all queues filled; False where that ended the motion."""
+        """Fill all queues; returns False if that ended the motion."""
         now_kiticks = self.clock.kiticks()
         self._readings.convert()
         rates = self.rates
@@ -253,13 +250,13 @@ class Engine:
             return False
         for joint in self.drives:
             if not joint.ended:
-                if self.rates.duration_ticks == LONGEST_RUN_TICKS:  # it has stood still for too long
+                if self.rates.duration_ticks == LONGEST_RUN_TICKS:  # the pause has lasted too long
                     self.freeze()
                 return False
         return True
 
     def _check_end(self, at_rest: bool = False) -> None:
-        """However a motion came to its end, each joint has made the steps of its record, or it is a fault.
+        """At the end of a motion: set a fault if a joint has not made the steps of its record.
 
         ``at_rest``: it ends in a pause.
         """
@@ -270,14 +267,14 @@ class Engine:
                 self._take_fault()
 
     def _check_following(self) -> None:
-        """Compare one joint with its encoder; the next joint comes with the next call."""
+        """Compare one joint with its encoder; the next call checks the next joint."""
         number = self._watched_joint
         self._watched_joint = (number + 1) % len(self.drives)
         joint = self.drives[number]
         if not self._following[number].limit:
             return
         matches = joint.ring.matches()
-        if self._sampler.waits():  # a sample may be older than these matches, and comes first
+        if self._sampler.waits():  # a sample may be older than these matches, and must be converted first
             return
         encoder = self._encoders[number]
         encoder.update()
@@ -295,11 +292,11 @@ class Engine:
             self._stopped()
 
     def brake(self) -> None:
-        """Come to rest along the path; freeze where the motion's record has no time for it, or at rest in a pause.
+        """Brake to rest along the path; freeze if the motion's record has no brake times, or in a pause.
 
-        Over that time acceleration and jerk stay within 1.25 times the arm's limits. Braking begins after what is
-        in the rings, about 75 ms from now; where the rate is changing, after that. A motion that ends by itself before
-        it would have come to rest does that.
+        Acceleration and jerk stay within 1.25 times the arm's limits. Braking begins after the steps in the
+        rings, about 75 ms from now, and after a change of rate in progress. If the motion would end earlier
+        than the brake, it simply ends.
         """
         rates = self.rates
         if not self.moving or rates.braked:
@@ -315,13 +312,13 @@ class Engine:
             self._change_rate()
 
     def rest_ms(self) -> int:
-        """In how many milliseconds it rests after ``brake``, which came before or comes now; 0: at once."""
+        """Milliseconds until rest after ``brake``, called earlier or now; 0: at once."""
         return (
             min(self.rates.rest_kiticks(self._ahead_kiticks()), _MOST_KITICKS) * 32 // _KITICKS_PER_32_MS + 1
         )
 
     def _ahead_kiticks(self) -> int:
-        """How far ahead steps are in the rings; allocates nothing."""
+        """Time until the last step in the rings; allocates nothing."""
         ahead_kiticks = 0
         for joint in self.drives:
             ahead_kiticks = max(joint.ahead_kiticks(), ahead_kiticks)
@@ -330,11 +327,10 @@ class Engine:
     if features.SPEED:
 
         def change_rate(self, rate: int) -> None:
-            """Let the motion's own time continue at another rate, in thousandths; 0: pause, RESUME: as before it.
+            """Change the rate of the motion's own time, in thousandths; 0: pause, RESUME: end of the pause.
 
-            Each change takes as long as the record says, with acceleration and jerk as in ``brake``. It begins as
-            braking does; one that comes while the rate is changing waits until that has ended, and only the last
-            one counts.
+            The record has the length of each change; acceleration and jerk are as in ``brake``. It begins as
+            braking does. Requests during a change wait for its end; only the last one counts.
             """
             if not self.moving:
                 raise Refused(codes.NOT_MOVING)
@@ -342,11 +338,11 @@ class Engine:
             self._change_rate()
 
     def _change_rate(self) -> None:
-        """Begin the ramp to the rate that is wanted, or wait until the last one has ended."""
+        """Begin the ramp to the requested rate, unless the last ramp has not ended."""
         rates = self.rates
         if not rates.is_due():
             return
-        self._readings.convert()  # by the law that they were taken under
+        self._readings.convert()  # by the time law at their times
         law = rates.ramp(self._ahead_kiticks())
         if law is None:
             return
@@ -364,7 +360,7 @@ class Engine:
     # after it
 
     def _stopped(self) -> None:
-        """The outputs were frozen: let pulses that have begun end, then count."""
+        """After a freeze: wait for the end of started pulses, then count."""
         time.sleep_us(self._pulse_us)
         self.clock.stop()
         end_ticks = max(self.clock.ticks(), 0)
@@ -376,7 +372,7 @@ class Engine:
         self._readings.convert()
         if self.block[isr.TURN_LATE]:
             self.known = 0
-        self.inputs.watch(0)  # a switch that bounces is noted once
+        self.inputs.watch(0)  # a bouncing switch is noted once
         self._note_trip()
         if self.block[isr.FAULT] == codes.LIMIT_SWITCH and self._homing:
             self.block[isr.FAULT] = 0
@@ -403,16 +399,16 @@ class Engine:
         self.feeder.disconnect()
         self.inputs.close()
 
-    # what it knows
+    # state
 
     def commanded(self, joint: int) -> int:
-        """Steps issued so far, as a position."""
+        """Commanded position of a joint in steps."""
         return self._readings.commanded(joint)
 
     def next_sample(self, buffer: "array[int]") -> bool:
-        """Copy the oldest sample to ``buffer``, its words as in ``buffers.py``; False: there is none."""
+        """Copy the oldest sample to ``buffer`` (words as in ``buffers.py``); returns False if there is none."""
         return self._readings.next(buffer)
 
     def snapshot(self, buffer: "array[int]") -> None:
-        """Write a sample of this moment to ``buffer``; after a motion with the time at which it ended."""
+        """Write the present state as a sample to ``buffer``; after a motion, with the time of its end."""
         self._readings.snapshot(buffer)

@@ -1,4 +1,4 @@
-"""The parts of an engine for one arm, made from its record: hardware, and what serves each joint."""
+"""The parts of an engine for one arm, made from its record: hardware and joint drives."""
 
 from armtempo_shared import armrecord
 from micropython import const
@@ -16,13 +16,17 @@ from armtempo_board.motion.workspace import Workspace
 
 _PULSE_SPARE_US = const(5)
 _TICKS_PER_US = const(84)
-_LIMITS = ("min_steps", "max_steps", "max_rate")  # what of a joint's row in the arm record is needed later
+_LIMITS = (
+    "min_steps",
+    "max_steps",
+    "max_rate",
+)  # fields of a joint's row in the arm record that are needed later
 
 
 class EngineParts:
-    """``head`` and ``joints`` as ``armrecord.unpack`` gives them. Nothing moves, drivers are off.
+    """``head`` and ``joints``: from ``armrecord.unpack``. Nothing moves, drivers are off.
 
-    ``workspace``: what the engine before worked in and this one takes over; MemoryError where it is too small.
+    ``workspace``: memory taken over from the engine before; raises MemoryError if it is too small.
     """
 
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:

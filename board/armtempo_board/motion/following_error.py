@@ -1,4 +1,4 @@
-"""Following error: how far an encoder is from where the commanded steps should have brought it."""
+"""Following error: the deviation of an encoder from the commanded steps."""
 
 
 class FollowingError:
@@ -14,13 +14,13 @@ class FollowingError:
         self.limit = 0 if row["encoder"] == armrecord.NONE else row["following_counts"]
 
     def expected(self, steps: int) -> int:
-        """Counts that belong to a commanded position; in small integers, so that nothing is allocated."""
+        """Encoder counts for a commanded position; uses small integers, so that nothing is allocated."""
         whole = steps // self._denominator
         part = steps - whole * self._denominator
         return whole * self._numerator + part * self._numerator // self._denominator
 
     def is_exceeded(self, steps: int, counts: int) -> bool:
-        """Whether the joint is further from its command than the arm file allows; without a limit it never is."""
+        """Whether the following error exceeds the arm file's limit; never without a limit."""
         return self.limit > 0 and abs(counts - self.expected(steps)) > self.limit
 
 

@@ -1,6 +1,6 @@
-"""The drive of one joint: step generator, ring, DIR pin, and the count of what has been stepped.
+"""The drive of one joint: step generator, ring, DIR pin, and step count.
 
-The generator puts steps into its queue, from where an interrupt (ring_feeder.py) writes them to the ring. Ki ticks are
+The generator puts steps into its queue; an interrupt (ring_feeder.py) writes them to the ring. Ki ticks are
 1024 ticks, 12.2 us.
 """
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 LOOKAHEAD_KITICKS = const(4096)
 """How far ahead steps are computed: 50 ms. A change of rate begins after what is computed."""
 
-_GUARD_KITICKS = const(16)  # 195 us: a turn of DIR is queued only after an edge that is further away
-_OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings comes no more
-_REFILL_KITICKS = const(512)  # at most 6 ms between two looks at a queue that is full or long enough
+_GUARD_KITICKS = const(16)  # 195 us: a change of DIR is queued only after an edge that is later than this
+_OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings has failed
+_REFILL_KITICKS = const(512)  # at most 6 ms between two checks of a queue that is full or long enough
 _NEVER_KITICKS = const(1 << 29)
 _NOT_FED = const(-(1 << 22))  # as in ring.py
 _LATEST_KITICKS = const(22)  # of the queue, as in step_queue.py
@@ -37,7 +37,7 @@ _TURNS = const(8)
 class JointDrive:
     """``arm``: head and joints of the arm record; ``sampler`` has the memory that the interrupts read.
 
-    ``ring_words``: see ``Ring``; ``memory``: where the step generator takes its words from.
+    ``ring_words``: see ``Ring``; ``memory``: for the step generator.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class JointDrive:
         block[isr.PULSE_TICKS] = head["pulse_ticks"]
         block[isr.TURN_SLACK_TICKS] = _TURN_SLACK_TICKS
         block[isr.DIR_SETUP_TICKS] = head["dir_setup_ticks"]
-        self._turn_steps = array("i", [0] * _TURNS)  # steps of the ring before each turn that is queued
+        self._turn_steps = array("i", [0] * _TURNS)  # steps of the ring before each queued turn
         self._direction = 1
         self._count_from(0)
         self.ended = True
@@ -77,7 +77,7 @@ class JointDrive:
         self._next_refill_kiticks = 0
 
     def _count_from(self, position: int) -> None:
-        """The ring begins anew at a position."""
+        """Restart the count of the ring at a position."""
         self._base = position
         self._base_steps = 0
         self._turns_in = self._turns_out = 0
@@ -88,7 +88,7 @@ class JointDrive:
         self.stand()
 
     def stand(self) -> None:
-        """Before the motion that the generator has loaded."""
+        """Prepare for the motion that the generator has loaded."""
         self._direction = self.generator.direction
         self._dir.value((self._direction > 0) ^ self._inverted)
         self.ring.release()  # a motion may have been loaded and never started
@@ -98,7 +98,7 @@ class JointDrive:
         self._next_refill_kiticks = -LOOKAHEAD_KITICKS  # nothing is to be done before
 
     def position(self, matches: int) -> int:
-        """Commanded steps after that many matches of the ring; call it in the order of the matches."""
+        """Commanded steps after ``matches`` matches of the ring; call it in the order of the matches."""
         steps = (matches + 1) >> 1
         while self._turns_out != self._turns_in:
             turned = self._turn_steps[self._turns_out & (_TURNS - 1)]
@@ -111,23 +111,23 @@ class JointDrive:
         return self._base + self._direction * (steps - self._base_steps)
 
     def is_astray(self, at_rest: bool) -> bool:
-        """Whether the motion that ends here made other steps than its record has; see ``StepGenerator.end_steps``."""
+        """Whether the ending motion made other steps than its record has; see ``StepGenerator.end_steps``."""
         return self.position(self.ring.matches()) != self.generator.end_steps(at_rest)
 
     def ahead_kiticks(self) -> int:
-        """How far ahead steps are in the ring, rounded up."""
+        """Time until the last step in the ring, Ki ticks, rounded up."""
         ahead_kiticks = self.ring.fed_kiticks()
         return 0 if ahead_kiticks == _NOT_FED else ahead_kiticks + 1
 
     def refill(self, now_kiticks: int) -> int:
-        """Keep the queue filled; code of a fault, or 0."""
+        """Fill the queue; returns the code of a fault, or 0."""
         self.can_queue_more = False
         if now_kiticks < self._next_refill_kiticks:
             return 0
         generator = self.generator
         can_queue_more = self.can_queue_more = generator.prepare(now_kiticks + LOOKAHEAD_KITICKS)
         if can_queue_more and self.ring.state[isr.FED]:
-            return 0  # it is looked after once the queue is full
+            return 0  # served once the queue is full
         ahead_kiticks = self.ring.fed_kiticks()
         if ahead_kiticks == _NOT_FED:
             return self._restart(now_kiticks) if self._sampler.quiet() else 0
@@ -141,7 +141,7 @@ class JointDrive:
         return codes.INTERNAL if ahead_kiticks < _OVERDUE_KITICKS else 0
 
     def _turn(self) -> bool:
-        """Queue the turn of DIR that the generator is at; False while the queue is full."""
+        """Queue the change of DIR at which the generator waits; returns False while the queue is full."""
         if self._turns_in - self._turns_out >= _TURNS:
             return False
         if not isr.add_turn(self._sampler.block, self.ring.state, self._words_at, self._turn_delay):
@@ -153,7 +153,7 @@ class JointDrive:
         return True
 
     def _restart(self, now_kiticks: int) -> int:
-        """The ring has run out of steps: fill it from its start once the next ones come near."""
+        """Fill an empty ring from its start when the next steps are near."""
         ring = self.ring
         generator = self.generator
         if not generator.waits():
@@ -179,14 +179,14 @@ class JointDrive:
         return codes.UNDERRUN if ring.run() else 0
 
     def follow(self, law: "array[int]", is_last: bool) -> None:
-        """Take the motion's time by another law (see ``StepGenerator.follow``)."""
+        """Follow another time law (see ``StepGenerator.follow``)."""
         fed = self.ring.feed(0)
         self.generator.follow(law, is_last)
         self._next_refill_kiticks = -LOOKAHEAD_KITICKS
         self.ring.feed(fed)
 
     def finish(self) -> None:
-        """Where the motion's time will stand still, that is the end."""
+        """End the motion where its time stops."""
         self.generator.finish()
         self._next_refill_kiticks = -LOOKAHEAD_KITICKS
 
@@ -196,9 +196,9 @@ class JointDrive:
         self.ring.stop()
 
     def settle(self) -> None:
-        """The outputs were frozen: count the last step.
+        """After a freeze: count the last step.
 
-        A rising edge after which DMA was too late is not in the ring's count, but the pin was high.
+        A rising edge that DMA had not yet counted is detected by the high level of the pin.
         """
         block, at = self._sampler.block, self._words_at
         port = block[isr.HIGH_B] if block[at + isr.ON_PORT_B] else block[isr.HIGH_A]
@@ -210,10 +210,10 @@ class JointDrive:
         self.ended = True
 
     def close(self) -> None:
-        """The motion is read no further; the stream does not read the ring any more."""
+        """Close the motion; stop the DMA stream of the ring."""
         self.generator.close()
         self.ring.stop()
 
     def declare(self, steps: int) -> None:
-        """The joint is at ``steps``; nothing moves."""
+        """Set the position to ``steps``; nothing moves."""
         self._base = steps

@@ -1,7 +1,7 @@
-"""Is a motion fit to be run? The board itself judges it before each start.
+"""The board's check of a motion before each start.
 
-Subintervals are judged by the convex hulls of their Bezier points, and halved where that does not decide: what passes
-is proven, not sampled.
+Subintervals are checked by the convex hulls of their Bezier points, and halved if that is not decisive, so
+the result is proven, not sampled.
 """
 
 import struct
@@ -51,12 +51,12 @@ def check(
     gap_ticks: int,
     interval: "Subintervals",
 ) -> None:
-    """Refused for the first thing that is wrong, with the joint and a value.
+    """Raise Refused for the first error, with the joint and a value.
 
-    ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``StepGenerator.load``. ``interval``: is used for
-    the walk through the motion, to save heap.
-    The value is, by code: time_order, the control point; too_long, ticks or steps of 2**28; out_of_range, the position
-    in steps; too_fast, steps/s; too_abrupt, steps/s**2.
+    ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``StepGenerator.load``. ``interval``:
+    reused for the walk through the motion, to save heap. The value is, by code: time_order, the control
+    point; too_long, ticks or steps of 2**28; out_of_range, the position in steps; too_fast, steps/s;
+    too_abrupt, steps/s**2.
     """
     try:
         for joint in range(motion.joints):
@@ -80,7 +80,7 @@ def _check_joint(interval: "Subintervals", judge: "Judge", joint: int) -> None:
 
 
 def _check_numbers(motion: "MotionHead", joint: int) -> None:
-    """Increasing time control points, and all numbers within what step generation can hold."""
+    """Check that time control points increase, and that all numbers are within the range of the step generator."""
     _check_spline(motion, joint, motion.time_offset(joint), motion.segments * motion.refine, True)
     _check_spline(motion, joint, motion.angle_offset(joint), motion.segments, False)
 
@@ -112,7 +112,7 @@ def _check_segment(control: "list[int]", joint: int, segment: int, is_time: bool
 
 
 class Judge:
-    """Judges the subintervals of one joint; ``value`` says how much where one fails."""
+    """Checks the subintervals of one joint; ``value`` is the value of a failure."""
 
     def __init__(self, interval: "Subintervals", row: "dict[str, int]", gap_ticks: int) -> None:
         self._interval = interval
@@ -123,7 +123,7 @@ class Judge:
         self._mantissa, self._exponent = rate_check.scaled(limit)
 
     def verdict(self, measured: int) -> int:
-        """A code, _PASS, or _SPLIT where halves have to be looked at; ``measured``: what ``measure`` gave."""
+        """A code, _PASS, or _SPLIT if its halves must be checked; ``measured``: the result of ``measure``."""
         interval = self._interval
         angle = interval.angle
         for high, low in ((HIGH, LOW), (LAST_HIGH, LAST_LOW)):
@@ -141,13 +141,13 @@ class Judge:
         return high < 2 and (high << _HIGH_TICKS_BITS) + (time[LAST_LOW] - time[LOW] >> 16) <= _SHORT_TICKS
 
     def _range(self) -> int:
-        """All points of the hull within the joint's range prove it for the subinterval."""
+        """Range: proven if all points of the hull are within the joint's range."""
         measures = self._interval.angle_measures
         is_inside = self._low <= measures[subdivision.LOWEST] and measures[subdivision.HIGHEST] <= self._high
         return _PASS if is_inside or self._is_short() else _SPLIT
 
     def _rate(self) -> int:
-        """|angle'| <= rate * time' for all Bezier points of the derivatives proves it for the subinterval."""
+        """Rate: proven if |angle'| <= rate * time' for all Bezier points of the derivatives."""
         interval = self._interval
         angle, time = interval.angle_measures, interval.time_measures
         shift = 30 - self._exponent + angle[SCALE] - time[SCALE] + _HIGH_TICKS_BITS
@@ -161,9 +161,10 @@ class Judge:
         return codes.TOO_FAST
 
     def _reversal(self, measured: int) -> int:
-        """Where the joint stands still or reverses, acceleration may carry it 0.02 steps in half a gap.
+        """Reversal: at standstill, acceleration may move the joint at most 0.02 steps in half a gap.
 
-        Two opposite steps closer than the gap are left out; acceleration a goes a gap**2 / 8 past a half step.
+        Two opposite steps closer than the gap are left out; the angle then passes the half step by up to a
+        gap**2 / 8 for an acceleration a.
         """
         interval = self._interval
         if measured & subdivision.ANGLE_STEADY:

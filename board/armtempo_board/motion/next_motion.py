@@ -1,7 +1,8 @@
-"""The motion that comes next, brought as far as its first steps while another one moves.
+"""Prepares the next motion, with its first steps, while another one runs.
 
-It has step generators of its own. Neither what moves nor pins, rings and clock are touched before ``hand_over``, when
-nothing moves. Imported for sequences, where the heap has room for it (``armtempo_shared.engine_memory.ahead_bytes``).
+It has its own step generators. The running motion, pins, rings and clock are not touched before
+``hand_over``, when nothing moves. Imported for sequences, if the heap has room
+(``armtempo_shared.engine_memory.ahead_bytes``).
 """
 
 import gc
@@ -31,20 +32,20 @@ if TYPE_CHECKING:
     from armtempo_board.motion.joint_drive import JointDrive
 
 _RESERVE_KITICKS = const(3277)
-"""40 ms, in Ki ticks (1024 ticks). Pieces of the work take 1 to 2 ms at 1.3 cycles an instruction, a collection of the
-heap 5, the checksum of the largest motion 10. What moves may need the loop for itself from then on, and all that
-can be queued before."""
+"""40 ms, in Ki ticks (1024 ticks). A slice of the work takes 1 to 2 ms at 1.3 cycles an instruction, a
+garbage collection 5 ms, the checksum of the largest motion 10 ms; the running motion may need the loop
+afterwards."""
 _FAST_PART = const(4)
-"""A motion of an arm that may be faster than this part of the highest rates needs the loop until its last step is
-queued."""
+"""If the arm's rates exceed this fraction of the highest rates, the running motion needs the loop until its
+last step is queued."""
 _LEAD_TICKS = const(168000)  # 2 ms
 _PERMILLE = const(1000)
 
 
 class NextMotion:
-    """Of an engine. ``is_ready``: the motion is loaded, to start where ``expected`` says.
+    """The next motion of an engine. ``is_ready``: it is loaded, to start at ``expected``.
 
-    MemoryError where the heap has no room.
+    Raises MemoryError if the heap has no room.
     """
 
     def __init__(self, engine: "Engine") -> None:
@@ -64,14 +65,14 @@ class NextMotion:
     def pieces(
         self, rate: int, opened: "Callable[[], MotionHead]", stands_at: "Callable[[MotionHead, int], int]"
     ) -> "Iterator[None]":
-        """Do the work, a piece each time. Refused.
+        """Do the work, one slice per iteration; raises Refused.
 
-        ``rate``: as for ``Engine.load``; ``opened``: gives the motion, whose splines were checked before;
-        ``stands_at``: where a joint will stand before it.
+        ``rate``: as for ``Engine.load``; ``opened``: returns the motion, whose splines were checked before;
+        ``stands_at``: returns the position of a joint before it.
         """
         self.close()
         yield
-        gc.collect()  # now: else the heap would be collected when it is full, whatever moves
+        gc.collect()  # collect now, not when the heap is full, perhaps at a bad moment of the motion
         yield
         motion = opened()
         for number in range(len(self._generators)):
@@ -99,14 +100,15 @@ class NextMotion:
         self.is_ready = True
 
     def _expect(self, motion: "MotionHead", joint: int, position: int) -> None:
-        """Refused where the joint may not stand there."""
+        """Raise Refused if the joint cannot be there."""
         off = endpoints.start_offset(motion, joint, position)
         if off:
             raise Refused(codes.WRONG_START, joint, off)
         self.expected[joint] = position
 
     def has_time(self) -> bool:
-        """Whether what moves can go without ``Engine.refill`` for a piece: its queues hold the last steps, or many."""
+        """Whether the running motion needs no ``Engine.refill`` during a slice: its queues hold its last
+        steps, or many."""
         until_kiticks = self._engine.clock.kiticks() + _RESERVE_KITICKS
         for joint in self._engine.drives:
             generator = joint.generator
@@ -122,7 +124,7 @@ class NextMotion:
         return True
 
     def starts_from_here(self) -> bool:
-        """Whether it is ready, and all joints stand where it begins."""
+        """Whether it is ready, and all joints are at its start."""
         engine = self._engine
         for joint, expected in enumerate(self.expected):
             if not engine.known >> joint & 1 or engine.commanded(joint) != expected:
@@ -130,21 +132,21 @@ class NextMotion:
         return self.is_ready
 
     def lead_ticks(self) -> int:
-        """Time before it, from when the counters start: DIR settles, but drivers that are on have been on."""
+        """Lead time from the start of the counters: DIR must settle, but the drivers are already on."""
         inputs = self._engine.inputs
         if inputs.enable_pin.value() != inputs.on_level:
             return LEAD_TICKS
         return max(_LEAD_TICKS, max([joint.gap_ticks for joint in self._engine.drives]))
 
     def hand_over(self, number: int, joint: "JointDrive") -> None:
-        """Give a joint the generator that is ready for the motion, instead of the one that it had; nothing moves."""
+        """Exchange a joint's generator for the prepared one; nothing moves."""
         generator = self._generators[number]
         self._generators[number] = joint.generator
         self._put(number, joint, generator)
         joint.stand()
 
     def give_back(self) -> None:
-        """All joints have again the generators that they had before, and this is not used any more; nothing moves."""
+        """Give all joints their former generators again; this object is not used any more; nothing moves."""
         self.close()
         for number, joint in enumerate(self._engine.drives):
             self._put(number, joint, self._own[number])
@@ -154,7 +156,7 @@ class NextMotion:
         self._engine.feeder.take_queue(joint)
 
     def close(self) -> None:
-        """The motion is not meant any more, or others read it now."""
+        """Close the motion: it is not needed, or it was handed over."""
         self.is_ready = False
         self.motion = self.override = None
         for generator in self._generators:

@@ -52,9 +52,9 @@ def scaled(rate: int) -> "tuple[int, int]":
 
 @micropython.viper
 def compare(angle: ptr32, time: ptr32, mantissa: int, shift: int) -> int:
-    """Whether a subinterval keeps a rate: its differences against those of time * mantissa / 2**(30 - shift).
+    """Compare a subinterval with a rate: its differences with those of time * mantissa / 2**(30 - shift).
 
-    ``angle``, ``time``: its measures. At the ends the differences are the rate itself: FASTER there is certain.
+    ``angle``, ``time``: its measures. At the ends the differences give the exact rate, so FASTER is certain there.
     """
     found = SLOWER
     high = mantissa >> 15
@@ -106,7 +106,8 @@ def _rate(interval: "Subintervals", steps: int, ticks: int) -> int:
 
 
 def check_sum(motion: "MotionHead", joints: "list[dict[str, int]]", interval: "Subintervals") -> None:
-    """Refused (too_fast, no joint, rate) where all joints together may step too fast in one of many spans of time."""
+    """Raise Refused (too_fast, no joint, rate) if the sum of all rates may be too high in one of many spans
+    of time."""
     limit = step_rates.together + step_rates.together // 100
     if sum([row["max_rate"] for row in joints]) <= limit:
         return

@@ -1,4 +1,4 @@
-"""The rate of a motion's own time: changes and braking, when they begin, and the end that moves with them."""
+"""The rate of a motion's own time: changes, braking, their start times, and the resulting end of the motion."""
 
 from armtempo_shared import codes
 from armtempo_shared.messages import RESUME
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-_LAW_MARGIN_KITICKS = const(2048)  # 25 ms, within which all joints get another law of time
+_LAW_MARGIN_KITICKS = const(2048)  # 25 ms, within which all joints get the new time law
 _PERMILLE = const(1000)
 
 
 class RateControl:
-    """``wanted``: the rate, in thousandths. ``override``: the law of time (stepgen/override.py) of a motion.
+    """``wanted``: the requested rate, in thousandths. ``override``: the time law (stepgen/override.py) of a motion.
 
-    ``duration_ticks``: when the motion ends unless the rate changes. ``waits``: a change is wanted that has not begun.
-    ``end_moves``: the last sample is to be taken at another time than planned. ``braked``: it is to come to rest.
+    ``duration_ticks``: end of the motion unless the rate changes. ``waits``: a requested change has not
+    begun. ``end_moves``: the time of the last sample has changed. ``braked``: the motion is to come to rest.
     """
 
     def __init__(self, clock: MotionClock) -> None:
@@ -36,7 +36,7 @@ class RateControl:
         self.braked = self.end_moves = self.waits = False
 
     def begin(self, override: "Any", motion: "MotionHead") -> None:
-        """Of a motion that is loaded; ``override`` is at its time 0."""
+        """Begin with a loaded motion; ``override`` is at its time 0."""
         self.override = override
         self.wanted = self._before_pause = override.rate
         self.duration_ticks = override.end_ticks()
@@ -45,7 +45,7 @@ class RateControl:
         self.braked = self.end_moves = self.waits = False
 
     def brake(self) -> bool:
-        """Want rest; False where there is no way to it, or it is paused and needs none."""
+        """Request rest; returns False if the motion has no brake times, or it is paused."""
         if not self._can_brake or (self.stands() and self._is_steady()):
             return False
         self.braked = True
@@ -56,13 +56,13 @@ class RateControl:
         return True
 
     def stands(self) -> bool:
-        """Whether its own time stands still after the ramp that began last."""
+        """Whether the motion's own time stops at the end of the last ramp."""
         return bool(self.override.rate == 0)
 
     if features.SPEED:
 
         def want(self, rate: int) -> None:
-            """Want another rate, in thousandths; 0: pause, RESUME: as before it."""
+            """Request a rate, in thousandths; 0: pause, RESUME: end of the pause."""
             if self.braked:
                 raise Refused(codes.BUSY)
             if not self._can_brake:
@@ -75,7 +75,7 @@ class RateControl:
             self._before_pause = rate or self._before_pause
 
     def is_due(self) -> bool:
-        """Whether the change that is wanted can begin; else it waits until the one before has ended."""
+        """Whether the requested change can begin: the change before has ended."""
         self.waits = self.override.rate != self.wanted
         return self.waits and self._is_steady()
 
@@ -83,10 +83,11 @@ class RateControl:
         return bool(self._clock.kiticks() > self.override.steady_kiticks)
 
     def ramp(self, ahead_kiticks: int) -> "array[int] | None":
-        """Begin the change, after what is in the rings: the law that all joints are to follow; None: it ends before.
+        """Begin the change after the steps in the rings; returns the time law for all joints, None if the
+        motion ends before.
 
-        ``ahead_kiticks``: how far ahead steps are in them. Where it would come to rest later than it ends by itself,
-        it does that.
+        ``ahead_kiticks``: time until the last step in the rings. If rest would be later than the end of the
+        motion, there is no change.
         """
         ahead_kiticks = max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
         start_ticks = (self._clock.kiticks() + ahead_kiticks) << 10
@@ -101,7 +102,7 @@ class RateControl:
         return law
 
     def rest_kiticks(self, ahead_kiticks: int) -> int:
-        """How long from now it takes to come to rest after a stop: one that came before, or one now; 0 by freezing.
+        """Time from now until rest after a stop, given earlier or now; 0 by freezing.
 
         Allocates nothing.
         """

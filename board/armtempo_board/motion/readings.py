@@ -1,4 +1,4 @@
-"""Where the joints stand: samples from raw samples, kept until they are fetched, and snapshots.
+"""Positions of the joints: samples converted from raw samples, kept until they are fetched, and snapshots.
 
 The words of a sample are named in ``buffers.py``.
 """
@@ -23,7 +23,7 @@ _HALF_ROUND_KITICKS = const(1 << 21)  # of the counter
 
 
 class Readings:
-    """``joints`` and ``encoders``: one of each a joint; ``slots``: word of its encoder in a raw sample."""
+    """``joints``, ``encoders``: one per joint; ``slots``: word of its encoder in a raw sample."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class Readings:
         self._encoders = encoders
         self._slots = slots
         self._override: "Any" = None
-        self._end = array("i", [0] * COMMANDED)  # both times at which the last motion ended, as in a sample
+        self._end = array("i", [0] * COMMANDED)  # the two end times of the last motion, as in a sample
         self._has_ended = False
         self._size = COMMANDED + 2 * len(joints)
         self._words = array("i", bytearray(4 * _CAPACITY * self._size))
@@ -47,14 +47,14 @@ class Readings:
         self.lost = 0
 
     def begin(self, override: "Any") -> None:
-        """Forget what was not fetched; ``override``: of the motion that comes."""
+        """Drop samples that were not fetched; ``override``: of the next motion."""
         self._override = override
         self._has_ended = False
         self._in = self._out = 0
         self.lost = 0
 
     def convert(self) -> None:
-        """Convert all raw samples; the clock has been read a moment ago."""
+        """Convert all raw samples; the clock was read just before."""
         sampler = self._sampler
         at = sampler.next_raw()
         while at >= 0:
@@ -93,7 +93,7 @@ class Readings:
             words[counts + number] = encoder.counts
 
     def end(self, ticks: int) -> None:
-        """The motion has ended at a time: take what is needed of its override, and let that go."""
+        """The motion has ended at ``ticks``: note the end times, and release its override."""
         if self._override:
             self.convert()
             _put_ticks(self._end, ticks)
@@ -102,7 +102,7 @@ class Readings:
         self._has_ended = True
 
     def next(self, buffer: "array[int]") -> bool:
-        """Copy the oldest sample to ``buffer`` and forget it; False if there is none."""
+        """Move the oldest sample to ``buffer``; returns False if there is none."""
         if self._in == self._out:
             return False
         at = (self._out & (_CAPACITY - 1)) * self._size
@@ -112,12 +112,12 @@ class Readings:
         return True
 
     def commanded(self, joint: int) -> int:
-        """Steps of a joint issued so far, as a position."""
+        """Commanded position of a joint in steps."""
         while True:
             matches = self._joints[joint].ring.matches()
             if not self._sampler.waits():
                 return self._joints[joint].position(matches)
-            self.convert()  # samples come first: they may be older
+            self.convert()  # samples first: they may be older
 
     def snapshot(self, buffer: "array[int]") -> None:
         """Write a sample of this moment to ``buffer``; after a motion with the time at which it ended."""
@@ -137,7 +137,7 @@ class Readings:
 
 
 def _put_ticks(sample: "array[int]", ticks: int) -> None:
-    """Put the time into a sample; the motion's own time is the same."""
+    """Put the time into a sample, also as the motion's own time."""
     low = ticks & 0xFFFFFFFF
     sample[TICKS_LOW] = sample[PATH_LOW] = low - (1 << 32) if low >> 31 else low
     sample[TICKS_HIGH] = sample[PATH_HIGH] = ticks >> 32

@@ -1,7 +1,7 @@
 """The interrupt of TIM6: every 0.5 or 1 ms it writes steps from the queues to the rings, whatever the main loop does.
 
-The compare interrupt and the switches rank above it and may interrupt it. While no ring is fed it stops its timer; who
-feeds one starts it (``Ring.feed``). What it costs: docs/hardware.md.
+The compare interrupt and the switches have a higher priority. While no ring is fed its timer is stopped;
+``Ring.feed`` starts it. Cost: docs/hardware.md.
 """
 
 import micropython
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-# Between two interrupts: 0.5 ms, or twice as long where each ring, when full, lasts _LONG_US. It is not filled before
+# Between two interrupts: 0.5 ms, or twice as long if each ring, when full, lasts _LONG_US. It is not filled before
 # three eighths are free, nor in its last 390 us.
 _PERIOD_TICKS = const(42000)
 _LONG_US = const(3150)
@@ -39,9 +39,9 @@ _STATES = const(6)
 
 
 class RingFeeder:
-    """``block``: the memory that the interrupts share. It is made once; ``connect`` gives it rings.
+    """``block``: the memory that the interrupts share. Made once; ``connect`` gives it rings.
 
-    ``inputs``: what freezes the outputs.
+    ``inputs``: freezes the outputs.
     """
 
     def __init__(self, block: "array[int]") -> None:
@@ -50,7 +50,7 @@ class RingFeeder:
         mem32[stm.TIM6] = 0
 
     def connect(self, inputs: Inputs, joints: "list[JointDrive]", rates: "list[int]") -> None:
-        """Feed the joints' rings; ``inputs`` freezes all where one was written too late.
+        """Feed the joints' rings; ``inputs`` freezes all if one was written too late.
 
         ``rates``: the joints' highest step rates.
         """
@@ -64,20 +64,20 @@ class RingFeeder:
         mem32[stm.TIM6] = 0
 
     def take_queue(self, joint: JointDrive) -> None:
-        """The steps come from the queue of the joint's generator; nothing moves."""
+        """Use the queue of the joint's present generator; nothing moves."""
         isr.set_places(joint.ring.state, joint.ring.words, joint.generator.queue)
 
     def disconnect(self) -> None:
-        """Hold no ring; none is fed any more."""
+        """Release the rings; none is fed any more."""
         mem32[stm.TIM6] = 0
         self.inputs = None
 
 
 def _feeder(owner: RingFeeder, block: "array[int]") -> "Callable[[object], object]":
-    """What the interrupt does.
+    """The interrupt's callback.
 
-    Looking up a name takes 110 to 150 instructions, an object's memory 150 to 250, a call 600 to 800. So all rings are
-    written in one call. A call with more than four variables from outside would allocate.
+    Looking up a name takes 110 to 150 instructions, an object's memory 150 to 250, a call 600 to 800. So all
+    rings are written in one call. A closure with more than four free variables would allocate when called.
     """
     states = memoryview(block)[isr.BLOCK_HEAD + isr.RING :]
     calls: "Any" = (block, stm.DMA1, stm.TIM2, stm.TIM6, isr.rings_to_refill, emit, states)

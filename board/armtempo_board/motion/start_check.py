@@ -1,4 +1,4 @@
-"""May a motion start from where the joints stand? Imported for that and given up after it: it needs much memory."""
+"""Whether a motion may start from the present positions. Needs much memory, so it is unloaded afterwards."""
 
 from armtempo_shared import codes
 
@@ -16,9 +16,9 @@ _ANY_JOINT = 0
 def check_start(
     motion: "MotionHead", joints: "list[JointDrive]", limits: "list[dict[str, int]] | None", known: int
 ) -> int:
-    """Duration of the motion, in ticks, or Refused.
+    """Duration of the motion, in ticks; raises Refused.
 
-    ``limits`` as the engine has them, None if its splines were checked before; ``known``: one bit per joint.
+    ``limits``: the engine's, None if its splines were checked before; ``known``: one bit per joint.
     """
     if limits is not None:
         check_splines(motion, joints, limits)
@@ -34,7 +34,7 @@ def check_start(
 
 
 def check_splines(motion: "MotionHead", joints: "list[JointDrive]", limits: "list[dict[str, int]]") -> None:
-    """The motion as such; Refused."""
+    """Check the splines of the motion; raises Refused."""
     from armtempo_board.motion import motion_check  # here, so that it can be forgotten
 
     joint = joints[_ANY_JOINT]  # as the gap is the same for all; it walks through the motion

@@ -1,4 +1,4 @@
-"""What one engine after the other works in, made once: the heap is as it was when an arm gives way to another."""
+"""Memory for the engine, made once and reused for each arm, so that the heap does not fragment."""
 
 import uctypes
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 class Workspace:
     """``room``: bytes for an engine, see ``armtempo_shared.engine_memory``; ``memory`` is made by ``make_memory``.
 
-    ``address``: where its PROCESSOR_WORDS are; 0: in the heap. The interrupts' callbacks belong to it, so they never
-    hold what an engine had before.
+    ``address``: of its PROCESSOR_WORDS; 0: in the heap. It owns the interrupts' callbacks, so they never
+    refer to objects of an earlier engine.
     """
 
     def __init__(self, room: int, address: int = 0) -> None:
@@ -33,14 +33,14 @@ class Workspace:
         self.feeder = RingFeeder(self.sampler.block)
 
     def make_memory(self, words: int) -> None:
-        """Blocks of that many words; MemoryError if the heap has no such block."""
+        """Allocate blocks of ``words`` words; raises MemoryError if the heap has no such block."""
         from armtempo_shared.engine_memory import PROCESSOR_WORDS, blocks  # here, so that it can be forgotten
 
         self.memory = Memory([])  # what was there goes first
         self.memory = Memory(blocks(words), self._address, PROCESSOR_WORDS)
 
     def rings(self, rates: "list[int]") -> "list[Any]":
-        """Take all memory back and out of it, the largest first, the words of a ring for each of these step rates."""
+        """Take all memory back, then allocate a ring for each of these step rates, the largest first."""
         from armtempo_shared.engine_memory import (  # here, so that it can be forgotten
             SHORT_MS,
             lasting_ms,

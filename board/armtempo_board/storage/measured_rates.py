@@ -1,6 +1,6 @@
-"""The step rates that a self-test measured, in flash. They count for this chip, firmware and program only.
+"""The step rates measured by a self-test, in flash; valid for this chip, firmware and program only.
 
-In a program in files they are never read: the self-test needs the firmware.
+Not used by the program in files, as the self-test needs the firmware.
 """
 
 from binascii import crc32
@@ -11,12 +11,12 @@ from micropython import const
 from armtempo_board import step_rates
 
 _FILE = "/rates.bin"
-_FIELDS = "<IIB"  # of one joint, of all together, of how many joints they were measured
-_CRC_BYTES = const(4)  # crc32 over the fields, which begins with the hash of what they count for
+_FIELDS = "<IIB"  # of one joint, of all together, number of joints in the measurement
+_CRC_BYTES = const(4)  # crc32 of the fields, initialised with the hash of chip, firmware and program
 
 
 def read(root: str, board_id: bytes, program_crc: int) -> None:
-    """Take what is stored, if it is of this chip with its firmware (``board_id``) and this program."""
+    """Use the stored rates, if they are of this chip with its firmware (``board_id``) and this program."""
     try:
         with open(root + _FILE, "rb") as file:
             data = file.read(calcsize(_FIELDS) + _CRC_BYTES + 1)
@@ -29,7 +29,7 @@ def read(root: str, board_id: bytes, program_crc: int) -> None:
 
 
 def write(root: str, board_id: bytes, program_crc: int, rates: "tuple[int, int, int]") -> None:
-    """Store them; they are in force after the next start."""
+    """Store them; they are used from the next start on."""
     with open(root + _FILE, "wb") as file:
         file.write(_sealed(pack(_FIELDS, *rates), board_id, program_crc))
 

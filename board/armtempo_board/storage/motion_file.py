@@ -1,4 +1,4 @@
-"""A stored motion, read from its file in pieces: it never needs to fit into memory."""
+"""A stored motion, read from its file in pieces, so it need not fit into memory."""
 
 import struct
 from binascii import crc32
@@ -17,7 +17,7 @@ _CRC_BYTES = const(4)
 class MotionFile(MotionHead):
     """The motion in the file ``path`` of ``length`` bytes; ``crc``: its checksum.
 
-    Raises MotionError where the record is cut, damaged or of an unknown kind, OSError where the flash fails.
+    Raises MotionError if the record is incomplete, damaged or of an unknown kind, OSError if the flash fails.
     """
 
     def __init__(self, path: str, length: int) -> None:
@@ -34,7 +34,7 @@ class MotionFile(MotionHead):
 
 
 def stated_crc(path: str, length: int) -> int:
-    """The crc32 that ends a record of ``length`` bytes; MotionError where it is not that of what is before it."""
+    """The crc32 at the end of a record of ``length`` bytes; raises MotionError if it is wrong."""
     piece = memoryview(bytearray(_PIECE))
     crc = 0
     left = length - _CRC_BYTES

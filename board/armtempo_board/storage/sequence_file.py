@@ -1,4 +1,4 @@
-"""A stored sequence, read from its file row by row: it takes no memory while motions run."""
+"""A stored sequence, read from its file row by row, so it takes no memory during motions."""
 
 from armtempo_shared import codes
 from armtempo_shared.sequence import OtherVersionError, SequenceRecord
@@ -10,8 +10,8 @@ from armtempo_board.storage.motion_file import stated_crc
 class SequenceFile(SequenceRecord):
     """The sequence in the file ``path`` of ``length`` bytes; ``crc``: its checksum.
 
-    Raises SequenceError or MotionError where the record is cut, damaged or of an unknown kind, Refused where it is of
-    another version, OSError where the flash fails.
+    Raises SequenceError or MotionError if the record is incomplete, damaged or of an unknown kind, Refused if
+    it is of another version, OSError if the flash fails.
     """
 
     def __init__(self, path: str, length: int) -> None:

@@ -1,11 +1,11 @@
-"""Records in flash: motions, the arm record, the default by name and checksum; never half written.
+"""Records in flash: motions, the arm record, the default by name and checksum; written atomically.
 
-A record is written to ``NAME.new``, read back, synced and renamed. Where a power cut leaves a ``.new`` file,
-``recover`` takes it if the old file is gone and the new one is whole, and removes it otherwise.
+A record is written to ``NAME.new``, read back, synced and renamed. If a power cut leaves a ``.new`` file,
+``recover`` uses it if the old file is gone and the new one is complete, and removes it otherwise.
 
-A record's name is that of its motion or sequence, or ``ARM_RECORD_NAME``; its first bytes say which it is.
-The module is imported when it is needed and forgotten before a motion (see ``Controller.store``): no file is read or
-written while one runs.
+A record has the name of its motion or sequence, or ``ARM_RECORD_NAME``; its first bytes give its kind. The
+module is imported when needed and unloaded before a motion (see ``Board.store``): it reads and writes no file
+during one.
 """
 
 import os
@@ -14,12 +14,11 @@ from binascii import crc32, hexlify
 from armtempo_shared import codes
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
 from armtempo_shared.messages import ARM_RECORD_NAME
-from armtempo_shared.motion import MotionError
 from micropython import const
 
 from armtempo_board import features
 from armtempo_board.errors import Refused
-from armtempo_board.storage.motion_file import MotionFile, stated_crc
+from armtempo_board.storage import motion_file
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -40,6 +39,8 @@ _SEQUENCE_MAGIC = (
     b"ATS"  # of every version, as in armtempo_shared.sequence, which is loaded for sequences only
 )
 _PIECE = const(512)
+_0, _9, _A, _Z = const(0x30), const(0x39), const(0x61), const(0x7A)  # letters, small
+_SMALL = const(0x20)
 _MOST_FREE = const(0x3FFFFFFF)
 
 
@@ -49,11 +50,11 @@ def _file_name(name: str) -> str:
 
 
 def _motion_file(name: str) -> str:
-    """The file of a motion; refuses what is no name for one."""
+    """The file of a motion; raises Refused for an invalid name."""
     if not 0 < len(name) <= MAX_NAME:
         raise Refused(codes.BAD_NAME)
-    for letter in name:
-        if not ("a" <= letter <= "z" or "A" <= letter <= "Z" or "0" <= letter <= "9" or letter in "-_"):
+    for byte in name.encode():  # letters as strings would each be a name that MicroPython keeps
+        if not (_A <= byte | _SMALL <= _Z or _0 <= byte <= _9 or byte in b"-_"):
             raise Refused(codes.BAD_NAME)
     return name + _MOTION
 
@@ -70,12 +71,12 @@ def _check_crc(data: bytes, crc: int) -> None:
 
 
 class Store:
-    """The folder ``root``; every method refuses with FLASH_ERROR or FLASH_FULL where the flash fails."""
+    """The folder ``root``; every method raises Refused with FLASH_ERROR or FLASH_FULL if the flash fails."""
 
     def __init__(self, root: str, recover: bool = True) -> None:
-        """``recover``: nothing is under way that another object began."""
+        """``recover``: recover from a power cut; only if no other object has an upload in progress."""
         self._root = root
-        self._file: "Any" = None  # the upload under way,
+        self._file: "Any" = None  # the upload in progress,
         self._target = ""  # its file name,
         self._size = 0  # bytes announced
         self._received = 0  # and received so far
@@ -83,7 +84,7 @@ class Store:
             self.recover()
 
     def recover(self) -> None:
-        """Make the folder if it is missing, finish or undo what a power cut interrupted."""
+        """Make the folder if it is missing; finish or undo an upload that a power cut interrupted."""
         for function in (os.stat, os.mkdir):  # a folder that is there costs no write
             try:
                 function(self._root)
@@ -95,7 +96,7 @@ class Store:
                 self._recover(name[: -len(_NEW)])
 
     def free(self) -> int:
-        """Bytes free in the flash; as many as a small integer can hold at most."""
+        """Bytes free in the flash, at most the largest small integer."""
         try:
             stat = os.statvfs(self._root)
         except OSError:
@@ -107,7 +108,7 @@ class Store:
         return sorted([name[: -len(_MOTION)] for name in self._files() if name.endswith(_MOTION)])
 
     def begin(self, name: str, size: int) -> None:
-        """Begin an upload; gives up one that was under way."""
+        """Begin an upload; aborts one in progress."""
         file_name = _file_name(name)
         self.abandon()
         if size > MAX_MOTION_BYTES:
@@ -121,7 +122,7 @@ class Store:
         self._received = 0
 
     def write(self, offset: int, data: bytes) -> int:
-        """Add a piece; one that has come before is ignored. Returns the offset of the next."""
+        """Add a piece; a repeated one is ignored. Returns the offset of the next."""
         if not self._file or not offset <= self._received or offset + len(data) > self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
         fresh = data[self._received - offset :]
@@ -135,9 +136,9 @@ class Store:
         return self._received
 
     def commit(self, crc: int) -> str:
-        """Check the upload in the flash and put it in place; returns the record's name.
+        """Check the upload in the flash and rename it; returns the record's name.
 
-        An arm record is not put in place before it is judged: see ``take_arm``.
+        An arm record is not renamed before it is checked: see ``take_arm``.
         """
         if not self._file or self._received != self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
@@ -157,18 +158,18 @@ class Store:
         return name[: -len(_MOTION)]
 
     def new_arm(self) -> bytes:
-        """The arm record that was uploaded and waits to be judged."""
+        """The uploaded arm record, before its check."""
         return self._read(_ARM + _NEW)
 
     def take_arm(self, is_fit: bool) -> None:
-        """Put it in place, or give it up."""
+        """Rename the uploaded arm record, or drop it."""
         if is_fit:
             self._replace(_ARM)
         else:
             self._discard(_ARM + _NEW)
 
     def abandon(self) -> None:
-        """Give up the upload under way, if any."""
+        """Abort the upload in progress, if any."""
         if self._file:
             try:
                 self._file.close()
@@ -178,22 +179,41 @@ class Store:
             self._discard(self._target + _NEW)
 
     def read(self, name: str) -> bytes:
-        """All bytes of a small record; NOT_FOUND, or TOO_LONG where they do not fit into memory."""
+        """All bytes of a small record; refuses with NOT_FOUND, or TOO_LONG if it does not fit into memory."""
         return self._read(_file_name(name))
 
-    def motion(self, name: str) -> MotionFile:
-        """A stored motion, checked as far as its head and checksum go."""
+    def motion(self, name: str) -> motion_file.MotionFile:
+        """A stored motion, with head and checksum checked."""
         return self._motion(_motion_file(name))
 
-    def is_sequence(self, name: str) -> bool:
-        """Whether the record of this name is a sequence; NOT_FOUND."""
-        if not name:
-            raise Refused(codes.NOT_FOUND)
-        return self._is_sequence(_motion_file(name))
+    if features.SEQUENCES:
 
-    def sequence(self, name: str) -> "Any":
-        """A stored sequence, a ``SequenceFile``, checked as far as its head and checksum go."""
-        return self._sequence(_motion_file(name))
+        def is_sequence(self, name: str) -> bool:
+            """Whether the record of this name is a sequence; refuses with NOT_FOUND."""
+            if not name:
+                raise Refused(codes.NOT_FOUND)
+            return self._is_sequence(_motion_file(name))
+
+        def sequence(self, name: str) -> "Any":
+            """A stored sequence (``SequenceFile``), with head and checksum checked."""
+            return self._sequence(_motion_file(name))
+
+        def _sequence(self, file_name: str) -> "Any":
+            from armtempo_board.storage import sequence_file  # here, so that it can be forgotten
+
+            size = self._size_of(file_name)
+            try:
+                return self._guard(sequence_file.SequenceFile, self._path(file_name), size)
+            except ValueError:  # SequenceError, or MotionError for its checksum
+                raise Refused(codes.BAD_RECORD)
+
+        def _check_sequence(self, file_name: str) -> None:
+            from armtempo_shared import sequence_check  # here, so that it can be forgotten
+
+            try:
+                sequence_check.check(self._sequence(file_name))
+            except ValueError:  # SequenceError
+                raise Refused(codes.BAD_RECORD)
 
     def size_of(self, name: str) -> int:
         """Bytes of a record; NOT_FOUND."""
@@ -218,7 +238,7 @@ class Store:
         self._guard(_sync)
 
     def rename(self, old: str, new: str) -> None:
-        """Give a motion another name; where it is the default it stays that."""
+        """Give a motion another name; a default stays the default."""
         old_file, new_file = _motion_file(old), _motion_file(new)
         self._size_of(old_file)
         if new.lower() in [name.lower() for name in self.names() if name != old] or new == old:
@@ -233,7 +253,7 @@ class Store:
             self._write_default(new + crc)
 
     def default(self) -> str:
-        """Name of the default motion; "" for none, or where it is no longer the one that was chosen."""
+        """Name of the default motion; "" if there is none, or its record has changed."""
         try:
             lines = self._read(_DEFAULT).decode().split("\n")
         except (Refused, UnicodeError):
@@ -252,7 +272,7 @@ class Store:
         self._write_default(name)
 
     def _crc(self, name: str) -> str:
-        """A motion's checksum as its last bytes have it, after a blank."""
+        """A motion's checksum, from its last bytes, after a blank."""
         size = self._size_of(_motion_file(name))
         _, crc = self.part(name, max(0, size - 4), 4)
         return " " + hexlify(crc).decode()
@@ -266,11 +286,11 @@ class Store:
             self._discard(_DEFAULT + _NEW)
             raise
         self._guard(file.close)
-        self._guard(_sync)  # before the rename: the old one is gone with it
+        self._guard(_sync)  # before the rename, which removes the old file
         self._replace(_DEFAULT)
 
     def _other_case(self, file_name: str) -> None:
-        """FAT ignores the case of letters: two names must differ in more than that."""
+        """Refuse a name that differs from another only in case, as FAT ignores case."""
         for name in self._files():
             if name != file_name and name.lower() == file_name.lower():
                 raise Refused(codes.EXISTS)
@@ -316,24 +336,19 @@ class Store:
 
     def _check_motion(self, file_name: str, crc: int) -> None:
         try:
-            found = self._guard(stated_crc, self._path(file_name), self._size_of(file_name))
-        except MotionError:
+            found = self._guard(motion_file.stated_crc, self._path(file_name), self._size_of(file_name))
+        except ValueError:  # MotionError
             raise Refused(codes.BAD_CHECKSUM)
         if found != crc:
             raise Refused(codes.BAD_CHECKSUM)
         self._check_kind(file_name)
 
     def _check_kind(self, file_name: str) -> None:
-        """Refuses what is neither a motion nor a sequence."""
-        if not features.SEQUENCES or not self._is_sequence(file_name):
+        """Refuse a record that is neither a motion nor a sequence."""
+        if features.SEQUENCES and self._is_sequence(file_name):
+            self._check_sequence(file_name)
+        else:
             self._motion(file_name)
-            return
-        from armtempo_shared import sequence_check  # here, so that it can be forgotten
-
-        try:
-            sequence_check.check(self._sequence(file_name))
-        except ValueError:  # SequenceError
-            raise Refused(codes.BAD_RECORD)
 
     def _is_sequence(self, file_name: str) -> bool:
         self._size_of(file_name)
@@ -343,26 +358,17 @@ class Store:
         finally:
             file.close()
 
-    def _sequence(self, file_name: str) -> "Any":
-        from armtempo_board.storage import sequence_file  # here, so that it can be forgotten
-
+    def _motion(self, file_name: str) -> motion_file.MotionFile:
         size = self._size_of(file_name)
         try:
-            return self._guard(sequence_file.SequenceFile, self._path(file_name), size)
-        except ValueError:  # SequenceError, or MotionError for its checksum
-            raise Refused(codes.BAD_RECORD)
-
-    def _motion(self, file_name: str) -> MotionFile:
-        size = self._size_of(file_name)
-        try:
-            return self._guard(MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
-        except MotionError:
+            return self._guard(motion_file.MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
+        except ValueError:  # MotionError
             if not self._is_sequence(file_name):
                 raise Refused(codes.BAD_RECORD)
             raise Refused(codes.IS_SEQUENCE if features.SEQUENCES else codes.NEEDS_FIRMWARE)
 
     def _is_whole(self, file_name: str) -> bool:
-        """Whether a ``.new`` file is a whole record, of the kind that the file's name says."""
+        """Whether a ``.new`` file is a complete record, of the kind given by its name."""
         try:
             if file_name.endswith(_MOTION):
                 self._check_kind(file_name + _NEW)

@@ -1,1 +1,1 @@
-"""Errors, the array type, progress, the version."""
+"""Errors, the array type, progress, version, settings; files: TOML, JSON, text tables, written whole or not at all."""

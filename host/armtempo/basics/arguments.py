@@ -1,4 +1,4 @@
-"""Arguments of public calls, checked against their annotations: one InputError that says what to give instead."""
+"""Checks of the arguments of public calls against their annotations, with an InputError that says what to give."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SIMPLE = {
 
 
 def checked(target: T) -> T:
-    """A function whose arguments are checked by its annotations, or a class whose public methods and calls are.
+    """Decorate a function (or a class: its public methods and constructor) to check arguments by their annotations.
 
     ``ArrayLike`` and ``Array`` take finite numbers only.
     """
@@ -72,9 +72,9 @@ def _wrong(name: str, argument: str, value: object, kind: Any) -> InputError:
 
 @cache
 def _annotated(function: Callable[..., Any]) -> tuple[list[str], str, dict[str, Any]]:
-    """Names of the arguments that may be given by their places, of one that takes the rest, and types of all.
+    """Names of the positional arguments, name of the variable one ("" if none), and types of all.
 
-    ``Numbers`` stands for arrays.
+    Arrays have the type ``Numbers``.
     """
     arrays: dict[str, Any] = {"ArrayLike": Numbers, "Array": Numbers, "Where": Any}
     code = function.__code__
@@ -87,11 +87,11 @@ _TAKES_MORE = inspect.CO_VARARGS
 
 
 class Numbers:
-    """The type of finite numbers in any arrangement."""
+    """Type for arrays (or nested lists) of finite numbers."""
 
 
 def fits(value: object, kind: Any) -> bool:
-    """Whether a value is of a type, as an annotation says it."""
+    """Whether a value fits an annotation."""
     return _check(kind)(value)
 
 
@@ -161,7 +161,7 @@ def _entries_fit(value: object, origin: Any, kinds: Sequence[Any]) -> bool:
 
 
 def words(kind: Any) -> str:
-    """A type in words."""
+    """Describe a type."""
     origin, inner = get_origin(kind) or kind, get_args(kind)
     if kind in _SIMPLE:
         return _SIMPLE[kind]

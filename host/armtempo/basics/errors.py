@@ -1,4 +1,4 @@
-"""What can go wrong, as one tree of exceptions.
+"""The tree of exceptions.
 
 ::
 
@@ -7,21 +7,21 @@
     ├── PlanError                  no plan under these limits, or no posture for this pose
     ├── MissingPackageError        an optional package is not installed
     ├── ToolError                  a program of the system that armtempo calls is missing or fails
-    ├── RunFolderError             a recorded run cannot be read, is not whole, or cannot be written
+    ├── RunFolderError             a recorded run cannot be read, is incomplete, or cannot be written
     └── LinkError                  the board cannot be reached or stopped answering
-        ├── PortError              the port is there and cannot be opened
+        ├── PortError              the port exists but cannot be opened
         │   └── PortInUseError     another program has it
-        ├── PortGivenUpError       the program that had the port, and was asked, has ended
+        ├── PortGivenUpError       the program that had the port has closed it
         ├── NoAnswerError          the port is open and the board does not answer in time
         ├── NoProgramError         MicroPython's prompt answers instead of the board program
-        ├── DisturbedError         pieces of messages arrive, too few of them whole
-        ├── OtherBoardError        another board answers than before, or the same one started anew
+        ├── DisturbedError         parts of messages arrive, but too few complete ones
+        ├── OtherBoardError        another board answers than before, or it has restarted
         ├── BoardError             the board refused a command or a fault ended a motion; carries the code
         ├── PartError              a part of the self-test raised an exception on the board
         └── SilentError            the board does not answer in a part of the self-test
 
-Every error says what is wrong and where (``problem``) and what to do next (``hint``). Next to the tree is
-Stopped, a KeyboardInterrupt: a motion was brought to rest because a stop was asked for.
+Every error says what is wrong and where (``problem``) and what to do next (``hint``). Stopped is not in the
+tree: it is a KeyboardInterrupt, raised after a stop request brought a motion to rest.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class InputError(ArmtempoError):
 
 
 class PlanError(ArmtempoError):
-    """The input is well formed but has no solution, and the message says why."""
+    """The input is valid but has no solution; the message says why."""
 
 
 class MissingPackageError(ArmtempoError):
@@ -70,19 +70,19 @@ class MissingPackageError(ArmtempoError):
 
 
 class ToolError(ArmtempoError):
-    """A program of the system is not installed, or did not do what it was called for."""
+    """A program of the system is not installed, or failed."""
 
 
 class RunFolderError(ArmtempoError):
-    """A run folder is incomplete, contradicts itself, or cannot be written."""
+    """A run folder is incomplete or inconsistent, or cannot be written."""
 
 
 class LinkError(ArmtempoError):
-    """No board, no answer, or the connection broke."""
+    """There is no board, it does not answer, or the connection broke."""
 
 
 class PortError(LinkError):
-    """The port is there, but it cannot be opened."""
+    """The port exists but cannot be opened."""
 
 
 class PortInUseError(PortError):
@@ -90,7 +90,7 @@ class PortInUseError(PortError):
 
 
 class PortGivenUpError(LinkError):
-    """The program that had the port has ended, or closed it."""
+    """The program that had the port has closed it or ended."""
 
 
 class NoAnswerError(LinkError):
@@ -102,11 +102,11 @@ class NoProgramError(LinkError):
 
 
 class DisturbedError(LinkError):
-    """Pieces of messages arrive, but too few whole ones: worth another try."""
+    """Parts of messages arrive, but too few complete ones: worth another try."""
 
 
 class OtherBoardError(LinkError):
-    """The board that answers is not the one that was there before, or was started anew since."""
+    """Another board answers than before, or the board has restarted."""
 
 
 class BoardError(LinkError):

@@ -1,4 +1,4 @@
-"""Which version of armtempo is installed, and how, and so how a package that is missing comes to it."""
+"""The installed version of armtempo, and the command that adds a package to this installation."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 
 
 def command(package: str, extra: str) -> str:
-    """The command that adds ``package``, or armtempo's ``extra`` that installs it, to this installation."""
+    """The command that adds ``package``, or armtempo's ``extra`` with it, to this installation."""
     if os.path.exists(os.path.join(sys.prefix, "pipx_metadata.json")):
         return f"pipx inject armtempo {package}"
     if os.path.exists(os.path.join(sys.prefix, "uv-receipt.toml")):

@@ -1,4 +1,4 @@
-"""How work that takes a while tells how far it is and what it does, and how it is ended: by an exception there."""
+"""Progress of long work: a callback with the work done, which can end the work by an exception."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 Progress = Callable[[float, float], object]
-"""Called now and then with the work done and the whole of it, both in the same unit. What it raises ends the work. One
-that has a method ``stage`` is told by it, in a word or two, what is being done."""
+"""Called repeatedly with the work done and the total, in the same unit; an exception ends the work. If it has
+a method ``stage``, that is called with a word or two about the present work."""
 
 _EVERY_S = 0.05
-"""Time after which ``alive`` calls the progress again."""
+"""Interval at which ``alive`` calls the progress again."""
 
 
 def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
-    """The progress of part ``number`` (from 0) of work that has ``parts`` equal ones."""
+    """The progress of part ``number`` (from 0) of ``parts`` equal parts."""
     return None if progress is None else _Part(progress, number, parts)
 
 
@@ -32,7 +32,7 @@ class _Part:
 
 
 class _Watched:
-    """A progress, how far it was when last called, and when."""
+    """A progress, with the values and the time of its last call."""
 
     def __init__(self, progress: Progress) -> None:
         self.progress = progress
@@ -56,7 +56,7 @@ _watched: ContextVar[_Watched | None] = ContextVar("_watched", default=None)
 
 @contextmanager
 def watched(progress: Progress | None) -> Iterator[Progress]:
-    """A progress for work within, where ``stage`` and ``alive`` reach it from any depth."""
+    """A context with a progress that ``stage`` and ``alive`` reach from any depth of calls."""
     whole = _Watched(progress or _silent)
     token = _watched.set(whole)
     try:
@@ -66,13 +66,13 @@ def watched(progress: Progress | None) -> Iterator[Progress]:
 
 
 def stage(name: str) -> None:
-    """What is being done from here on."""
+    """Report what is being done from now on."""
     if (current := _watched.get()) is not None:
         current.stage(name)
 
 
 def alive() -> None:
-    """Work continues: the progress is called again with what it was last called with, so that it may end the work."""
+    """Call the progress again with its last values, so that it can end the work."""
     if (current := _watched.get()) is not None:
         current.alive()
 

@@ -18,17 +18,17 @@ from click.shell_completion import CompletionItem
 
 from armtempo.basics.errors import INTERRUPTED, ArmtempoError
 from armtempo.basics.installation import installed_version
+from armtempo.basics.text import did_you_mean
 from armtempo.cli import results
 from armtempo.cli.commands import COMMANDS, GROUPS
-from armtempo.formats.text import did_you_mean
 
 _EXAMPLES = """\
 Examples:
 
 \b
   armtempo demo                        the paper's motion on a virtual board
-  armtempo new my_arm                  a folder for an own arm; the commands below are for inside
-  armtempo plan                        a job as a trajectory file
+  armtempo new my_arm                  make a folder for your arm; run the commands below in it
+  armtempo plan                        plan a job, write a trajectory file
   armtempo run first.json --repeat 3   replay and record it
   armtempo COMMAND --help              more about one of them
 """
@@ -55,7 +55,8 @@ class LazyGroup(click.Group):
                 formatter.write_dl(rows)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """The commands that begin so, with what they do; then what any command completes: its options."""
+        """Commands whose names start with ``incomplete``, with their short help; then click's own
+        completions."""
         found = [
             CompletionItem(name, help=one.short_help())
             for name, one in COMMANDS.items()
@@ -80,7 +81,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that is meant; the error for one that there is not names the nearest."""
+        """The command in ``args``; the error for an unknown command names the most similar one."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             near = did_you_mean(args[0], COMMANDS) or ". 'armtempo --help' lists them"
             ctx.fail(f"no command {args[0]!r}{near}")
@@ -90,9 +91,9 @@ class LazyGroup(click.Group):
         """Run the command; an error that the user can correct is one message, without a traceback."""
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
-                stream.reconfigure(errors="replace")  # a ² in a code page that has none ends no command
+                stream.reconfigure(errors="replace")  # the code page may lack a character
         as_json = "--json" in [*ctx._protected_args, *ctx.args]
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads only cost time on matrices this small
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads make work on matrices this small slower
         try:
             with raised_by_signals():
                 return super().invoke(ctx)
@@ -100,15 +101,15 @@ class LazyGroup(click.Group):
             results.show_error(error, as_json=as_json)
             ctx.exit(error.exit_code)
         except OSError as error:
-            if error.errno == errno.EPIPE:  # the reader of the output has gone: click ends quietly
+            if error.errno == errno.EPIPE:  # the reader of the output has closed it: click ends quietly
                 raise
             results.show_error(_of_file(error), as_json=as_json)
             ctx.exit(1)
         except MemoryError as error:
             results.show_error(
                 ArmtempoError(
-                    f"this takes more memory than there is: {error}".rstrip(": "),
-                    "close other programs, or ask for less: lower refine, a smaller population",
+                    f"not enough memory: {error}".rstrip(": "),
+                    "close other programs, or lower refine or the population",
                 ),
                 as_json=as_json,
             )
@@ -122,7 +123,7 @@ class LazyGroup(click.Group):
 def raised_by_signals() -> Iterator[None]:
     """Let Ctrl-C and SIGTERM raise KeyboardInterrupt.
 
-    Ctrl-C stays ignored where it is, as in a program that a shell has put into the background.
+    If Ctrl-C is ignored, as in a program that a shell runs in the background, it stays ignored.
     """
     ignored = signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     numbers = [signal.SIGTERM] if ignored else [signal.SIGTERM, signal.SIGINT]

@@ -1,4 +1,4 @@
-"""``armtempo check``: what looks wrong about an arm file and a job."""
+"""``armtempo check``: looks for mistakes in an arm file and a job."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import JOB, ProjectSettings
 from armtempo.cli import chosen, options, results
 from armtempo.diagnosis import arm_check, figures
 from armtempo.diagnosis.figures import JointFigures, table
 from armtempo.diagnosis.finding import Finding, Level
 from armtempo.model.arm import Arm
 from armtempo.planning.checks import rate_words
-from armtempo.project.settings import JOB, ProjectSettings
 from armtempo.report import arm_picture, drawing
 
 
@@ -28,12 +28,12 @@ from armtempo.report import arm_picture, drawing
     metavar="FILE",
     help="Draw the arm at home and at the ends of its ranges into FILE (PNG or SVG). Needs the extra 'plot'.",
 )
-@options.force("the picture if it is there")
+@options.force("an existing picture")
 @options.as_json
 def check(
     arm_path: Path | None, job_path: Path | None, picture: Path | None, force: bool, as_json: bool
 ) -> None:
-    """Check an arm file, and a job if given: what looks wrong, and how to correct it.
+    """Check an arm file, and a job if given, for likely mistakes, and say how to correct them.
 
     Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 if there are errors; 0
     with warnings and notes only.
@@ -56,7 +56,7 @@ def _check_picture(picture: Path | None, force: bool) -> None:
         return
     if picture.suffix not in (".png", ".svg"):
         raise InputError(
-            f"--picture {picture}: not a kind of picture", "give a name that ends in .png or .svg"
+            f"--picture {picture}: not a supported picture format", "give a name that ends in .png or .svg"
         )
     if picture.exists() and not force:
         raise InputError(f"--picture {picture}: already exists", "choose another name, or add --force")

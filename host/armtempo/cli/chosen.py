@@ -1,4 +1,4 @@
-"""What the shared options name: the board, the arm, the job, the plan, and the rules where an option is missing."""
+"""Board, arm, job and plan of the shared options, and the defaults if an option is missing."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armtempo.basics.errors import InputError, PortGivenUpError
+from armtempo.basics.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
+from armtempo.basics.text import did_you_mean
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import remark
-from armtempo.formats.text import did_you_mean
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, is_name
 from armtempo.model.tool_pose import Pose
+from armtempo.ports import board_port
 from armtempo.ports.names import SIM, is_sim
-from armtempo.project import board_port
-from armtempo.project.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
 
-if TYPE_CHECKING:  # planner and link take long to import: a command without a plan or a board needs neither
+if TYPE_CHECKING:  # planner and link take long to import, and many commands need neither
     from armtempo.link.traffic import Sink
     from armtempo.model.plan import Plan
     from armtempo.model.sequence_plan import SequencePlan
@@ -34,31 +34,31 @@ _ANEW = ", started for this command: its arm begins at home; 'armtempo virtual-b
 
 
 def named_arm(path: Path | None, for_shape: bool = False) -> Arm | None:
-    """The arm of ``--arm``, of the variable or of the project folder, with its postures checked; None without one.
+    """The arm of ``--arm``, the variable or the project folder, its postures checked; None if none is set.
 
-    ``for_shape``: for its kinematics, so it needs no motors.
+    ``for_shape``: only its kinematics are needed, so it may have no motors.
     """
     setting = ProjectSettings().get(ARM, path)
     if not setting:
         return None
     arm = (Arm.shape if for_shape else Arm.load)(setting.path)
     if any(isinstance(posture.where, Pose) for posture in arm.postures):
-        from armtempo.planning import via_points  # here, because most arms need no kinematics
+        from armtempo.planning import via_points  # imported here, because most arms need no kinematics
 
         via_points.check_postures(arm)
     return arm
 
 
 def arm_file(path: Path | None) -> Path:
-    """The file of the same, or the paper's arm's, which is printed."""
+    """The file of the arm as in ``named_arm``; default: the paper's arm, which is printed."""
     setting = ProjectSettings().get(ARM, path)
     if not setting:
-        remark(f"no arm given; using the one that ships with armtempo, {shipped.PAPER!r}")
+        remark(f"no arm given; using the shipped arm {shipped.PAPER!r}")
     return shipped.find(setting.value or shipped.PAPER).path
 
 
 def load_arm(path: Path | None) -> Arm:
-    """The same; InputError if none is named."""
+    """The arm as in ``named_arm``; raises InputError if none is set."""
     found = named_arm(path)
     if found is None:
         raise nothing_set(ARM, "which arm?")
@@ -66,16 +66,17 @@ def load_arm(path: Path | None) -> Arm:
 
 
 def arm_or_paper(path: Path | None, for_shape: bool = False) -> Arm:
-    """The same, for commands that move nothing: without one the paper's arm, which is printed."""
+    """The arm as in ``named_arm``; default: the paper's arm, which is printed. For commands that move
+    nothing."""
     found = named_arm(path, for_shape)
     if found is None:
         found = Arm.paper()
-        remark(f"no arm given; using the one that ships with armtempo, {found.name!r}")
+        remark(f"no arm given; using the shipped arm {found.name!r}")
     return found
 
 
 def load_job(path: Path | None, arm: Arm) -> Job:
-    """The job of ``--job``, of the variable or of the project folder; InputError if none is named."""
+    """The job of ``--job``, the variable or the project folder; raises InputError if none is set."""
     setting = ProjectSettings().get(JOB, path)
     if not setting:
         raise nothing_set(JOB, "which job?")
@@ -83,31 +84,31 @@ def load_job(path: Path | None, arm: Arm) -> Job:
 
 
 def job_file(path: Path | None) -> Path | None:
-    """The file of the job that is named; None without one."""
+    """The job's file as in ``load_job``; None if none is set."""
     setting = ProjectSettings().get(JOB, path)
     return setting.path if setting else None
 
 
 def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]:
-    """What to plan: both as they are named, or, where neither is, the demo's.
+    """The arm and the job to plan; the demo's if neither is set.
 
-    InputError if only one of them is named: a job is never planned for an arm that nobody has named.
+    Raises InputError if only one of them is set: a job is never planned for a default arm.
     """
     settings = ProjectSettings()
     arm, job = settings.get(ARM, arm_path), settings.get(JOB, job_path)
     if arm or job:
         if not arm:
-            raise nothing_set(ARM, f"job {job.value} ({job.source}) is for which arm?")
+            raise nothing_set(ARM, f"no arm is set for job {job.value} ({job.source})")
         loaded = load_arm(arm_path)
         return loaded, load_job(job_path, loaded)
-    remark("no arm and no job given; using the feeding job and the arm that ship with armtempo")
+    remark("no arm and no job given; using the shipped feeding job and arm")
     return Arm.paper(), Job.paper()
 
 
 def arm_of_board(board: Board, named: Arm | None) -> Arm:
-    """The arm that is named; else the one that ships with armtempo, if the board is set up for just that.
+    """``named`` if given, else the paper's arm if the board is set up for it.
 
-    InputError if neither is.
+    Raises InputError otherwise.
     """
     if named is not None:
         return named
@@ -117,7 +118,7 @@ def arm_of_board(board: Board, named: Arm | None) -> Arm:
     if board.info.arm_crc == record_crc(paper):
         remark(f"arm: {paper.name}, which the board is set up for")
         return paper
-    has = "another than the one that ships with armtempo" if board.info.arm_crc else "none yet"
+    has = "an arm other than the paper's" if board.info.arm_crc else "none yet"
     raise nothing_set(ARM, f"which arm does the board move? It is set up for {has}")
 
 
@@ -127,7 +128,7 @@ def describe_arm(arm: Arm) -> str:
 
 
 def source_words(name: str, source: str) -> str:
-    """An arm's name and file; the one that ships with armtempo needs no path."""
+    """An arm's name and file; without the file for a shipped arm."""
     ships = Path(source).is_relative_to(Path(__file__).parents[1]) if source else False
     where = "ships with armtempo" if ships else source
     return f"{name} ({where})" if where else name
@@ -137,9 +138,9 @@ def source_words(name: str, source: str) -> str:
 
 
 def is_file(what: str) -> bool:
-    """Whether an argument names a trajectory file rather than a motion on the board.
+    """Whether an argument is a trajectory file rather than the name of a motion on the board.
 
-    InputError, naming the nearest file, for what is no file and can be no name of a motion either.
+    Raises InputError, with the most similar file, if it can be neither.
     """
     path = Path(what)
     if path.is_file():
@@ -155,14 +156,14 @@ def is_file(what: str) -> bool:
 
 
 def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan:
-    """The plan of a trajectory file, which must fit the arm that is named, if one is."""
+    """The plan of a trajectory file; raises InputError if an arm is set and it does not fit."""
     from armtempo import pipeline
 
     return pipeline.load(path, named_arm(arm_path), altered)
 
 
 def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = None) -> SequencePlan:
-    """A planned sequence, which must fit the arm that is named, if one is; ``name`` is refused."""
+    """A planned sequence; raises InputError if an arm is set and it does not fit, or if ``name`` is given."""
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.records.encode import arm_record
 
@@ -182,9 +183,10 @@ def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = Non
 
 
 def port(given: str | None, others: bool = False) -> str:
-    """The port of ``--port``, of the variable or of the project folder, else the one that can be meant, printed.
+    """The port of ``--port``, the variable or the project folder; default: the only board plugged in,
+    printed.
 
-    ``others``: one that another armtempo program has open will do too.
+    ``others``: the default may also be a port that another armtempo program has open.
     """
     setting = board_port.choose(given, others)
     if setting.source in board_port.UNASKED:
@@ -193,12 +195,12 @@ def port(given: str | None, others: bool = False) -> str:
 
 
 def any_port(given: BoardOptions) -> BoardOptions:
-    """The same with the port that is meant, which another armtempo program may have open."""
+    """The options with their port filled in, which another armtempo program may have open."""
     return replace(given, port=port(given.port, others=True))
 
 
 def runs(out: Path | None) -> Path:
-    """Where run folders go."""
+    """The folder for run folders."""
     return ProjectSettings().get(RUNS, out).path
 
 
@@ -209,9 +211,10 @@ def board(
     sink: Sink | None = None,
     wait: bool = True,
 ) -> Board:
-    """The board of ``--port``; a virtual one moves ``arm``, and is said to be one; ``sink`` takes the traffic.
+    """The board of ``--port``. A virtual board moves ``arm``, and a remark says that it is virtual.
 
-    ``wait``: a few seconds for a port that another program has, see ``connect``.
+    ``sink`` gets the traffic. ``wait``: wait a few seconds for a port that another program has, see
+    ``connect``.
     """
     from armtempo.robot import connect
 
@@ -219,16 +222,16 @@ def board(
     log = given.log_traffic
     found = opened(given.port, arm, log_traffic=log, sink=sink, any_program=any_program, tell=remark)
     if found.info.virtual:
-        remark(f"port {found.port}: {virtual_words(found.port)}")
+        remark(f"port {found.port}: {_virtual_words(found.port)}")
     return found
 
 
 def shared_or_own(
     given: BoardOptions, arm: Arm | None = None, any_program: bool = False, sink: Sink | None = None
 ) -> SharedBoard | Board:
-    """The board through another program that has its port, which is printed, else over the port itself.
+    """The board through the program that has its port open (printed), else over the port itself.
 
-    ``given`` names a port. A program that opens it just now answers for it soon; one that ends gives it up.
+    ``given.port`` must be set. Retries while another program is opening or closing the port.
     """
     from armtempo.link import patiently
     from armtempo.robot import shared_board
@@ -244,17 +247,17 @@ def shared_or_own(
 
 
 def board_state(given: BoardOptions) -> BoardState:
-    """What the board says, whichever program has the port, which ``given`` names."""
+    """The board's state, also if another program has the port; ``given.port`` must be set."""
     while True:
         with shared_or_own(given, any_program=True) as found:
             try:
                 return found.state()
-            except PortGivenUpError:  # it is free now, or another program's
+            except PortGivenUpError:  # the port is free now, or another program has it
                 continue
 
 
-def virtual_words(port: str) -> str:
-    """What kind of virtual board is on a port."""
+def _virtual_words(port: str) -> str:
+    """Describe the virtual board on a port."""
     if port == SIM:
         return "a virtual board, which ends with this command"
     return f"a virtual board{_ANEW}" if is_sim(port) else "a virtual board"

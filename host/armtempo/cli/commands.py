@@ -1,7 +1,7 @@
-"""The commands: the module and the function of each, what it does in a line, and examples.
+"""The commands: module and function, one line of help, and examples of each.
 
-The help page and the Tab key take a line from here, so that they import no command's module. A test takes each example
-through the command's own parser, and compares the line with the function's docstring.
+The help page and completion use these lines, so they import no command's module. A test parses each example
+with the command's own parser, and compares the line with the function's docstring.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import click
 
 
 class Entry:
-    """Where a command is, as ``module:function``, and what is said of it without importing it."""
+    """A command's place, ``module:function``, and the help that is shown without importing it."""
 
     def __init__(self, where: str, summary: str, *examples: str) -> None:
         self.module, self.function = where.split(":")
@@ -18,12 +18,12 @@ class Entry:
         self.examples = examples
 
     def short_help(self, width: int = 45) -> str:
-        """The line as click cuts it."""
+        """The line, cut by click to ``width`` characters."""
         return click.Command(None, help=self.summary).get_short_help_str(width)
 
     @property
     def epilog(self) -> str:
-        """The end of its help page."""
+        """The examples at the end of its help page."""
         lines = "\n".join(f"  armtempo {line}" for line in self.examples)
         return f"Examples:\n\n\b\n{lines}"
 
@@ -58,7 +58,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "check": Entry(
             "check:check",
-            "Check an arm file, and a job if given: what looks wrong, and how to correct it.",
+            "Check an arm file, and a job if given, for likely mistakes, and say how to correct them.",
             "check",
             "check --arm my_arm.toml --job first.toml --picture arm.png",
         ),
@@ -192,7 +192,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "configure": Entry(
             "deploy:configure",
-            "Set the board up for an arm, or for another one than before.",
+            "Set the board up for an arm.",
             "configure --arm my_arm.toml",
         ),
         "upload": Entry(

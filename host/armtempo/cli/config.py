@@ -1,4 +1,4 @@
-"""``armtempo config`` and ``ports``: what is set and where that comes from, and where a board may be."""
+"""``armtempo config`` and ``ports``: the settings with their sources, and the serial ports."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics import settings
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import ProjectSettings, Setting
 from armtempo.cli import options, results
-from armtempo.ports.listing import find_ports
+from armtempo.ports import board_port
+from armtempo.ports.board_port import find_ports
 from armtempo.ports.names import SIM
-from armtempo.project import board_port, settings
-from armtempo.project.settings import ProjectSettings, Setting
 
 
 @click.command("config")
@@ -46,7 +47,7 @@ def config(
 
 
 def _unset_port(found: dict[str, Setting]) -> str:
-    """What happens where no port is set."""
+    """The text for a port that is not set."""
     if found[settings.PORT]:
         return ""
     try:

@@ -35,22 +35,22 @@ next:   armtempo new my_arm            a folder for your own arm and job, step b
     default=SIM,
     show_default=True,
     metavar="PORT",
-    help="Where to replay it: a virtual board, unless this option names another port.",
+    help="Port of the board. Default: a virtual board.",
 )
 @click.option(
     "--pick-and-place",
     is_flag=True,
-    help="Instead: a sequence with a gripper and a part sensor, on a virtual board only.",
+    help="Run a sequence with a gripper and a part sensor instead, on a virtual board only.",
 )
 @options.log_traffic
 def demo(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | None) -> None:
     """Plan, replay and report the paper's feeding motion.
 
-    Without --port a virtual board replays it, faster than real time, even if a board is plugged in.
+    Without --port a virtual board replays it faster than real time, even if a board is plugged in.
     """
     if pick_and_place:
         if port != SIM:
-            raise InputError(f"--port {port}: this demo is for a virtual board", "leave --port out")
+            raise InputError(f"--port {port}: --pick-and-place needs a virtual board", "leave --port out")
         _pick_and_place()
         return
     with ProgressBar("planning") as progress:

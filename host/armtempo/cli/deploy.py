@@ -72,10 +72,10 @@ def undeploy(port: str | None, as_json: bool) -> None:
 @click.command("configure")
 @options.board(options.arm)
 def configure(given: BoardOptions) -> None:
-    """Set the board up for an arm, or for another one than before.
+    """Set the board up for an arm.
 
     The position is unknown afterwards, unless only limits differ: ranges, speeds, following errors, the link time-out.
-    Motions that were stored for another geometry or gearing are refused; upload them again.
+    Stored motions of an arm with another geometry or gearing are refused; upload them again.
     """
     arm = chosen.load_arm(given.arm_path)
     with chosen.board(given, arm) as board:
@@ -103,11 +103,9 @@ def _unchanged(arm: Arm) -> str:
 def _configured(arm: Arm, values: dict[str, Any]) -> list[str]:
     lines = [f"the board is set up for {chosen.describe_arm(arm)}", values["memory"]]
     if motions := values["motions_to_upload_again"]:
-        lines.append(
-            f"{motions} stored motions were made for the old arm; upload again those that are needed"
-        )
+        lines.append(f"{motions} stored motions are for the old arm; upload those that you need again")
     if values["position_known"]:
-        lines.append("only limits differ from those that the board had: the position is still known")
+        lines.append("only limits have changed: the position is still known")
     else:
         lines.append("the position is unknown: move the arm to its home posture, then 'armtempo home'")
     return lines

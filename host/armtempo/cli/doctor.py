@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics import settings
 from armtempo.basics.errors import ArmtempoError
+from armtempo.basics.settings import ProjectSettings
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.diagnosis import arm_check, machine
 from armtempo.diagnosis.finding import Finding, Level, error, good, note
 from armtempo.model import shipped
-from armtempo.project import board_port, settings
-from armtempo.project.settings import ProjectSettings
+from armtempo.ports import board_port
 from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
 
@@ -66,7 +67,7 @@ def _arm(arm_path: Path | None) -> list[Finding]:
 def _board(port: str | None, arm_path: Path | None) -> list[Finding]:
     try:
         name = board_port.choose(port, others=True).value
-    except ArmtempoError:  # none was named and none can be meant: nothing is wrong with that
+    except ArmtempoError:  # no port is set and no board is plugged in: not an error
         return [note("board", "not checked", "give --port PORT, or --port sim")]
     try:
         return board_check.examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
@@ -75,10 +76,10 @@ def _board(port: str | None, arm_path: Path | None) -> list[Finding]:
 
 
 def _named(state: BoardState, arm_path: Path | None) -> BoardState:
-    """With the name of the arm that the board is set up for, where that is the one named here."""
+    """``state`` with the arm's name, if the board is set up for the arm that is set here."""
     try:
         arm = chosen.named_arm(arm_path)
-    except ArmtempoError:  # told where the arm was examined
+    except ArmtempoError:  # already reported with the arm
         return state
     return state if arm is None else state.named(arm)
 

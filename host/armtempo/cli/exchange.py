@@ -1,4 +1,4 @@
-"""``armtempo import``, ``export`` and ``import-urdf``: from and for other programs."""
+"""``armtempo import``, ``export`` and ``import-urdf``: exchange of files with other programs."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 from armtempo_shared.limits import MAX_JOINTS
 
+from armtempo.basics import number_table, toml_table
+from armtempo.basics.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
-from armtempo.formats import number_table, toml_table
-from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.model import mesh_files, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -24,14 +24,13 @@ from armtempo.new_arm import urdf_reader as reader
 @click.command("import")
 @click.argument("table", type=click.Path(dir_okay=False, path_type=Path))
 @options.arm
-@click.option("--name", help="Name of the job; without it the table's file name.")
+@click.option("--name", help="Name of the job; default: the table's file name.")
 @click.option("--radians", is_flag=True, help="The angles are in radians.")
 @click.option(
     "--tolerance-deg",
     type=float,
     metavar="DEG",
-    help="Leave out lines that change the path by less than DEG. A table with a column time_s is a sampled "
-    "motion, for which this is 0.1 unless given.",
+    help="Leave out lines that change the path by less than DEG. Default for a table with a column time_s: 0.1.",
 )
 @click.option(
     "-o",
@@ -81,8 +80,8 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     if found.thinned_to_deg is None:
         return [written]
     thinned = (
-        f"{found.lines} lines thinned to {len(found.via_deg)} via points: a spline through them keeps to the table "
-        f"within {found.thinned_to_deg:g} deg; the times are planned anew"
+        f"{found.lines} lines reduced to {len(found.via_deg)} via points: a spline through them follows the table "
+        f"within {found.thinned_to_deg:g} deg; 'armtempo plan' computes new times"
     )
     return [thinned, written]
 
@@ -95,7 +94,7 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     type=click.Choice(["csv", "ros"]),
     default="csv",
     show_default=True,
-    help="csv: degrees, a line a time; ros: trajectory_msgs/JointTrajectory in YAML, radians.",
+    help="csv: degrees, one line per time; ros: trajectory_msgs/JointTrajectory in YAML, radians.",
 )
 @click.option("--rate", type=float, default=100.0, show_default=True, metavar="HZ", help="Points a second.")
 @click.option("--frame-id", default="", help="header.frame_id of the ROS message.")
@@ -124,7 +123,7 @@ def export(
     TRAJECTORY: a trajectory file, as 'armtempo plan' writes it.
     """
     if as_json and output is None:
-        raise InputError("--json is about the file of -o", "give -o FILE, or leave --json out")
+        raise InputError("--json needs -o FILE", "give -o FILE, or leave out --json")
     plan = Plan.load(trajectory, altered)
     text = plan.to_csv(rate) if kind == "csv" else plan.to_ros(rate, frame_id)
     if output is None:
@@ -151,7 +150,7 @@ def export(
 @click.option(
     "--tip",
     metavar="LINK",
-    help="Link whose frame is the tool's; default: the parent of the fingers, or the end.",
+    help="Link whose frame is the tool's; default: the parent of the fingers, or the last link.",
 )
 @click.option("--meshes", is_flag=True, help="Write the links' shapes too, which 'armtempo panel' shows.")
 @click.option("--force", is_flag=True, help="Replace FILE if it exists, and the meshes next to it.")
@@ -176,9 +175,11 @@ def import_urdf(
         raise InputError(f"{out}: is the URDF itself", "choose another name")
     chain = reader.read(urdf, base, tip)
     fit = fitting.fit(chain)
-    text = arm_text.arm_text(chain, fit, urdf.name)
-    Arm.of_table(toml_table.parse(text, str(out)))  # what would not be read again is not written
     corners_mm = urdf_meshes.of_rows(chain, fit, urdf) if meshes else {}
+    text = arm_text.arm_text(chain, fit, urdf)
+    arm = Arm.of_table(
+        toml_table.parse(text, str(out))
+    )  # an arm file that could not be read again is not written
     replace_text(out, text)
     written = mesh_files.write(out, corners_mm) if meshes else []
     values = {
@@ -191,17 +192,20 @@ def import_urdf(
         "postures": fit.postures,
         "worst_position_mm": float(fit.position_mm),
         "worst_rotation_deg": float(fit.rotation_deg),
+        "radii_mm": [joint.radius_mm for joint in arm.joints],
     }
     lines = [
         f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}",
         f"worst error at {fit.postures} random postures: {fit.position_mm:.2g} mm and {fit.rotation_deg:.2g} degrees",
-        f"wrote {out}; now put its motors in, then: armtempo check --arm {out}",
+        f"{sum(joint.radius_mm > 0.0 for joint in arm.joints)} of {len(arm.joints)} rows have a radius_mm, from the "
+        "links' shapes",
+        f"wrote {out}; add the motors, then: armtempo check --arm {out}",
     ]
     if meshes:
         lines.append(f"wrote {len(written)} meshes into {mesh_files.folder_of(out)}")
     if len(chain.joints) > MAX_JOINTS:
         lines.append(
             f"the board drives {MAX_JOINTS} joints, this chain has {len(chain.joints)}: lock some of them by "
-            "fixed_deg = ANGLE in the place of their motors, or choose a part of it with --base and --tip"
+            "fixed_deg = ANGLE instead of their motors, or choose a shorter chain with --base and --tip"
         )
     results.show(as_json, values, lines)

@@ -1,4 +1,4 @@
-"""``armtempo firmware`` and ``flash``: a MicroPython with the board program in it."""
+"""``armtempo firmware`` and ``flash``: MicroPython with the board program built in."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import PORT, ProjectSettings
 from armtempo.cli import options, results
 from armtempo.cli.progress import ProgressBar
 from armtempo.deploy import changes
 from armtempo.deploy.firmware import build, checkout, frozen, image, write
 from armtempo.deploy.firmware.image import Image
-from armtempo.project.settings import PORT, ProjectSettings
 
 
 @click.command("firmware")
@@ -39,7 +39,7 @@ from armtempo.project.settings import PORT, ProjectSettings
     "--program",
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help="Instead write FOLDER with the program and a manifest.py, for a build of your own.",
+    help="Only write the program and a manifest.py to FOLDER, for your own build.",
 )
 @options.as_json
 def firmware(
@@ -51,7 +51,7 @@ def firmware(
 ) -> None:
     """Build a MicroPython firmware with the board program in it.
 
-    Needs make, gcc and arm-none-eabi-gcc; what is missing is named with the command that installs it.
+    Needs make, gcc and arm-none-eabi-gcc; if one is missing, the command that installs it is printed.
     """
     if program is not None:
         frozen.write(program)
@@ -73,7 +73,7 @@ def firmware(
     )
     if changes.lacks_pins(made.machine):
         click.echo(f"it cannot drive an arm: {changes.NO_PINS}; {changes.MORE_PINS}", err=True)
-    say(f"onto the board: armtempo flash --image {folder}, then armtempo deploy")
+    say(f"next: armtempo flash --image {folder}, then armtempo deploy")
     if as_json:
         results.show_json({"folder": str(folder), **_values(made)})
 
@@ -93,7 +93,7 @@ def _values(made: Image) -> dict[str, Any]:
     "given",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="The zip file of a release, or a folder that 'armtempo firmware' made. Without it the only one here.",
+    help="The zip file of a release, or a folder that 'armtempo firmware' made. Default: the only one in this folder.",
 )
 @click.option("--port", metavar="PORT", help="The board's present port, if it runs MicroPython.")
 @click.option(
@@ -105,8 +105,9 @@ def _values(made: Image) -> dict[str, Any]:
 def flash(given: Path | None, port: str | None, tool: str | None, as_json: bool) -> None:
     """Flash MicroPython with the board program built in; 'armtempo deploy' comes next.
 
-    A board that runs MicroPython is put into its bootloader first, which is refused while it moves; a board that is
-    in it already, or has an ST-LINK, needs no port. The flash is read back and compared. Files on the board are kept.
+    A board that runs MicroPython is put into its bootloader first, unless a motion runs. A board in its
+    bootloader, or with an ST-LINK, needs no port. The flash is read back and compared. Files on the board are
+    kept.
     """
     chosen = given or image.find(Path())
     found = ProjectSettings().get(PORT, port).value or None

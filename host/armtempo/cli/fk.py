@@ -1,4 +1,4 @@
-"""``armtempo fk``: where the tool and every frame are for given joint angles, as a table or as JSON values."""
+"""``armtempo fk``: the poses of the tool and of every frame for given joint angles, as a table or as JSON."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import click
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.text import aligned
 from armtempo.cli import chosen, options, posture, results
-from armtempo.formats.text import aligned
 from armtempo.kinematics.chain import spread_deg
 from armtempo.kinematics.forward import all_frames
 from armtempo.kinematics.geometry import Geometry
@@ -23,7 +23,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.pose import to_quaternion, to_rpy_deg
 
 
-@click.command("fk", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
+@click.command("fk", cls=options.TakesNumbers)
 @click.argument("where", nargs=-1)
 @options.job
 @options.arm
@@ -34,9 +34,9 @@ def fk(
 ) -> None:
     """Print the tool's pose and every frame for given joint angles.
 
-    WHERE: angles in degrees ('0,-60,40', or as separate numbers), of all joints or of those that have a motor, the
-    others at their home angles; a posture of the arm file; a via point such as P0; or a trajectory file for its start.
-    Without it, or for 'home', the arm's home. Compare the frames with the real arm to find a wrong row.
+    WHERE: angles in degrees ('0,-60,40', or as separate numbers), of all joints or of those with a motor (the
+    others are at their home angles); a posture of the arm file; a via point such as P0; or a trajectory file
+    (its start). Default: 'home'. Compare the frames with the real arm to find a wrong row.
     """
     if len(where) == 1 and posture.is_via(where[0]):
         arm, job = chosen.arm_and_job(arm_path, job_path)
@@ -62,7 +62,7 @@ def _angles(where: tuple[str, ...], arm: Arm) -> Array:
 
 
 def _lines(arm: Arm, angles_deg: Array) -> Iterator[str]:
-    """The table for the angles of all joints, (joints,): one row a frame, then the tool's pose."""
+    """The table for the angles of all joints, (joints,): one row per frame, then the tool's pose."""
     frames = all_frames(Geometry.of(arm), np.radians(angles_deg).tolist())
     yield f"{arm.name} at {' '.join(_number(angle) for angle in angles_deg)} deg"
     rows = [["frame", "x", "y", "z", "roll", "pitch", "yaw"], ["", "mm", "mm", "mm", "deg", "deg", "deg"]]

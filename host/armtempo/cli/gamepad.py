@@ -1,6 +1,7 @@
-"""A gamepad in addition to the keys of the terminal: what is held repeats as a held key does, its buttons are keys.
+"""A gamepad in addition to the keys of the terminal: a held stick repeats like a held key, its buttons are
+keys.
 
-pygame reads it, in a thread of its own, which nothing else asks. A gamepad that is unplugged holds nothing.
+A thread reads it with pygame. An unplugged gamepad counts as released.
 """
 
 from __future__ import annotations
@@ -21,11 +22,11 @@ from armtempo.cli.keys import Keys
 BUTTONS = MappingProxyType({0: "p", 1: " ", 2: "s", 3: "h", 6: "<", 7: ">"})
 """Keys by the numbers of buttons: A, B, X, Y, Back and Start of the usual layout."""
 BEFORE, AFTER = 4, 5
-"""The shoulder buttons: what moves, one back or one on."""
+"""The shoulder buttons: select the previous or the next joint or axis."""
 REPEAT_S = 0.1
-"""So often comes the key of what is held: faster than a terminal's, and than what counts as a release."""
+"""Repeat interval of a held direction: shorter than a terminal's, and than ``jog_screen.RELEASE_S``."""
 PUSHED = 0.5
-"""A stick is held from this part of its way on."""
+"""A stick counts as held from this deflection on (of 1)."""
 HELP = """\
   gamepad: stick or cross  move    shoulder buttons  joint or axis    A  take a point (teach)    B  stop
            X  steps    Y  steps, or moving while held    Back, Start  slower, faster    keys still work"""
@@ -37,10 +38,10 @@ _START_S = 10.0
 
 @dataclass
 class GamepadState:
-    """What a gamepad says, as keys."""
+    """State of a gamepad, as keys."""
 
     joints: int
-    """How many the arm has."""
+    """Number of the arm's joints."""
     held: str = ""
     """The key of the direction that is held, + or -; "" for none."""
     pressed: SimpleQueue[str] = field(default_factory=SimpleQueue)
@@ -57,7 +58,7 @@ class GamepadState:
             self.pressed.put(BUTTONS[number])
 
     def directions(self, sticks: list[float], cross: tuple[int, int]) -> None:
-        """Where the left stick (right and up are positive, -1 to 1) and the cross are held."""
+        """Note the positions of the left stick (-1 to 1, right and up positive) and of the cross."""
         pushed = max([*sticks, *map(float, cross)], key=abs)
         self.held = "" if abs(pushed) < PUSHED else "+" if pushed > 0 else "-"
 
@@ -79,7 +80,7 @@ class GamepadState:
 
 
 class KeysAndGamepad:
-    """Keys of a terminal and of a gamepad, whichever comes first."""
+    """Keys of a terminal and of a gamepad, in the order in which they are pressed."""
 
     def __init__(self, keys: Keys, gamepad: GamepadState) -> None:
         self._keys = keys
@@ -102,7 +103,7 @@ class KeysAndGamepad:
 
 @contextmanager
 def beside(keys: Keys, joints: int) -> Iterator[Keys]:
-    """``keys`` with the first gamepad that is connected, for an arm of that many ``joints``.
+    """``keys`` together with the first connected gamepad, for an arm of ``joints`` joints.
 
     Raises MissingPackageError without pygame, InputError if there is no gamepad.
     """
@@ -126,7 +127,7 @@ def beside(keys: Keys, joints: int) -> Iterator[Keys]:
 
 def _pygame() -> Any:
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # no window is needed, nor a display
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # neither a window nor a display is needed
     os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")
     try:
         import pygame
@@ -138,9 +139,9 @@ def _pygame() -> Any:
 def _follow(
     pygame: Any, state: GamepadState, found: Callable[[str], None], ready: Event, done: Event
 ) -> None:
-    """What the thread does: note what the gamepad says until ``done``."""
+    """The thread: update ``state`` from the gamepad until ``done``."""
     try:
-        pygame.display.init()  # events need it
+        pygame.display.init()  # pygame's events need it
         pygame.joystick.init()
         if not pygame.joystick.get_count():
             return
@@ -156,7 +157,7 @@ def _follow(
 
 
 def _look(pygame: Any, pad: Any, state: GamepadState) -> bool:
-    """Whether the gamepad is still there."""
+    """Update ``state``; False if the gamepad is disconnected."""
     for event in pygame.event.get():
         if event.type == pygame.JOYDEVICEREMOVED:
             return False

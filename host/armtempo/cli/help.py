@@ -1,4 +1,4 @@
-"""``armtempo help`` and ``completion``: pages of the documentation, and the Tab key."""
+"""``armtempo help`` and ``completion``: pages of the documentation, and shell completion."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def show_page(topic: str | None) -> None:
 
 
 def page(topic: str) -> str:
-    """The text of a page: of the wheel, or of the checkout."""
+    """The text of a page, from the wheel or from the checkout."""
     package = Path(str(files("armtempo")))
     shipped = package / "data" / "pages" / f"{topic}.md"
     found = shipped if shipped.exists() else package.parents[1] / TOPICS[topic] / "docs" / f"{topic}.md"

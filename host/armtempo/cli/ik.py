@@ -1,4 +1,4 @@
-"""``armtempo ik``: all inverse solutions of a pose, and why some are refused."""
+"""``armtempo ik``: all inverse solutions of a pose, and why some are rejected."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Four = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class _Given:
-    """What the options say of the pose."""
+    """The options that describe the pose."""
 
     matrix: str | None
     position: Three | None
@@ -53,19 +53,27 @@ class _Given:
     "--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw in deg: the whole orientation."
 )
 @click.option("--quaternion", type=float, nargs=4, metavar="W X Y Z", help="The same as a quaternion.")
-@click.option("--roll", type=float, metavar="DEG", help="Only the roll is asked for, or roll and pitch.")
 @click.option(
-    "--pitch", type=float, metavar="DEG", help="Only the pitch is asked for, or one more of the three."
+    "--roll", type=float, metavar="DEG", help="Roll in deg; alone or with the pitch (the rest is free)."
 )
-@click.option("--yaw", type=float, metavar="DEG", help="Only the yaw is asked for, or pitch and yaw.")
 @click.option(
-    "--approach", type=float, nargs=3, metavar="X Y Z", help="Only the direction of the tool's z axis."
+    "--pitch", type=float, metavar="DEG", help="Pitch in deg; alone or with roll or yaw, the rest is free."
+)
+@click.option(
+    "--yaw", type=float, metavar="DEG", help="Yaw in deg; alone or with the pitch, the rest is free."
+)
+@click.option(
+    "--approach",
+    type=float,
+    nargs=3,
+    metavar="X Y Z",
+    help="Direction of the tool's z axis; rotation about it is free.",
 )
 @click.option(
     "--poses",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="One pose a line: x y z alone, with roll pitch yaw (- for a free one) or a quaternion, or 12 or 16 "
+    help="One pose per line: x y z alone, with roll pitch yaw (- if free) or a quaternion, or 12 or 16 "
     "numbers of a matrix.",
 )
 @click.option(
@@ -81,10 +89,10 @@ class _Given:
 @click.option(
     "--previous",
     metavar="ANGLES",
-    help="Posture to stay near to, all joints in deg, in quotes; without it the arm's home. "
-    "With --poses each pose follows the one before.",
+    help="Posture to stay near to, all joints in deg, in quotes; default: the arm's home. "
+    "With --poses it is the posture of the pose before.",
 )
-@click.option("--numerical", is_flag=True, help="Search numerically for any arm.")
+@click.option("--numerical", is_flag=True, help="Use the numerical search even if the arm has a closed form.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def ik(
     arm_path: Path | None,
@@ -97,9 +105,9 @@ def ik(
 ) -> None:
     """Print all solutions of the inverse kinematics for a pose, or for each pose of a file.
 
-    The solution marked * is the one nearest to the previous posture within the joint ranges. For a pose with free
-    components, and for an arm outside the class of the closed form, a numerical search over the joints that have a
-    motor finds the solutions. Exit code 1 if a pose has no solution.
+    The solution marked * is the one nearest to the previous posture within the joint ranges. A pose with free
+    components, or an arm without a closed form, is solved by a numerical search over the joints that have a
+    motor. Exit code 1 if a pose has no solution.
     """
     wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
     solver = PoseSolver(chosen.arm_or_paper(arm_path, for_shape=True))
@@ -109,16 +117,18 @@ def ik(
 
 
 def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None) -> Pose:
-    """The pose with the tolerances that were given."""
+    """The pose with the given tolerances."""
     if tolerance_mm is not None:
         pose = replace(pose, tolerance_mm=tolerance_mm)
     return pose if tolerance_deg is None else replace(pose, tolerance_deg=tolerance_deg)
 
 
 def _poses(given: _Given) -> list[Pose]:
-    """The poses of the options; InputError if they do not make exactly one of the three forms."""
+    """The poses of the options; raises InputError unless exactly one of the three forms is given."""
     if sum(form is not None for form in (given.matrix, given.position, given.poses)) != 1:
-        raise InputError("no pose is given, or more than one", "give one of --matrix, --position and --poses")
+        raise InputError(
+            "no pose, or more than one, is given", "give one of --matrix, --position and --poses"
+        )
     angles = {
         name: getattr(given, name) for name in ("roll", "pitch", "yaw") if getattr(given, name) is not None
     }
@@ -127,7 +137,7 @@ def _poses(given: _Given) -> list[Pose]:
     )
     if orientations > (given.position is not None):
         raise InputError(
-            "these options do not make a pose",
+            "these options do not describe a pose",
             "--position goes alone or with one of --rpy, --quaternion, --approach, or any of --roll, --pitch and "
             "--yaw; and they go with it",
         )
@@ -139,7 +149,7 @@ def _poses(given: _Given) -> list[Pose]:
 
 
 def _positioned(given: _Given, angles: dict[str, float]) -> Pose:
-    """The pose of --position and what goes with it."""
+    """The pose of --position and its orientation options."""
     assert given.position is not None
     if given.quaternion is not None:
         matrix = from_quaternion(given.position, given.quaternion, "--position --quaternion")
@@ -187,7 +197,7 @@ def _print_json(solver: PoseSolver, found: Iterable[Listing]) -> None:
 
 
 def _fail(without: list[int]) -> None:
-    """End with exit code 1 if poses are left without a solution."""
+    """End with exit code 1 if there are poses without a solution."""
     if without:
         which = ", ".join(map(str, without))
         raise PlanError(

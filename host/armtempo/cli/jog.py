@@ -25,7 +25,7 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
 )
 @click.option("--axis", type=_AXES, help="Move the tool along this axis by --by mm.")
 @click.option("--about", type=_AXES, help="Turn the tool about this axis by --by degrees.")
-@click.option("--by", type=float, metavar="NUMBER", help="How far: degrees or mm.")
+@click.option("--by", type=float, metavar="NUMBER", help="Distance: degrees or mm.")
 @click.option(
     "--speed",
     type=click.FloatRange(1, 100),
@@ -33,6 +33,7 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
     show_default=True,
     help="Percent of the speed limits.",
 )
+@options.holds
 @options.gamepad
 @options.board(options.arm_of_board, options.replace_arm)
 def jog(
@@ -41,19 +42,20 @@ def jog(
     about: str | None,
     by: float | None,
     speed: float,
+    holds: str | None,
     gamepad: bool,
     given: BoardOptions,
 ) -> None:
     """Jog: move a joint or the tool by a step or while a key is held, within the ranges.
 
-    Without --joint, --axis and --about, keys move the arm, and one line shows the position. With one of them, and
-    --by, it moves once. Axes are those of the base, or those of the tool at its present orientation. The arm must be
-    homed. Ctrl-C brakes.
+    Without --joint, --axis and --about, keys move the arm, and one line shows the position. With one of them
+    and --by, the arm moves once. Axes are those of the base, or of the tool at its present orientation
+    (tool-x, …). The arm must be homed. Ctrl-C brakes.
     """
     moves = _one_move(joint, axis, about, by, gamepad, given.as_json)
     arm = chosen.named_arm(given.arm_path)
     with chosen.board(given, arm) as board:
-        prepare(board, chosen.arm_of_board(board, arm), given.replace_arm)
+        prepare(board, chosen.arm_of_board(board, arm).holding(holds), given.replace_arm)
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 screen(board, pressed, speed).loop()
@@ -70,24 +72,26 @@ def jog(
 def _one_move(
     joint: str | None, axis: str | None, about: str | None, by: float | None, gamepad: bool, as_json: bool
 ) -> bool:
-    """Whether the options ask for one move rather than for the keys; InputError where they do not go together."""
+    """Whether the options ask for a single move instead of the keys; raises InputError if they contradict."""
     moves = sum(option is not None for option in (joint, axis, about))
     if moves > 1 or (by is None) != (not moves):
         raise InputError(
-            "one of --joint, --axis and --about goes with --by",
+            "--by needs one of --joint, --axis and --about, and they need --by",
             "for example --joint 2 --by -5; or none of them, for the keys",
         )
     if moves and gamepad:
-        raise InputError("--gamepad goes with the keys of jog", "leave out --by, or --gamepad")
+        raise InputError("--gamepad is for jog by keys", "leave out --by, or --gamepad")
     if not moves and as_json:
-        raise InputError("the keys of jog give no JSON", "give --joint, --axis or --about, and --by")
+        raise InputError(
+            "--json is not possible with jog by keys", "give --joint, --axis or --about, and --by"
+        )
     if not moves and not keys.is_terminal():
-        raise InputError("the keys of jog need a terminal", "give --joint, --axis or --about, and --by")
+        raise InputError("jog by keys needs a terminal", "give --joint, --axis or --about, and --by")
     return moves == 1
 
 
 def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
-    """Set the board up; LinkError if the position is unknown. A virtual arm that has just come is at home."""
+    """Set the board up; raises LinkError if the position is unknown. A new virtual arm is at home."""
     board.configure(arm, replace=replace_arm)
     try:
         board.posture_deg()
@@ -99,8 +103,8 @@ def prepare(board: Board, arm: Arm, replace_arm: bool = False) -> None:
 
 @contextmanager
 def pressed_keys(board: Board, with_gamepad: bool) -> Iterator[Keys]:
-    """The keys of the terminal, and of a gamepad where that is wanted."""
-    assert board.arm is not None  # it was configured
+    """The keys of the terminal, and of a gamepad if ``with_gamepad``."""
+    assert board.arm is not None  # set by ``configure``
     with keys.of_terminal() as pressed:
         if not with_gamepad:
             yield pressed
@@ -117,7 +121,7 @@ def screen(
     more: dict[str, Callable[[], str]] | None = None,
     told: str = "",
 ) -> JogScreen:
-    """The jog screen, its keys said; ``more``: the caller's, which ``told`` says."""
+    """The jog screen, after printing its keys; ``more``: keys of the caller, described by ``told``."""
     click.echo(f"{KEYS}\n{told}" if told else KEYS)
     made = JogScreen(board, pressed, more, told)
     made.choice.speed = min(range(len(SPEEDS)), key=lambda index: abs(SPEEDS[index] - speed))

@@ -1,4 +1,4 @@
-"""The jog screen: keys move the arm, one line says where it is. Any terminal will do, over ssh too."""
+"""The jog screen: keys move the arm, one line shows the position. Works in any terminal, also over ssh."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Thread
-from types import TracebackType
 from typing import Self
 
 import click
@@ -24,9 +23,9 @@ STEPS = (0.1, 1.0, 10.0)
 SPEEDS = (1, 5, 10, 25, 50, 75, 100)
 """Percent of the speed limits."""
 FIRST_REPEAT_S = 0.8
-"""A key that is held down repeats after less than this in any usual terminal."""
+"""Longest delay until the first repeat of a held key in usual terminals."""
 RELEASE_S = 0.3
-"""A key that has not repeated for this long was released."""
+"""A key without a repeat for this long counts as released."""
 _POLL_S = 0.03
 _IDLE_S = 0.5
 _FORWARD, _BACKWARD = ("+", "=", "right", "up"), ("-", "_", "left", "down")
@@ -39,12 +38,12 @@ KEYS = f"""\
   s            steps of 0.1, 1, 10 (deg, mm)  h       steps, or moving while + or - is held down
   < >          slower, faster                 space   stop
   c            clear a fault                  q       end, with the arm at rest; ? help
-A terminal tells no release: it is noticed {RELEASE_S:g} s after a held key's last repeat; then the arm brakes."""
+Terminals do not report a release: {RELEASE_S:g} s after a held key's last repeat the arm brakes."""
 
 
 @dataclass
 class JogChoice:
-    """What the keys move, and how."""
+    """What the keys move: joint or tool axis, step, speed."""
 
     joint: int | None = 1
     """Number, from 1; None: the tool."""
@@ -53,17 +52,17 @@ class JogChoice:
     in_tool: bool = False
     """Axes of the tool, not of the base."""
     step: int = 1
-    """Of STEPS."""
+    """Index into STEPS."""
     held: bool = False
     speed: int = SPEEDS.index(25)
 
     @property
     def tool_axis(self) -> str | None:
-        """As the library calls it; None if a joint moves."""
+        """The axis as ``Board.jog`` takes it; None if a joint moves."""
         return None if self.joint is not None else f"tool-{self.axis}" if self.in_tool else self.axis
 
     def press(self, key: str, joints: int) -> bool:
-        """Take a key that chooses something; whether it is one."""
+        """Handle a key that selects something; False if it is another key."""
         if key.isdecimal() and 1 <= int(key) <= joints:
             self.joint = int(key)
         elif key in "xyzXYZ":
@@ -81,7 +80,7 @@ class JogChoice:
         return True
 
     def words(self, names: list[str]) -> str:
-        """In a few words."""
+        """Describe the choice in a few words."""
         if self.joint is not None:
             what, unit = names[self.joint - 1], "°"
         else:
@@ -93,9 +92,10 @@ class JogChoice:
 
 
 class JogScreen:
-    """``loop`` until the user ends it.
+    """The jog screen; ``loop`` runs it until the user ends it.
 
-    ``more``: keys of the caller, each with what it does and gives to say; ``told``: what ``?`` says of them.
+    ``more``: keys of the caller, each with a function that gives the text to show; ``told``: their help for
+    ``?``.
     """
 
     def __init__(
@@ -224,7 +224,7 @@ class JogScreen:
         click.echo(f"{_CLEAR_LINE}{fitted(parts, shutil.get_terminal_size().columns - 1)}", nl=False)
 
     def _where(self, angles_deg: list[float]) -> list[str]:
-        """Angles and tool, what is chosen first."""
+        """Angles and tool pose, the selected ones first."""
         pose = forward(self._arm, angles_deg)
         angles = " ".join(f"{angle + 0.0:.2f}" for angle in angles_deg) + "°"
         position = " ".join(f"{value + 0.0:.1f}" for value in pose[:3, 3]) + " mm"
@@ -233,7 +233,7 @@ class JogScreen:
 
 
 def fitted(parts: list[str], width: int) -> str:
-    """As many of the parts, most important first, as one line holds; what it would wrap, it drops."""
+    """The first of ``parts`` (in order of importance) that fit into one line of ``width`` characters."""
     line = parts[0]
     for number, part in enumerate(parts[1:]):
         if len(line) + 3 + len(part) <= width or not number:
@@ -242,12 +242,12 @@ def fitted(parts: list[str], width: int) -> str:
 
 
 class _StopKeys:
-    """While a step is under way, space ends it, and so does what ends the screen."""
+    """Watches the keys during a step: space, and the keys that end the screen, stop it."""
 
     def __init__(self, keys: Keys) -> None:
         self.request = StopRequest()
         self.pressed = ""
-        """The key that ended it."""
+        """The key that ended the step."""
         self._keys = keys
         self._done = False
         self._thread = Thread(target=self._look, name="armtempo keys", daemon=True)
@@ -263,9 +263,7 @@ class _StopKeys:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._done = True
         self._thread.join()
 

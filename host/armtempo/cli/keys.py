@@ -1,4 +1,4 @@
-"""Single keys from a terminal, one by one and without Enter: on POSIX by termios, on Windows by msvcrt."""
+"""Single keys from a terminal without Enter: termios on POSIX, msvcrt on Windows."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ import select
 import sys
 import time
 from contextlib import suppress
-from types import TracebackType
 from typing import Any, Protocol, Self
 
 END, INTERRUPT = "end", "ctrl-c"
-"""Keys for the end of the input, and for Ctrl-C, which is a key here and no signal."""
+"""Keys for the end of the input, and for Ctrl-C, which is a key here, not a signal."""
 _POSIX = {
     "\x1b[A": "up",
     "\x1b[B": "down",
@@ -27,27 +26,27 @@ _LOOK_S = 0.01
 
 
 class Keys(Protocol):
-    """Where keys come from."""
+    """A source of keys."""
 
     def read(self, timeout_s: float) -> str:
         """The next key, "" if none comes in time: a letter, or "up", "down", "left", "right", END, INTERRUPT."""
 
     def flush(self) -> None:
-        """Forget keys that were pressed and not read."""
+        """Discard keys that were pressed and not read."""
 
 
 def is_terminal() -> bool:
-    """Whether there is somebody who can press keys."""
+    """Whether stdin is a terminal."""
     return sys.stdin.isatty()
 
 
 def of_terminal() -> PosixKeys | WindowsKeys:
-    """The keys of the terminal, as a context that leaves it as it was."""
+    """The keys of the terminal; a context that restores the terminal at its end."""
     return WindowsKeys() if os.name == "nt" else PosixKeys(sys.stdin.fileno())
 
 
 def split(text: str) -> tuple[str, str]:
-    """The first key of what a POSIX terminal has sent, and what is left; ("", text) while a sequence is cut."""
+    """The first key in the text of a POSIX terminal, and the rest; ("", text) if an escape sequence is incomplete."""
     if text[:1] != "\x1b" or len(text) == 1:
         return _POSIX.get(text[:1], text[:1]), text[1:]
     if text[:2] not in ("\x1b[", "\x1bO"):
@@ -59,7 +58,7 @@ def split(text: str) -> tuple[str, str]:
 
 
 class PosixKeys:
-    """Of a terminal by its file descriptor."""
+    """Keys of a POSIX terminal."""
 
     def __init__(self, fd: int) -> None:
         self._fd = fd
@@ -76,12 +75,10 @@ class PosixKeys:
         termios.tcsetattr(self._fd, termios.TCSADRAIN, now)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         import termios
 
-        with suppress(termios.error):  # the terminal is gone
+        with suppress(termios.error):  # the terminal was closed
             termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
 
     def read(self, timeout_s: float) -> str:
@@ -107,14 +104,12 @@ class PosixKeys:
 
 
 class WindowsKeys:
-    """Of the console."""
+    """Keys of the Windows console."""
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.flush()
 
     def read(self, timeout_s: float) -> str:

@@ -1,4 +1,4 @@
-"""What a run shows while it runs: a progress bar with angles and errors, and a window where one is wanted."""
+"""Display of a run: a progress bar with angles and errors, and optionally a window."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from armtempo.cli.progress import ProgressBar
 from armtempo.link.board_messages import Sample
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report.live_plot import LivePlot
+from armtempo.report.run_folder import Repetition, RunFolder
 from armtempo.robot.recording import Watcher
-from armtempo.runs.run_folder import Repetition, RunFolder
 
 
 class Live(Watcher):
-    """Shows a run on the terminal; used as a context. Without a display it says so and opens no window."""
+    """Shows a run on the terminal; a context. Without a display it prints that and opens no window."""
 
     def __init__(self, window: bool, where: str = "", aside: bool = False) -> None:
-        """``where``: on what the motion runs, if that needs saying; ``aside``: say it on stderr."""
+        """``where``: text about a virtual board; ``aside``: print to stderr."""
         self._say = results.remark if aside else click.echo
         self._window = window
         self._where = f", on {where}" if where else ""
@@ -35,7 +35,7 @@ class Live(Watcher):
         """Ticks of the last sample, and of the motion's own time."""
 
     def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
-        """Say what runs and where it is recorded."""
+        """Print the motion and its run folder."""
         self._motion = motion
         self._started_s = time.monotonic()
         self._plot = self._open() if self._window else None
@@ -53,7 +53,7 @@ class Live(Watcher):
             self._plot.add(time_s, angles)
 
     def _speed(self, sample: Sample) -> str:
-        """How fast it goes since the sample before, where that is not as planned."""
+        """The speed since the previous sample, if it is not the planned one."""
         (before, path_before), self._before = self._before, (sample.ticks, sample.path_ticks)
         if sample.ticks <= before:
             return ""
@@ -61,7 +61,7 @@ class Live(Watcher):
         return "" if percent in (99, 100, 101) else f", at {percent} %" if percent > 0 else ", in a pause"
 
     def end(self, repetition: Repetition) -> None:
-        """Say how it ended."""
+        """Print how the repetition ended."""
         self._say(repetition_line(repetition))
 
     def _open(self) -> LivePlot | None:
@@ -72,7 +72,7 @@ class Live(Watcher):
             return None
 
     def _angles_deg(self, sample: Sample) -> Array:
-        """Measured angles (J,); commanded ones where there is no encoder."""
+        """Measured angles, degrees (J,); commanded angles of joints without an encoder."""
         joints, positions = self._motion.arm.driven, sample.positions
         return np.array(
             [
@@ -96,7 +96,7 @@ class Live(Watcher):
 
 
 def repetition_line(done: Repetition) -> str:
-    """One line on a repetition: how it ended, how long it took, what of it is missing."""
+    """One line about a repetition: how it ended, its duration, missing samples."""
     lost = sum(gap.number for gap in done.lost)
     missing = f", {lost} lost" if lost else ""
     state = f"{done.state} ({done.fault})" if done.fault else done.state

@@ -1,4 +1,4 @@
-"""``armtempo new``: a project folder for an arm of one's own, asked for at the terminal or given by options."""
+"""``armtempo new``: a project folder for a new arm, described by options or by answers at the terminal."""
 
 from __future__ import annotations
 
@@ -8,36 +8,38 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
 from armtempo.diagnosis import figures
-from armtempo.formats.atomic_file import replace_text
 from armtempo.new_arm import folder as project_folder
-from armtempo.new_arm import given_geometry, joint_entry, questions
-from armtempo.new_arm.given_geometry import ArmText
+from armtempo.new_arm import joint_entry, questions
+from armtempo.new_arm.folder import ArmText
 from armtempo.new_arm.questions import Answers
 
 
 @click.command("new")
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--like", metavar="ARM", help="Begin with an arm that ships, such as ar4.")
+@click.option("--like", metavar="ARM", help="Copy a shipped arm, such as ar4.")
 @click.option(
     "--urdf",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Begin with the arm of a URDF. Needs the extra 'urdf'.",
+    help="Import the arm of a URDF. Needs the extra 'urdf'.",
 )
 @click.option(
     "--joint",
     "joints",
     multiple=True,
     metavar="KEY=VALUE,…",
-    help="A joint of an own arm, base first; give one for each: name, d_mm, a_mm, alpha_deg, theta_offset_deg, "
+    help="One joint, base first; repeat for each: name, d_mm, a_mm, alpha_deg, theta_offset_deg, "
     "low_deg, high_deg, steps_per_rev, microsteps, gear_ratio, speed_deg_s, encoder_counts, parallel_linkage (1).",
 )
 @click.option("--modified", is_flag=True, help="The joints' rows are in the modified (Craig) convention.")
 @click.option("--resume", is_flag=True, help="Continue with the questions that Ctrl-C interrupted.")
-@click.option("--port", default=None, help="Port of the board; 'sim:board' is a virtual one.", metavar="PORT")
+@click.option(
+    "--port", default=None, help="Port of the board; 'sim:board' is a virtual board.", metavar="PORT"
+)
 @options.as_json
 def new(
     folder: Path,
@@ -53,7 +55,7 @@ def new(
 
     FOLDER: a new or an empty folder.
 
-    Asks for what no option gives, if run in a terminal: '?' explains, '<' goes back.
+    In a terminal, it asks for what the options do not give: '?' explains, '<' goes back.
     """
     if sum(map(bool, (like, urdf, joints))) > 1:
         raise InputError("--like, --urdf and --joint exclude each other", "give one of them")
@@ -78,7 +80,7 @@ def new(
 
 
 def _asked() -> bool:
-    """Whether somebody is there to ask."""
+    """Whether questions can be asked: stdin and stdout are terminals."""
     return sys.stdin.isatty()
 
 
@@ -86,28 +88,28 @@ def _given_arm(
     name: str, like: str | None, urdf: Path | None, joints: tuple[str, ...], modified: bool
 ) -> ArmText:
     if like:
-        return given_geometry.from_shipped(like)
+        return project_folder.from_shipped(like)
     if urdf:
-        return given_geometry.from_urdf(urdf)
-    return given_geometry.from_joints(
+        return project_folder.from_urdf(urdf)
+    return project_folder.from_joints(
         name, [joint_entry.parse(text, n) for n, text in enumerate(joints, 1)], modified
     )
 
 
 def _arm_of(name: str, answers: dict[str, str]) -> ArmText:
     if answers["arm"] != "own":
-        return given_geometry.from_shipped(answers["arm"])
+        return project_folder.from_shipped(answers["arm"])
     modified = answers["convention"] == questions.MODIFIED
-    return given_geometry.from_joints(name, questions.joints(answers), modified)
+    return project_folder.from_joints(name, questions.joints(answers), modified)
 
 
 def draft_path(folder: Path) -> Path:
-    """Where the answers for a project folder are kept until it is made."""
+    """The file that keeps the answers until the project folder is made."""
     return folder.parent / f".{folder.name}.draft.json"
 
 
 def hold(folder: Path, resume: bool) -> Answers:
-    """Ask until all is answered. KeyboardInterrupt says how to continue, if answers were kept."""
+    """Ask all questions. The text of KeyboardInterrupt says how to continue if answers were kept."""
     draft = draft_path(folder)
     answers = _kept(draft) if resume else {}
     click.echo("'?' explains a question, '<' goes back to the previous one; Ctrl-C keeps the answers.")
@@ -138,12 +140,12 @@ def hold(folder: Path, resume: bool) -> Answers:
 
 
 def _kept(draft: Path) -> Answers:
-    """The answers of a draft, as far as they can be taken; InputError if there are none."""
+    """The valid answers of a draft; raises InputError if there are none."""
     try:
         found = json.loads(draft.read_text(encoding="utf-8"))
         given = {str(key): str(value) for key, value in found.items()}
     except (OSError, ValueError, AttributeError):
-        raise InputError(f"{draft}: no answers are kept there", "leave out --resume") from None
+        raise InputError(f"{draft}: no kept answers", "leave out --resume") from None
     answers: Answers = {}
     while (question := questions.following(answers)) is not None and question.key in given:
         try:

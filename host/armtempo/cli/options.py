@@ -1,4 +1,4 @@
-"""Options that several commands share, and the object that the commands for a board take theirs in."""
+"""Options of several commands, and the object that holds those of the commands for a board."""
 
 from __future__ import annotations
 
@@ -15,14 +15,31 @@ if TYPE_CHECKING:
 
 FC = TypeVar("FC", bound=Callable[..., Any] | click.Command)
 
-_ELSE = "Without it: variable ARMTEMPO_{}, else what the project folder's armtempo.toml says"
-_ARM = "Arm file (TOML), or the name of an arm that ships, such as ar4"
+
+class TakesNumbers(click.Command):
+    """A command whose arguments may begin with a minus sign: "-10,20" is a posture, not an option; "--speed" is one."""
+
+    ignore_unknown_options = True
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """The rest of the arguments; UsageError for a word that is neither an option nor a number."""
+        rest = super().parse_args(ctx, args)
+        for argument in (one for one in self.params if isinstance(one, click.Argument)):
+            given = ctx.params[argument.name or ""]
+            for text in given if isinstance(given, tuple) else (given,):
+                if str(text)[:1] == "-" and str(text)[1:2] not in ".0123456789":
+                    ctx.fail(f"No such option {str(text)!r}.")
+        return rest
+
+
+_ELSE = "Default: variable ARMTEMPO_{}, else the project folder's armtempo.toml"
+_ARM = "Arm file (TOML), or the name of a shipped arm, such as ar4"
 
 port = click.option(
     "--port",
     metavar="PORT",
-    help="Serial device or URL of the board; 'sim' starts a virtual board for this command, 'sim:FOLDER' one "
-    f"that keeps its flash in FOLDER. {_ELSE.format('PORT')}, else the one board that is plugged in.",
+    help="Serial device or URL of the board; 'sim': a virtual board for this command; 'sim:FOLDER': the same with "
+    f"its flash in FOLDER. {_ELSE.format('PORT')}, else the only board that is plugged in.",
 )
 log_traffic = click.option(
     "--log-traffic",
@@ -34,14 +51,14 @@ log_traffic = click.option(
 
 
 def files(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
-    """What the Tab key offers for an argument that may be a file: the shell's own choice of files."""
+    """Completion of an argument that may be a file: the shell's own."""
     from click.shell_completion import CompletionItem
 
     return [CompletionItem(begun, type="file")]
 
 
 def _arms(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
-    """The arms that ship and begin so; else files."""
+    """The shipped arms whose names start with ``begun``; else files."""
     from click.shell_completion import CompletionItem
 
     from armtempo.model import shipped
@@ -65,10 +82,13 @@ arm_of_file = _arm_option(
 replace_arm = click.option(
     "--replace-arm",
     is_flag=True,
-    help="Set the board up for this arm if it is set up for another one; then its position is unknown.",
+    help="If the board is set up for another arm, set it up for this one; its position is unknown afterwards.",
 )
 gamepad = click.option(
     "--gamepad", is_flag=True, help="Use a gamepad in addition to the keys (needs the extra 'gamepad')."
+)
+holds = click.option(
+    "--holds", metavar="NAME", help="Load of the arm file that the tool holds: it keeps to the room, too."
 )
 job = click.option(
     "--job",
@@ -81,7 +101,7 @@ out = click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help=f"Where run folders go; each run makes a new one. {_ELSE.format('RUNS')}, else 'runs'.",
+    help=f"Folder for run folders; each run makes a new one. {_ELSE.format('RUNS')}, else 'runs'.",
 )
 altered = click.option(
     "--altered",
@@ -107,7 +127,7 @@ def force(what: str) -> Callable[[FC], FC]:
 
 @dataclass(frozen=True)
 class BoardOptions:
-    """What the options of a command that speaks with a board say; those that it does not have keep the default."""
+    """Options of a command for a board; options that the command does not have keep the default."""
 
     port: str | None = None
     log_traffic: Path | None = None
@@ -118,9 +138,10 @@ class BoardOptions:
 
 
 def board(*before: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Options of a command that speaks with a board: those of ``before``, --port, --log-traffic and --json.
+    """Options of a command for a board: those of ``before``, --port, --log-traffic and --json.
 
-    The command takes those of ``BoardOptions`` as one argument, ``given``. It is the decorator nearest to it.
+    The command gets those of ``BoardOptions`` as one argument, ``given``. This must be its innermost
+    decorator.
     """
     names = [field.name for field in fields(BoardOptions)]
 

@@ -32,7 +32,7 @@ _LOOPBACK = "127.0.0.1"
     default=8088,
     show_default=True,
     metavar="PORT",
-    help="TCP port to listen on; 0: one that is free.",
+    help="TCP port to listen on; 0: any free port.",
 )
 @click.option("--show/--no-show", default=True, help="Open the page in the browser.")
 def panel(
@@ -40,8 +40,8 @@ def panel(
 ) -> None:
     """Open the panel in a browser: see, move, teach, run and watch the arm.
 
-    Ctrl-C ends it and brakes what moves. Closing a page while a button is held stops the arm. One page has control,
-    others watch; stop works from all.
+    Ctrl-C ends the panel and brakes a motion. Closing a page while a button is held stops the arm. One page
+    controls the arm, others watch; Stop works on all.
     """
     try:
         from armtempo.panel.desk import Desk
@@ -57,7 +57,7 @@ def panel(
     token = "" if host == _LOOPBACK else secrets.token_urlsafe(16)
     with ExitStack() as stack:
         listening = stack.enter_context(listen(host, web_port))
-        if is_sim(name):  # in real time, as a board is
+        if is_sim(name):  # real time, as on a board
             wanted = LaunchOptions(sim_flash(name), virtual_time=False, arm=arm)
             name = stack.enter_context(launch(wanted)).port
         operator = Operator(

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics.atomic_file import replace_text
 from armtempo.cli import options, results
 from armtempo.cli.progress import ProgressBar
-from armtempo.formats.atomic_file import replace_text
 from armtempo.paper import experiment, motions, postures, searches, sheet
-from armtempo.paper.claims import Claim
+from armtempo.paper.printed import Claim
 
 
 @click.command("paper")

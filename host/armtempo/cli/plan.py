@@ -9,17 +9,17 @@ from typing import Any
 import click
 
 from armtempo import pipeline
+from armtempo.basics.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.cli import chosen, options, results, sequences
 from armtempo.cli.progress import ProgressBar
-from armtempo.formats.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import is_sequence
-from armtempo.planning import by_torque, checks
+from armtempo.planning import checks, torque
 from armtempo.planning.free.corridor_curve import unit_of
-from armtempo.report import corridor_plot, drawing, text_summary
+from armtempo.report import drawing, plots, text_summary
 from armtempo.robot import engine_room
 
 
@@ -41,41 +41,50 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Trajectory file to write; without it the job's name with .json. An existing FILE is only replaced if it "
+    help="Trajectory file to write; default: the job's name with .json. An existing FILE is only replaced if it "
     "is an earlier plan of the same job for the same arm, by name.",
 )
 @options.force("any other FILE too")
 @click.option(
     "--path",
     type=click.Choice(["through", "free"]),
-    help="Instead of the job's path: on the spline through the via points, or free between them.",
+    help="Overrides the job's path: the spline through the via points, or free between them.",
 )
 @click.option(
-    "--corridor-deg", type=click.FloatRange(0), metavar="DEG", help="How far a joint may leave the spline."
+    "--corridor-deg",
+    type=click.FloatRange(0),
+    metavar="DEG",
+    help="Largest distance of a joint from the spline.",
 )
 @click.option(
-    "--corridor-mm", type=click.FloatRange(0), metavar="MM", help="How far the tool may leave the spline."
+    "--corridor-mm",
+    type=click.FloatRange(0),
+    metavar="MM",
+    help="Largest distance of the tool from the spline.",
 )
-@click.option("--timing", type=click.Choice(["per-joint", "shared"]), help="Instead of the job's timing.")
-@click.option("--degree", type=click.Choice(["3", "5"]), help="Instead of the job's spline degree.")
+@click.option("--timing", type=click.Choice(["per-joint", "shared"]), help="Overrides the job's timing.")
+@click.option("--degree", type=click.Choice(["3", "5"]), help="Overrides the job's spline degree.")
 @click.option(
     "--refine",
     callback=_refine,
     metavar="N|auto",
-    help="Instead of the job's segments between via points: 1 to 64, or as many as shorten the motion.",
+    help="Overrides the job's segments between via points: 1 to 64, or auto.",
 )
-@click.option("--polish/--no-polish", default=None, help="Whether a gradient solver finishes the search.")
-@click.option("--optimiser", metavar="NAME", help="Instead of the job's search algorithm.")
-@click.option("--population", type=click.IntRange(4), help="Instead of the job's population.")
-@click.option("--iterations", type=click.IntRange(1), help="Instead of the job's iterations.")
-@click.option("--starts", type=click.IntRange(1), help="Instead of the job's starts of the gradient solver.")
-@click.option("--seed", type=click.IntRange(0), help="Instead of the job's seed.")
+@click.option("--holds", metavar="NAME", help="Overrides the job's load: a load of the arm file.")
+@click.option(
+    "--polish/--no-polish", default=None, help="Finish the search with a gradient solver; overrides the job."
+)
+@click.option("--optimiser", metavar="NAME", help="Overrides the job's search algorithm.")
+@click.option("--population", type=click.IntRange(4), help="Overrides the job's population.")
+@click.option("--iterations", type=click.IntRange(1), help="Overrides the job's iterations.")
+@click.option("--starts", type=click.IntRange(1), help="Overrides the job's starts of the gradient solver.")
+@click.option("--seed", type=click.IntRange(0), help="Overrides the job's seed.")
 @click.option(
     "--use-torque", is_flag=True, help="Plan by the motors' torque instead of the acceleration limits."
 )
 @click.option("--split", is_flag=True, help="Cut a motion that is too long for the board at its stops.")
 @click.option(
-    "--corridor-curve", is_flag=True, help="Instead of a plan: the motion time in ever wider corridors."
+    "--corridor-curve", is_flag=True, help="Write the motion time in ever wider corridors instead of a plan."
 )
 @options.as_json
 def plan(
@@ -93,7 +102,7 @@ def plan(
     """Plan a job and write its trajectory file, or plan a sequence.
 
     FILE: a sequence file, or a job file, as with --job.
-    If neither an arm nor a job is given, this plans the demo's job for the arm that ships with armtempo.
+    If neither an arm nor a job is set, it plans the demo's job for the paper's arm.
     """
     if file is not None and job_path is not None:
         raise InputError("FILE and --job are both given", "give one of them")
@@ -107,7 +116,7 @@ def plan(
     job = _changed(job, changes)
     if use_torque and (split or corridor_curve):
         raise InputError(
-            "--use-torque goes with neither --split nor --corridor-curve",
+            "--use-torque cannot be combined with --split or --corridor-curve",
             "lower acceleration_deg_s2 in the arm file instead",
         )
     target = output or Path(f"{job.name}.json")
@@ -124,7 +133,7 @@ def plan(
 
 
 def _changed(job: Job, changes: dict[str, Any]) -> Job:
-    """The job with what options say instead."""
+    """The job with the options' values."""
     given = {name: value for name, value in changes.items() if value is not None}
     if "degree" in given:
         given["degree"] = int(given["degree"])
@@ -132,10 +141,10 @@ def _changed(job: Job, changes: dict[str, Any]) -> Job:
 
 
 def _plans(arm: Arm, job: Job, split: bool, use_torque: bool) -> list[Plan]:
-    """The plan of the job, or those of its parts; each one that the board can hold."""
+    """The plan of the job, or the plans of its parts; checked to fit the board."""
     with ProgressBar("planning") as progress:
         if use_torque:
-            plans = [by_torque.plan(arm, job, progress)]
+            plans = [torque.plan_by_torque(arm, job, progress)]
         else:
             plans = pipeline.split(arm, job, progress) if split else [pipeline.plan(arm, job, progress)]
     for plan in plans:
@@ -149,7 +158,7 @@ def _part(target: Path, number: int) -> Path:
 
 
 def _save(made: dict[Path, Plan], force: bool) -> None:
-    """All files, or none where one of them may not be replaced."""
+    """Write all files, or none if one of them may not be replaced."""
 
     for file, plan in made.items():
         plan.check_replaceable(file, force)
@@ -168,20 +177,20 @@ def _json(file: Path, plan: Plan) -> dict[str, Any]:
 
 
 def _write_curve(arm: Arm, job: Job, target: Path, force: bool, as_json: bool) -> None:
-    """Table to the terminal and as CSV, and the figure where matplotlib is installed."""
+    """Write the table to the terminal and as CSV, and the figure if matplotlib is installed."""
     table, picture = (target.with_name(f"{target.stem}-corridor{suffix}") for suffix in (".csv", ".png"))
     for file in (table, picture):
-        check_replaceable(file, "", force)  # before the work, which takes a while
+        check_replaceable(file, "", force)  # checked before the work, which takes a while
     with ProgressBar("planning") as progress:
         points = pipeline.corridor_curve(arm, job, progress)
     unit = unit_of(job)
-    replace_text(table, corridor_plot.csv(points, unit))
+    replace_text(table, plots.corridor_csv(points, unit))
     written = [str(table)]
     try:
-        drawing.save(corridor_plot.figure(points, unit, job.name), picture)
+        drawing.save(plots.corridors(points, unit, job.name), picture)
         written.append(str(picture))
     except MissingPackageError as error:
         results.show_error(error, "no plot")
     curve = [{f"corridor_{unit}": point.corridor, "duration_s": point.total_s} for point in points]
-    lines = [*corridor_plot.lines(points, unit), f"written: {', '.join(written)}"]
+    lines = [*plots.corridor_lines(points, unit), f"written: {', '.join(written)}"]
     results.show(as_json, {"files": written, "curve": curve}, lines)

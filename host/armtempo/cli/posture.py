@@ -1,4 +1,4 @@
-"""``armtempo goto`` and ``home``, and postures as they take them: by name, angles, via point or trajectory file."""
+"""``armtempo goto`` and ``home``, and their WHERE: a name, angles, a via point or a trajectory file."""
 
 from __future__ import annotations
 
@@ -25,18 +25,21 @@ from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
 
 
-@click.command("goto", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
+@click.command("goto", cls=options.TakesNumbers)
 @click.argument("where", nargs=-1, required=True, shell_complete=options.files)
-@click.option("--line", is_flag=True, help="The tool moves in a straight line and turns evenly.")
+@click.option("--line", is_flag=True, help="Move the tool in a straight line, turning evenly.")
+@options.holds
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
-def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: BoardOptions) -> None:
+def goto(
+    where: tuple[str, ...], line: bool, holds: str | None, job_path: Path | None, given: BoardOptions
+) -> None:
     """Move straight to a posture.
 
-    WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such as P0, or
-    a trajectory file or a planned sequence for its start. All joints move together, within their limits; with --line
-    the tool moves in a straight line. The arm must be homed. Ctrl-C brakes, as does 'armtempo stop' in another
-    terminal.
+    WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such
+    as P0, or a trajectory file or a planned sequence (its start). All joints move together, within their
+    limits; with --line the tool moves in a straight line. The arm must be homed. Ctrl-C, or 'armtempo stop'
+    in another terminal, brakes.
     """
     if len(where) > 1:
         raise InputError(
@@ -45,7 +48,7 @@ def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: Board
         )
     wanted = NamedPosture.of(where[0], given.arm_path, given.altered)
     with chosen.board(given, wanted.arm) as board:
-        arm = chosen.arm_of_board(board, wanted.arm)
+        arm = chosen.arm_of_board(board, wanted.arm).holding(holds)
         target_deg = wanted.angles_deg(arm, job_path)
         board.configure(arm, replace=given.replace_arm)
         try:
@@ -57,7 +60,7 @@ def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: Board
         say_where_it_is(board, given.as_json)
 
 
-@click.command("home", context_settings={"ignore_unknown_options": True})  # so that -10,20,30 is a posture
+@click.command("home", cls=options.TakesNumbers)
 @click.argument("where", default=HOME, shell_complete=options.files)
 @click.option("--switches", is_flag=True, help="Find the position by moving to the limit switches.")
 @options.job
@@ -65,10 +68,11 @@ def goto(where: tuple[str, ...], line: bool, job_path: Path | None, given: Board
 def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions) -> None:
     """Declare the arm's position.
 
-    WHERE: angles such as '0,-60,40', a posture of the arm file by its name, a via point of the job such as P0, or a
-    trajectory file for its start. Without it: the home posture of the arm file. Nothing moves; afterwards motions may
-    start. With --switches the joints that have a switch of known angle move: to it, off it, slowly to it again, and to
-    their home angle; in the order of 'homing' in the arm file, else one after the other.
+    WHERE: angles such as '0,-60,40', a posture of the arm file by its name, a via point of the job such as
+    P0, or a trajectory file (its start). Default: the home posture of the arm file. Nothing moves; afterwards
+    motions may start. With --switches the joints that have a switch of known angle move: to it, off it,
+    slowly to it again, and to their home angle; in the order of 'homing' in the arm file, by default one
+    after the other.
     """
     if switches and where != HOME:
         raise InputError(
@@ -88,24 +92,24 @@ def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions)
 
 
 def is_named(text: str) -> bool:
-    """Whether the text means home or another posture by name, a via point or a trajectory file, and no angles."""
+    """Whether the text is a name (of a posture, a via point or a trajectory file) instead of angles."""
     return text == HOME or is_via(text) or text.endswith(".json") or not name_problem(text)
 
 
 @dataclass(frozen=True)
 class NamedPosture:
-    """What a user calls a posture, before the arm is known for which it is meant."""
+    """The user's text for a posture, before its arm is known."""
 
     text: str
     arm: Arm | None
-    """The arm that is named, else the one of the trajectory file; None: whatever the board is set up for."""
+    """The arm that is set, else the arm of the trajectory file; None: the arm that the board is set up for."""
     plan: Plan | None
     """Of the trajectory file."""
     sequence: SequencePlan | None = None
 
     @classmethod
     def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
-        """The posture that ``text`` names; InputError if its trajectory file or the arm cannot be read."""
+        """The posture of ``text``; raises InputError if its trajectory file or the arm cannot be read."""
         if text.endswith(".json") and is_sequence_plan(Path(text)):
             sequence = chosen.load_sequence_plan(Path(text), arm_path)
             return cls(text, sequence.arm, None, sequence)
@@ -113,14 +117,14 @@ class NamedPosture:
             plan = chosen.load_plan(Path(text), arm_path, altered)
             return cls(text, plan.arm, plan)
         if not is_named(text):
-            _numbers(text)  # what is not a posture is said before a port is opened
+            _numbers(text)  # a wrong posture is reported before a port is opened
         arm = chosen.named_arm(arm_path)
         if arm is not None and is_named(text) and not is_via(text):
             arm.posture(text)  # the same
         return cls(text, arm, None)
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
-        """Angles in degrees (J,); InputError if the text is not a posture, or does not fit the arm."""
+        """Angles in degrees (J,); raises InputError if the text is not a posture or does not fit the arm."""
         if self.sequence is not None:
             return point_to_point.posture(self.sequence.start_deg or arm.home_deg, arm)
         if self.plan is not None:
@@ -146,7 +150,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def say_where_it_is(board: Board, as_json: bool = False) -> None:
-    """Print where the arm is, as the commands that place it do in the end; as JSON what ``status`` prints."""
+    """Print the arm's position at the end of a command; as JSON like ``status``."""
     found = board.state()
     lines = ["position:", *(f"  {line}" for line in state.joint_lines(found))]
     results.show(as_json, found.to_json(), lines)
@@ -161,7 +165,7 @@ def words(angles_deg: Array, arm: Arm) -> str:
 
 
 def via_deg(text: str, arm: Arm, job: Job) -> Array:
-    """The angles of a via point of a job, degrees (J,); InputError if the job has no such point."""
+    """The angles of a via point of a job, degrees (J,); raises InputError if the job has no such point."""
     points_deg, _ = planner.via_angles(arm, job)
     index = int(text[1:])
     if index >= len(points_deg):

@@ -1,4 +1,4 @@
-"""Progress bars: on a terminal only, and only for work that takes longer than a second."""
+"""Progress bars, only on a terminal and for work that takes longer than a second."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import shutil
 import sys
 import time
 from contextlib import ExitStack
-from types import TracebackType
 from typing import Any, Self
 
 import click
@@ -19,7 +18,7 @@ _BAR_COLUMNS = 24
 
 
 class ProgressBar:
-    """Call it with (done, whole); a bar appears once a second has passed and work is left."""
+    """Call it with (done, whole); the bar appears after a second if work is left."""
 
     def __init__(self, label: str) -> None:
         self._label = label
@@ -30,11 +29,11 @@ class ProgressBar:
         self._stage = ""
 
     def stage(self, name: str) -> None:
-        """What is being done from here on: the note where none is given."""
+        """Set the default note for the work from now on."""
         self._stage = name
 
     def __call__(self, done: float, whole: float, note: str = "") -> None:
-        """Show how far the work is, with a note before the bar."""
+        """Show the progress, with a note before the bar."""
         note = note or self._stage
         if self._bar is None and done < whole and self._wanted():
             self._bar = self._stack.enter_context(
@@ -53,7 +52,5 @@ class ProgressBar:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._stack.close()

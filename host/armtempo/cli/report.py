@@ -9,12 +9,12 @@ from typing import Any
 import click
 
 from armtempo import pipeline
+from armtempo.basics.atomic_file import check_replaceable
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.cli import options, results
-from armtempo.formats.atomic_file import check_replaceable
 from armtempo.report import evaluation, sequence_report, verdict
+from armtempo.report.sequence_reader import SequenceRun, is_sequence_run
 from armtempo.robot.run import Run
-from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run
 
 
 @click.command("report")
@@ -32,13 +32,12 @@ from armtempo.runs.sequence_reader import SequenceRun, is_sequence_run
 def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool) -> None:
     """Write report.html and its figures into a run folder, of a motion or a sequence.
 
-    RUNS: run folders. With two or more, each gets its page, and one more page compares them, naming those that cannot
-    be read.
+    RUNS: run folders. With two or more, one more page compares them, and names those that cannot be read.
     """
     if len(runs) == 1:
         if out is not None:
             raise InputError(
-                "--out goes with two or more runs",
+                "--out needs two or more runs",
                 "leave it out: the page of one run is report.html in its folder",
             )
         sequence = is_sequence_run(runs[0])
@@ -64,14 +63,14 @@ def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool)
 
 
 def _values(run: Path, page: Path) -> dict[str, Any]:
-    """The verdict of a page, which is ``good``, ``bad`` or ``open``, with what it rests on."""
+    """The verdict (``good``, ``bad`` or ``open``) and the findings of a page."""
     told = sequence_report.verdict_of(run) if is_sequence_run(run) else verdict.of(evaluation.evaluate(run))
     findings = [asdict(finding) for finding in told.findings]
     return {"folder": str(run), "page": str(page), "verdict": told.state, "findings": findings}
 
 
 def _is_comparison(page: Path) -> bool:
-    """Whether a file is a page that this command wrote."""
+    """Whether a file is a comparison page written by this command."""
     try:
         return "<title>Runs compared" in page.read_text(encoding="utf-8", errors="replace")[:4000]
     except OSError:

@@ -1,7 +1,8 @@
-"""What commands print: results as lines or as one JSON document, errors, and remarks that ``--quiet`` leaves out.
+"""Output of commands: results as lines or as one JSON document, errors, and remarks, which ``--quiet``
+suppresses.
 
-The keys of the documents carry units as names do (``_deg``, ``_s``, ``_mm``, ``_steps``, ``_bytes``); what is not
-known is null.
+The keys of the documents end with units (``_deg``, ``_s``, ``_mm``, ``_steps``, ``_bytes``); unknown values
+are null.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import ArmtempoError
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 
 _DOCUMENT = "armtempo.document"
 """Key of click's context: a JSON document was printed."""
@@ -35,10 +36,10 @@ def show_json(values: Any) -> None:
 
 
 def show_error(error: ArmtempoError, who: str = "armtempo", as_json: bool = False) -> None:
-    """Write an error to stderr, ``who`` before it, and what to do next on the line below.
+    """Write an error to stderr, after ``who``, and its hint on the next line.
 
-    Characters that would steer the terminal are spelt out. ``as_json``: as a document on stdout, with ``error``,
-    ``hint`` and the ``exit_code``, unless one was printed there.
+    Control characters are escaped. ``as_json``: print a document with ``error``, ``hint`` and ``exit_code``
+    on stdout instead, unless a document was printed before.
     """
     if as_json and _DOCUMENT not in click.get_current_context().meta:
         click.echo(json.dumps({"error": error.problem, "hint": error.hint, "exit_code": error.exit_code}))
@@ -61,5 +62,5 @@ def remark(text: str) -> None:
 
 
 def teller(as_json: bool) -> Callable[[str], None]:
-    """What says how the work goes: on stdout, or on stderr where that is for the document."""
+    """The function that prints progress: to stdout, or to stderr if stdout is for the document."""
     return remark if as_json else click.echo

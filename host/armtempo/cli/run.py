@@ -1,4 +1,4 @@
-"""``armtempo run`` and ``fetch``: replay a motion and record what comes back, or fetch what the board recorded."""
+"""``armtempo run`` and ``fetch``: replay and record a motion, or fetch the samples of a run without a host."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ def run(
 ) -> None:
     """Replay a motion and record it, or run a sequence.
 
-    WHAT: a trajectory file or the name of a motion on the board, or a planned sequence or the name of one on the
-    board, whose step and cycle are shown. The samples go into a new run folder. The arm must be homed ('armtempo
-    home') and be at the start of the motion ('armtempo goto'); a virtual board is put there first. Between repetitions
-    the arm returns along the same path. Ctrl-C brakes, as does 'armtempo stop' in another terminal; 'armtempo speed',
-    'pause' and 'resume' work there too.
+    WHAT: a trajectory file, a planned sequence, or the name of a motion or sequence on the board. The samples
+    go into a new run folder. The arm must be homed ('armtempo home') and be at the start of the motion
+    ('armtempo goto'); a virtual arm is moved there first. Between repetitions the arm returns along the same
+    path. Ctrl-C, or 'armtempo stop' in another terminal, brakes; 'armtempo speed', 'pause' and 'resume' work
+    there too.
     """
     if chosen.is_file(what) and is_sequence_plan(Path(what)):
         only_for_motions(repeat, live)
@@ -64,7 +64,7 @@ def run(
 
 
 def only_for_motions(repeat: int, live: bool) -> None:
-    """InputError for what a sequence does not have: repetitions of its own, a plot."""
+    """Raise InputError for options that a sequence does not have: --repeat, --live."""
     for name, given in (("--repeat", repeat != 1), ("--live", live)):
         if given:
             raise InputError(f"{name}: not for a sequence", "leave it out; repeat is a step of the sequence")
@@ -83,11 +83,11 @@ def run_and_tell(
     live: bool = False,
     as_json: bool = False,
 ) -> Run:
-    """Run a motion, or the stored one of that name, and print what happens and the outcome for each joint.
+    """Run a motion, or the stored motion of that name, and print the progress and the result of each joint.
 
-    ``as_json``: the result as JSON, what happens on the other stream.
+    ``as_json``: print the result as JSON, and the progress to stderr.
     """
-    virtual = chosen.virtual_words(board.port) if board.info.virtual else ""
+    virtual = "a virtual board" if board.info.virtual else ""
     with Live(window=live, where=virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
     results.show(as_json, run.to_json(), text_summary.result_lines(run.results))
@@ -101,8 +101,8 @@ def run_and_tell(
 def fetch(what: str | None, out: Path | None, given: BoardOptions) -> None:
     """Fetch the samples that the board recorded of its last run, such as one started by its button.
 
-    WHAT: what was run: a trajectory file, or the name of a motion on the board; without it the motion that
-    the button starts. If it is still running, this waits for its end. The samples go into a new run folder, once.
+    WHAT: the motion of that run: a trajectory file, or the name of a motion on the board; default: the motion
+    that the button starts. Waits for the end of a motion that still runs. The samples can be fetched once.
     """
     plan = (
         chosen.load_plan(Path(what), given.arm_path, given.altered) if what and chosen.is_file(what) else None

@@ -11,9 +11,9 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
+from armtempo.diagnosis.selftest.result import Measurement, SelfTest
+from armtempo.report import selftest_page as page
 from armtempo.robot.motor_test import ARM_FILE
-from armtempo.selftest import page
-from armtempo.selftest.result import Measurement, SelfTest
 
 
 @click.command("selftest")
@@ -24,24 +24,25 @@ from armtempo.selftest.result import Measurement, SelfTest
     metavar="FOLDER",
     help="Write selftest.json and a page with figures, selftest.html, to FOLDER.",
 )
-@options.force("the files of an earlier self-test in FOLDER")
+@options.force("files of an earlier self-test in FOLDER")
 @click.option(
     "--with-motors",
     is_flag=True,
-    help="Instead, after a question: move each joint up to a degree there and back; press switches and E-stop.",
+    help="Ask first, then move each joint up to a degree there and back; you press switches and E-stop.",
 )
 @options.board(options.arm_of_board)
 def selftest(given: BoardOptions, out: Path | None, force: bool, with_motors: bool) -> None:
     """Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.
 
-    Nothing needs to be connected, and nothing moves: the drivers must be off, and are kept off. The board is reset at
-    the end, so the arm's position is unknown then. With --with-motors it asks, then moves each joint of the homed arm
-    and compares directions and encoders with the arm file. Exit code 1 if anything is wrong.
+    Nothing needs to be connected, and nothing moves: the drivers must be off, and stay off. The board is
+    reset at the end, and the arm's position is unknown afterwards. With --with-motors it asks, then moves
+    each joint of the homed arm and compares directions and encoders with the arm file. Exit code 1 if
+    anything is wrong.
     """
     if out is not None:
         page.check_free(out, force)
     if given.arm_path is not None and not with_motors:
-        raise InputError("--arm goes with --with-motors", "leave it out: the board has its arm's record")
+        raise InputError("--arm needs --with-motors", "leave it out: the board has its arm's record")
     given = replace(given, port=chosen.port(given.port))
     found = _with_motors(given) if with_motors else _alone(given)
     if out is not None:
@@ -67,8 +68,8 @@ def _with_motors(given: BoardOptions) -> SelfTest:
 
 
 def _lines(found: SelfTest) -> list[str]:
-    kind = "virtual board: its figures are simulated" if found.simulated else "board"
-    lines = [f"self-test of {kind} {found.board_id}"]
+    kind = ", a virtual one: its figures are simulated" if found.simulated else ""
+    lines = [f"self-test of board {found.board_id}{kind}"]
     for line in found.lines:
         lines.extend(_words(line))
     if to_correct := found.data.get(ARM_FILE):

@@ -1,4 +1,4 @@
-"""Sequences on the terminal: what a planned one takes, and how far one that runs is."""
+"""Sequences on the terminal: times of a planned sequence, progress of a running one."""
 
 from __future__ import annotations
 
@@ -12,22 +12,23 @@ import click
 from armtempo_shared.sequence import END, MOVE, REPEAT, WAIT
 
 import armtempo
+from armtempo.basics.atomic_file import check_not_input
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError
+from armtempo.basics.text import aligned
 from armtempo.cli import chosen, results
 from armtempo.cli.progress import ProgressBar
 from armtempo.cli.state import counted
-from armtempo.formats.atomic_file import check_not_input
-from armtempo.formats.text import aligned
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share
+from armtempo.report import text_summary
 from armtempo.robot.board import Board
 from armtempo.robot.sequence_run import cycles, where
 from armtempo.robot.stop_request import Stopped
 
 
 def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as_json: bool) -> None:
-    """Plan a sequence file, say what its time is made of, and write it."""
+    """Plan a sequence file, print its times, and write it."""
     named = arm_path or arm_named(file)
     arm = chosen.load_arm(named)
     sequence = Sequence.load(file, arm)
@@ -41,7 +42,7 @@ def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as
 
 
 def refuse_job_options(options: dict[str, Any]) -> None:
-    """InputError if an option changes the job, and there is none."""
+    """Raise InputError for an option that changes a job: a sequence has none."""
     given = sorted(name for name, value in options.items() if value not in (None, False))
     if given:
         raise InputError(
@@ -51,7 +52,7 @@ def refuse_job_options(options: dict[str, Any]) -> None:
 
 
 def values(planned: SequencePlan) -> dict[str, Any]:
-    """The same as ``lines``, as plain values."""
+    """The content of ``lines`` as plain values."""
     cycles = [
         {"step": cycle.step, "times": cycle.times or None, **_share(cycle.share)} for cycle in planned.cycles
     ]
@@ -73,14 +74,14 @@ def _share(share: Share) -> dict[str, Any]:
 
 
 def _duration_s(planned: SequencePlan, row: SequenceRow) -> float | None:
-    """What a row takes; None if it takes no time of its own."""
+    """Duration of a row; None for a row without one."""
     if row.op == MOVE:
         return float(planned.legs[row.number].duration_s)
     return row.amount / 1000 if row.op == WAIT else None
 
 
 def lines(planned: SequencePlan) -> list[str]:
-    """Each row with its time, the cycle, the whole."""
+    """Each row with its time, then the times of the cycles and of the whole sequence."""
     rows, depth = [("step", "", "seconds")], 0
     for row in planned.rows:
         depth -= row.op == END
@@ -94,6 +95,7 @@ def lines(planned: SequencePlan) -> list[str]:
         found.append(f"cycle (step {cycle.step}, {times}): {_made_of(cycle.share)}")
     if planned.total is not None:
         found.append(f"in all: {_made_of(planned.total)}")
+    found.extend(text_summary.torque_lines(planned.loaded_legs))
     found.append(f"pause between two motions: about {PAUSE_S:g} s; waits for inputs are not counted")
     return found
 
@@ -107,7 +109,7 @@ def _made_of(share: Any) -> str:
 
 
 class Shown:
-    """A watcher that keeps one line on a terminal, or says each new cycle elsewhere."""
+    """A watcher that updates one line on a terminal, or else prints a line for each new cycle."""
 
     def __init__(self, planned: SequencePlan | None, say: Callable[[str], object]) -> None:
         self._say = say
@@ -116,7 +118,7 @@ class Shown:
         self.last: SequenceState | None = None
 
     def __call__(self, state: SequenceState) -> None:
-        """Show how far the sequence is."""
+        """Show step and cycle."""
         self.last = state
         doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
@@ -134,9 +136,10 @@ class Shown:
 def run_and_tell(
     board: Board, sequence: SequencePlan | str, replace: bool, out: Path | None, as_json: bool = False
 ) -> SequenceState:
-    """Run a sequence into a run folder below ``out`` (None: nowhere), print where it is and how it ended.
+    """Run a sequence, recorded in a run folder in ``out`` (None: not recorded); print its progress and its
+    end.
 
-    ``as_json``: the end as JSON. Exit code 1 if an input did not come.
+    ``as_json``: print the end as JSON. Exit code 1 if the wait for an input timed out.
     """
     say = results.teller(as_json)
     shown = Shown(sequence if not isinstance(sequence, str) else None, say)
@@ -149,7 +152,7 @@ def run_and_tell(
     except LinkError:
         shown.close()
         if shown.last is not None:
-            say(f"last heard of {where(shown.last)}")
+            say(f"last known state: {where(shown.last)}")
         raise
     finally:
         if (recorded := board.last_sequence) is not None and out is not None:
@@ -158,7 +161,7 @@ def run_and_tell(
     if end.ending == "timed_out":
         raise ArmtempoError(
             f"an input did not change in time {where(end)}",
-            "see why, 'armtempo goto' its start, run it again",
+            "find the cause, 'armtempo goto' its start, run it again",
         )
     result = _as_json(end, board, recorded.path if recorded else None)
     results.show(as_json, result, [f"{end.ending} after {cycles(end)}{counted(board.counters)}"])
@@ -166,7 +169,7 @@ def run_and_tell(
 
 
 def _as_json(end: SequenceState, board: Board, folder: Path | None) -> dict[str, Any]:
-    """How it ended, for other programs."""
+    """The end as plain values."""
     return {
         "name": end.name,
         "folder": str(folder) if folder else None,

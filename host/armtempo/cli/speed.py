@@ -1,4 +1,4 @@
-"""``armtempo speed``, ``pause`` and ``resume``: how fast what moves continues."""
+"""``armtempo speed``, ``pause`` and ``resume``."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def speed(percent: float, given: BoardOptions) -> None:
 
     PERCENT: 1 to 100.
 
-    The arm stays on its path; the speed goes over smoothly, in the time in which the motion can brake. Where another
-    armtempo program has the port, it is asked to do it, and what it starts later runs at that speed too.
+    The arm stays on its path; the speed changes smoothly, within the motion's brake time. If another armtempo
+    program has the port, that program changes it, and uses the speed for its next motions too.
     """
     words = f"{percent:g} % of the planned speed"
     _change(given, _Asked("speed", lambda board: board.speed(percent / 100), words, percent))
@@ -39,11 +39,11 @@ class _Asked:
     ask: Callable[[Board | SharedBoard], None]
     words: str
     percent: float | None = None
-    """Of the planned speed; None: as before the pause."""
+    """Percentage of the planned speed; None: the speed before the pause."""
 
 
 def _change(given: BoardOptions, asked: _Asked) -> None:
-    """Ask for it, through the program that has the port where there is one, and say so."""
+    """Make the change, through the program that has the port if there is one, and print it."""
     given = chosen.any_port(given)
     program = _ask(given, asked)
     values = {"asked": asked.what, "speed_percent": asked.percent, "port": given.port, "program": program}
@@ -51,10 +51,10 @@ def _change(given: BoardOptions, asked: _Asked) -> None:
 
 
 def _ask(given: BoardOptions, asked: _Asked) -> str | None:
-    """Ask for it; through which program, None if over the port itself."""
+    """Make the change; returns the program that did it, None if over the port itself."""
     with chosen.shared_or_own(given) as board:
         if asked.what == "speed" and not isinstance(board, SharedBoard) and not board.status().moving:
-            raise LinkError("nothing moves", "'armtempo run --speed' begins at a lower speed")
+            raise LinkError("nothing moves", "'armtempo run --speed' starts at a lower speed")
         try:
             asked.ask(board)
         except BoardError as error:
@@ -71,7 +71,7 @@ def _ask(given: BoardOptions, asked: _Asked) -> str | None:
 def pause(given: BoardOptions) -> None:
     """Bring the running motion to rest on its path; 'armtempo resume' continues it, 'armtempo stop' ends it.
 
-    The drivers hold meanwhile. A run, its pauses counted, lasts at most 1 h 49 min.
+    The drivers keep their current. A run with its pauses can last at most 1 h 49 min.
     """
     _change(given, _Asked("pause", lambda board: board.pause(), "paused", 0.0))
 

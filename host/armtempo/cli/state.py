@@ -1,4 +1,4 @@
-"""``armtempo status``, and a board's state in lines, as it and others print it."""
+"""``armtempo status``, and the lines of a board's state for other commands."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from pathlib import Path
 import click
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.text import aligned
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.formats.text import aligned
+from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.model.arm import Arm
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 
@@ -32,11 +33,11 @@ def status(given: BoardOptions) -> None:
 
 
 def _named(found: BoardState, arm_path: Path | None) -> BoardState:
-    """In degrees, where the arm that is named, or the one that ships, is what the board is set up for."""
+    """The state in degrees, if the board is set up for the arm that is set, or for the paper's."""
     named: Arm | None = None
     try:
         named = chosen.named_arm(arm_path)
-    except InputError as error:  # the board is worth looking at all the same
+    except InputError as error:  # show the board's state nevertheless
         results.remark(f"armtempo: {error}")
     if named is not None and found.arm_crc and not found.arm and not found.named(named).arm:
         results.remark(
@@ -46,9 +47,9 @@ def _named(found: BoardState, arm_path: Path | None) -> BoardState:
 
 
 def lines(state: BoardState) -> list[str]:
-    """Who the board is, what it is doing, where the joints are."""
-    virtual = f", {chosen.virtual_words(state.port)}" if state.virtual else ""
-    current = "" if state.program_current else "; differs from the one installed here: 'armtempo deploy'"
+    """The board, its state, and the joints' positions."""
+    virtual = ", a virtual board" if state.virtual else ""
+    current = "" if state.program_current else f"; installed here is {own_crc():08x}: {UPDATE}"
     return [
         f"board     {state.board_id}{virtual}",
         f"port      {state.port}",
@@ -66,7 +67,7 @@ def _measured(state: BoardState) -> str:
 
 
 def motion_lines(state: BoardState) -> list[str]:
-    """What the board is doing, where the joints are."""
+    """The board's state and the joints' positions."""
     found = [f"state     {state.state}{_speed(state)}{_rest(state)}"]
     if state.fault:
         found.append(f"fault     {state.fault}; see 'armtempo clear'")
@@ -78,20 +79,20 @@ def motion_lines(state: BoardState) -> list[str]:
 
 
 def _sequence(stand: SequenceStand) -> str:
-    """Which it is, where it is, what it has counted."""
+    """Name, step, cycles and counters of a sequence."""
     cycles = f"{stand.cycle} whole cycle{'s' * (stand.cycle != 1)}"
     return f"{stand.name}: {stand.ending}, step {stand.step}, {cycles}{counted(stand.counters)}"
 
 
 def counted(counters: Mapping[str, int]) -> str:
-    """Values of counters, as the end of a line; "" without any."""
+    """Values of counters, as the end of a line; "" if there are none."""
     return "".join(f"; {name} {value}" for name, value in counters.items())
 
 
 def _speed(state: BoardState) -> str:
     if state.speed_percent == 100.0 or not state.moving:
         return ""
-    return f", at {state.speed_percent:g} % of the planned speed" if state.speed_percent else ", in a pause"
+    return f", at {state.speed_percent:g} % of the planned speed" if state.speed_percent else ", paused"
 
 
 def _rest(state: BoardState) -> str:
@@ -105,14 +106,14 @@ def _rest(state: BoardState) -> str:
 
 
 def joint_lines(state: BoardState) -> list[str]:
-    """A line a joint: its name, its angle with the steps, the encoder's angle with the counts; and the tool."""
+    """One line per joint: name, angle (steps), encoder angle (counts); and a line for the tool."""
     rows = [_cells(joint) for joint in state.joints]
     lines = [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
     return [*lines, f"tool at {tool_words(state.tool)}"] if state.tool else lines
 
 
 def tool_words(tool: ToolPlace) -> str:
-    """Where the tool is, in one line."""
+    """The tool's pose in one line."""
     x, y, z = tool.position_mm
     roll, pitch, yaw = tool.rpy_deg
     return f"{x:.1f} {y:.1f} {z:.1f} mm, roll {roll:.1f}° pitch {pitch:.1f}° yaw {yaw:.1f}°"
@@ -121,16 +122,14 @@ def tool_words(tool: ToolPlace) -> str:
 def _link(state: BoardState) -> str:
     if not state.frames_bad and not state.samples_lost:
         return "OK: no damaged messages, no lost samples"
-    return (
-        f"messages damaged {state.frames_bad} times, {state.samples_lost} samples lost: check cable and plugs"
-    )
+    return f"{state.frames_bad} damaged messages, {state.samples_lost} lost samples: check cable and plugs"
 
 
 def _arm(state: BoardState) -> str:
     if state.arm_problem:
         return state.arm_problem
     if not state.arm_crc:
-        return "none; set the board up for one with 'armtempo configure'"
+        return "none; set the board up with 'armtempo configure'"
     record = f"{len(state.joints)} joints, record {state.arm_crc:08x}"
     if state.arm:
         return f"{chosen.source_words(state.arm, state.arm_source)}: {record}"

@@ -10,15 +10,15 @@ from armtempo.basics.errors import ArmtempoError, LinkError, NoAnswerError, Port
 from armtempo.cli import chosen, options, results, state
 from armtempo.cli.options import BoardOptions
 from armtempo.model.arm import Arm
-from armtempo.project import quick_stop
-from armtempo.project.quick_stop import StopAnswer
+from armtempo.ports import quick_stop
+from armtempo.ports.quick_stop import StopAnswer
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.shared_board import SharedBoard
 from armtempo.robot.stored_motion import fault_name
 
 _PORT_FREE_S = 5.0
-"""A program that was stopped gives its port up within this time."""
+"""A stopped program closes its port within this time."""
 _LOOK_S = 0.1
 
 
@@ -28,7 +28,7 @@ _LOOK_S = 0.1
 def stop(now: bool, given: BoardOptions) -> None:
     """Brake or freeze, and print the arm's position.
 
-    If another armtempo program has the port, it is told to stop and ends its command.
+    If another armtempo program has the port, that program stops the arm and ends its command.
     """
     given = chosen.any_port(given)
     answer = quick_stop.take_answer(given.port or "", now)
@@ -38,7 +38,7 @@ def stop(now: bool, given: BoardOptions) -> None:
 
 
 def _stopped(given: BoardOptions, now: bool, told: bool) -> BoardState:
-    """Where the arm has come to rest; ``told``: the program that has the port knows already."""
+    """The state after the arm has come to rest; ``told``: the program that has the port was already told."""
     limit_s = time.monotonic() + _PORT_FREE_S
     while True:
         shared = shared_board.find(given.port or "")
@@ -52,7 +52,7 @@ def _stopped(given: BoardOptions, now: bool, told: bool) -> BoardState:
                 return found
         try:
             return _directly(given, now)
-        except PortInUseError:  # its program answers for it soon, or gives it up
+        except PortInUseError:  # its program is about to open the socket, or to close the port
             if time.monotonic() > limit_s:
                 raise
             time.sleep(_LOOK_S)
@@ -64,7 +64,7 @@ def _tell(given: BoardOptions, answer: StopAnswer, now: bool) -> None:
 
 
 def _rest(shared: SharedBoard) -> BoardState | None:
-    """Where the arm comes to rest; None if the other program gives up the port before."""
+    """The state at rest; None if the other program closes the port before."""
     try:
         found = shared.state()
         if found.moving and found.rest_s:
@@ -92,7 +92,7 @@ def _show(found: BoardState, as_json: bool) -> None:
 
 
 def _with_degrees(found: BoardState) -> BoardState:
-    """The same in degrees, where the arm is known; the stop is done by now, so it may take a while."""
+    """``found`` in degrees if the arm is known. Slow imports do not matter: the stop was already sent."""
     if found.arm or not found.arm_crc:
         return found
     try:

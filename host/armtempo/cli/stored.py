@@ -1,4 +1,4 @@
-"""What the board keeps: ``armtempo upload``, ``list``, ``show``, ``remove`` and ``rename``."""
+"""Stored motions and sequences: ``armtempo upload``, ``list``, ``show``, ``remove`` and ``rename``."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import click
 import numpy as np
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.text import aligned
 from armtempo.cli import chosen, options, posture, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.progress import ProgressBar
-from armtempo.formats.text import aligned
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import is_sequence_plan
@@ -24,14 +24,14 @@ from armtempo.robot.board_state import record_crc
 
 @click.command("upload")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--name", metavar="NAME", help="Name on the board; without it the job's name.")
+@click.option("--name", metavar="NAME", help="Name on the board; default: the job's name.")
 @click.option("--default", "as_default", is_flag=True, help="Let the board's button start it.")
 @options.force("another motion of this name on the board")
 @options.board(options.arm_of_file, options.replace_arm, options.altered)
 def upload(file: Path, name: str | None, as_default: bool, force: bool, given: BoardOptions) -> None:
     """Store a trajectory file, or a planned sequence with its motions, on the board.
 
-    FILE: what 'armtempo plan' has written.
+    FILE: written by 'armtempo plan'.
     """
     if is_sequence_plan(file):
         plan = chosen.load_sequence_plan(file, given.arm_path, name)
@@ -49,7 +49,7 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
         with ProgressBar("uploading") as progress:
             board.upload(motion, default=as_default, progress=progress, replace=force)
         virtual = board.info.virtual
-        where = f" on {chosen.virtual_words(board.port)}" if virtual else ""
+        where = " on a virtual board" if virtual else ""
     values = {"name": motion.name, "sequence": False, "size_bytes": len(motion.data), "virtual": virtual}
     results.show(given.as_json, values, [f"{motion.name}: {len(motion.data)} bytes stored{where}"])
 
@@ -59,7 +59,7 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
 def list_motions(given: BoardOptions) -> None:
     """List the motions and sequences on the board, and their first and last postures.
 
-    The one marked * is the default that the board's button starts.
+    The default, which the board's button starts, is marked *.
     """
     with chosen.board(given) as board:
         found = board.list()
@@ -67,7 +67,7 @@ def list_motions(given: BoardOptions) -> None:
             results.show_json({"virtual": board.info.virtual, "motions": [_listed(one) for one in found]})
             return
         arm = _arm_of(board, given.arm_path)
-        virtual = f"  on {chosen.virtual_words(board.port)}" if board.info.virtual else ""
+        virtual = "  on a virtual board" if board.info.virtual else ""
         click.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum{virtual}")
         for entry in found:
             click.echo(_row(entry))
@@ -88,7 +88,7 @@ def _listed(entry: StoredMotion) -> dict[str, Any]:
 
 
 def _arm_of(board: Board, arm_path: Path | None) -> Arm | None:
-    """The arm that the board is set up for, as far as it is known."""
+    """The arm that the board is set up for; None if it is not known."""
     named = chosen.named_arm(arm_path)
     if named is not None and record_crc(named) != board.info.arm_crc:
         results.remark(
@@ -111,7 +111,7 @@ def _row(entry: StoredMotion) -> str:
 
 
 def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:
-    """Where a motion begins and ends, in degrees and steps, where the arm is known."""
+    """The first and last posture of a motion, in degrees and steps, if the arm is known."""
     if arm is None or not entry.joints:
         return []
     try:
@@ -138,7 +138,7 @@ def show(name: str, given: BoardOptions) -> None:
 
 
 def _top_speeds_deg_s(motion: EncodedMotion) -> list[float]:
-    """Of each driven joint, by samples."""
+    """Top speed of each driven joint, from samples."""
     times = np.linspace(0.0, motion.trajectory.duration_s, 2001)
     found: list[float] = np.abs(motion.trajectory(times, 1)).max(axis=0).tolist()
     return found

@@ -1,4 +1,4 @@
-"""``armtempo teach``: where the arm is becomes a posture of its file, or the via points of a job."""
+"""``armtempo teach``: stores the arm's position as a posture in its file, or as via points of a job."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 import click
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
+from armtempo.basics.settings import ARM, ProjectSettings, nothing_set
 from armtempo.cli import chosen, jog, keys, options
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
-from armtempo.formats.atomic_file import replace_text
-from armtempo.model import job_text, posture, posture_text, shipped
+from armtempo.model import posture, shipped, taught
 from armtempo.model.arm import Arm
-from armtempo.project.settings import ARM, ProjectSettings, nothing_set
 from armtempo.robot.board import Board
 
 
@@ -23,7 +23,9 @@ from armtempo.robot.board import Board
 @click.argument(
     "job_file", required=False, metavar="[JOB.toml]", type=click.Path(dir_okay=False, path_type=Path)
 )
-@click.option("--posture", "name", metavar="NAME", help="Write [posture.NAME] into the arm file instead.")
+@click.option(
+    "--posture", "name", metavar="NAME", help="Write the position as [posture.NAME] into the arm file."
+)
 @click.option("--by-hand", is_flag=True, help="Switch the motors' current off and follow the encoders.")
 @click.option(
     "--replace", "replace_old", is_flag=True, help="Replace the posture, or the job file, of that name."
@@ -44,16 +46,17 @@ def teach(
 ) -> None:
     """Teach: store the arm's present position.
 
-    JOB.toml: a new job file for the via points: move by the keys of 'armtempo jog' and press p for a point, or move
-    --by-hand. --posture NAME writes one posture into the arm file, whose comments and layout are kept; nothing moves.
-    Then 'armtempo goto NAME' moves the arm there, and a job may use it: [[via]] posture = "NAME".
+    JOB.toml: a new job file for the via points: move by the keys of 'armtempo jog' and press p for a point,
+    or move the arm --by-hand. --posture NAME writes one posture into the arm file and keeps its comments and
+    layout; nothing moves. Then 'armtempo goto NAME' moves the arm there, and a job can use it: [[via]]
+    posture = "NAME".
     """
     if (job_file is None) == (name is None) or (name is not None and by_hand):
         raise InputError(
-            "teach makes a job or a posture", "give JOB.toml, or --posture NAME without --by-hand"
+            "give either a job file or a posture", "give JOB.toml, or --posture NAME without --by-hand"
         )
     if gamepad and (by_hand or name is not None):
-        raise InputError("--gamepad goes with the keys of teach JOB.toml", "leave it out")
+        raise InputError("--gamepad is for teach JOB.toml by keys", "leave it out")
     if name is not None:
         file = _own_arm_file(arm_path, name)
         arm = chosen.load_arm(arm_path)
@@ -63,7 +66,7 @@ def teach(
     elif job_file is not None:
         check_free(job_file, replace_old)
         if not keys.is_terminal():
-            raise InputError("the keys of teach need a terminal", "run it in one")
+            raise InputError("teach by keys needs a terminal", "run it in one")
         named = chosen.named_arm(arm_path)
         with chosen.board(BoardOptions(port, log_traffic), named) as board:
             jog.prepare(board, chosen.arm_of_board(board, named))
@@ -71,17 +74,17 @@ def teach(
 
 
 def _own_arm_file(arm_path: Path | None, name: str) -> Path:
-    """The arm file to write to; InputError for one that ships, and for what is no name."""
+    """The arm file to write to; raises InputError for a shipped arm, and for an invalid posture name."""
     if problem := posture.name_problem(name):
         raise InputError(f"--posture {name}: {problem}", "choose another name")
     setting = ProjectSettings().get(ARM, arm_path)
     if not setting:
-        raise nothing_set(ARM, "into which arm file?")
+        raise nothing_set(ARM, "no arm file is set")
     found = shipped.find(setting.path)
     if found.ships or found.path.resolve() in [path.resolve() for path in shipped.files().values()]:
         raise InputError(
-            f"the arm file {found.path.name} ships with armtempo and is not written to",
-            f"make your own of it: armtempo new FOLDER --like {found.path.stem}, then name it with --arm",
+            f"the arm file {found.path.name} belongs to armtempo and is not changed",
+            f"make a copy: armtempo new FOLDER --like {found.path.stem}, then give it with --arm",
         )
     return found.path
 
@@ -89,8 +92,8 @@ def _own_arm_file(arm_path: Path | None, name: str) -> Path:
 def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> None:
     arm = board.arm
     assert arm is not None  # it was configured
-    angles_deg = posture_text.digits(arm, board.posture_deg().tolist())
-    posture_text.save(file, arm, name, angles_deg, replace_old)
+    angles_deg = taught.digits(arm, board.posture_deg().tolist())
+    taught.save(file, arm, name, angles_deg, replace_old)
     words = ", ".join(
         f"{joint.name} {angle:.12g}°" for joint, angle in zip(arm.driven, angles_deg, strict=True)
     )
@@ -98,7 +101,7 @@ def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> No
 
 
 def _write_job(board: Board, file: Path, by_hand: bool, gamepad: bool) -> None:
-    """Collect the points and write them; where that fails they are told."""
+    """Collect the points and write them; print them if that fails."""
     arm = board.arm
     assert arm is not None  # it was configured
     points = TaughtPoints(arm, board.posture_deg)
@@ -123,7 +126,7 @@ def _guide(board: Board, pressed: Keys, points: TaughtPoints) -> None:
         "hold the arm: it sinks when the motors' current goes off. Enter: off; any other key: leave it on"
     )
     if pressed.read(600.0) not in ("\r", "\n"):
-        raise InputError("the motors kept their current", "run it again while somebody holds the arm")
+        raise InputError("the motors kept their current", "run it again while someone holds the arm")
     points.where = guided.angles_deg
     with guided:
         click.echo(
@@ -138,7 +141,7 @@ _BY_HAND_S = 0.3
 
 
 class TaughtPoints:
-    """The points so far; ``where`` gives the posture of the arm, (J,) in degrees."""
+    """The points taught up to now; ``where`` returns the posture of the arm, degrees (J,)."""
 
     def __init__(self, arm: Arm, where: Callable[[], Array]) -> None:
         self.points_deg: list[list[float]] = []
@@ -147,12 +150,12 @@ class TaughtPoints:
 
     @property
     def keys(self) -> dict[str, Callable[[], str]]:
-        """What the keys do that a screen has for them."""
+        """The keys for the jog screen, with their functions."""
         return {TAKE: self.take, UNDO: self.undo}
 
     def take(self) -> str:
-        """Take where the arm is; says what was done."""
-        point = posture_text.digits(self._arm, self.where().tolist())
+        """Store the arm's position; returns a message."""
+        point = taught.digits(self._arm, self.where().tolist())
         if problem := self._arm.angles_problem(point):
             return f"not taken: {problem}"
         if self.points_deg and point == self.points_deg[-1]:
@@ -161,28 +164,28 @@ class TaughtPoints:
         return f"point {len(self.points_deg)} taken: {_row(point)}"
 
     def undo(self) -> str:
-        """Forget the last point."""
+        """Remove the last point; returns a message."""
         if not self.points_deg:
             return "there is no point to remove"
         self.points_deg.pop()
         return f"point {len(self.points_deg) + 1} removed"
 
     def save(self, file: Path) -> None:
-        """Write the job; InputError for fewer than two points."""
-        text = job_text.of_points(job_text.name_of(file), self.points_deg)
+        """Write the job; raises InputError for fewer than two points."""
+        text = taught.of_points(taught.name_of(file), self.points_deg)
         replace_text(file, text)
         click.echo(
             f"written: {file}, {len(self.points_deg)} via points; 'armtempo plan --job {file}' plans it"
         )
 
     def tell(self) -> None:
-        """Print the points, where they cannot become a file: nothing that was taught is lost."""
+        """Print the points if the file cannot be written, so that they are not lost."""
         for point in self.points_deg:
             click.echo(f"[[via]]\nangles_deg = [{_row(point)}]", err=True)
 
 
 def check_free(file: Path, replace_old: bool) -> None:
-    """InputError if the job file already exists, before anything moves."""
+    """Raise InputError if the job file exists; called before anything moves."""
     if file.exists() and not replace_old:
         raise InputError(f"{file} already exists", "choose another name, or replace it with --replace")
     if not file.parent.is_dir():
@@ -190,9 +193,9 @@ def check_free(file: Path, replace_old: bool) -> None:
 
 
 def by_hand(keys: Keys, points: TaughtPoints, button: Callable[[], bool] = lambda: False) -> None:
-    """Take points while the arm is moved by hand, until q, Ctrl-C or the end of the input.
+    """Store points while the arm is moved by hand, until q, Ctrl-C or the end of the input.
 
-    ``button``: whether the board's button, which takes a point too, was pressed since it was asked last.
+    ``button``: whether the board's button, which stores a point too, was pressed since the last call.
     """
     said = ""
     while True:

@@ -26,11 +26,11 @@ _LOOK_S = 0.5
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write every pin edge with its time to this file.",
 )
-@click.option("--interpreter", help="MicroPython or Python to run it. Default: micropython if found.")
+@click.option("--interpreter", help="MicroPython or Python that runs it. Default: micropython if found.")
 @click.option(
     "--deployed",
     is_flag=True,
-    help="Run the program in the flash (installed by 'armtempo deploy'), not the one of this installation.",
+    help="Run the program in the flash (installed by 'armtempo deploy') instead of this installation's.",
 )
 @click.option(
     "--hold-button",
@@ -46,7 +46,7 @@ _LOOK_S = 0.5
     help="Folder used as an SD card in the board.",
 )
 @options.arm
-@click.option("--ideal", is_flag=True, help="Ideal motors, as without an arm file.")
+@click.option("--ideal", is_flag=True, help="Use ideal motors, as without an arm file.")
 @click.option(
     "--seed", default=0, show_default=True, help="Seed of the board's id and of its random deviations."
 )
@@ -64,8 +64,8 @@ def virtual_board(
 ) -> None:
     """Start a virtual board, print its port, and run it until Ctrl-C.
 
-    The port can be opened like a serial device, by armtempo (--port) and by any other program. Its motors are those of
-    the arm file; without one they are ideal, for any arm that the board is set up for.
+    The port can be opened like a serial device, by armtempo (--port) and by any other program. Its motors are
+    those of the arm file; without an arm file they are ideal and fit any arm.
     """
     wanted = LaunchOptions(
         flash,

@@ -1,4 +1,4 @@
-"""``armtempo watch`` and ``monitor``: what another program does with the arm, as state or as traffic."""
+"""``armtempo watch`` and ``monitor``: state and traffic of a board that another program uses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STATE_S = 0.5
 def watch(given: BoardOptions) -> None:
     """Show samples, states and events of another armtempo program that has the port.
 
-    If no program has it, the board is asked for its state. Ctrl-C ends it; a running motion continues.
+    If no program has the port, it prints the board's state. Ctrl-C ends it; a running motion continues.
     """
     given = chosen.any_port(given)
     with chosen.shared_or_own(given, any_program=True) as board:
@@ -81,9 +81,9 @@ Say = Callable[[float, str, list[str]], None]
 def monitor(file: Path | None, given: BoardOptions) -> None:
     """Show decoded traffic.
 
-    FILE: what '--log-traffic FILE' recorded; without it, the traffic of another armtempo program that has the port,
-    else the board is asked once a second. Ctrl-C ends it; a running motion continues. With --json each line is a
-    document.
+    FILE: a log of '--log-traffic FILE'; without it, the traffic of the armtempo program that has the port,
+    else of a status request each second. Ctrl-C ends it; a running motion continues. With --json each line is
+    a document.
     """
     say = _print_json if given.as_json else _print
     if file is not None:

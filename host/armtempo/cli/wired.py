@@ -1,4 +1,4 @@
-"""``armtempo output`` and ``input``, directly or through the program that has the port."""
+"""``armtempo output`` and ``input``, over the port or through the program that has it open."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from armtempo.basics.errors import InputError, LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link.board_messages import Levels
@@ -20,19 +20,17 @@ from armtempo.robot.outputs import BoardOutput, Way
 from armtempo.robot.shared_board import SharedBoard
 
 
-@click.command("output", context_settings={"ignore_unknown_options": True})  # so that -10 is a value
+@click.command("output", cls=options.TakesNumbers)
 @click.argument("name", required=False)
 @click.argument("value", required=False)
 @options.board(options.arm_of_board)
 def output(name: str | None, value: str | None, given: BoardOptions) -> None:
     """Set an output of the arm, or list them.
 
-    NAME: an [output.NAME] of the arm file. VALUE: a state of it such as open, or a number: 0 or 1, a duty of 0 to 1,
-    degrees of a servo. Without VALUE: prints its value; without NAME: all of them. Also while a motion runs, and while
-    another armtempo program has the port.
+    NAME: an [output.NAME] of the arm file. VALUE: one of its states, such as open, or a number: 0 or 1, a
+    duty of 0 to 1, degrees of a servo. Without VALUE it prints the value; without NAME, all outputs. Works
+    during a motion, and while another armtempo program has the port.
     """
-    if name is not None and name.startswith("-"):
-        raise InputError(f"no such option: {name}", "see 'armtempo output --help'")
     with _board(given) as board:
         if name is not None:
             output = BoardOutput(board.way, board.arm, name)
@@ -92,7 +90,7 @@ def _choices(output: Output) -> str:
 def read_inputs(name: str | None, given: BoardOptions) -> None:
     """Read the inputs of the arm.
 
-    NAME: an [input.NAME] of the arm file; without it all of them. Also while a motion runs, and while another armtempo
+    NAME: an [input.NAME] of the arm file; default: all. Works during a motion, and while another armtempo
     program has the port.
     """
     with _board(given) as board:
@@ -128,19 +126,19 @@ def _input_lines(found: list[tuple[Input, bool]]) -> list[str]:
 
 @dataclass(frozen=True)
 class Wired:
-    """The way to a board that is set up for ``arm``."""
+    """Access to a board that is set up for ``arm``."""
 
     way: Way
     arm: Arm
 
     def levels(self) -> Levels:
-        """What the board says."""
+        """The levels of its inputs and outputs."""
         return self.way.levels()
 
 
 @contextmanager
 def _board(given: BoardOptions) -> Iterator[Wired]:
-    """Raises LinkError if the board is set up for a different arm than the one that is named."""
+    """Access to the board; raises LinkError if it is set up for another arm than the one that is set."""
     given = chosen.any_port(given)
     named = chosen.named_arm(given.arm_path)
     with chosen.shared_or_own(given, named) as found:

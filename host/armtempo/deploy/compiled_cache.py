@@ -11,17 +11,17 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
+from armtempo.basics import atomic_file
 from armtempo.basics.errors import InputError
-from armtempo.formats import atomic_file
 
 Files = Mapping[str, bytes]
 """By the path on the board, below the library folder."""
 
 
 def fetch(name: str, key: str, make: Callable[[], Files]) -> Files:
-    """The files that were kept under ``name``, where they were made for ``key`` and are undamaged; else ``make()``.
+    """The files that were kept under ``name``, if they were made for ``key`` and are undamaged; else ``make()``.
 
-    Where the folder cannot be written, nothing is kept. ``key``: as of ``key_of``.
+    If the folder cannot be written, nothing is kept. ``key``: as of ``key_of``.
     """
     path = _folder() / f"{name}.json"
     with suppress(OSError, ValueError, KeyError, TypeError):

@@ -18,7 +18,7 @@ from armtempo_shared import table
 from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import archive, compiled_cache, plain_frames
-from armtempo.deploy.compact import Compact, compact, frames
+from armtempo.deploy.compact import Compact, compact, frames, without_constants
 from armtempo.deploy.compact.merge import CORE
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo.simulator import launcher
@@ -64,41 +64,37 @@ _IN_FIRMWARE = (
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
 """Modules of what the core is without: there is no heap for these if it is in files (board/docs/memory.md)."""
-_AT_REST = {
-    "start_up": (
-        "app.board.Board.__init__",
-        "app.commands.Commands.__init__",
-        "app.events.Events.__init__",
-        "hardware.sampler.Sampler.__init__",
-        "link.frame_reader.FrameReader.__init__",
-        "link.serial_link.SerialLink.__init__",
-        "motion.engine.Engine.home",
-        "motion.ring_feeder.RingFeeder.__init__",
-    ),
-    "set_up": (
-        "hardware.encoders.EncoderInput.__init__",
-        "hardware.inputs.Inputs.__init__",
-        "hardware.inputs.Inputs._add_limits",
-        "hardware.inputs.Inputs._make_freezer",
-        "hardware.ring.Ring.__init__",
-        "hardware.ring.Ring._describe",
-        "hardware.sampler.Sampler.configure",
-        "memory.Memory.release",
-        "memory.Memory.take",
-        "memory.Memory.take_for_processor",
-        "motion.engine_parts.EngineParts.__init__",
-        "motion.following_error.FollowingError.__init__",
-        "motion.joint_drive.JointDrive.__init__",
-        "motion.readings.Readings.__init__",
-        "motion.ring_feeder.RingFeeder.connect",
-        "motion.workspace.Workspace.rings",
-        "stepgen.step_generator.StepGenerator.__init__",
-        "stepgen.subintervals.Subintervals.__init__",
-    ),
-}
-"""Methods of the board package that are called only when the program starts, and only when it takes an arm; by the
-module that holds them in the compact form. What is called when a motion is brought into the rings is not among them:
-most is in memory then."""
+_AT_REST = (
+    "app.board.Board.__init__",
+    "app.commands.Commands.__init__",
+    "app.events.Events.__init__",
+    "hardware.encoders.EncoderInput.__init__",
+    "hardware.inputs.Inputs.__init__",
+    "hardware.inputs.Inputs._add_limits",
+    "hardware.inputs.Inputs._make_freezer",
+    "hardware.ring.Ring.__init__",
+    "hardware.ring.Ring._describe",
+    "hardware.sampler.Sampler.__init__",
+    "hardware.sampler.Sampler.configure",
+    "link.frame_reader.FrameReader.__init__",
+    "link.serial_link.SerialLink.__init__",
+    "memory.Memory.release",
+    "memory.Memory.take",
+    "memory.Memory.take_for_processor",
+    "motion.engine.Engine.home",
+    "motion.engine_parts.EngineParts.__init__",
+    "motion.following_error.FollowingError.__init__",
+    "motion.joint_drive.JointDrive.__init__",
+    "motion.readings.Readings.__init__",
+    "motion.ring_feeder.RingFeeder.__init__",
+    "motion.ring_feeder.RingFeeder.connect",
+    "motion.workspace.Workspace.rings",
+    "stepgen.step_generator.StepGenerator.__init__",
+    "stepgen.subintervals.Subintervals.__init__",
+)
+"""Methods of the board package that are called only when the program starts or takes an arm: the compact form has them
+in a module of their own. What is called when a motion is brought into the rings is not among them: most is in memory
+then."""
 _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "armv7em", 7: "armv7emsp"}
 """By the number in ``sys.implementation._mpy`` (MicroPython's py/persistentcode.h)."""
 
@@ -162,7 +158,7 @@ def compiled(mpy: int) -> Mapping[str, bytes]:
 
 def _compile(compiler: str, architecture: str) -> dict[str, bytes]:
     reader = (package_folder(PACKAGES[0]) / _READER).read_text(encoding="utf-8")
-    texts = {**compact_files(), f"{_READER_NAME}.py": reader}
+    texts = {**compact_files(), f"{_READER_NAME}.py": without_constants(reader)}
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "module.py", Path(folder) / "module.mpy"
@@ -206,7 +202,7 @@ def compact_program() -> Compact:
         entries & set(sources),
         {*_handlers(), *_hardware_names(), *(name for node in nodes for name in _named(node))},
         _TOGETHER,
-        {module: [f"{PACKAGES[0]}.{name}" for name in names] for module, names in _AT_REST.items()},
+        [f"{PACKAGES[0]}.{name}" for name in _AT_REST],
     )
 
 

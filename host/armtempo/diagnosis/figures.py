@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from armtempo.basics.text import aligned
 from armtempo.diagnosis import drives, torque
 from armtempo.diagnosis.resolution import resolutions
-from armtempo.formats.text import aligned
 from armtempo.model.arm import Arm
 
 _HEAD = ("joint", "steps/deg", "step deg", "step at tool mm", "top steps/s", "motor rpm", "torque margin")
@@ -57,7 +57,7 @@ def of(arm: Arm) -> tuple[JointFigures, ...]:
 
 
 def table(joints: Sequence[JointFigures]) -> list[str]:
-    """Lines for people; none where nothing is driven."""
+    """Lines for people; none if nothing is driven."""
     return aligned([_HEAD, *map(_row, joints)], _WIDTHS) if joints else []
 
 

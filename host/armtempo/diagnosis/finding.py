@@ -19,7 +19,7 @@ class Level(Enum):
 
     @property
     def word(self) -> str:
-        """The level where something works or does not, as on a machine: ``ok``, ``note`` or ``wrong``."""
+        """The level if something works or does not, as on a machine: ``ok``, ``note`` or ``wrong``."""
         return "wrong" if self is Level.ERROR else self.value
 
 
@@ -35,7 +35,7 @@ class Finding:
 
 
 def error(where: str, what: str, next_step: str) -> Finding:
-    """A finding that stands in the way."""
+    """A finding that prevents use."""
     return Finding(Level.ERROR, where, what, next_step)
 
 

@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 
 from armtempo.basics import installation
 from armtempo.diagnosis.finding import Finding, Level, error, good, note
-from armtempo.ports.listing import Port, find_ports
+from armtempo.ports.board_port import Port, find_ports
 
 LEAST_PYTHON = (3, 11)
 _NO_PORT = "connect a board by its USB socket, or use --port sim; a board without MicroPython: armtempo flash"

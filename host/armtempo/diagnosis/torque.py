@@ -68,7 +68,7 @@ def _body(joint: Joint, body: Dynamics) -> list[Finding]:
         )
     elif body.mass_kg and most == 0.0:
         text = "its inertia_kg_m2 is not given: its mass counts as a point"
-        found.append(note(joint.name, text, "give it where the link is large for the way it moves"))
+        found.append(note(joint.name, text, "give it if the link is large for the way it moves"))
     if body.mass_kg > _HEAVY_KG:
         found.append(warning(joint.name, f"a mass of {body.mass_kg:g} kg", "give mass_kg in kilograms"))
     return found

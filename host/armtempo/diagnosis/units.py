@@ -24,7 +24,7 @@ def findings(arm: Arm) -> list[Finding]:
 
 
 def position_finding(name: str, position_mm: Array, reach_mm: float) -> Finding | None:
-    """A warning where a via point lies at the base, but would lie in reach if it were in metres."""
+    """A warning if a via point lies at the base, but would lie in reach if it were in metres."""
     distance = math.dist(position_mm, (0.0, 0.0, 0.0))
     if not 0.0 < distance < min(_SHORT_MM, 0.01 * reach_mm):
         return None

@@ -1,8 +1,9 @@
-"""Inverse dynamics of a serial arm, recursive Newton-Euler: torques at its rows for a motion, many moments at once."""
+"""Inverse dynamics of a serial arm by recursive Newton-Euler, vectorised over time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics.forward import array_frames
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
-from armtempo.model.parts import Dynamics
+from armtempo.model.parts import Dynamics, Load
 
 GRAVITY_M_S2 = 9.80665
 """Along the base's -z."""
@@ -19,12 +20,16 @@ _M = 1e-3
 
 
 def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) -> Array:
-    """Torque in Nm that each joint needs, friction included: (N, joints); a row without ``dynamics`` weighs nothing.
+    """Torque of each joint, including friction, Nm: (N, joints); a row without ``dynamics`` has no mass.
 
-    ``angles``, ``rates`` and ``rate_changes`` of all joints, each (N, joints) in rad, rad/s and rad/s^2. What a
-    parallel linkage turns is counted from the link before the previous one: its rods weigh nothing.
+    The load is part of the last link.
+
+    ``angles``, ``rates`` and ``rate_changes`` of all joints, each (N, joints) in rad, rad/s and rad/s^2.
+    Angles of a parallel linkage are relative to the link before the previous one; its rods have no mass.
     """
     bodies = [joint.dynamics or Dynamics(0.0) for joint in arm.joints]
+    if arm.held:
+        bodies[-1] = _with_load(bodies[-1], arm.held)
     geometry = Geometry.of(arm)
     by_row = _row_torques(geometry, bodies, angles, rates, rate_changes)
     turns = np.array(geometry.turns(list(np.eye(len(bodies)))))
@@ -32,10 +37,35 @@ def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) ->
     return np.asarray(by_row @ turns + friction * np.sign(rates) + damping * rates)
 
 
+def _with_load(link: Dynamics, load: Load) -> Dynamics:
+    if not (mass := link.mass_kg + load.mass_kg):
+        return link
+    both = [
+        (each.mass_kg, _M * np.array(each.centre_mm), inertia_matrix(each.inertia_kg_m2))
+        for each in (link, load)
+    ]
+    centre, ((xx, xy, xz), (_, yy, yz), (_, _, zz)) = as_one(mass, both)
+    x, y, z = centre / _M
+    return replace(link, mass_kg=mass, centre_mm=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
+
+
+def as_one(mass: float, parts: Sequence[tuple[float, Array, Array]]) -> tuple[Array, Array]:
+    """Centre of mass (3,) of bodies with the total ``mass``, and their inertia (3, 3) about it.
+
+    ``parts``: mass, centre (3,) in m and inertia (3, 3) about that, of each.
+    """
+    centre = np.sum([own * place for own, place, _ in parts], axis=0) / mass
+    inertia = np.zeros((3, 3))
+    for own, place, tensor in parts:
+        away = place - centre
+        inertia += tensor + own * (away @ away * np.eye(3) - np.outer(away, away))
+    return centre, inertia
+
+
 def _row_torques(
     geometry: Geometry, bodies: Sequence[Dynamics], angles: Array, rates: Array, rate_changes: Array
 ) -> Array:
-    """The same about the axis of each row, without friction.
+    """Torques about the axis of each row, without friction.
 
     Recursive Newton-Euler (Luh, Walker, Paul 1980) with all vectors in the base's frame: speeds outwards; forces, and
     moments about the base's origin, are summed inwards.
@@ -43,7 +73,9 @@ def _row_torques(
     chained = array_frames(geometry, angles)
     turning, bending = (np.stack(geometry.turns(list(each.T))) for each in (rates, rate_changes))
     spin, spin_change = np.zeros((len(angles), 3)), np.zeros((len(angles), 3))
-    fall = np.tile([0.0, 0.0, GRAVITY_M_S2], (len(angles), 1))  # the base accelerates up: this is gravity
+    fall = np.tile(
+        [0.0, 0.0, GRAVITY_M_S2], (len(angles), 1)
+    )  # gravity as an upward acceleration of the base
     forces, moments = [], []
     for row, body in enumerate(bodies):
         before, after = chained[row], chained[row + 1]
@@ -70,7 +102,7 @@ def _row_torques(
 
 
 def _carried(arm: Array, spin: Array, spin_change: Array) -> Array:
-    """Acceleration of a point that a body carries at ``arm`` from its origin, less the origin's."""
+    """Acceleration of a point of a body at ``arm`` from its origin, relative to the origin."""
     return np.asarray(np.cross(spin_change, arm) + np.cross(spin, np.cross(spin, arm)))
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import why
 from armtempo.model.pose import LARGEST, checked, from_quaternion
 from armtempo.model.tool_pose import WHOLE, Pose
 

@@ -1,6 +1,6 @@
 """The link: from the name of a port to a ``Client`` with one method for each command of the protocol.
 
-``open_board`` is all that most need; ``session`` holds the protocol's timing, ``follow`` receives a run's samples.
+``open_board`` opens a board; ``session`` has the protocol's timing; ``follow`` receives a run's samples.
 """
 
 from armtempo.link.client import Client

@@ -11,13 +11,13 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 from armtempo.ports.names import is_virtual
 
 
 @dataclass(frozen=True)
 class Hello:
-    """Who answers on the port."""
+    """The board's answer to ``hello``."""
 
     protocol: int
     joints: int
@@ -34,19 +34,19 @@ class Hello:
     engine_room: int
     """Bytes of heap that the engine for an arm can have, with its objects (``armtempo_shared.engine_memory``)."""
     features: int
-    """Bits of what the program can do beyond one motion at a time, by ``messages.FEATURES``."""
+    """One bit per optional feature of the program, see ``messages.FEATURES``."""
     arm_problem: int
-    """Code of what is wrong with the stored arm record; 0 if it is in force or there is none."""
+    """Error code of the stored arm record; 0 if it is used or there is none."""
     arm_value: int
     board_id: str
 
     def can(self, feature: str) -> bool:
-        """Whether the program can do one of ``messages.FEATURES``; in the firmware it can do all."""
+        """Whether the program has one of ``messages.FEATURES``; in the firmware it has all."""
         return bool(self.features >> FEATURES.index(feature) & 1)
 
     @property
     def rates_measured(self) -> bool:
-        """Whether ``max_rate`` and ``max_rate_sum`` were measured by its self-test; else they are estimated."""
+        """Whether ``max_rate`` and ``max_rate_sum`` were measured by its self-test; otherwise they are estimates."""
         return bool(self.features & RATES_MEASURED)
 
     @property
@@ -57,7 +57,7 @@ class Hello:
 
 @dataclass(frozen=True)
 class Positions:
-    """Steps commanded so far and encoder counts, one entry a joint."""
+    """Commanded steps and encoder counts, one entry per joint."""
 
     commanded_steps: tuple[int, ...]
     counts: tuple[int, ...]
@@ -74,19 +74,19 @@ class Status:
     run: int
     ticks: int
     path_ticks: int
-    """The motion's own time, less than the clock's where the speed was below 100 %."""
+    """The motion's own time; it lags behind the clock while the speed is below 100 %."""
     rate: int
-    """Of the motion's own time, in thousandths: the one that is wanted; 0 in a pause."""
+    """Requested rate of the motion's own time, in thousandths; 0 in a pause."""
     samples_kept: int
     samples_lost: int
     frames_bad: int
     rest_ms: int
-    """Until the arm rests after a stop, one that came before or one now; 0: at once."""
+    """Time until the arm is at rest, after a stop given earlier or now; 0: at once."""
     positions: Positions
 
     @property
     def moving(self) -> bool:
-        """Whether steps may still come."""
+        """Whether the board may still make steps."""
         return self.state in ("moving", "braking")
 
     def joint_known(self, joint: int) -> bool:
@@ -94,7 +94,7 @@ class Status:
         return bool(self.known >> joint & 1)
 
     def as_fault(self) -> Fault:
-        """The event that reported the pending fault, where it did not arrive."""
+        """The pending fault as an event, in case the event was lost."""
         return Fault(self.run, self.fault, self.fault_joint, self.ticks, self.path_ticks, self.positions)
 
 
@@ -103,7 +103,7 @@ class Levels:
     """The board's answer to ``inputs``."""
 
     inputs: int
-    """One bit per input of the arm record: it is active."""
+    """One bit per input of the arm record, set if it is active."""
     outputs: tuple[int, ...]
     """The value of each output, 0 to 65535."""
 
@@ -124,7 +124,7 @@ class StoredMotion:
     default: bool
     """Whether the board's button starts it."""
     sequence: bool = False
-    """Whether it is a sequence, which has neither ``duration_ticks`` nor ``joints`` of its own."""
+    """Whether it is a sequence, without ``duration_ticks`` and ``joints``."""
 
     @property
     def duration_s(self) -> float:
@@ -134,14 +134,14 @@ class StoredMotion:
 
 @dataclass(frozen=True)
 class SequenceState:
-    """How far a sequence is, or where the last one ended."""
+    """State of the running sequence, or of the last one."""
 
     ending: str
     """One of ``armtempo_shared.sequence.ENDINGS``."""
     code: int
-    """Of the fault or refusal that ended it."""
+    """Code of the fault or refusal that ended it."""
     step: int
-    """Of the sequence file, from 1."""
+    """Step of the sequence file, from 1."""
     row: int
     cycle: int
     """Finished passes of its outermost repeats."""
@@ -162,7 +162,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Done:
-    """A motion ended as planned, or after a stop."""
+    """A motion has ended as planned, or after a stop."""
 
     run: int
     ticks: int
@@ -174,7 +174,7 @@ class Done:
 
 @dataclass(frozen=True)
 class Fault:
-    """A motion ended by a fault."""
+    """A fault has ended a motion."""
 
     run: int
     code: int
@@ -186,17 +186,17 @@ class Fault:
 
 @dataclass(frozen=True)
 class RowBegun:
-    """A row of the sequence that runs has begun."""
+    """A row of the running sequence has begun."""
 
     passed: int
-    """How many had, since its start, with this one."""
+    """Number of rows begun since its start, including this one."""
     run: int
-    """Of the last motion that it has started; of this row, where it moves."""
+    """Run number of the last motion that it started (of this row, where it moves)."""
     row: int
     step: int
     cycle: int
     value: int
-    """Of the counter, where the row counts."""
+    """Value of the counter, if the row counts."""
 
 
 @dataclass(frozen=True)
@@ -210,17 +210,17 @@ Event = Sample | Done | Fault | RowBegun | Notice
 
 
 def state_name(number: int) -> str:
-    """Name of a state; a number the host does not know is shown as such."""
+    """Name of a state; for an unknown number, text with the number."""
     return wire.STATES[number] if number < len(wire.STATES) else f"state {number}"
 
 
 def ending_name(number: int) -> str:
-    """The state of a sequence; a number the host does not know is shown as such."""
+    """Name of a sequence's state; for an unknown number, text with the number."""
     return ENDINGS[number] if number < len(ENDINGS) else f"ending {number}"
 
 
 def positions(tail: bytes) -> Positions:
-    """The tail of status, sample, done and fault: two int32 a joint; WireError if it does not fit."""
+    """The tail of status, sample, done and fault: two int32 per joint; raises WireError if its length is wrong."""
     if len(tail) % 8:
         raise wire.WireError("length")
     values = struct.unpack(f"<{len(tail) // 4}i", tail)
@@ -228,14 +228,14 @@ def positions(tail: bytes) -> Positions:
 
 
 def levels(inputs: int, tail: bytes) -> Levels:
-    """The answer to ``inputs``; WireError if the tail does not fit."""
+    """The answer to ``inputs``; raises WireError if the length of the tail is wrong."""
     if len(tail) % 2:
         raise wire.WireError("length")
     return Levels(inputs, struct.unpack(f"<{len(tail) // 2}H", tail))
 
 
 def event(number: int, payload: bytes) -> Event:
-    """An event from its message id and payload; WireError if it is none."""
+    """An event from its message id and payload; raises WireError if it is none."""
     entry = wire.EVENT_BY_ID.get(number)
     if entry is None:
         raise wire.WireError("not an event")
@@ -243,7 +243,7 @@ def event(number: int, payload: bytes) -> Event:
 
 
 def decode(entry: tuple[Any, ...], payload: bytes) -> tuple[tuple[Any, ...], Any]:
-    """Values and tail of a payload, control characters spelt out; WireError if it does not fit."""
+    """Values and tail of a payload, control characters escaped; raises WireError if it does not fit."""
     values, tail = wire.decode(entry, payload)
     return values, visible(tail) if isinstance(tail, str) else tail
 

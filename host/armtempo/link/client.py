@@ -16,16 +16,16 @@ from armtempo.link.refusal import refusal
 from armtempo.link.session import ANSWER_TIMEOUT_S, Session
 
 FLASH_TIMEOUT_S = 30.0
-"""Time-out of commands for which the board erases flash or checks a whole motion before it answers."""
+"""Time-out of commands for which the board erases flash or checks a motion before it answers."""
 HELLO_TIMEOUT_S = 1.2
-"""Time-out of ``hello``; with the diagnosis of what else is on the port, under 2 s."""
+"""Time-out of ``hello``; together with the diagnosis of a port without a board it stays under 2 s."""
 SMALLEST_PIECE = 16
 LARGEST_PIECE = MAX_PAYLOAD - 4
 PIECE_TIMEOUT_S = 0.5
 
 _CTRL_C = 3
 _GREETINGS = 8
-"""Number of a session's first frames that may be ``hello``."""
+"""Number of a session's first frames that can be ``hello``."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Started:
 
 @dataclass(frozen=True)
 class KeptSamples:
-    """The board's answer to ``samples``: which samples it still keeps."""
+    """The board's answer to ``samples``: the samples that it still has."""
 
     first: int
     """Index of the oldest one."""
@@ -61,7 +61,7 @@ def harmless_number() -> int:
 
 
 class Client:
-    """The host's end of the protocol, one method a command.
+    """The host's end of the protocol, one method per command.
 
     Every method raises BoardError if the board refuses, LinkError if the connection is lost.
     """
@@ -72,18 +72,18 @@ class Client:
         self._piece = LARGEST_PIECE
         self._info: board_messages.Hello | None = None
         self.rate = PERMILLE
-        """At which motions are started, in thousandths of their planned speed."""
+        """Speed at which motions are started, in thousandths of the planned one."""
         session.greet = self._greet_again
 
     @property
     def info(self) -> board_messages.Hello:
-        """The board's answer to ``hello``; LinkError before it."""
+        """The board's answer to ``hello``; raises LinkError before it."""
         if self._info is None:
             raise LinkError("no hello has been exchanged yet", "call hello() first")
         return self._info
 
     def hello(self) -> board_messages.Hello:
-        """Begin a session; NoAnswerError after HELLO_TIMEOUT_S where no armtempo board answers."""
+        """Begin a session; raises NoAnswerError if no armtempo board answers within HELLO_TIMEOUT_S."""
         values, board_id = self.session.command(
             "hello",
             (wire.PROTOCOL_VERSION, self._number),
@@ -96,7 +96,7 @@ class Client:
         return self._info
 
     def need(self, feature: str, what: str) -> None:
-        """BoardError that names ``what``, where the program on the board cannot do one of ``messages.FEATURES``."""
+        """Raise BoardError, naming ``what``, if the board's program lacks one of ``messages.FEATURES``."""
         if not self.info.can(feature):
             raise refusal(what, wire.ERROR_CODES["needs_firmware"])
 
@@ -110,7 +110,7 @@ class Client:
         if now.board_id != before.board_id:
             raise OtherBoardError(
                 f"another board is on {where} now ({now.board_id}, before {before.board_id})",
-                "plug the right board in, or run the command again for this one",
+                "plug in the right board, or run the command again for this one",
             )
         raise OtherBoardError(
             f"the board on {where} has restarted: positions are unknown",
@@ -118,13 +118,13 @@ class Client:
         )
 
     def status(self) -> board_messages.Status:
-        """What the board is doing, and the positions of the joints."""
+        """The board's state, and the positions of the joints."""
         values, tail = self.session.command("status")
         fields = [board_messages.state_name(values[0]), *values[1:], board_messages.positions(tail)]
         return board_messages.Status(*fields)
 
     def upload(self, name: str, data: bytes, progress: Progress | None = None) -> None:
-        """Store a record under a name; the board keeps the old one until all of the new one has arrived."""
+        """Store a record under a name; the board keeps the old one until the new one is complete."""
         crc = wire.record_crc(data)
         self.session.command("put_begin", (len(data), crc), name, silence_timeout_s=FLASH_TIMEOUT_S)
         offset = 0
@@ -137,7 +137,7 @@ class Client:
         )
 
     def _put_piece(self, data: bytes, offset: int) -> int:
-        """Send the next piece; pieces are halved while the link loses them, and doubled again."""
+        """Send the next piece; its size is halved after a loss, and doubled again after a success."""
         repeats = self.session.repeats
         try:
             values, _ = self.session.command(
@@ -203,11 +203,11 @@ class Client:
         self.session.command("rename", (len(old.encode()),), old + new, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def set_default(self, name: str) -> None:
-        """Choose the default that the board's button starts; "" for nothing."""
+        """Set the motion or sequence that the board's button starts; "" for none."""
         self.session.command("set_default", (), name, silence_timeout_s=FLASH_TIMEOUT_S)
 
     def sequence(self) -> board_messages.SequenceState:
-        """How far the sequence is, or where the last one since the board's start ended."""
+        """State of the running sequence, or of the last one since the board's start."""
         if not self.info.can("sequences"):
             return board_messages.SequenceState("none", 0, 0, 0, 0, "")
         try:
@@ -219,7 +219,7 @@ class Client:
         return board_messages.SequenceState(board_messages.ending_name(ending), code, step, row, cycle, name)
 
     def counters(self) -> dict[str, int]:
-        """Values of the sequence's counters, or those of the last one since the board's start, by name."""
+        """Counters of the running or the last sequence since the board's start, by name."""
         found: dict[str, int] = {}
         try:
             while True:
@@ -256,18 +256,19 @@ class Client:
         self.session.command("stop", (int(now),))
 
     def speed(self, rate: int) -> None:
-        """Let what moves continue at ``rate`` thousandths of its planned speed; 0: pause, RESUME: as before it."""
+        """Set the running motion's speed to ``rate`` thousandths of the planned one; 0: pause, RESUME: end of
+        the pause."""
         if rate == PERMILLE and not self.info.can("speed"):
             return
         self.need("speed", "another speed than planned")
         self.session.command("speed", (rate,))
 
     def hold(self, answer_timeout_s: float = ANSWER_TIMEOUT_S) -> None:
-        """What was started with START_HELD is still wanted; BoardError ``not_moving`` where it has ended."""
+        """Hold a motion that was started with START_HELD; raises BoardError ``not_moving`` if it has ended."""
         self.session.command("hold", silence_timeout_s=answer_timeout_s, answer_timeout_s=answer_timeout_s)
 
     def drivers(self, on: bool) -> None:
-        """The motors' current on or off; off, all positions are unknown, and only encoders know where the arm is."""
+        """Switch the motors' current; off: all positions are unknown, only the encoders measure."""
         self.session.command("drivers", (int(on),))
 
     def clear(self) -> None:
@@ -289,8 +290,8 @@ class Client:
             ) from None
 
     def levels(self) -> board_messages.Levels:
-        """What the inputs of the arm record are now, debounced, and what its outputs are set to; none of an arm that
-        has none, whose board does not know this command."""
+        """The debounced levels of the inputs, and the values of the outputs; empty for an arm without either,
+        as its board does not know this command."""
         if not self.info.can("outputs"):
             return board_messages.Levels(0, ())
         try:
@@ -306,9 +307,9 @@ class Client:
         self.session.command("leave")
 
     def samples(self, acknowledged: int, wanted: int = 0) -> KeptSamples:
-        """All samples before ``acknowledged`` have arrived; ask for up to ``wanted`` from there on again.
+        """Acknowledge all samples before ``acknowledged``, and request ``wanted`` samples from there on again.
 
-        ``wanted`` is at most what one answer asks for; the samples come as events.
+        The samples arrive as events.
         """
         (first, count), _ = self.session.command("samples", (acknowledged, wanted))
         return KeptSamples(first, count)

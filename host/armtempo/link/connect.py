@@ -8,17 +8,21 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from armtempo_shared import wire
+from armtempo_shared.messages import SYNC
+
 from armtempo.basics.errors import (
     BoardError,
     DisturbedError,
     LinkError,
     NoAnswerError,
+    NoProgramError,
     PortError,
     PortInUseError,
 )
-from armtempo.link import diagnose, traffic
+from armtempo.link import traffic
 from armtempo.link.client import Client
-from armtempo.link.program_version import own_crc
+from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
@@ -29,14 +33,26 @@ from armtempo.ports.claim import PortClaim
 
 _Found = TypeVar("_Found")
 _NOISY_TRIES = 10
-"""Attempts at ``hello`` where pieces of frames arrive."""
+"""Attempts at ``hello`` if parts of frames arrive."""
 _LOOK_S = 0.05
+LOOK_S = 0.4
+_REPL_SIGNS = (b">>>", b"raw REPL")
+"""Bytes that identify a REPL; not the firmware's name, which is also in the answer to ``hello``."""
+_FRAME_SIGNS = (bytes((SYNC,)), bytes((wire.EVENT["ok"][1], wire.COMMAND["hello"][1])))
+"""A frame's first byte, or the beginning of an answer to ``hello``."""
+_ECHO = b"#armtempo?"
+_NUDGE = b"\r\x02\r" + _ECHO + b"\r"
+"""Ends a line, leaves a raw REPL, and writes a comment, which a prompt echoes even in an unfinished line; the
+board program ignores these bytes."""
+_ASK = b"print('armtempo','is','here')if'armtempo'in open('/flash/main.py').read()else 0\r"
+_HERE = b"armtempo is here"
+"""The prompt's answer if the program is in the flash; differs from the echo of the question."""
 
 
 def patiently(attempt: Callable[[], _Found]) -> _Found:
-    """What ``attempt`` returns, tried again while another program has the port: many only ask something.
+    """Call ``attempt`` again while another program has the port, as many programs use it only briefly.
 
-    PortInUseError after PATIENCE_S; what else ``attempt`` raises.
+    Raises PortInUseError after PATIENCE_S, and any other error of ``attempt``.
     """
     limit_s = time.monotonic() + claims.PATIENCE_S
     while True:
@@ -57,13 +73,13 @@ def open_board(
     any_program: bool = False,
     tell: Callable[[str], object] = lambda text: None,
 ) -> Iterator[Client]:
-    """The board on ``port``, greeted; a sim port starts a virtual one that lives as long as the context.
+    """Open the board on ``port``; a sim port starts a virtual board that lives as long as the context.
 
-    ``log_traffic``: file for the traffic log; ``sink`` takes the traffic as well; ``arm``: what a virtual
-    board's motors move; ``any_program``: also talk to a board whose program is not the one installed here;
-    ``tell`` is called with the outcome for a program that had the port. Raises InputError if there is no such port,
-    PortInUseError if another program has it (see ``patiently``), LinkError if it is silent or runs something
-    else. A program that has the port and hangs loses it.
+    ``log_traffic``: file for the traffic log; ``sink`` is called with the traffic too; ``arm``: moved by a
+    virtual board's motors; ``any_program``: accept a board whose program differs from the installed one;
+    ``tell`` is called with a message if the port is taken over. Raises InputError if there is no such port,
+    PortInUseError if another program has it (see ``patiently``), LinkError if the board does not answer or
+    runs another program. The port is taken over from a program that hangs.
     """
     hanging = _check_owner(port, tell)
     with ExitStack() as stack:
@@ -91,7 +107,7 @@ def open_board(
 
 
 def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
-    """The claim of a program that has the port and hangs; PortInUseError if it lives and continues."""
+    """The claim of a program that has the port and hangs; raises PortInUseError if it answers."""
     name = names.same_for_all(port)
     claim = claims.find(name, port) if name else None
     if claim is None:
@@ -103,10 +119,10 @@ def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
             "wait for its end, or stop it with 'armtempo stop'; 'armtempo status' and 'watch' work meanwhile",
         )
     if state is Ownership.DEAD:
-        tell(f"{claim.who} has ended without giving up {port}; what it had started may still move")
+        tell(f"{claim.who} has ended without closing {port}; a motion that it started may still run")
         claim.remove()
         return None
-    if not claims.LOCAL_SOCKETS:  # the operating system opens a port once only
+    if not claims.LOCAL_SOCKETS:  # Windows opens a port only once
         raise PortError(
             f"{claim.who} has port {port} and does not answer", "end that process, then try again"
         )
@@ -115,7 +131,7 @@ def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
 
 
 def _greeted(stack: ExitStack, transport: Transport) -> Client:
-    """The board at a transport; the transport in use at the end is closed with the stack."""
+    """The board at a transport; the transport in use at the end is closed by the stack."""
     first = stack.enter_context(closing(transport))
     board = greet(first)
     stack.callback(lambda: board.session.transport.close())
@@ -129,21 +145,21 @@ def _check_program(board: Client) -> None:
                 f"the board on {board.session.transport.name} runs version {board.info.program_crc:08x} of the board "
                 f"program, installed here is {own_crc():08x}"
             ),
-            "update it: 'armtempo flash' if the program is in its firmware, else 'armtempo deploy'",
+            f"update it: {UPDATE}",
         )
 
 
 def greet(
     transport: Transport, session_number: int | None = None, clock: Callable[[], float] = time.monotonic
 ) -> Client:
-    """A board that has answered ``hello``; LinkError with a diagnosis where none has."""
+    """Exchange ``hello``; raises LinkError with a diagnosis if no board answers."""
     board = Client(Session(transport, clock), session_number)
     for _ in range(_NOISY_TRIES):
         try:
             board.hello()
             return board
         except NoAnswerError:
-            reason = diagnose.explain(transport, bytes(board.session.recent))
+            reason = explain(transport, bytes(board.session.recent))
             if not isinstance(reason, DisturbedError):
                 break
     raise reason
@@ -151,7 +167,7 @@ def greet(
 
 @contextmanager
 def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
-    """A virtual board's port; where its program fails, link errors end with the last line of its log."""
+    """A virtual board's port; if its program fails, link errors end with the last line of its log."""
     from armtempo.simulator import LaunchOptions, launch
 
     with launch(LaunchOptions(names.sim_flash(port), arm=arm)) as board:
@@ -164,3 +180,51 @@ def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
             raise LinkError(
                 f"{error.problem}; the virtual board says: {words[0]}", f"{error.hint}"
             ) from error
+
+
+def explain(transport: Transport, heard: bytes) -> LinkError:
+    """The error for what the port sends: nothing, a REPL, parts of frames, or something else; ``heard``:
+    bytes received before."""
+    transport.write(_NUDGE)
+    heard += _listen(transport)
+    where = f"the board on {transport.name}"
+    if _ECHO in heard or any(sign in heard for sign in _REPL_SIGNS):
+        transport.write(_ASK)
+        if _HERE in _listen(transport):
+            return NoProgramError(
+                f"{where} runs MicroPython but not the armtempo program, which is on it: mpremote or an IDE ended it",
+                f"press the board's reset button, or: mpremote connect {transport.name} reset; if it does "
+                "not start then: armtempo deploy",
+            )
+        return NoProgramError(
+            f"{where} runs MicroPython but not the armtempo program",
+            "'armtempo flash' installs the firmware with it; then run 'armtempo deploy'",
+        )
+    if any(sign in heard for sign in _FRAME_SIGNS):
+        return DisturbedError(
+            f"{where} is mostly unreadable: only parts of armtempo's messages arrive",
+            "check cable and plugs",
+        )
+    if heard:
+        return LinkError(
+            f"something other than armtempo answers on {transport.name} (it says {_excerpt(heard)})",
+            "choose another port: 'armtempo ports' lists them",
+        )
+    return LinkError(
+        f"{where} does not answer within 2 s",
+        (
+            "check the cable, that the board is powered, and that this is its port ('armtempo ports'); reset a "
+            "board that hangs by its button"
+        ),
+    )
+
+
+def _listen(transport: Transport) -> bytes:
+    heard = b""
+    for _ in range(4):
+        heard += transport.read(LOOK_S / 4)
+    return heard
+
+
+def _excerpt(heard: bytes) -> str:
+    return repr(heard[:40])[1:]

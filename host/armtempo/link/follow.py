@@ -13,22 +13,22 @@ from armtempo.link.client import Client
 ACKNOWLEDGE_S = 0.25
 """Interval of acknowledgements; they also show the board that the host is alive."""
 CHECK_S = 0.5
-"""After this time without an event the board is asked for its status."""
+"""The board is asked for its status after this time without an event."""
 GAP_S = 0.05
 """A missing sample is requested again after this time."""
 RESEND = 16
 """Number of samples requested at once."""
 MOST_REPEATS = 40
-"""Number of requests without progress (of motion clock or resent samples) after which none is expected."""
+"""Requests without progress (of motion clock or resent samples) after which no more progress is expected."""
 
 
 class Gap(NamedTuple):
-    """Samples in a row that never arrived."""
+    """A range of samples that never arrived."""
 
     first: int
     """Index of the first one."""
     number: int
-    """How many."""
+    """Number of samples."""
 
 
 @dataclass(frozen=True)
@@ -41,18 +41,18 @@ class RunEnd:
     ticks: int
     """The motion clock at the end."""
     path_ticks: int
-    """The motion's own time then."""
+    """The motion's own time at the end."""
     positions: Positions
     received: int
-    """Samples that arrived."""
+    """Number of samples that arrived."""
     lost: tuple[Gap, ...]
-    """Samples that never will."""
+    """Samples that are lost."""
     notices: tuple[str, ...] = ()
-    """Texts from the board: the traceback of a failure in its program, for one."""
+    """Texts from the board, such as the traceback of an exception in its program."""
 
     @property
     def samples_lost(self) -> int:
-        """How many samples never arrived."""
+        """Number of lost samples."""
         return sum(gap.number for gap in self.lost)
 
 
@@ -65,8 +65,8 @@ class Follower:
         self._run = run
         self._held: dict[int, Sample] = {}
         self._next = 0  # index of the next sample
-        self._oldest = 0  # the board keeps none before this one
-        self._total = 0  # samples that the board has taken, by its last answer
+        self._oldest = 0  # the board has no samples before this one
+        self._total = 0  # number of samples that the board took, by its last answer
         self._received = 0
         self._lost: list[Gap] = []
         self._last: Done | Fault | None = None
@@ -75,7 +75,7 @@ class Follower:
         self._progress = (
             -1,
             0,
-        )  # last value of what should increase (motion clock, sample index), and how often it has not
+        )  # last value that should increase (motion clock, sample index), and how often it did not
 
     @property
     def ended(self) -> bool:
@@ -84,7 +84,7 @@ class Follower:
 
     @property
     def end(self) -> RunEnd:
-        """How the run ended; LinkError before it has."""
+        """How the run ended; raises LinkError before its end."""
         if self._end is None:
             raise LinkError("the run has not ended yet", "read all samples first")
         return self._end
@@ -92,8 +92,8 @@ class Follower:
     def samples(self, between: Callable[[], None] = lambda: None) -> Iterator[Sample]:
         """The samples in order, until the run has ended and each has arrived or is lost.
 
-        ``between`` is called between two messages; it may tell the board to stop. Raises LinkError where
-        the connection breaks; a later call continues from there.
+        ``between`` is called between two messages; it may tell the board to stop. Raises LinkError if the
+        connection breaks; a later call continues from there.
         """
         while self._last is None:
             between()
@@ -136,7 +136,7 @@ class Follower:
             self._lost.append(Gap(self._next, 1))
 
     def _keep_up(self) -> None:
-        """Acknowledge at intervals; sooner, and with a request, where a sample is missing."""
+        """Acknowledge at intervals; sooner, and with a request, if a sample is missing."""
         waited_s = self._client.session.clock() - self._asked_s
         if waited_s >= (GAP_S if self._held else ACKNOWLEDGE_S):
             self._request(min(self._held) - self._next if self._held else 0)
@@ -145,7 +145,7 @@ class Follower:
         kept = self._client.samples(self._next, min(missing, RESEND))
         self._asked_s = self._client.session.clock()
         events = self._client.session.events
-        while events:  # they came before the answer; the board may have dropped them since
+        while events:  # received before the answer; the board may have dropped them since
             self._take(events.popleft())
         self._oldest = max(self._oldest, kept.first)
         self._total = kept.first + kept.count

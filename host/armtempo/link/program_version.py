@@ -1,4 +1,4 @@
-"""The board program's sources on this machine, and their hash, with which that of a board is compared."""
+"""The board program's sources on this machine, and their hash, which is compared with a board's."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from pathlib import Path
 from armtempo_shared.program_hash import sources_crc
 
 PACKAGES = ("armtempo_board", "armtempo_shared")
+UPDATE = "'armtempo flash' if the program is in the board's firmware, else 'armtempo deploy'"
+"""What to do about another version."""
 
 
 def package_folder(name: str) -> Path:

@@ -13,7 +13,7 @@ _FASTER_TOGETHER = "the joints together need more steps per second than the boar
 
 
 def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardError:
-    """A BoardError with the sentence for an error or fault code; ``joint`` from 0, 255 where it is about none."""
+    """A BoardError with the text of an error or fault code; ``joint``: from 0, or 255 for none."""
     name, meaning, cure = wire.ERRORS.get(
         code, ("", f"error {code}, unknown to this version", "update armtempo")
     )
@@ -25,7 +25,7 @@ def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardErro
 
 
 def fault_words(name: str) -> str:
-    """What a fault means and its cure, by its name in the table; the name if this version does not know it."""
+    """Meaning and cure of a fault, by its name; the name itself if this version does not know it."""
     found = (f"{meaning}: {cure}" for known, meaning, cure in wire.ERRORS.values() if known == name)
     return next(found, name)
 
@@ -41,8 +41,8 @@ def _words(name: str, where: str, value: int) -> str:
 
 
 def _pin(value: int) -> str:
-    """A pin by its number in the arm record, and what the board takes it for."""
-    from armtempo.model import engine_pins  # reads the board program's table: only where it is needed
+    """The name of a pin of the arm record, and its use on the board."""
+    from armtempo.model import engine_pins  # imported here, because it reads the board program's table
 
     pin = f"P{chr(ord('A') + value // 16)}{value % 16}"
     uses = engine_pins.uses(pin)

@@ -1,8 +1,8 @@
 """Commands and events over a transport: sequence numbers, time-outs, repeats.
 
-One command is under way at a time, whichever thread it comes from. Its frame is sent again, under the same
-sequence number, until the board answers; the board acts once on a number and repeats its answer. Events that
-arrive meanwhile wait in ``events``.
+Only one command at a time is in progress, from any thread. Its frame is sent again with the same sequence
+number until the board answers; the board acts once on a number and repeats its answer. Events that arrive
+meanwhile are queued in ``events``.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ ANSWER_TIMEOUT_S = 20.0
 FRAME_TIMEOUT_S = 0.05
 """An incomplete frame is dropped after this time without a byte."""
 RECONNECT_S = 60.0
-"""How long a port that broke is tried again."""
+"""Time for which opening a broken port is retried."""
 STOPPING_RECONNECT_S = 5.0
-"""The same after a stop request: long enough to tell the board once the plug is in again."""
+"""The same after a stop request: long enough to send the stop if the cable is plugged in again."""
 REOPEN_INTERVAL_S = 0.2
-"""Time between two attempts to open it."""
+"""Time between two attempts to open the port."""
 RECENT_BYTES = 512
 """Number of received bytes that are kept, to diagnose a port that does not answer."""
 
@@ -47,24 +47,24 @@ Answer = tuple[tuple[Any, ...], Any]
 class Session:
     """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests.
 
-    Where the port breaks, ``reopen`` (if set) is called until it gives a new transport on which ``greet`` finds
-    the same board. Then the command under way is sent again; who follows a run asks for the samples that were
-    lost. The greeting makes the board forget its last answer. If just that answer was lost, the board executes
-    the command twice and may refuse it the second time.
+    If the port breaks, ``open_transport`` is called until it returns a transport on which ``greet`` finds the
+    same board. Then the command in progress is sent again; ``follow`` requests lost samples. The greeting
+    makes the board forget its last answer: if that answer was lost, the board executes the command twice and
+    may refuse it the second time.
     """
 
     def __init__(self, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
         self.transport = transport
         self.clock = clock
         self.open_transport: Callable[[], Transport] = lambda: transport
-        """Opens the port that this session is on, which was closed."""
+        """Opens the session's port again after it was closed."""
         self.reopen: Callable[[], Transport] | None = None
         self.greet: Callable[[], None] = lambda: None
-        """Raises OtherBoardError if another one answers, or the same one started anew."""
+        """Exchanges ``hello``; raises OtherBoardError if another board answers, or it has restarted."""
         self.tell: Callable[[str], object] = lambda text: None
         """Called with messages for the user while other calls wait."""
         self.stopping: Callable[[], bool] = lambda: False
-        """Whether a stop was asked for: then a broken port is tried again for STOPPING_RECONNECT_S only."""
+        """Whether a stop was requested: then a broken port is retried only for STOPPING_RECONNECT_S."""
         self.check: Callable[[], None] = lambda: None
         """Called before the port is used; raises PortError if it is no longer this program's."""
         self.listeners: list[Callable[[board_messages.Event], None]] = []
@@ -81,7 +81,7 @@ class Session:
 
     @property
     def frames_bad(self) -> int:
-        """Number of byte sequences received that were no frame."""
+        """Number of damaged frames received."""
         return int(self._parser.bad)
 
     def command(
@@ -93,7 +93,7 @@ class Session:
         silence_timeout_s: float = SILENCE_TIMEOUT_S,
         answer_timeout_s: float = ANSWER_TIMEOUT_S,
     ) -> Answer:
-        """(fields, tail) of the board's answer.
+        """Send a command; returns (fields, tail) of the board's answer.
 
         Raises BoardError if the board refuses, NoAnswerError after ``silence_timeout_s`` without a byte or
         ``answer_timeout_s`` without an answer, LinkError if the port breaks.
@@ -118,18 +118,18 @@ class Session:
             now_s = self.clock()
             silent = (
                 now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
-            )  # on a disturbed line all may be lost
+            )  # on a disturbed line every frame may be lost
             if silent or now_s - begin_s >= answer_timeout_s:
                 raise self._no_answer(name, now_s - begin_s)
             self.repeats += 1
 
     def open_again(self) -> None:
-        """Open the port after ``transport.close``; what had come in part is forgotten."""
+        """Open the port after ``transport.close``; incomplete frames are dropped."""
         self._parser = wire.Parser()
         self.transport = self.open_transport()
 
     def poll(self, timeout_s: float) -> board_messages.Event | None:
-        """The oldest event; waits up to ``timeout_s`` for one, or until ``wake``."""
+        """The oldest event; None if none arrives within ``timeout_s`` or before ``wake``."""
         deadline_s = self.clock() + timeout_s
         while not self.events:
             left_s = deadline_s - self.clock()
@@ -143,13 +143,13 @@ class Session:
         return self.events.popleft()
 
     def wake(self) -> None:
-        """Let a ``poll`` that waits return at once; for other threads and signal handlers."""
+        """Make a waiting ``poll`` return at once; for other threads and signal handlers."""
         self._woken = True
         self.transport.wake()
 
     @contextmanager
     def in_a_hurry(self, timeout_s: float) -> Iterator[bool]:
-        """The next turn to talk to the board, for a request from outside; see ``Turns.in_a_hurry``."""
+        """The next turn to talk to the board, for a request of another program; see ``Turns.in_a_hurry``."""
         self.transport.wake()
         with self.turns.in_a_hurry(timeout_s) as mine:
             yield mine
@@ -162,7 +162,7 @@ class Session:
         return NoAnswerError(problem, "check the cable and that the board is powered")
 
     def _next_sequence(self) -> int:
-        """The next of 255: a board that is just starting would take a 3 for Ctrl-C."""
+        """The next sequence number; skips 3, which a starting board would take for Ctrl-C."""
         self._sequence = (self._sequence + (2 if self._sequence == _CTRL_C - 1 else 1)) % 256
         return self._sequence
 
@@ -209,7 +209,7 @@ class Session:
     def reconnect(self, reason: LinkError) -> None:
         """Close the port and open it again until the board answers, for up to RECONNECT_S.
 
-        Raises ``reason`` where that fails, OtherBoardError if another board answers.
+        Raises ``reason`` if that fails, OtherBoardError if another board answers.
         """
         self.check()
         if self.reopen is None:
@@ -238,7 +238,7 @@ class Session:
     def _found_again(self, reopen: Callable[[], Transport]) -> bool:
         """Open the port and greet the board; False if that fails."""
         self._parser = wire.Parser()
-        self.reopen = None  # the caller repeats what fails meanwhile
+        self.reopen = None  # the caller repeats a command that fails meanwhile
         try:
             self.transport = reopen()
             self.greet()

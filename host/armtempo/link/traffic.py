@@ -1,6 +1,6 @@
-"""The traffic log: every byte to and from the board, with its meaning.
+"""The traffic log: every byte to and from the board, decoded.
 
-A log is a text file, one line a chunk of bytes, tab-separated::
+A log is a text file with one tab-separated line per chunk of bytes::
 
     seconds since the start | ">" to the board, "<" from it | the bytes in hex | the frames decoded
 """
@@ -17,8 +17,8 @@ from typing import Any, Self
 
 from armtempo_shared import wire
 
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import why
 from armtempo.link.transport import Transport
 
 HEADER = "# armtempo traffic 1"
@@ -28,7 +28,7 @@ FROM_BOARD = "<"
 
 @dataclass(frozen=True)
 class Chunk:
-    """Bytes that went one way together."""
+    """Consecutive bytes in one direction."""
 
     time_s: float
     direction: str
@@ -36,11 +36,11 @@ class Chunk:
 
 
 Sink = Callable[[Chunk, list[str]], None]
-"""Takes a chunk and the descriptions of the frames that it completes."""
+"""Called with a chunk and the descriptions of the frames that it completes."""
 
 
 class Decoder:
-    """Decodes the chunks of both directions; keeps incomplete frames for the next chunk."""
+    """Decodes chunks of both directions; keeps incomplete frames for the next chunk."""
 
     def __init__(self) -> None:
         self._parsers = {TO_BOARD: wire.Parser(), FROM_BOARD: wire.Parser()}
@@ -119,10 +119,10 @@ class LoggedTransport:
 
 
 class LogFile:
-    """A sink that writes a log; used as a context. InputError if the file cannot be opened.
+    """A sink that writes a log; a context. Raises InputError if the file cannot be opened.
 
-    Each line is flushed, so that a killed program leaves a readable log. Where the disk fills up the log ends
-    and the traffic continues; InputError says so when the context is left without another error.
+    Each line is flushed, so that a killed program leaves a readable log. If the disk is full, the log ends
+    and the traffic continues; the context then raises InputError at its end, unless there is another error.
     """
 
     def __init__(self, path: Path) -> None:
@@ -164,7 +164,7 @@ class LogFile:
 
 
 def read_log(path: Path) -> Iterator[Chunk]:
-    """The chunks of a recorded log; InputError if it is none. A cut last line is left out."""
+    """The chunks of a log; raises InputError if it is none. An incomplete last line is skipped."""
     try:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeError) as error:

@@ -1,4 +1,4 @@
-"""Bytes to and from a board: a serial port (or whatever pyserial can open), nothing above that."""
+"""Byte streams to and from a board: a serial port, or whatever pyserial can open."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import serial
 from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseError
 
 BAUD_RATE = 115_200
-"""Has no effect over USB; a UART between host and board would use it."""
+"""Only used by a UART between host and board; no effect over USB."""
 _ADVICE = "'armtempo ports' lists the ports"
 _BROKEN = (
     serial.SerialException,
     OSError,
     TypeError,
-)  # TypeError: pyserial, closed by another thread meanwhile
+)  # TypeError: pyserial's, if another thread has closed it
 
 
 class Transport(Protocol):
@@ -28,13 +28,13 @@ class Transport(Protocol):
     name: str
 
     def read(self, timeout_s: float) -> bytes:
-        """What has arrived; waits up to ``timeout_s`` for the first byte, then gives ``b""``."""
+        """The received bytes; waits up to ``timeout_s`` for the first, then returns ``b""``."""
 
     def write(self, data: bytes) -> None:
         """Send all of it."""
 
     def wake(self) -> None:
-        """End a read that waits, or the next one; for other threads and signal handlers. It may do nothing."""
+        """Make the waiting or the next read return; for other threads and signal handlers. May do nothing."""
 
     def close(self) -> None:
         """Free the port; may be called twice."""
@@ -48,7 +48,7 @@ class SerialTransport:
     """
 
     def __init__(self, port: str, exclusive: bool = True) -> None:
-        """``exclusive``: not while another program has the port open, where the operating system can tell."""
+        """``exclusive``: fail if another program has the port open, if the operating system can detect it."""
         self.name = port
         self._serial = _open(port, exclusive)
 
@@ -69,7 +69,7 @@ class SerialTransport:
 
     def wake(self) -> None:
         """See Transport."""
-        with suppress(serial.SerialException, OSError, AttributeError, TypeError):  # URLs need not have it
+        with suppress(serial.SerialException, OSError, AttributeError, TypeError):  # not all URLs have it
             self._serial.cancel_read()
 
     def close(self) -> None:
@@ -93,7 +93,7 @@ def _open(port: str, exclusive: bool) -> serial.Serial:
 
 
 def _broken(port: str, error: Exception) -> LinkError:
-    """A port that was open and is gone; pyserial's own words for it ("reports readiness to read") help nobody."""
+    """The error for a port that has disappeared; pyserial's text ("reports readiness to read") does not help."""
     unplugged = not os.path.exists(port) or "returned no data" in str(error)
     reason = "its cable was unplugged, or the board was reset" if unplugged else str(error)
     return LinkError(
@@ -112,7 +112,7 @@ def _open_error(port: str, error: Exception) -> PortError | InputError:
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
         return PortInUseError(f"port {port} is in use by another program", "close it and try again")
     if number == errno.EACCES or "PermissionError" in text:
-        kind = PortInUseError if sys.platform == "win32" else PortError  # Windows says so of a port in use
+        kind = PortInUseError if sys.platform == "win32" else PortError  # Windows: of a port in use
         return kind(
             f"no permission to open {port}: another program holds it, or your user may not use serial ports",
             "close the other program, or on Debian: 'sudo adduser $USER dialout', then log in again",

@@ -1,4 +1,4 @@
-"""Whose turn it is to talk to the board: threads of one program take turns, and requests from outside come first."""
+"""A lock for talking to the board: threads of a program take turns, requests of other programs come first."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import TracebackType
 from typing import Self
 
 _YIELD_S = 0.0002
 
 
 class Turns:
-    """A lock that its holder may take again; as a context it lets those who are in a hurry go first."""
+    """A re-entrant lock; as a context it lets waiting ``in_a_hurry`` callers go first."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -30,9 +29,7 @@ class Turns:
         self._taken()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._depth -= 1
         if not self._depth:
             self._holder = None
@@ -40,7 +37,7 @@ class Turns:
 
     @contextmanager
     def in_a_hurry(self, timeout_s: float) -> Iterator[bool]:
-        """The next turn; gives False if it does not come within ``timeout_s``."""
+        """Take the next turn; yields False if it does not come within ``timeout_s``."""
         self._count(1)
         try:
             mine = self._lock.acquire(timeout=timeout_s)

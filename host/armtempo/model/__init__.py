@@ -1,1 +1,1 @@
-"""What is given and what comes out: arm, job, pose, plan, and the files that hold them."""
+"""The data: arm, job, pose, sequence, plan, and their files."""

@@ -9,29 +9,29 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec, toml_table
-from armtempo.formats.text import did_you_mean
-from armtempo.formats.toml_table import Table
-from armtempo.model import boards, outputs_file, parts_file, pin_use, pose_table, room, shipped
+from armtempo.basics.text import did_you_mean
+from armtempo.basics.toml_table import Table
+from armtempo.model import boards, outputs_file, parts_file, pin_use, room, shipped, tool_pose
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
-from armtempo.model.parts import DrivenJoint, Driver, Joint, Limits, Motor, Safety
+from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
 from armtempo.model.room import ArmRoom
 from armtempo.model.tool_pose import Pose
 
 _REACHES_MM = 1e-6
 STILL_DEG = 0.01
-"""A joint of so narrow a range is a constant row of the table, such as a tool's."""
+"""A joint with a range at most this wide is a constant row of the table, such as a tool's."""
 
 
 @checked
 @checked_fields
 @dataclass(frozen=True)
 class Arm:
-    """An arm; ``source`` is the file that it was read from."""
+    """An arm; ``source``: the file that it was read from."""
 
     name: str
     joints: tuple[Joint, ...]
@@ -41,17 +41,21 @@ class Arm:
     board: str = field(default=boards.DEFAULT, metadata=json_codec.ADDED)
     """Name in ``boards.BOARDS``."""
     outputs: tuple[Output, ...] = field(default=(), metadata=json_codec.ADDED)
-    """In the order of the file, which is also the board's."""
+    """In the order of the file, which is also the order on the board."""
     inputs: tuple[Input, ...] = field(default=(), metadata=json_codec.ADDED)
     postures: tuple[ArmPosture, ...] = field(default=(), metadata=json_codec.ADDED)
-    """In the order of the file; the board knows nothing of them."""
+    """In the order of the file; not sent to the board."""
     room: ArmRoom | None = field(default=None, metadata=json_codec.ADDED)
-    """Where it may move; the board knows nothing of it."""
+    """The space in which it may move; not sent to the board."""
+    loads: tuple[Load, ...] = field(default=(), metadata=json_codec.ADDED)
+    """What its tool may hold; the board knows nothing of them."""
+    held: Load | None = field(default=None, metadata=json_codec.ADDED)
+    """What it holds; see ``holding``."""
     homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
-    """Names of the joints that are homed first, together those of an entry; the others follow one by one."""
+    """Names of the joints in the order of homing, joints of an entry together; the other joints follow one by one."""
 
     def __post_init__(self) -> None:
-        """InputError for what no file could say either."""
+        """Raise InputError for values that a file may not have either."""
         object.__setattr__(self, "joints", tuple(self.joints))
         if not self.joints:
             raise InputError(f"arm {self.name!r} has no joints", "give at least one Joint")
@@ -69,15 +73,15 @@ class Arm:
 
     @classmethod
     def of(cls, arm: Arm | Path | str) -> Arm:
-        """The arm itself, or the one of a file or name as ``load`` finds it."""
+        """The arm itself, or the arm of a file or name as in ``load``."""
         return arm if isinstance(arm, Arm) else cls.load(arm)
 
     @classmethod
     def load(cls, path: Path | str) -> Arm:
-        """The arm described by a TOML file, or the one of that name that ships, such as ``"ar4"``; a file wins.
+        """The arm of a TOML file, or the shipped arm of that name, such as ``"ar4"``; a file has precedence.
 
-        It is ready to be driven. Raises InputError, naming file, key and value, for anything missing, unknown or not
-        allowed; naming the arms that ship if there is neither file nor arm.
+        At least one joint has a motor. Raises InputError, naming file, key and value, for anything missing,
+        unknown or not allowed; and, naming the shipped arms, if there is neither a file nor a shipped arm.
         """
         path = shipped.find(path).path
         arm = cls.read(path)
@@ -88,7 +92,7 @@ class Arm:
 
     @classmethod
     def shape(cls, arm: Arm | Path | str) -> Arm:
-        """The arm for its kinematics: as ``of``, but where no joint has a motor yet, each that can turn gets one."""
+        """The arm for kinematics: as ``of``, but if no joint has a motor yet, each that can turn gets one."""
         if not isinstance(arm, Arm):
             path = shipped.find(arm).path
             arm = cls.read(path)
@@ -107,15 +111,15 @@ class Arm:
 
     @classmethod
     def read(cls, path: Path | str) -> Arm:
-        """The arm of a TOML file, even if no joint has a motor yet or two have the same channel or pin.
+        """The arm of a TOML file, even if no joint has a motor yet, or two have the same channel or pin.
 
-        Raises InputError as ``load`` does for all else.
+        Otherwise raises InputError as ``load``.
         """
         return cls.of_table(toml_table.read(path))
 
     @classmethod
     def of_table(cls, top: Table) -> Arm:
-        """The arm in the top table of a file, as ``read`` gives it."""
+        """The arm in the top table of a file, as ``read``."""
         name = top.text("name")
         driver = parts_file.driver(top.table("driver"))
         safety = parts_file.safety(top.table("safety"))
@@ -125,21 +129,34 @@ class Arm:
         outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
         postures = top.table("posture")
         around = room.read(top.table("room"))
+        loads = parts_file.loads(top)
         homing = parts_file.homing(top, [joint.name for joint in joints])
         top.done()
-        arm = cls(name, joints, driver, safety, top.file, board, outputs, inputs, room=around, homing=homing)
+        arm = cls(
+            name,
+            joints,
+            driver,
+            safety,
+            top.file,
+            board,
+            outputs,
+            inputs,
+            room=around,
+            loads=loads,
+            homing=homing,
+        )
         if not postures:
             return arm
         return replace(arm, postures=tuple(read_posture(postures, name, arm) for name in postures.names()))
 
     @classmethod
     def paper(cls) -> Arm:
-        """The arm that ships with armtempo: the paper's 1:5 model, three of its six joints driven."""
+        """The shipped arm of the paper: its 1:5 model, three of six joints driven."""
         return cls.load(shipped.arm_path())
 
     @cached_property
     def driven(self) -> tuple[DrivenJoint, ...]:
-        """The joints with a motor, in order. InputError if one of them has no limits."""
+        """The joints with a motor, in order; raises InputError if one of them has no limits."""
         return tuple(
             _driven(self.name, joint, joint.motor) for joint in self.joints if joint.motor is not None
         )
@@ -150,12 +167,23 @@ class Arm:
         return tuple(index for index, joint in enumerate(self.joints) if joint.motor is not None)
 
     def output(self, name: str) -> int:
-        """The number of an output, from 0; InputError if the arm has none of this name."""
+        """The number of an output, from 0; raises InputError if the arm has no output of this name."""
         return self._number("output", name, [output.name for output in self.outputs])
 
     def input(self, name: str) -> int:
-        """The number of an input, from 0; InputError if the arm has none of this name."""
+        """The number of an input, from 0; raises InputError if the arm has no input of this name."""
         return self._number("input", name, [entry.name for entry in self.inputs])
+
+    def holding(self, load: str | None) -> Arm:
+        """The arm with a load of its file in its tool; "nothing": with none, "" or None: as it is.
+
+        InputError if it has no such load.
+        """
+        if not load:
+            return self
+        if load == NOTHING:
+            return replace(self, held=None)
+        return replace(self, held=self.loads[self._number("load", load, [each.name for each in self.loads])])
 
     def _number(self, what: str, name: str, names: list[str]) -> int:
         if name in names:
@@ -165,16 +193,16 @@ class Arm:
 
     @property
     def all_home_deg(self) -> tuple[float, ...]:
-        """The home posture with the joints that have no motor: degrees, (joints,)."""
+        """The home posture of all joints, also those without a motor: degrees, (joints,)."""
         return tuple(joint.home_deg for joint in self.joints)
 
     @property
     def home_deg(self) -> tuple[float, ...]:
-        """The home posture: an angle for each driven joint, degrees (J,)."""
+        """The home posture of the driven joints, degrees (J,)."""
         return tuple(joint.home_deg for joint in self.driven)
 
     def posture(self, name: str) -> ArmPosture:
-        """The posture of that name, "home" among them; InputError, naming the nearest, if there is none."""
+        """The posture of that name, or "home"; raises InputError, with the most similar name, if there is none."""
         if name == named.HOME:
             return ArmPosture(name, self.home_deg)
         found = [posture for posture in self.postures if posture.name == name]
@@ -187,7 +215,7 @@ class Arm:
         return found[0]
 
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
-        """Why the driven joints cannot be at these angles, in words; "" if they can."""
+        """Why the driven joints cannot be at these angles; "" if they can."""
         angles = tuple(angles_deg)
         if len(angles) != len(self.driven):
             return f"{len(angles)} angles, but {len(self.driven)} joints have a motor"
@@ -198,7 +226,7 @@ class Arm:
         return ""
 
     def posture_problem(self, posture: ArmPosture) -> str:
-        """What is wrong with a posture, as far as it shows without the inverse kinematics; "" for nothing."""
+        """What is wrong with a posture, without solving the inverse kinematics; "" for nothing."""
         if found := named.name_problem(posture.name):
             return found
         if not isinstance(posture.where, Pose):
@@ -226,7 +254,7 @@ def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:
 
 
 def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
-    """The posture ``name`` of the table [posture]; InputError if it is none that the arm can take."""
+    """The posture ``name`` of the table [posture]; raises InputError if the arm cannot take it."""
     where = f"{tables.file}: posture.{name}"
     table = tables.table(name)
     if problem := named.name_problem(name):
@@ -241,7 +269,7 @@ def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
     if forms == ["angles_deg"]:
         found = ArmPosture(name, table.numbers("angles_deg", len(arm.driven)))
     else:
-        found = ArmPosture(name, replace(pose_table.read(table, where), posture_deg=arm.all_home_deg))
+        found = ArmPosture(name, replace(tool_pose.from_table(table, where), posture_deg=arm.all_home_deg))
     table.done()
     if problem := arm.posture_problem(found):
         raise InputError(f"{where}: {problem}", "give a posture that the arm can take")
@@ -249,7 +277,7 @@ def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
 
 
 class SharedChannel(NamedTuple):
-    """A channel of the board that more than one joint has."""
+    """A channel of the board used by more than one joint."""
 
     key: str
     """``"motor"`` or ``"encoder"``."""
@@ -258,7 +286,7 @@ class SharedChannel(NamedTuple):
 
 
 def shared_channels(arm: Arm) -> list[SharedChannel]:
-    """Channels that more than one joint has; empty for an arm that can be wired."""
+    """Channels used by more than one joint; empty for a valid arm."""
     users: dict[tuple[str, int], list[str]] = defaultdict(list)
     for joint in arm.joints:
         for key, part in (("motor", joint.motor), ("encoder", joint.encoder)):

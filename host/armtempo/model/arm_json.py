@@ -1,4 +1,4 @@
-"""An arm as JSON, for run folders of motions that the board had and whose plan nobody knows."""
+"""An arm as JSON, for run folders of motions without a plan."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from armtempo.basics import json_codec
+from armtempo.basics.atomic_file import replace_text, why
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
-from armtempo.formats.atomic_file import replace_text, why
 from armtempo.model import boards, pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.outputs import KINDS, SWITCH, Output
@@ -20,13 +20,13 @@ _AGAIN = "restore it from a copy, or run again"
 
 
 def save(arm: Arm, path: Path) -> None:
-    """Write the arm, whole or not at all; InputError if the file cannot be written."""
+    """Write the arm, atomically; raises InputError if the file cannot be written."""
     content = {"format": FORMAT, "version": VERSION, "arm": json_codec.encode(arm)}
     replace_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def load(path: Path) -> Arm:
-    """The arm of such a file; InputError if it is none, damaged, or cannot be driven."""
+    """The arm of such a file; raises InputError if it is invalid or damaged, or no joint can be driven."""
     try:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
@@ -39,9 +39,9 @@ def load(path: Path) -> Arm:
 
 
 def check(arm: Arm, where: str, hint: str) -> None:
-    """Check what types cannot express: the driven joints can be driven, and their figures divided by.
+    """Check what types cannot express: limits, motors and encoders of the driven joints are usable, no value is 0.
 
-    Raises InputError with that hint.
+    Raises InputError with ``hint``.
     """
     for joint in arm.joints:
         if problem := _problem(joint):

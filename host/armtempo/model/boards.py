@@ -1,4 +1,4 @@
-"""The boards that an arm file can name: pins that exist, pins that something on the board has, and timers' outputs."""
+"""The boards that an arm file can name: their pins, pins used by parts on the board, and timer outputs."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ class BoardPins:
 
     name: str
     pins: frozenset[str]
-    """Pins of ports A to E that are led out: ``"PE9"``."""
+    """Accessible pins of ports A to E, such as ``"PE9"``."""
     taken: Mapping[str, str]
-    """Of these, those that something on the board has, and what."""
+    """Pins used by a part on the board, and that part."""
 
 
 @dataclass(frozen=True)
 class TimerOutput:
-    """A channel of a timer that comes out at a pin."""
+    """A channel of a timer at a pin."""
 
     timer: int
     channel: int
 
     @property
     def clock_hz(self) -> int:
-        """What the timer counts before its prescaler (RM0090 6.2, at 168 MHz)."""
+        """The timer's clock before its prescaler, Hz (RM0090 6.2, at 168 MHz)."""
         return 168_000_000 if self.timer in (1, 8, 9, 10, 11) else 84_000_000
 
 
@@ -67,7 +67,7 @@ TIMER_OUTPUTS: dict[str, tuple[TimerOutput, ...]] = {
 
 
 def pin_number(pin: str) -> int:
-    """A pin (``"PE9"``) as the arm record has it."""
+    """The number of a pin (``"PE9"``) in the arm record."""
     return 16 * (ord(pin[1]) - ord("A")) + int(pin[2:])
 
 

@@ -1,4 +1,4 @@
-"""Pins and timers that the engine takes for an arm: from the board program's own table, ``hardware/pins.py``."""
+"""Pins and timers that the engine uses for an arm, from the board program's table ``hardware/pins.py``."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ ENGINE_TIMERS = {2: "the step pulses", 5: "the step pulses", 6: "the step pulses
 
 
 class ChannelUser(Protocol):
-    """What is needed of an arm here."""
+    """The part of an arm that is needed here."""
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """Those with a motor have channels."""
+        """Joints; those with a motor have channels."""
 
     @property
     def safety(self) -> Safety:
-        """Whether there is an E-stop."""
+        """Safety: whether there is an E-stop."""
 
 
 @cache
 def table() -> dict[str, Any]:
-    """The constants of the board program's table by name; nothing of it is executed."""
+    """The constants of the board program's table by name, read without executing it."""
     spec = find_spec("armtempo_board")
     if spec is None or not spec.submodule_search_locations:
         raise FileNotFoundError("the package armtempo_board is not installed")
@@ -44,7 +44,7 @@ def table() -> dict[str, Any]:
 
 
 def taken_pins(arm: ChannelUser) -> dict[str, str]:
-    """Pins (``"PE12"``) that the program takes for this arm, and what for."""
+    """Pins (``"PE12"``) that the program uses for this arm, and their use."""
     pins = table()
     found = {pins["ENABLE"]: "ENABLE of the drivers", pins["BUTTON"]: "the button"}
     found.update(dict.fromkeys(pins["LEDS"], "a LED of the board"))
@@ -66,7 +66,7 @@ def taken_pins(arm: ChannelUser) -> dict[str, str]:
 
 
 def uses(pin: str) -> list[str]:
-    """All that the program can take a pin (``"PE12"``) for, whatever the arm."""
+    """All uses of a pin (``"PE12"``) in the program, for any arm."""
     pins, name = table(), pin.removeprefix("P")
     found = [words for words, key in _SINGLE.items() if pins[key] == name]
     found += ["a LED of the board"] * (name in pins["LEDS"])
@@ -80,7 +80,7 @@ def uses(pin: str) -> list[str]:
 
 
 def taken_timers(arm: ChannelUser) -> dict[int, str]:
-    """Timers that the program takes for this arm, and what for."""
+    """Timers that the program uses for this arm, and their use."""
     found = dict(ENGINE_TIMERS)
     for joint in arm.joints:
         if joint.motor is not None and joint.encoder is not None:

@@ -1,4 +1,4 @@
-"""For other programs: a trajectory as CSV or as a ROS JointTrajectory."""
+"""A trajectory as CSV or as a ROS JointTrajectory."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ TIME_COLUMN = "time_s"
 
 
 def times_s(duration_s: float, rate_hz: float) -> Array:
-    """0, 1/rate, … and the end itself, seconds: (K,).
+    """0, 1/rate, … and the end of the motion, seconds: (K,).
 
-    Raises InputError for a rate that is not above 0 and at most MAX_RATE_HZ.
+    Raises InputError for a rate of 0 or less, or above MAX_RATE_HZ.
     """
     if not 0.0 < rate_hz <= MAX_RATE_HZ:
         raise InputError(
@@ -33,7 +33,7 @@ def times_s(duration_s: float, rate_hz: float) -> Array:
 
 
 def to_csv(trajectory: Trajectory, rate_hz: float) -> str:
-    """One line a time: ``time_s``, then ``jN_`` with each of CSV_COLUMNS for every driven joint N."""
+    """CSV with one line per time: ``time_s``, then ``jN_`` with each of CSV_COLUMNS for every driven joint N."""
     times = times_s(trajectory.duration_s, rate_hz)
     orders = np.stack([trajectory(times, order) for order in range(len(CSV_COLUMNS))], axis=-1)
     joints = orders.shape[1]

@@ -1,4 +1,4 @@
-"""The job: what to plan and how, and the file that describes it."""
+"""The job: via points and settings of a plan, and its file."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 
+from armtempo.basics import json_codec, number_table, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec, number_table, toml_table
-from armtempo.formats.toml_table import Table
-from armtempo.model import pose_table, shipped, tool_way, via_table
+from armtempo.basics.toml_table import Table
+from armtempo.model import shipped, tool_way, via_table
 from armtempo.model.arm import Arm
-from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, Pose
+from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, Pose, from_table
 from armtempo.model.tool_way import ToolWay
 from armtempo.optimise import ALGORITHMS
 
 GRADIENT = "gradient"
-"""The optimiser that is no population search: gradients from several starts."""
+"""The optimiser without a population: gradients from several starts."""
 
 PATHS = ("through", "free")
 TIMINGS = ("shared", "per-joint")
@@ -41,7 +41,7 @@ OPTIMISERS = (*ALGORITHMS, GRADIENT)
 @checked_fields
 @dataclass(frozen=True)
 class Stop:
-    """A rest at via point ``via``, counted from 0, for ``dwell_s``."""
+    """A stop at via point ``via`` (from 0) for ``dwell_s``."""
 
     via: int
     dwell_s: float = 0.0
@@ -53,42 +53,45 @@ class Stop:
 class Job:
     """A motion to plan: through ``via`` in order, from rest to rest.
 
-    ``Job(name, via_deg=rows)`` is a short way to say ``via`` where every via point is given by angles.
+    ``Job(name, via_deg=rows)`` is a short form of ``via`` if all via points are given by angles.
     """
 
     name: str
     via: tuple[tuple[float, ...] | Pose, ...] = ()
-    """Each entry: the driven joints' angles in degrees, (J,), or a pose."""
+    """Each entry: the driven joints' angles, degrees (J,), or a pose."""
     stops: tuple[Stop, ...] = field(default=(), metadata=json_codec.ADDED)
-    """Via points between the ends where the motion comes to rest, in order."""
+    """Via points between the ends at which the motion stops, in order."""
     ways: tuple[ToolWay, ...] = field(default=(), metadata=json_codec.ADDED)
-    """What is asked of the tool on the way to some via points, in order."""
+    """Requirements for the tool between via points (lines, arcs, speeds), in order."""
     speed_mm_s: float | None = field(default=None, metadata=json_codec.ADDED)
     acceleration_mm_s2: float | None = field(default=None, metadata=json_codec.ADDED)
-    """Limits of the tool on all ways."""
+    """Limits of the tool for the whole motion."""
+    holds: str = field(default="", metadata=json_codec.ADDED)
+    """The load of the arm that the tool holds; "": none, and in a sequence what it holds there."""
     path: str = field(default="through", metadata=json_codec.ADDED)
     """``"through"``: the spline of Eqs. (13) and (14); ``"free"``: it may bend between the via points."""
     corridor_deg: float | None = field(default=None, metadata=json_codec.ADDED)
     corridor_mm: float | None = field(default=None, metadata=json_codec.ADDED)
-    """How far a free path may leave the one through the via points: any joint, or the tool; None: at will."""
+    """Largest distance of a free path from the spline through the via points, of any joint or of the tool;
+    None: no limit."""
     degree: int = 5
     timing: str = "shared"
-    """``"shared"``: one time axis for all joints; ``"per-joint"`` (the paper): one for each."""
+    """``"shared"``: one time axis for all joints; ``"per-joint"`` (the paper): one for each joint."""
     refine: int | str = AUTO
-    """Segments of the time axis per segment of the path (of a free path: pieces of both from via point to via
-    point); ``"auto"``: as many as shorten the motion and fit the board's record."""
+    """Segments of the time axis per segment of the path (free path: segments of both between two via points);
+    ``"auto"``: more as long as they shorten the motion and fit the board's record."""
     optimiser: str = "acs"
     population: int = 10
     iterations: int = 500
     parameters: Mapping[str, float | str | bool] = field(default_factory=dict)
-    """Further parameters of the optimiser, by its own names."""
+    """Parameters of the optimiser, by its names."""
     starts: int = field(default=3, metadata=json_codec.ADDED)
-    """Starts of the gradient solver, where it searches."""
+    """Starts of the gradient solver, if it is the search."""
     seed: int = 1
     bounds_s: tuple[float, float] | None = None
-    """Range of a time interval in the search (the paper: 0.1 to 3); None: follows from the job."""
+    """Range of a time interval in the search (the paper: 0.1 to 3); None: computed from the job."""
     polish: bool = True
-    """Whether gradients finish what the search has found."""
+    """Whether a gradient solver finishes the search."""
     source: str = ""
     _: KW_ONLY
     via_deg: InitVar[Sequence[Sequence[float]] | None] = None
@@ -101,7 +104,7 @@ class Job:
         self._check()
 
     def _check(self) -> None:
-        """InputError for settings that no planner knows or the board cannot keep."""
+        """Raise InputError for settings that the planner does not know or the board cannot store."""
         if not is_name(self.name):
             raise InputError(f"job {self.name!r}: not a valid name on the board", f"give {NAME_RULE}")
         for key, allowed in (
@@ -133,7 +136,7 @@ class Job:
 
     @classmethod
     def of(cls, job: Job | Path | str, arm: Arm) -> Job:
-        """The job itself, or the one of a file as ``load`` finds it."""
+        """The job itself, or the job of a file as in ``load``."""
         return job if isinstance(job, Job) else cls.load(job, arm)
 
     @classmethod
@@ -156,6 +159,7 @@ class Job:
             ways=ways,
             speed_mm_s=tool_way.limit(top, "speed_mm_s"),
             acceleration_mm_s2=tool_way.limit(top, "acceleration_mm_s2"),
+            holds=held(top, arm),
             path=top.choice("path", PATHS, cls.path),
             corridor_deg=_corridor(top, "corridor_deg"),
             corridor_mm=_corridor(top, "corridor_mm"),
@@ -183,11 +187,11 @@ class Job:
         radians: bool = False,
         tolerance_deg: float | None = None,
     ) -> Job:
-        """A job through the via points of a CSV file: a line for each point, a column for each driven joint.
+        """A job through the via points of a CSV file: one line per point, one column per driven joint.
 
-        It has the file's name. A table with a column ``time_s``, as ``Plan.to_csv`` writes, is a sampled motion and
-        thinned to ``tolerance_deg`` (0.1 unless given), and its joints pass the points together. Raises InputError
-        with line and value for what is no angle.
+        Its name is the file's. A table with a column ``time_s``, as ``Plan.to_csv`` writes, is a sampled
+        motion: it is thinned to ``tolerance_deg`` (default 0.1), with shared timing. Raises InputError with
+        line and value for an invalid angle.
         """
         file = Path(path)
         found = via_table.via_points(number_table.read(file), Arm.of(arm), radians, tolerance_deg)
@@ -196,8 +200,18 @@ class Job:
 
     @classmethod
     def paper(cls, arm: Arm | Path | str | None = None) -> Job:
-        """The job that ships with armtempo: the paper's feeding motion, for its arm or ``arm``."""
+        """The shipped job: the paper's feeding motion, for its arm or ``arm``."""
         return cls.load(shipped.job_path(), arm or shipped.arm_path())
+
+
+def held(top: Table, arm: Arm) -> str:
+    """``holds``: a load of the arm, or "nothing"; "" if it is not given."""
+    name = top.text("holds") if top.has("holds") else ""
+    try:
+        arm.holding(name)
+    except InputError as error:
+        raise InputError(f"{top.file}: {top.place}holds: {error.problem}", error.hint) from None
+    return name
 
 
 def _corridor(top: Table, key: str) -> float | None:
@@ -223,7 +237,7 @@ def _bounds(top: Table) -> tuple[float, float] | None:
 
 
 def name_of(top: Table, longest: int = MAX_NAME, key: str = "name") -> str:
-    """The ``name`` of a job or sequence, or what else the board is to keep as a name."""
+    """The ``name`` of a job or sequence (or another ``key`` that is a name on the board)."""
     name = top.text(key)
     if not is_name(name, longest):
         raise top.fail(key, NAME_RULE.replace(str(MAX_NAME), str(longest)))
@@ -231,7 +245,7 @@ def name_of(top: Table, longest: int = MAX_NAME, key: str = "name") -> str:
 
 
 def is_name(name: str, longest: int = MAX_NAME) -> bool:
-    """Whether the board can keep something under this name."""
+    """Whether it is a valid name on the board."""
     return 0 < len(name) <= longest and all(letter in _LETTERS for letter in name)
 
 
@@ -266,7 +280,7 @@ def _vias(
 
 
 def _stops(table: Table) -> bool:
-    """Whether the motion is to rest at this via point."""
+    """Whether the motion stops at this via point."""
     stops = table.boolean("stop", False)
     if table.has("dwell_s") and not stops:
         raise table.fail("dwell_s", "given with stop = true only")
@@ -298,9 +312,9 @@ def _via(table: Table, where: str, arm: Arm, way: ToolWay | None) -> tuple[float
         _done(table, way)
         return found
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
-    pose = pose_table.read(table, where)
+    pose = from_table(table, where)
     table.done()
-    if way and way.line:  # its tolerances are those of the line
+    if way and way.line:  # its tolerances are read as those of the line
         pose = replace(pose, tolerance_mm=TOLERANCE_MM, tolerance_deg=TOLERANCE_DEG)
     return replace(pose, posture_deg=posture)
 

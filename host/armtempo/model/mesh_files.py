@@ -1,4 +1,4 @@
-"""Meshes of an arm's links, to be shown: STL files in mm, in a folder next to the arm file.
+"""Meshes of an arm's links for display: STL files in mm, in a folder next to the arm file.
 
 ``arm.toml`` has its meshes in ``arm-meshes``: ``3.stl`` moves with the third row and is in its frame, ``0.stl`` is the
 base.
@@ -12,20 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
-from armtempo.formats.atomic_file import why
 from armtempo.model.arm import Arm
 
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 
 
 def folder_of(arm_file: Path) -> Path:
-    """Where the meshes of an arm file are."""
+    """The folder with the meshes of an arm file."""
     return arm_file.with_name(f"{arm_file.stem}-meshes")
 
 
 def of_arm(arm: Arm) -> dict[int, Path]:
-    """The files by the number of their row, 0 for the base; none for an arm without a file."""
+    """The files by row number, 0 for the base; empty for an arm without a file."""
     if not arm.source:
         return {}
     folder = folder_of(Path(arm.source))
@@ -34,9 +34,9 @@ def of_arm(arm: Arm) -> dict[int, Path]:
 
 
 def write(arm_file: Path, corners_mm: Mapping[int, Array]) -> list[Path]:
-    """Write the triangles (N, 3, 3) of each row in the place of those that are there; the paths.
+    """Write the triangles (N, 3, 3) of each row, replacing older files; returns the paths.
 
-    InputError if they cannot be written.
+    Raises InputError if they cannot be written.
     """
     folder = folder_of(arm_file)
     try:

@@ -1,4 +1,4 @@
-"""Outputs and inputs of an arm: what its file says of them, and the values that the board takes."""
+"""Outputs and inputs of an arm: their description in the file, and their values on the board."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from armtempo_shared.limits import FULL_OUTPUT
 
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats.text import did_you_mean
+from armtempo.basics.text import did_you_mean
 
 SWITCH, PWM, SERVO = "switch", "pwm", "servo"
 KINDS = (SWITCH, PWM, SERVO)
@@ -29,15 +29,15 @@ class Output:
     pin: str
     """``"PE9"``."""
     safe: float
-    """Value that it takes at power-up, on a fault or an E-stop, and when the board's program ends."""
+    """Value at power-up, at a fault or an E-stop, and when the board's program ends."""
     states: tuple[tuple[str, float], ...] = ()
     """Values by name."""
     active: str = "high"
-    """Of a switch: level of the pin when it is on."""
+    """For a switch: level of the pin when it is on."""
     frequency_hz: float = 0.0
-    """Of the pulses; 0 for a switch."""
+    """Frequency of the pulses; 0 for a switch."""
     pulse_us: tuple[float, float] = (0.0, 0.0)
-    """Of a servo: pulse widths at the ends of ``angles_deg``."""
+    """For a servo: pulse widths at the ends of ``angles_deg``."""
     angles_deg: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -51,9 +51,9 @@ class Output:
         return _UNITS[self.kind]
 
     def number(self, value: float | str) -> float:
-        """A value, or a state by its name, in the output's own unit.
+        """The number of a value or of a state's name, in the output's unit.
 
-        Raises InputError for a state that there is not, or a value that the output cannot take.
+        Raises InputError for an unknown state, or a value outside the output's range.
         """
         if isinstance(value, str):
             value = self._state(value)
@@ -71,21 +71,21 @@ class Output:
         return float(value)
 
     def raw(self, value: float | str) -> int:
-        """As the board takes it: 0 to 65535 for the whole range. Raises InputError as ``number`` does."""
+        """The board's value: 0 to 65535 for the whole range. Raises InputError as ``number``."""
         low, high = self.range
         return round((self.number(value) - low) / (high - low) * FULL_OUTPUT)
 
     def value(self, raw: int) -> float:
-        """The value, in the output's own unit, that the board has as ``raw``."""
+        """The value of ``raw`` in the output's unit."""
         low, high = self.range
         return low + (high - low) * raw / FULL_OUTPUT
 
     def state(self, raw: int) -> str:
-        """The name of the state that the board has as ``raw``; "" if it is none."""
+        """The name of the state with the value ``raw``; "" if there is none."""
         return next((name for name, value in self.states if self.raw(value) == raw), "")
 
     def words(self, raw: int) -> str:
-        """The value that the board has as ``raw``, in words: ``open (20 deg)``."""
+        """Describe the value ``raw``: ``open (20 deg)``."""
         number = f"{self.value(raw):.4g} {self.unit}".rstrip()
         if self.kind == SWITCH:
             number = "on" if raw else "off"
@@ -123,4 +123,4 @@ class Input:
     active: str = "low"
     """Level at which it is active: ``"low"`` (with a pull-up) or ``"high"`` (with a pull-down)."""
     debounce_ms: int = 10
-    """A level counts when it has lasted so long."""
+    """Time for which a level must be stable."""

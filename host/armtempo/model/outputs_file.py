@@ -8,7 +8,8 @@ from typing import Any
 from armtempo_shared.limits import MAX_INPUTS, MAX_OUTPUTS
 
 from armtempo.basics.errors import InputError
-from armtempo.formats.toml_table import Table
+from armtempo.basics.text import is_number
+from armtempo.basics.toml_table import Table
 from armtempo.model.outputs import KINDS, PWM, SERVO, SWITCH, Input, Output
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,24}")
@@ -22,18 +23,19 @@ _MAX_ANGLE_DEG = 3600.0
 
 
 def outputs(top: Table) -> tuple[Output, ...]:
-    """The outputs of a file; InputError, naming file, key and value, for what is not allowed."""
-    return tuple(_output(name, table) for name, table in _named(top, "output", MAX_OUTPUTS))
+    """The outputs of a file; raises InputError, with file, key and value, for invalid ones."""
+    return tuple(_output(name, table) for name, table in named(top, "output", MAX_OUTPUTS))
 
 
 def inputs(top: Table) -> tuple[Input, ...]:
     """The inputs of a file; raises as ``outputs``."""
-    return tuple(_input(name, table) for name, table in _named(top, "input", MAX_INPUTS))
+    return tuple(_input(name, table) for name, table in named(top, "input", MAX_INPUTS))
 
 
-def _named(top: Table, key: str, most: int) -> list[tuple[str, Table]]:
+def named(top: Table, key: str, most: int | None = None) -> list[tuple[str, Table]]:
+    """The tables [key.NAME] of a file, of which the board takes ``most``; raises as ``outputs``."""
     found = top.named_tables(key)
-    if len(found) > most:
+    if most is not None and len(found) > most:
         raise InputError(f"{top.file}: {len(found)} tables [{key}.NAME]", f"the board has room for {most}")
     for name, _ in found:
         if not _NAME.fullmatch(name):
@@ -80,14 +82,14 @@ def _states(output: Output, table: Table | None) -> tuple[tuple[str, float], ...
         return ()
     found = []
     for name in table.rest():
-        if not _NAME.fullmatch(name) or _is_number(name):
+        if not _NAME.fullmatch(name) or is_number(name):
             raise table.fail(name, "states with names of letters, digits, '-' and '_'")
         found.append((name, _checked(output, table, name, table.number(name))))
     return tuple(found)
 
 
 def _safe(output: Output, table: Table) -> float:
-    """Without it: 0, which a servo has to have within its angles."""
+    """The safe value; default 0, which must be within a servo's angles."""
     names = [name for name, _ in output.states]
     if not table.has("safe") and output.kind != SERVO:
         return 0.0
@@ -116,16 +118,8 @@ def _input(name: str, table: Table) -> Input:
 
 
 def pin(table: Table, key: str = "pin", allowed: str = _PIN_WORDS) -> str:
-    """The name of a pin, such as ``"PD0"``; whether the board has it is not judged here."""
+    """The name of a pin, such as ``"PD0"``; whether the board has it is checked in ``pin_use``."""
     found = table.text(key)
     if not _PIN.fullmatch(found):
         raise table.fail(key, allowed)
     return found
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

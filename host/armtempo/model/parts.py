@@ -8,12 +8,14 @@ from itertools import pairwise
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
-from armtempo.formats.part import check, key
+from armtempo.basics.part import check, key
 
 LEVELS = ("low", "high")
+NOTHING = "nothing"
+"""What an arm holds that holds no load."""
 _LEAST_LIMIT = 0.001
 _MOST_US = 500.0
 Curve = tuple[tuple[float, float], ...]
@@ -21,7 +23,7 @@ CURVE = "pairs of rpm and Nm, at least two: speeds increasing from 0, no torque 
 
 
 def is_curve(curve: Curve) -> bool:
-    """Whether pairs are a motor's torque over its speed, or none at all."""
+    """Whether pairs are a valid torque curve of a motor, or empty."""
     speeds, torques = [pair[0] for pair in curve], [pair[1] for pair in curve]
     increasing = all(after > before for before, after in pairwise(speeds))
     return len(curve) == 0 or (len(curve) > 1 and speeds[0] == 0.0 and increasing and min(torques) >= 0.0)
@@ -53,10 +55,10 @@ class Motor:
     gear_ratio: float = field(metadata=key("motor turns for one turn of the joint", 0.1, 10_000.0))
     direction: int = field(default=1, metadata=key("-1 inverts DIR", choices=(1, -1)))
     curve_rpm_nm: Curve = field(default=(), metadata=json_codec.ADDED)
-    """Speed of its shaft and torque that it holds there; empty: not known."""
+    """(Shaft speed, torque) pairs; empty: not known."""
 
     def __post_init__(self) -> None:
-        """InputError for figures that no motor has."""
+        """Raise InputError for values that no motor has."""
         check(self)
         if not is_curve(self.curve_rpm_nm):
             raise InputError(f"Motor: curve_rpm_nm is {self.curve_rpm_nm}", f"give {CURVE}")
@@ -84,7 +86,7 @@ class Encoder:
     )
 
     def __post_init__(self) -> None:
-        """InputError for figures that no encoder has."""
+        """Raise InputError for values that no encoder has."""
         check(self)
 
 
@@ -93,8 +95,8 @@ class Encoder:
 class LimitSwitches:
     """Switches of one joint.
 
-    Each is one of the board's limit switch inputs 1 to 3, where it stops what moves towards it at once; or a pin
-    (``"PD0"``), which is only looked at while homing; or None.
+    Each is one of the board's limit switch inputs 1 to 3, which stops a joint that moves towards it; or a pin
+    (``"PD0"``), which is only read while homing; or None.
     """
 
     low: int | str | None = None
@@ -108,9 +110,9 @@ class LimitSwitches:
 @checked_fields
 @dataclass(frozen=True)
 class JointModel:
-    """What the virtual arm simulates of one joint beyond its drive.
+    """The virtual arm's model of one joint beyond its drive.
 
-    The bounds are those that no small arm comes near: what is beyond them is a slip of the unit or of the point.
+    The bounds are far above the values of any small arm: a value beyond them has a wrong unit or decimal point.
     """
 
     holding_torque_nm: float = field(
@@ -145,10 +147,10 @@ class JointModel:
 @checked_fields
 @dataclass(frozen=True)
 class Dynamics:
-    """What a row of the table carries, and the friction of its joint."""
+    """Mass and inertia of a row of the table, and the friction of its joint."""
 
     mass_kg: float = field(
-        metadata=key("of the link with all that is fixed to it: motors, the tool and what it holds", 0.0, 1e3)
+        metadata=key("of the link with all that is fixed to it: motors, the tool", 0.0, 1e3)
     )
     centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Its centre of mass in the frame after the row."""
@@ -160,14 +162,40 @@ class Dynamics:
     viscous_nm_s: float = field(default=0.0, metadata=key("at the joint, for a rad/s", 0.0, 1e4))
 
     def __post_init__(self) -> None:
-        """InputError for figures that no link has."""
+        """Raise InputError for values that no link has."""
         check(self)
 
 
 @checked_fields
 @dataclass(frozen=True)
+class Load:
+    """What the tool may hold: its mass, and the capsule that contains it, in the frame after the last row."""
+
+    name: str
+    mass_kg: float = field(default=0.0, metadata=key("of it", 0.0, 1e3))
+    radius_mm: float = field(default=0.0, metadata=key("of the capsule that contains it", 0.0, 1e4))
+    length_mm: float = field(
+        default=0.0, metadata=key("of the capsule, between the centres of its ends; 0: a ball", 0.0, 1e4)
+    )
+    along: str = field(
+        default="z", metadata=key("axis of the tool along which the capsule lies", choices=("x", "y", "z"))
+    )
+    centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of the capsule, and of mass."""
+    inertia_kg_m2: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """As of ``Dynamics``."""
+
+    def __post_init__(self) -> None:
+        """InputError for figures that nothing has."""
+        check(self)
+        if self.name == NOTHING:
+            raise InputError(f"[load.{NOTHING}]: {NOTHING!r} means no load", "choose another name")
+
+
+@checked_fields
+@dataclass(frozen=True)
 class Joint:
-    """One Denavit-Hartenberg row (standard convention) and what moves it; ``motor`` None: not driven."""
+    """One Denavit-Hartenberg row (standard convention) and its drive; ``motor`` None: not driven."""
 
     name: str
     d_mm: float
@@ -182,10 +210,10 @@ class Joint:
     switches: LimitSwitches = field(default_factory=LimitSwitches)
     model: JointModel = field(default_factory=JointModel)
     parallel_linkage: bool = field(default=False, metadata=json_codec.ADDED)
-    """The drive is on the link before the previous one and turns this link by a parallelogram: the angle
-    is counted from that link, so it stays when the previous joint turns. The row turns by the difference."""
+    """The drive is on the link before the previous one and turns this link by a parallelogram: the angle is
+    relative to that link, so the previous joint does not change it. The row turns by the difference."""
     radius_mm: float = field(default=0.0, metadata=json_codec.ADDED)
-    """Of the link about its d and its a; what it holds included."""
+    """Of the link about its d and its a."""
     dynamics: Dynamics | None = field(default=None, metadata=json_codec.ADDED)
 
 
@@ -209,7 +237,7 @@ class DrivenJoint:
 
     @property
     def counts_per_step(self) -> Fraction:
-        """Encoder counts per step pulse, exactly as the arm file's decimals say; 0 without an encoder."""
+        """Encoder counts per step pulse, exact for the arm file's decimals; 0 without an encoder."""
         if self.encoder is None:
             return Fraction(0)
         gear = Fraction(str(self.motor.gear_ratio))
@@ -248,8 +276,8 @@ class Safety:
     )
     on_link_loss: str = field(
         default="finish",
-        metadata=key("what becomes of a motion when the host disappears", choices=("finish", "stop")),
+        metadata=key("what a motion does when the host disappears", choices=("finish", "stop")),
     )
     link_timeout_ms: int = field(
-        default=1000, metadata=key("time without a message that counts as that", 200, 60_000)
+        default=1000, metadata=key("time without a message after which the host counts as lost", 200, 60_000)
     )

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from armtempo.basics import part
 from armtempo.basics.arguments import fits
 from armtempo.basics.errors import InputError
-from armtempo.formats import part
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 from armtempo.model import outputs_file
 from armtempo.model.parts import (
     CURVE,
@@ -19,6 +19,7 @@ from armtempo.model.parts import (
     JointModel,
     Limits,
     LimitSwitches,
+    Load,
     Motor,
     Safety,
     is_curve,
@@ -34,7 +35,7 @@ _LOCKED_DEG = 0.001
 
 
 def driver(table: Table | None) -> Driver:
-    """[driver]; errors of this and the other functions: InputError, naming file, key and value."""
+    """[driver]. All functions here raise InputError, with file, key and value."""
     return part.read(Driver, table) if table else Driver()
 
 
@@ -65,7 +66,7 @@ def joint(table: Table, number: int) -> Joint:
         raise table.fail("limits", "a table with speed_deg_s, acceleration_deg_s2 and jerk_deg_s3")
     encoder = _encoder(table.table("encoder"))
     if encoder is not None and motor is None:
-        raise table.fail("motor", "given where there is an encoder")
+        raise table.fail("motor", "only allowed with an encoder")
     found = Joint(
         name=table.text("name", f"joint {number}"),
         d_mm=table.number("d_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
@@ -90,9 +91,26 @@ def joint(table: Table, number: int) -> Joint:
 def _dynamics(table: Table | None) -> Dynamics | None:
     if table is None:
         return None
-    x, y, z = table.numbers("centre_mm", 3, *[] if table.peek("mass_kg") else [(0.0,) * 3])
-    xx, yy, zz, xy, xz, yz = table.numbers("inertia_kg_m2", 6, (0.0,) * 6)
-    return part.read(Dynamics, table, centre_mm=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
+    centre = table.numbers("centre_mm", 3, *[] if table.peek("mass_kg") else [(0.0,) * 3])
+    return part.read(Dynamics, table, centre_mm=centre, inertia_kg_m2=_inertia(table))
+
+
+def _inertia(table: Table) -> tuple[float, ...]:
+    return table.numbers("inertia_kg_m2", 6, (0.0,) * 6)
+
+
+def loads(top: Table) -> tuple[Load, ...]:
+    """The tables [load.NAME]."""
+    return tuple(
+        part.read(
+            Load,
+            table,
+            name=name,
+            centre_mm=table.numbers("centre_mm", 3, (0.0,) * 3),
+            inertia_kg_m2=_inertia(table),
+        )
+        for name, table in outputs_file.named(top, "load")
+    )
 
 
 def _home(table: Table, low: float, high: float) -> float:
@@ -102,12 +120,12 @@ def _home(table: Table, low: float, high: float) -> float:
 
 
 def _locked(table: Table) -> tuple[float, float]:
-    """The range of a joint that ``fixed_deg`` locks: just about that angle."""
+    """The narrow range of a joint that ``fixed_deg`` locks."""
     angle = table.number("fixed_deg", least=1 - MAX_ANGLE_DEG, most=MAX_ANGLE_DEG - 1)
     table.known("range_deg", "limits")
     for key in ("motor", "home_deg"):
         if table.has(key):
-            raise table.fail(key, "left out where fixed_deg locks the joint")
+            raise table.fail(key, "left out if fixed_deg locks the joint")
     return angle - _LOCKED_DEG, angle + _LOCKED_DEG
 
 

@@ -1,4 +1,4 @@
-"""Which pin and timer each output, input and home switch of an arm takes, and what collides."""
+"""The pin and timer of each output, input and home switch of an arm, and conflicts between them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PinUser(ChannelUser, Protocol):
 
 @dataclass(frozen=True)
 class PinProblem:
-    """A pin or timer that cannot be had."""
+    """A pin or timer that is not available."""
 
     where: str
     """Key of the arm file: ``"output.gripper"``."""
@@ -42,14 +42,14 @@ class PinProblem:
 
 @dataclass(frozen=True)
 class Period:
-    """How a timer makes a frequency: ``counts`` a period, each of ``prescaler`` of its clocks."""
+    """A timer's settings for a frequency: ``counts`` per period, each of ``prescaler`` clocks."""
 
     prescaler: int
     counts: int
 
     @classmethod
     def of(cls, output: Output, place: TimerOutput) -> Period:
-        """The nearest to the output's frequency."""
+        """The settings nearest to the output's frequency."""
         clocks = place.clock_hz / output.frequency_hz
         prescaler = max(1, -int(-clocks // _MOST_COUNTS))
         return cls(prescaler, min(round(clocks / prescaler), _MOST_COUNTS))
@@ -60,7 +60,7 @@ class Period:
 
 
 def problems(arm: PinUser) -> list[PinProblem]:
-    """What collides with outputs, inputs and home switches, and with the board; empty if nothing does."""
+    """Conflicts of outputs, inputs and home switches with each other, the engine and the board."""
     if not (arm.outputs or arm.inputs or _home_switches(arm)) and arm.board == DEFAULT:
         return []
     board = BOARDS[arm.board]
@@ -75,7 +75,7 @@ def problems(arm: PinUser) -> list[PinProblem]:
 
 
 def timer_outputs(arm: PinUser) -> dict[str, TimerOutput]:
-    """The timer channel of each output with pulses, by the output's name; of an arm without problems."""
+    """The timer channel of each output with pulses, by the output's name; for an arm without problems."""
     return _placed(arm)[0]
 
 
@@ -130,7 +130,7 @@ def _placed(arm: PinUser) -> tuple[dict[str, TimerOutput], list[PinProblem]]:
 def _place(
     output: Output, taken: dict[int, str], periods: dict[int, tuple[Period, str]], used: list[TimerOutput]
 ) -> tuple[TimerOutput | None, str]:
-    """The timer channel for an output, or why there is none."""
+    """The timer channel for an output (or None), and why there is none."""
     why = [f"{output.pin} has no timer for pulses"]
     for place in TIMER_OUTPUTS.get(output.pin, ()):
         period, first = periods.get(place.timer, (Period.of(output, place), ""))

@@ -1,7 +1,7 @@
-"""A finished plan: the trajectory with all that led to it, and its file.
+"""A plan: the trajectory with arm, job and search results, and its file.
 
-The trajectory file is JSON, whole enough to run the plan and to plan it again. It carries a sha256 over the plan,
-which does not depend on blanks and line breaks; files of version 1 have none.
+The trajectory file is JSON, with everything that is needed to run the plan and to plan it again. It has a
+sha256 of the plan, independent of white space; files of version 1 have none.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from armtempo_shared.basis import BASIS
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import check_replaceable, replace_text, why
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
-from armtempo.formats.atomic_file import check_replaceable, replace_text, why
 from armtempo.model import arm_json, exchange
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, Job
@@ -31,45 +31,45 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 FORMAT = "armtempo trajectory"
 VERSION = 2
 _RUN = "run.json"
-"""A run folder has this next to its trajectory file."""
+"""File next to the trajectory file in a run folder."""
 RULE = "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name"
 LOG = logging.getLogger("armtempo")
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """How the time axis of one joint, or the shared one, was found."""
+    """The search for the time axis of one joint, or for the shared one."""
 
     joints: tuple[int, ...]
-    """Indices, among the driven joints, of those that the axis serves."""
+    """Indices (among the driven joints) of the joints with this axis."""
     intervals_s: Array
-    """What was varied: the intervals X (n,), or with refinement all differences of time control points."""
+    """The variables: the intervals X (n,), or with refinement all differences of time control points."""
     total_s: float
     """The motion time."""
     searched_s: float
-    """What the search alone reached, without polish or refinement."""
+    """The motion time of the search alone, without polish or refinement."""
     evaluations: int
     """Fitness evaluations of the search."""
     history_s: Array
     """Best fitness of the first population and after each iteration, (iterations + 1,); of a gradient search the best
     motion time after each start."""
     optimum_s: float
-    """Where polished: lower bound of the local optimum with as many intervals; else 0."""
+    """After polish: lower bound of the local optimum with the same number of intervals; else 0."""
     floor_s: float
-    """Proven lower bound of the motion time, whatever the time law along this path; for a free path, whatever the path
-    through the via points."""
+    """Proven lower bound of the motion time over all time laws along this path; for a free path, over all
+    paths through the via points."""
     floor_kind: str
     """How the lower bound was found, see ``lower_bounds.Floor``."""
     starts_s: Array = field(default_factory=lambda: np.empty(0), metadata=json_codec.ADDED)
-    """Of a gradient search, the motion time that each start led to on few segments; else empty."""
+    """For a gradient search, the motion time of each start on few segments; else empty."""
 
 
 @checked
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan:
-    """A motion for ``arm`` that does ``job`` and keeps every limit.
+    """A motion of ``arm`` for ``job`` within all limits.
 
-    ``trajectory(time_s, order)`` gives the angles of the driven joints or their derivatives at any time.
+    ``trajectory(time_s, order)``: angles of the driven joints or their derivatives, (..., J).
     """
 
     arm: Arm
@@ -77,28 +77,33 @@ class Plan:
     via_deg: Array
     """Angles of the driven joints at the via points, (n + 1, J)."""
     notes: tuple[str, ...]
-    """What the user must know of how poses became angles."""
+    """Notes for the user about the solution of poses."""
     trajectory: Trajectory
     searches: tuple[Search, ...]
     """One for each joint that moves, or one for the shared time axis."""
     extremes: tuple[Extremes, ...]
     """Largest speed, acceleration and jerk of each driven joint, as proven bounds."""
     versions: Mapping[str, str]
-    """What the numbers depend on besides arm and job: armtempo, numpy, scipy, Python, processor."""
+    """Versions on which the numbers depend: armtempo, numpy, scipy, Python, processor."""
 
     def __repr__(self) -> str:
         return f"<Plan {self.job.name!r} for {self.arm.name!r}: {len(self.via_deg)} via points, {self.total_s:.3f} s>"
 
     @property
+    def holding(self) -> Arm:
+        """The arm with what it holds in this motion."""
+        return self.arm.holding(self.job.holds)
+
+    @property
     def total_s(self) -> float:
-        """The motion time: when the last joint arrives, seconds."""
+        """The motion time, until the last joint arrives, seconds."""
         return self.trajectory.duration_s
 
     def save(self, path: Path | str, force: bool = False) -> None:
-        """Write the trajectory file, whole or not at all.
+        """Write the trajectory file, atomically.
 
-        ``force``: also over a file that is not of the same job for the same arm, by their names, or was altered.
-        Raises InputError if such a file exists, or the file cannot be written.
+        Replaces only a file of the same job for the same arm (by name) that was not altered; ``force``: any
+        file. Raises InputError if it may not be replaced, or cannot be written.
         """
         self.check_replaceable(path, force)
         replace_text(Path(path), _text(self))
@@ -120,9 +125,9 @@ class Plan:
     def load(cls, path: Path | str, altered: bool = False) -> Plan:
         """The plan of a trajectory file.
 
-        ``altered``: also of one that was altered after it had been written. Raises InputError for a file that is
-        missing, cut, altered, of another format or version, or holds a key, value or shape that this program does
-        not understand.
+        ``altered``: accept a file that was altered after it had been written. Raises InputError for a file
+        that is missing, incomplete, altered, of another format or version, or has an unknown key, value or
+        shape.
         """
         content = _read(path)
         if not isinstance(content, dict) or content.get("format") != FORMAT:
@@ -175,7 +180,7 @@ def _cure(path: Path | str) -> str:
 
 
 def _is_earlier(path: Path, plan: Plan) -> bool:
-    """Whether the file holds an earlier plan of the same job and arm, by their names, as it was written."""
+    """Whether the file is an unaltered plan of the same job and arm, by their names."""
     try:
         content = _read(path)
         before = content["plan"]

@@ -13,14 +13,14 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 
 LARGEST = 1e9
-"""Lengths in mm and angles in degrees beyond this are typing errors; no digit of a result would be right."""
+"""Larger lengths in mm and angles in degrees are typing errors; a result would have no correct digit."""
 
 ROUNDED = 1e-3
-"""How far a rotation or a unit quaternion may be off by rounding of the printed numbers."""
+"""Tolerance for rotations and unit quaternions that were rounded for printing."""
 
 
 ORTHONORMAL = 1e-14
-"""A matrix whose columns' products are off by less is a rotation to the last digits."""
+"""A matrix whose columns are orthonormal within this is a rotation to the last digit."""
 
 
 class RollPitchYaw(NamedTuple):
@@ -41,9 +41,9 @@ class Quaternion(NamedTuple):
 
 
 def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
-    """Return a (4, 4) pose, its rotation part made exact; InputError, naming ``what``, if it is not a pose.
+    """A (4, 4) pose with its rotation made exact; raises InputError, naming ``what``, if it is not a pose.
 
-    Rounding to three digits is put right by the nearest rotation (of singular value decomposition).
+    A rounded rotation is replaced by the nearest one (by singular value decomposition).
     """
     pose = np.array(matrix, dtype=np.float64)
     if pose.shape == (3, 4):
@@ -61,7 +61,7 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
     if np.abs(pose[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
         raise InputError(
             f"{what}: the last row of a pose is 0 0 0 1, not {' '.join(f'{v:g}' for v in pose[3])}",
-            "write it so, with the position in the last column",
+            "write 0 0 0 1, with the position in the last column",
         )
     pose[:3, :3] = _nearest_rotation(pose[:3, :3], what)
     pose[3] = (0.0, 0.0, 0.0, 1.0)
@@ -69,7 +69,7 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
 
 
 def checked_rows(matrix: ArrayLike) -> list[float]:
-    """The 16 elements of ``checked`` in row order, quickly for a matrix that is exact."""
+    """The 16 elements of ``checked`` in row order; fast for an exact matrix."""
     given = np.asarray(matrix, dtype=np.float64)
     if given.shape in ((3, 4), (4, 4)):
         rows = given.ravel().tolist()
@@ -89,7 +89,7 @@ def checked_rows(matrix: ArrayLike) -> list[float]:
 
 
 def checked_all(matrices: ArrayLike) -> Array:
-    """The same for N poses, (N, 4, 4) or (N, 3, 4): (N, 4, 4). The InputError names the first that is not a pose."""
+    """As ``checked`` for N poses, (N, 4, 4) or (N, 3, 4): (N, 4, 4). The InputError names the first invalid one."""
     given = np.array(matrices, dtype=np.float64)
     if given.ndim != 3 or given.shape[1:] not in ((3, 4), (4, 4)):
         raise InputError(
@@ -102,7 +102,7 @@ def checked_all(matrices: ArrayLike) -> Array:
         fine = (off < ORTHONORMAL) & (np.linalg.det(np.nan_to_num(poses[:, :3, :3])) > 0.0)
         fine &= np.all(poses[:, 3] == (0.0, 0.0, 0.0, 1.0), axis=1)
         fine &= np.all(np.abs(poses) <= LARGEST, axis=(1, 2))
-    for number in np.flatnonzero(~fine):  # rounded, or none
+    for number in np.flatnonzero(~fine):  # rounded, or invalid
         poses[number] = checked(poses[number], f"pose {number + 1}")
     return poses
 
@@ -113,12 +113,12 @@ def _nearest_rotation(part: Array, what: str) -> Array:
     if off > ROUNDED:
         raise InputError(
             f"{what}: the 3 x 3 part is not a rotation (off by {off:.3g}, {ROUNDED:g} allowed)",
-            "its columns must have length 1 and be square to each other: give more digits, or roll, pitch and yaw",
+            "its columns must have length 1 and be perpendicular: give more digits, or roll, pitch and yaw",
         )
     rotation: Array = left @ right
     if np.linalg.det(rotation) < 0.0:
         raise InputError(f"{what}: the 3 x 3 part is a mirror image (left-handed)", "swap or negate a column")
-    # An exact matrix is unchanged, to the last bit.
+    # an exact matrix is not changed
     return part if np.abs(rotation - part).max() < 1e-14 else rotation
 
 
@@ -135,7 +135,7 @@ def from_rpy(position: Sequence[float], rpy_deg: Sequence[float], what: str = "t
 
 
 def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str = "the pose") -> Array:
-    """Pose of shape (4, 4) from a unit quaternion, real part w first; rounding of its length is put right."""
+    """Pose of shape (4, 4) from a unit quaternion, real part w first; it is normalised."""
     length = math.hypot(*wxyz)
     if not abs(length - 1.0) <= ROUNDED:
         raise InputError(
@@ -152,7 +152,7 @@ def from_quaternion(position: Sequence[float], wxyz: Sequence[float], what: str 
 
 
 def to_rpy_deg(matrix: ArrayLike) -> RollPitchYaw:
-    """Roll, pitch and yaw of a pose (4, 4) or rotation (3, 3); roll is 0 if the x axis stands upright."""
+    """Roll, pitch and yaw of a pose (4, 4) or rotation (3, 3); roll is 0 if the x axis is vertical."""
     r = np.asarray(matrix, dtype=np.float64)
     level = math.hypot(r[0, 0], r[1, 0])
     pitch = math.atan2(-r[2, 0], level)
@@ -163,15 +163,16 @@ def to_rpy_deg(matrix: ArrayLike) -> RollPitchYaw:
 
 
 def _degrees(angle_rad: float) -> float:
-    """From above -180 to 180, and never -0; rounding makes no -180 of a half turn."""
+    """Degrees in (-180, 180], never -0."""
     angle_deg = math.degrees(angle_rad)
     return 180.0 if angle_deg < -180.0 + 1e-9 else angle_deg + 0.0
 
 
 def to_quaternion(matrix: ArrayLike) -> Quaternion:
-    """Unit quaternion w x y z of a pose (4, 4) or rotation (3, 3), with w not below 0."""
+    """Unit quaternion w x y z of a pose (4, 4) or rotation (3, 3), with w >= 0."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.asarray(matrix, dtype=np.float64)[:3, :3].tolist()
-    # Four times the products of the quaternion's elements; the row of the largest square has the most digits.
+    # four times the products of the quaternion's elements; the row with the largest square is the most
+    # accurate
     rows = (
         (1 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
         (zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx),

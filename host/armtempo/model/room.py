@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 
 FAR_MM = 1e5
-"""Walls and boxes are within so much; beyond is no wall."""
+"""Largest coordinate of walls and boxes; a missing wall is here."""
 
 
 @checked_fields
@@ -22,7 +22,7 @@ class KeepOut:
     high_mm: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """InputError for what is no box."""
+        """Raise InputError if it is not a box."""
         if (len(self.low_mm), len(self.high_mm)) != (3, 3) or not all(
             low < high for low, high in zip(self.low_mm, self.high_mm, strict=True)
         ):
@@ -35,7 +35,7 @@ class KeepOut:
 @checked_fields
 @dataclass(frozen=True)
 class ArmRoom:
-    """Boxes to keep out of, and walls: the least and largest x, y and z, FAR_MM away if there is none."""
+    """Boxes to keep out of, and walls: the least and largest x, y and z (FAR_MM for a missing wall)."""
 
     keep_out: tuple[KeepOut, ...] = ()
     low_mm: tuple[float, ...] = (-FAR_MM,) * 3
@@ -43,7 +43,7 @@ class ArmRoom:
 
     @property
     def obstacles(self) -> tuple[KeepOut, ...]:
-        """The boxes, then the walls as boxes without end."""
+        """The boxes, then the walls as very large boxes."""
         walls = []
         for axis, letter in enumerate("xyz"):
             for side, end in enumerate((self.low_mm[axis], self.high_mm[axis])):
@@ -56,7 +56,7 @@ class ArmRoom:
 
 
 def read(table: Table | None) -> ArmRoom | None:
-    """The room of an arm file's table; None if there is none. InputError for what is not allowed."""
+    """The room of an arm file's table; None if there is none. Raises InputError for invalid values."""
     if table is None:
         return None
     low, high = [-FAR_MM] * 3, [FAR_MM] * 3

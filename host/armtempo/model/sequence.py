@@ -1,4 +1,4 @@
-"""A sequence of motions, outputs and waits, and the file that describes it; nothing is planned yet."""
+"""A sequence of motions, outputs and waits before planning, and its file."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS
 
+from armtempo.basics import toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats import toml_table
-from armtempo.formats.text import did_you_mean
-from armtempo.formats.toml_table import Table
+from armtempo.basics.text import did_you_mean
+from armtempo.basics.toml_table import Table
 from armtempo.model import tool_way
 from armtempo.model.arm import Arm, read_posture
-from armtempo.model.job import Job, is_name, name_of, read_angles
+from armtempo.model.job import Job, held, is_name, name_of, read_angles
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.steps import (
@@ -26,6 +26,7 @@ from armtempo.model.steps import (
     STOP,
     Count,
     Goto,
+    Hold,
     Repeat,
     RunMotion,
     SetOutput,
@@ -36,9 +37,9 @@ from armtempo.model.steps import (
 )
 
 LONGEST_NAME = 20
-"""Of a sequence: its motions are stored as NAME-1, NAME-2 …, within the board's 24 characters."""
+"""Longest name of a sequence: its motions NAME-1, NAME-2, … must fit the board's 24 characters."""
 HOME = "home"
-_KINDS = ("goto", "run", "output", "wait_s", "wait_input", "count", "repeat", "end", "call")
+_KINDS = ("goto", "run", "output", "holds", "wait_s", "wait_input", "count", "repeat", "end", "call")
 
 
 def is_sequence(path: Path | str) -> bool:
@@ -50,16 +51,16 @@ def is_sequence(path: Path | str) -> bool:
 @checked_fields
 @dataclass(frozen=True)
 class Sequence:
-    """What the arm is to do, step by step."""
+    """The steps of a sequence."""
 
     name: str
     steps: tuple[Step, ...]
     start: ArmPosture | None = None
-    """Where it begins; None: where its first step that moves says."""
+    """Start posture; None: the target of its first motion."""
     source: str = ""
 
     def __post_init__(self) -> None:
-        """InputError for a name that the board cannot keep."""
+        """Raise InputError for a name that is invalid on the board."""
         object.__setattr__(self, "steps", tuple(self.steps))
         if not is_name(self.name, LONGEST_NAME):
             raise InputError(
@@ -69,7 +70,7 @@ class Sequence:
 
     @classmethod
     def of(cls, sequence: Sequence | Path | str, arm: Arm) -> Sequence:
-        """The sequence itself, or the one of a file as ``load`` finds it."""
+        """The sequence itself, or the sequence of a file as in ``load``."""
         return sequence if isinstance(sequence, Sequence) else cls.load(sequence, arm)
 
     @classmethod
@@ -82,7 +83,7 @@ class Sequence:
 
     @classmethod
     def of_table(cls, top: Table, arm: Arm) -> Sequence:
-        """The sequence of a table, whose file may be still to be written; errors as of ``load``."""
+        """The sequence of a table, whose file need not exist yet; raises as ``load``."""
         name = name_of(top, LONGEST_NAME)
         reader = _Reader(arm, Path(top.file), _postures(top, arm))
         start = reader.posture(top, "start") if top.has("start") else None
@@ -92,7 +93,7 @@ class Sequence:
 
 
 def arm_named(path: Path | str) -> Path | None:
-    """The arm file that a sequence file names, or None."""
+    """The arm file that a sequence file names; None if it names none."""
     top = toml_table.read(path)
     if not top.has("arm"):
         return None
@@ -102,7 +103,7 @@ def arm_named(path: Path | str) -> Path | None:
 
 
 def _postures(top: Table, arm: Arm) -> dict[str, ArmPosture]:
-    """The arm's postures by name, the arm's home, and those of the sequence itself."""
+    """The postures of the arm, its home, and the sequence's own, by name."""
     found = {HOME: ArmPosture(HOME, tuple(float(angle) for angle in arm.home_deg))}
     found.update((posture.name, posture) for posture in arm.postures)
     own = top.table("posture")
@@ -117,18 +118,18 @@ def _postures(top: Table, arm: Arm) -> dict[str, ArmPosture]:
 
 @dataclass
 class _Reader:
-    """Reads the steps of one file, and of those that it calls."""
+    """Reads the steps of a file, and of the files that it calls."""
 
     arm: Arm
     file: Path
     postures: dict[str, ArmPosture]
     callers: tuple[Path, ...] = ()
     number: int = 0
-    """Of the calling step, for all steps of a file that was called; 0: each has its own."""
+    """In a called file: the number of the calling step, for all its steps; 0: each step has its own."""
     motions: dict[Path, SourceMotion] = field(default_factory=dict)
 
     def steps(self, top: Table) -> tuple[Step, ...]:
-        """All steps of a file; repeats hold what is between them and their end."""
+        """All steps of a file; a repeat holds its inner steps."""
         top.known("name", "arm", "start", "posture")
         tables = top.tables("step")
         found: list[list[Step]] = [[]]
@@ -153,7 +154,7 @@ class _Reader:
             table.done()
         if begun:
             raise InputError(
-                f"{_place(begun[-1][0])}: repeat has no end",
+                f"{_place(begun[-1][0])}: repeat without an end",
                 'write a step with end = "repeat" after its last step',
             )
         return tuple(found[0])
@@ -161,11 +162,11 @@ class _Reader:
     def _kind(self, table: Table, index: int) -> str:
         table.known(*_KINDS, "to", "active", "timeout_s", "on_timeout")
         kinds = [key for key in _KINDS if table.has(key)]
-        if kinds == ["output", "wait_s"]:
+        if kinds[:1] == ["output"] and set(kinds) <= {"output", "holds", "wait_s"}:
             return "output"
         if len(kinds) == 1:
             return kinds[0]
-        table.done()  # a key that nobody knows is the likelier mistake
+        table.done()  # an unknown key is the more likely mistake
         what = " and ".join(kinds) if kinds else "nothing"
         raise InputError(f"{_place(table)}: says {what}", f"give one of {', '.join(_KINDS)} in each step")
 
@@ -190,7 +191,7 @@ class _Reader:
         return [Goto(target, line=line, speed_mm_s=speed, where=_place(table), step=step)]
 
     def posture(self, table: Table, key: str) -> ArmPosture:
-        """A posture by name, or as angles."""
+        """A posture given by name or as angles."""
         if not isinstance(table.peek(key), str):
             angles = read_angles(table, key, self.arm)
             return ArmPosture(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
@@ -215,7 +216,7 @@ class _Reader:
         return self.motions[path]
 
     def output(self, table: Table, step: int) -> list[Step]:
-        only(table, "output", "to", "wait_s")
+        only(table, "output", "to", "wait_s", "holds")
         name, place = table.text("output"), _place(table)
         _placed(place, self.arm.output, name)
         to = table.peek("to")
@@ -224,10 +225,15 @@ class _Reader:
         _placed(f"{place}to: ", self.arm.outputs[self.arm.output(name)].raw, to)
         table.known("to")
         found: list[Step] = [SetOutput(name, to, where=place, step=step)]
+        found += self.holds(table, step) if table.has("holds") else []
         return found + (self.wait(table, step) if table.has("wait_s") else [])
 
+    def holds(self, table: Table, step: int) -> list[Step]:
+        only(table, "holds", "output", "to", "wait_s")
+        return [Hold(held(table, self.arm), where=_place(table), step=step)]
+
     def wait(self, table: Table, step: int) -> list[Step]:
-        only(table, "output", "to", "wait_s")
+        only(table, "output", "to", "wait_s", "holds")
         return [Wait(table.number("wait_s", least=0.001, most=MOST_S), where=_place(table), step=step)]
 
     def wait_input(self, table: Table, step: int) -> list[Step]:
@@ -254,7 +260,7 @@ class _Reader:
         if path in chain:
             names = " calls ".join(one.name for one in (*chain[chain.index(path) :], path))
             raise InputError(
-                f"{_place(table)}call: the sequence calls itself: {names}", "take one of the calls out"
+                f"{_place(table)}call: the sequence calls itself: {names}", "remove one of the calls"
             )
         top = toml_table.read(path)
         if not top.has("step"):
@@ -273,6 +279,7 @@ _GETTERS: dict[str, _Getter] = {
     "goto": _Reader.goto,
     "run": _Reader.run,
     "output": _Reader.output,
+    "holds": _Reader.holds,
     "wait_s": _Reader.wait,
     "wait_input": _Reader.wait_input,
     "count": _Reader.count,
@@ -281,7 +288,7 @@ _GETTERS: dict[str, _Getter] = {
 
 
 def only(table: Table, *keys: str) -> None:
-    """Raise InputError for a key that belongs to another kind of step."""
+    """Raise InputError for a key of another kind of step."""
     for key in (*_KINDS, "to", "active", "timeout_s", "on_timeout"):
         if table.has(key) and key not in keys:
             raise table.fail(key, f"none next to {keys[0]}")
@@ -292,7 +299,7 @@ def _place(table: Table) -> str:
 
 
 def _placed(place: str, function: Callable[[Any], int], value: Any) -> int:
-    """What a function of the arm says of a value; its InputError names the step."""
+    """Apply a function of the arm to a value; an InputError names the step."""
     try:
         return function(value)
     except InputError as error:

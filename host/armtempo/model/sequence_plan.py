@@ -1,21 +1,21 @@
-"""A planned sequence: every motion, and the rows that the board goes through."""
+"""A planned sequence: its motions, and the rows that the board executes."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from armtempo_shared import sequence as record
 from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
+from armtempo.basics.atomic_file import check_replaceable, replace_text, why
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
-from armtempo.formats.atomic_file import check_replaceable, replace_text, why
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.splines.trajectory import Trajectory
@@ -23,15 +23,15 @@ from armtempo.splines.trajectory import Trajectory
 FORMAT = "armtempo sequence"
 VERSION = 2
 PAUSE_S = 0.015
-"""About that from the end of a motion to the beginning of the next, on a board with the program in its firmware, which
-prepares it meanwhile: host/docs/sequences.md."""
+"""Approximate time from the end of a motion to the start of the next, if the board prepares motions
+(host/docs/sequences.md)."""
 _AGAIN = "plan it again"
 _RULE = "a sequence's plan is replaced by one of a sequence of the same name"
 
 
 @dataclass(frozen=True)
 class SequenceRow:
-    """One row of the record (``armtempo_shared.sequence``), with what it does in words."""
+    """One row of the record (``armtempo_shared.sequence``), with a description."""
 
     op: int
     number: int
@@ -43,16 +43,16 @@ class SequenceRow:
 
 @dataclass(frozen=True)
 class Share:
-    """What a stretch of time is made of."""
+    """The parts of a duration."""
 
     motion_s: float = 0.0
     wait_s: float = 0.0
     motions: int = 0
-    """How many there are; before each is a pause."""
+    """Number of motions; before each is a pause."""
 
     @property
     def total_s(self) -> float:
-        """All of it."""
+        """The sum."""
         return self.motion_s + self.wait_s + PAUSE_S * self.motions
 
     def __add__(self, other: Share) -> Share:
@@ -75,23 +75,31 @@ class Cycle:
 @checked
 @dataclass(frozen=True, eq=False, repr=False)
 class SequencePlan:
-    """A sequence for ``arm``, ready for the board."""
+    """A planned sequence for ``arm``."""
 
     arm: Arm
     name: str
     legs: tuple[Trajectory, ...]
-    """Its motions, each once; NAME-1, NAME-2 … on the board."""
+    """Its different motions; NAME-1, NAME-2, … on the board."""
     rows: tuple[SequenceRow, ...]
     counters: tuple[str, ...]
-    """Their names, by their number in the rows."""
+    """Names of the counters, by their number in the rows."""
     versions: Mapping[str, str]
+    loads: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
+    """What the tool holds in each leg; "": nothing."""
 
     def __repr__(self) -> str:
         return f"<SequencePlan {self.name!r} for {self.arm.name!r}: {len(self.rows)} rows, {len(self.legs)} motions>"
 
     @property
+    def loaded_legs(self) -> list[tuple[Arm, Trajectory]]:
+        """Each leg with the arm as it is loaded there."""
+        loads = self.loads or ("",) * len(self.legs)
+        return [(self.arm.holding(load), leg) for load, leg in zip(loads, self.legs, strict=False)]
+
+    @property
     def start_deg(self) -> tuple[float, ...] | None:
-        """Where it begins, degrees (J,); None if nothing moves."""
+        """Start posture, degrees (J,); None if nothing moves."""
         for row in self.rows:
             if row.op == MOVE:
                 return tuple(float(angle) for angle in self.legs[row.number](0.0))
@@ -104,7 +112,7 @@ class SequencePlan:
 
     @property
     def total(self) -> Share | None:
-        """The whole sequence without waiting for inputs; None if it has no end."""
+        """The whole sequence without waits for inputs; None if it has no end."""
         return self._times()[0]
 
     def _times(self) -> tuple[Share | None, tuple[Cycle, ...]]:
@@ -129,10 +137,10 @@ class SequencePlan:
         return (None if endless else share), tuple(cycles)
 
     def save(self, path: Path | str, force: bool = False) -> None:
-        """Write the sequence's plan, whole or not at all.
+        """Write the sequence's plan, atomically.
 
-        ``force``: also over a file that is no earlier plan of a sequence of this name. Raises InputError if such a
-        file is there, or the file cannot be written.
+        Replaces only a plan of a sequence of this name; ``force``: any file. Raises InputError if it may not
+        be replaced, or cannot be written.
         """
         content = json_codec.encode(self)
         whole = {"format": FORMAT, "version": VERSION, "sha256": _checksum(content), "sequence": content}
@@ -143,7 +151,7 @@ class SequencePlan:
 
     @classmethod
     def load(cls, path: Path | str) -> SequencePlan:
-        """The plan of a file that ``save`` wrote; InputError if it is none, is damaged, altered or does not fit."""
+        """The plan of a file written by ``save``; raises InputError if it is invalid, damaged or altered."""
         content = _read(path)
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise InputError(
@@ -168,7 +176,7 @@ class SequencePlan:
 
 
 def is_sequence_plan(path: Path) -> bool:
-    """Whether a file is a planned sequence; False for what cannot be read."""
+    """Whether a file is a planned sequence; False if it cannot be read."""
     return bool(_name_in(path))
 
 
@@ -178,7 +186,7 @@ def rows_of(plan: SequencePlan) -> list[tuple[int, ...]]:
 
 
 def check_size(rows: int, legs: int, counters: int, where: str) -> None:
-    """Raise InputError if the board takes no sequence as large."""
+    """Raise InputError if the sequence is too large for the board."""
     if counters > record.MAX_COUNTERS:
         raise InputError(
             f"{where}: {counters} counters; the board keeps {record.MAX_COUNTERS} for a sequence",
@@ -187,7 +195,7 @@ def check_size(rows: int, legs: int, counters: int, where: str) -> None:
     if rows > record.MAX_ROWS or legs > record.MAX_MOTIONS:
         raise InputError(
             f"{where}: {rows} rows and {legs} motions; the board takes {record.MAX_ROWS} and {record.MAX_MOTIONS}",
-            "use repeat, or make two sequences of it",
+            "use repeat, or split it into two sequences",
         )
 
 

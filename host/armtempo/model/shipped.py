@@ -1,4 +1,4 @@
-"""The files that ship with armtempo: arms by name, the paper's job."""
+"""The shipped files: arms by name, the paper's job."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from armtempo.basics.errors import InputError
 
 _DATA = Path(__file__).parents[1] / "data"
 PAPER = "paper"
-"""Name of the paper's 1:5 arm, which is taken where none is named."""
+"""Name of the paper's 1:5 arm, the default arm."""
 
 
 @dataclass(frozen=True)
 class ArmFile:
-    """An arm file that was asked for."""
+    """An arm file, and whether it is a shipped one."""
 
     path: Path
     ships: bool
-    """Whether it was found by the name of an arm that ships."""
+    """Whether it was found by the name of a shipped arm."""
 
 
 def arm_path() -> Path:
@@ -32,15 +32,15 @@ def job_path() -> Path:
 
 
 def files() -> dict[str, Path]:
-    """The arm file of each name: the paper's arm first, then by alphabet."""
+    """The arm files by name, the paper's arm first, then in alphabetical order."""
     paper = arm_path()
     return {PAPER: paper, **{path.stem: path for path in sorted((paper.parent / "arms").glob("*.toml"))}}
 
 
 def find(given: Path | str) -> ArmFile:
-    """The arm file that a user means by a path or a name; a file of that name wins over an arm that ships.
+    """The arm file of a path or of a shipped arm's name; a file has precedence.
 
-    Raises InputError if there is neither, naming the arms that ship.
+    Raises InputError, with the names of the shipped arms, if there is neither.
     """
     path, shipped = Path(given), files()
     named = str(given) in shipped
@@ -49,6 +49,6 @@ def find(given: Path | str) -> ArmFile:
     if named:
         return ArmFile(shipped[str(given)], True)
     raise InputError(
-        f"{given}: no such file, and no arm of that name ships with armtempo",
-        f"check the path, or give one of those that do: {', '.join(shipped)}",
+        f"{given}: neither a file nor the name of a shipped arm",
+        f"check the path, or give a shipped arm: {', '.join(shipped)}",
     )

@@ -14,7 +14,7 @@ from armtempo.model.posture import ArmPosture
 
 STOP, FAULT, NEXT = "stop", "fault", "next"
 ON_TIMEOUT = (STOP, FAULT, NEXT)
-"""What happens where an input does not come in time: the sequence ends in order, or by a fault, or continues."""
+"""What the sequence does after the time-out of an input: it ends normally, ends with a fault, or continues."""
 FOR_EVER = "for ever"
 MOST_S = MAX_WAIT_MS / 1000
 """Longest wait."""
@@ -23,7 +23,7 @@ MOST_S = MAX_WAIT_MS / 1000
 @checked_fields
 @dataclass(frozen=True, eq=False)
 class SourceMotion:
-    """A job that is still to be planned, or a plan, by its file."""
+    """The file of a job (to be planned) or of a plan."""
 
     name: str
     source: Job | Plan
@@ -31,31 +31,31 @@ class SourceMotion:
 
 @dataclass(frozen=True)
 class Placed:
-    """A step; where it comes from a file, that file."""
+    """A step, with its place in a file if it comes from one."""
 
     _: KW_ONLY
     where: str = ""
     """File and step, for messages."""
     step: int = 0
-    """Its number in the sequence's own file, from 1."""
+    """Its number in the sequence's file, from 1."""
 
 
 @checked_fields
 @dataclass(frozen=True, eq=False)
 class Goto(Placed):
-    """Move straight to a posture: of the arm by its name, or by angles in degrees (J,); or to where a motion begins."""
+    """Move straight to a posture (a name, or angles in degrees (J,)) or to the start of a motion."""
 
     target: ArmPosture | SourceMotion | Job | Plan | str | tuple[float, ...]
     line: bool = field(default=False, kw_only=True)
-    """The tool goes there in a straight line."""
+    """Move the tool in a straight line."""
     speed_mm_s: float | None = field(default=None, kw_only=True)
-    """Of the tool on a line at most."""
+    """Speed limit of the tool on a line."""
 
 
 @checked_fields
 @dataclass(frozen=True, eq=False)
 class RunMotion(Placed):
-    """Run a motion from its beginning."""
+    """Run a motion."""
 
     motion: SourceMotion | Job | Plan
 
@@ -63,10 +63,18 @@ class RunMotion(Placed):
 @checked_fields
 @dataclass(frozen=True)
 class SetOutput(Placed):
-    """Set an output of the arm to a state of it, or to a number in its unit."""
+    """Set an output of the arm to one of its states, or to a number in its unit."""
 
     output: str
     to: float | str
+
+
+@checked_fields
+@dataclass(frozen=True)
+class Hold(Placed):
+    """The tool holds a load of the arm from now on; "nothing": none."""
+
+    load: str
 
 
 @checked_fields
@@ -77,14 +85,14 @@ class Wait(Placed):
     wait_s: float
 
     def __post_init__(self) -> None:
-        """InputError for a time that the board cannot wait."""
+        """Raise InputError for a time that the board does not support."""
         _check_wait(self.wait_s)
 
 
 @checked_fields
 @dataclass(frozen=True)
 class WaitInput(Placed):
-    """Wait until an input of the arm is active, or not; ``timeout_s`` 0: for ever."""
+    """Wait until an input of the arm is active, or not; ``timeout_s`` 0: no limit."""
 
     input: str
     active: bool = True
@@ -93,7 +101,7 @@ class WaitInput(Placed):
     """``"stop"``, ``"fault"`` or ``"next"``."""
 
     def __post_init__(self) -> None:
-        """InputError for what the board cannot do."""
+        """Raise InputError for values that the board does not support."""
         if self.timeout_s:
             _check_wait(self.timeout_s)
         if self.on_timeout not in ON_TIMEOUT:
@@ -120,13 +128,13 @@ class Count(Placed):
 @checked_fields
 @dataclass(frozen=True)
 class Repeat(Placed):
-    """Steps that come ``times`` times, 0: for ever."""
+    """Repeat steps ``times`` times; 0: for ever."""
 
     steps: tuple[Step, ...]
     times: int = 0
 
     def __post_init__(self) -> None:
-        """InputError for what the board cannot count."""
+        """Raise InputError for a number that the board does not support."""
         object.__setattr__(self, "steps", tuple(self.steps))
         if not 0 <= self.times <= MAX_REPEATS:
             raise InputError(
@@ -134,7 +142,7 @@ class Repeat(Placed):
             )
 
 
-Step = Goto | RunMotion | SetOutput | Wait | WaitInput | Count | Repeat
+Step = Goto | RunMotion | SetOutput | Hold | Wait | WaitInput | Count | Repeat
 
 
 def _check_wait(wait_s: float) -> None:

@@ -1,4 +1,4 @@
-"""A tool pose to reach: its position and as much of its orientation as is asked for, with tolerances."""
+"""A tool pose: position and all, part or none of the orientation, with tolerances."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
+from armtempo.basics.toml_table import Table
 from armtempo.model import pose
 
 Rows = tuple[tuple[float, ...], ...]
@@ -28,35 +29,38 @@ CONSTRAINTS = {
     (APPROACH,): 5,
     WHOLE: 6,
 }
-"""What may be asked of the orientation, and how many numbers that asks for, the three of the position included."""
+"""The supported constraints on the orientation, and their number, including the three of the position."""
 
 TOLERANCE_MM, TOLERANCE_DEG = 0.1, 0.1
-"""A tool this near to its pose has reached it, unless something else is asked for."""
+"""Default tolerances."""
 
 SMALLEST, LARGEST_MM, LARGEST_DEG = 1e-6, 1000.0, 180.0
-"""Tolerances that make sense."""
+"""Bounds of tolerances."""
+ORIENTATIONS = ("rpy_deg", "quaternion", "approach")
+"""Keys that give an orientation in one piece; position_mm goes with one of them, with single angles, or alone."""
 
 
 @checked
 @checked_fields
 @dataclass(frozen=True)
 class Pose:
-    """A tool pose, or as much of one as ``fixed`` says.
+    """A tool pose; ``fixed`` says which part of the orientation is constrained.
 
-    The position always counts. Roll, pitch and yaw turn about x, then y, then z of the base.
+    The position is always constrained. Roll, pitch and yaw turn about x, then y, then z of the base.
     """
 
     matrix: Rows
-    """4 rows of 4, lengths in mm; its rotation is one of those that are asked for."""
+    """4 rows of 4, lengths in mm; its rotation is one of the allowed ones."""
     posture_deg: tuple[float, ...] | None = None
-    """In a job: angles of all joints; the solution nearest to them is taken. None: nearest to the one before."""
+    """In a job: angles of all joints; the solution nearest to them is used. None: nearest to the via point before."""
     fixed: tuple[str, ...] = field(default=WHOLE, metadata=json_codec.ADDED)
-    """A key of CONSTRAINTS: what counts of the orientation; "approach": the direction of the tool's z axis."""
+    """The constrained part of the orientation, a key of CONSTRAINTS; "approach": the direction of the tool's
+    z axis."""
     tolerance_mm: float = field(default=TOLERANCE_MM, metadata=json_codec.ADDED)
     tolerance_deg: float = field(default=TOLERANCE_DEG, metadata=json_codec.ADDED)
 
     def __post_init__(self) -> None:
-        """InputError for what makes no pose."""
+        """Raise InputError for an invalid pose."""
         if [len(row) for row in self.matrix] != [4] * 4:
             raise InputError(
                 "the matrix of a pose has 4 rows of 4", "give them, or use Pose.of_angles or Pose.of_approach"
@@ -77,23 +81,23 @@ class Pose:
 
     @property
     def constraints(self) -> int:
-        """How many numbers the pose asks for, 3 to 6."""
+        """Number of constraints, 3 to 6."""
         return CONSTRAINTS[self.fixed]
 
     @property
     def words(self) -> str:
-        """What is asked for."""
+        """Describe the constraints."""
         if self.fixed == WHOLE:
             return "whole pose"
         return " and ".join(("position", *self.fixed)) if self.fixed else "position only"
 
     def exact(self, what: str = "the pose") -> Pose:
-        """The same with its rotation part made exact; InputError, naming ``what``, if it is not a pose."""
+        """The pose with its rotation made exact; raises InputError, naming ``what``, if it is not a pose."""
         return replace(self, matrix=_rows(pose.checked(self.matrix, what)))
 
     @classmethod
     def of_matrix(cls, matrix: Array, fixed: tuple[str, ...] = WHOLE) -> Pose:
-        """Of a checked matrix, (4, 4)."""
+        """A pose from a checked matrix, (4, 4)."""
         rows = np.asarray(matrix, dtype=float)
         return cls(_rows(rows) if rows.shape == (4, 4) else (), fixed=fixed)
 
@@ -101,7 +105,8 @@ class Pose:
     def of_angles(
         cls, position: Sequence[float], angles_deg: Mapping[str, float], what: str = "the pose"
     ) -> Pose:
-        """A position with any of "roll", "pitch" and "yaw"; those left out are free. InputError names ``what``."""
+        """A position with any of "roll", "pitch" and "yaw"; the others are free. Raises InputError, naming
+        ``what``."""
         fixed = tuple(name for name in WHOLE if name in angles_deg)
         if fixed not in CONSTRAINTS:
             raise InputError(
@@ -115,7 +120,7 @@ class Pose:
     def of_approach(
         cls, position: Sequence[float], direction: Sequence[float], what: str = "the pose"
     ) -> Pose:
-        """A position with the direction, of any length, in which the tool's z axis points."""
+        """A position with the direction (of any length) of the tool's z axis."""
         if (len(position), len(direction)) != (3, 3):
             raise InputError(f"{what}: position and direction have 3 numbers each", "give x, y and z")
         length = math.hypot(*direction)
@@ -133,3 +138,42 @@ class Pose:
 
 def _rows(matrix: Array) -> Rows:
     return tuple(map(tuple, matrix.tolist()))
+
+
+def from_table(table: Table, where: str) -> Pose:
+    """The pose that ``table`` gives as ``matrix`` or ``position_mm``; InputError, naming ``where``, else."""
+    found = _matrix(table, where) if table.has("matrix") else _positioned(table, where)
+    return replace(
+        found,
+        tolerance_mm=table.number("tolerance_mm", found.tolerance_mm, least=SMALLEST, most=LARGEST_MM),
+        tolerance_deg=table.number("tolerance_deg", found.tolerance_deg, least=SMALLEST, most=LARGEST_DEG),
+    )
+
+
+def _matrix(table: Table, where: str) -> Pose:
+    given = table.array("matrix", "the 4 rows of a pose, lengths in mm")
+    if len(given) != 4:
+        raise table.fail("matrix", "4 rows of 4 numbers")
+    rows = Table({f"row {n}": row for n, row in enumerate(given, 1)}, table.file, "matrix ")
+    matrix = np.array([rows.numbers(f"row {n}", 4) for n in range(1, 5)])
+    return Pose.of_matrix(pose.checked(matrix, f"{where}.matrix"))
+
+
+def _positioned(table: Table, where: str) -> Pose:
+    position = table.numbers("position_mm", 3)
+    angles = {name: table.number(f"{name}_deg") for name in WHOLE if table.has(f"{name}_deg")}
+    given = [key for key in ORIENTATIONS if table.has(key)]
+    if len(given) + bool(angles) > 1:
+        raise InputError(
+            f"{where}: {', '.join((*given, *(f'{name}_deg' for name in angles)))} cannot be given together",
+            "give position_mm alone, with one of rpy_deg, quaternion and approach, or with any of roll_deg, "
+            "pitch_deg and yaw_deg",
+        )
+    if given == ["quaternion"]:
+        matrix = pose.from_quaternion(position, table.numbers("quaternion", 4), f"{where}.quaternion")
+        return Pose.of_matrix(matrix)
+    if given == ["approach"]:
+        return Pose.of_approach(position, table.numbers("approach", 3), f"{where}.approach")
+    if given == ["rpy_deg"]:
+        angles = dict(zip(WHOLE, table.numbers("rpy_deg", 3), strict=True))
+    return Pose.of_angles(position, angles, where)

@@ -1,4 +1,4 @@
-"""What a job asks of the tool on the way to a via point: a straight line, an arc, a speed."""
+"""Requirements for the tool between two via points: a straight line, an arc, a speed."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from dataclasses import dataclass
 
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.formats.toml_table import Table
+from armtempo.basics.toml_table import Table
 
 LINE_TOLERANCE_MM, LINE_TOLERANCE_DEG = 0.5, 0.5
-"""How far the tool may leave a line or an arc, unless the job says otherwise."""
+"""Default tolerances of a line or an arc."""
 TOLERANCE_MM, TOLERANCE_DEG = (0.01, 100.0), (0.01, 90.0)
 """Least and largest values."""
 LEAST = 1e-3
-"""Speeds, accelerations and cut corners are at least so much."""
+"""Least speed, acceleration and size of a cut corner."""
 MOST = 1e6
 KEYS = ("line", "arc_through_mm", "blend_mm", "speed_mm_s", "acceleration_mm_s2")
-"""What a via point's table may ask of the way to it."""
+"""Keys of a via point's table for the way to it."""
 
 
 @checked_fields
 @dataclass(frozen=True)
 class ToolWay:
-    """The way to via point ``via``, counted from 0."""
+    """The way from the previous via point to via point ``via`` (from 0)."""
 
     via: int
     line: bool = False
@@ -32,15 +32,15 @@ class ToolWay:
     """A point (3,) between the via points."""
     tolerance_mm: float = LINE_TOLERANCE_MM
     tolerance_deg: float = LINE_TOLERANCE_DEG
-    """How far the tool may leave it."""
+    """Largest deviation of the tool."""
     blend_mm: float = 0.0
-    """How far before and after the via point the corner to the next line is cut; 0: the motion rests there."""
+    """Distance before and after the via point at which the corner to the next line is cut; 0: stop there."""
     speed_mm_s: float | None = None
     acceleration_mm_s2: float | None = None
-    """The tool's limits on the way; None: those of the job."""
+    """The tool's limits; None: those of the job."""
 
     def __post_init__(self) -> None:
-        """InputError for what no planner can keep."""
+        """Raise InputError for invalid requirements."""
         where = f"the way to P{self.via}"
         if self.via < 1:
             raise InputError(f"{where}: nothing leads there", "give line at a later via point")
@@ -64,7 +64,7 @@ class ToolWay:
 
 
 def read(table: Table, via: int) -> ToolWay | None:
-    """What the table of a via point asks of the way to it, None if nothing; InputError for what is not allowed."""
+    """The requirements in a via point's table, None without any; raises InputError for invalid ones."""
     if not any(table.has(key) for key in KEYS):
         table.known(*KEYS)
         return None
@@ -72,7 +72,7 @@ def read(table: Table, via: int) -> ToolWay | None:
     line = table.boolean("line", arc is not None)
     if via == 0:
         key = next(key for key in KEYS if table.has(key))
-        raise table.fail(key, "left out at the first via point: nothing leads there")
+        raise table.fail(key, "not allowed at the first via point")
     if arc and not line:
         raise table.fail("line", "true with arc_through_mm")
     if table.has("blend_mm") and not line:
@@ -99,5 +99,5 @@ def limit(table: Table, key: str) -> float | None:
 
 
 def at(ways: Sequence[ToolWay], via: int) -> ToolWay | None:
-    """What is asked of the way to this via point."""
+    """The requirements for the way to this via point, None without any."""
     return next((way for way in ways if way.via == via), None)

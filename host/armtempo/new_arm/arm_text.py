@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.kinematics import all_frames
 from armtempo.model.parts import Dynamics
+from armtempo.new_arm import urdf_meshes
 from armtempo.new_arm.urdf_fitting import Fit
 from armtempo.new_arm.urdf_reader import Chain, TurningJoint
 from armtempo.new_arm.urdf_rows import DhRow, geometry
@@ -41,10 +44,15 @@ _ENCODER = """\
 _NO_CHANNEL = f"# The board drives {MAX_JOINTS} joints: lock this one or another, by fixed_deg = ANGLE.\n"
 
 
-def arm_text(chain: Chain, fit: Fit, source: str) -> str:
-    """The arm file for ``chain`` with the rows of ``fit``; ``source`` names the URDF file."""
+def arm_text(chain: Chain, fit: Fit, urdf: Path) -> str:
+    """The arm file for ``chain`` in a file, with the rows of ``fit``; without radii if a mesh cannot be read."""
+    radii_mm, unread = {}, ""
+    try:
+        radii_mm = urdf_meshes.radii_mm(chain, fit, urdf)
+    except InputError as error:
+        unread = f"# No link has a radius_mm, as not all shapes are known: {_one_line(error.problem)}\n"
     head = _HEAD.format(
-        source=_text(source),
+        source=_text(urdf.name),
         robot=_text(_one_line(chain.robot) or "imported arm"),
         base=_text(chain.base),
         tip=_text(chain.tip),
@@ -54,21 +62,21 @@ def arm_text(chain: Chain, fit: Fit, source: str) -> str:
     )
     frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))
     rows = [
-        _joint(row, chain, frame, number == 0)
-        for number, (row, frame) in enumerate(zip(fit.rows, frames[1:], strict=True))
+        _joint(row, chain, frame, number == 1, radii_mm.get(number))
+        for number, (row, frame) in enumerate(zip(fit.rows, frames[1:], strict=True), 1)
     ]
-    return "\n".join([head, *rows])
+    return "\n".join([unread + head, *rows])
 
 
-def _joint(row: DhRow, chain: Chain, frame: Array, first: bool) -> str:
+def _joint(row: DhRow, chain: Chain, frame: Array, first: bool, radius_mm: float | None) -> str:
     """Its table; ``frame``: after the row, all joints at 0."""
     if row.joint is None:
         name = "base" if first else "tool"
-        return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves")
+        return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves", radius_mm)
     joint = chain.joints[row.joint]
     note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
     name = _one_line(joint.name) or f"joint {row.joint + 1}"
-    text = _row_text(name, row, _inside(joint.range_deg), note)
+    text = _row_text(name, row, _inside(joint.range_deg), note, radius_mm)
     if any(each.body for each in chain.joints):
         text += _dynamics(joint.body.in_frame(frame) if joint.body else Dynamics(0.0))
     return text + _placeholders(row.joint + 1, joint)
@@ -90,7 +98,9 @@ def _digits(value: float | tuple[float, ...]) -> str:
     return repr(float(f"{value:.7g}") + 0.0)
 
 
-def _row_text(name: str, row: DhRow, range_deg: tuple[float, float], note: str) -> str:
+def _row_text(
+    name: str, row: DhRow, range_deg: tuple[float, float], note: str, radius_mm: float | None
+) -> str:
     lines = ["[[joint]]", f"name = {_text(name)}"]
     values = {
         "d_mm": row.d_mm,
@@ -99,6 +109,10 @@ def _row_text(name: str, row: DhRow, range_deg: tuple[float, float], note: str) 
         "theta_offset_deg": row.theta_deg,
     }
     lines += [f"{key} = {value!r}" for key, value in values.items()]
+    if radius_mm:
+        lines.append(
+            f"radius_mm = {math.ceil(10.0 * radius_mm) / 10.0!r}  # about d and a: all collision shapes"
+        )
     low, high = range_deg
     lines.append(f"range_deg = [{low!r}, {high!r}]" + (f"  # {note}" if note else ""))
     lines.append(f"home_deg = {0.0 if low <= 0.0 <= high else round((low + high) / 2, 1)!r}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS, MAX_STEP_RATE
 
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 from armtempo.model import shipped
 from armtempo.model.parts_file import MAX_ANGLE_DEG, MAX_LENGTH_MM
 from armtempo.new_arm.joint_entry import INTEGERS, JointEntry

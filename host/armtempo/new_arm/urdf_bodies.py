@@ -8,6 +8,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
+from armtempo.kinematics.dynamics import as_one
 from armtempo.model.parts import Dynamics
 
 _MM = 1000.0
@@ -44,11 +45,7 @@ def of_joint(model: Any, base: str, joint: Any, after: Any) -> Body | None:
     if not parts:
         return None
     mass = sum(part[0] for part in parts)
-    centre = sum(part[0] * part[1] for part in parts) / mass
-    inertia = np.zeros((3, 3))
-    for own, place, tensor in parts:
-        away = place - centre
-        inertia += tensor + own * (away @ away * np.eye(3) - np.outer(away, away))
+    centre, inertia = as_one(mass, parts)
     try:
         friction, viscous = (
             float(getattr(joint.dynamics, key, None) or 0.0) for key in ("friction", "damping")

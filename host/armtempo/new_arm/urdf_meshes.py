@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from armtempo.new_arm import urdf_bodies
 from armtempo.new_arm.urdf_fitting import Fit
 from armtempo.new_arm.urdf_reader import MM, Chain
 from armtempo.new_arm.urdf_rows import geometry
+from armtempo.planning.capsules import point_distance
 
 
 def of_rows(chain: Chain, fit: Fit, urdf: Path) -> dict[int, Array]:
@@ -32,6 +34,40 @@ def of_rows(chain: Chain, fit: Fit, urdf: Path) -> dict[int, Array]:
     return {row: np.concatenate(parts) for row, parts in found.items()}
 
 
+def radii_mm(chain: Chain, fit: Fit, urdf: Path) -> dict[int, float]:
+    """Radii of rows, from 1, about whose d and a the links' shapes for collision are, or those that are seen.
+
+    A triangle is within a capsule if its corners are; constant rows carry what the one before them does. Rows
+    without shapes are left out. InputError for a mesh that cannot be read.
+    """
+    frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))
+    found: dict[int, float] = {}
+    for joint, links in enumerate(_links(chain)[1:]):
+        first = next(number for number, row in enumerate(fit.rows) if row.joint == joint)
+        rows = [
+            first,
+            *itertools.takewhile(lambda n: fit.rows[n].joint is None, range(first + 1, len(fit.rows))),
+        ]
+        for corners_mm in _corners(chain, urdf, links, collision=True):
+            away = []
+            for row in rows:
+                begin, end = frames[row][:3, 3], frames[row + 1][:3, 3]
+                turn = begin + fit.rows[row].d_mm * frames[row][:3, 2]
+                away += [_farthest(corners_mm, *each) for each in ((begin, turn), (turn, end))]
+            nearest = np.argmin(away, axis=0)
+            for number, corners in enumerate(away):
+                far = float(corners[nearest == number].max(initial=0.0))
+                row = rows[number // 2] + 1
+                found[row] = max(far, found.get(row, 0.0))
+    return found
+
+
+def _farthest(corners_mm: Array, begin: Array, end: Array) -> Array:
+    """Of triangles (N, 3, 3) the corner that is farthest from a segment: (N,)."""
+    found = point_distance(corners_mm.reshape(-1, 3), begin[None], (end - begin)[None])
+    return np.asarray(found.reshape(-1, 3).max(axis=1))
+
+
 def _links(chain: Chain) -> list[set[str]]:
     """Names of the links that move with the base, then with each joint."""
     joints = {joint.name: joint for joint in chain.model.robot.joints}
@@ -43,16 +79,19 @@ def _links(chain: Chain) -> list[set[str]]:
     return [urdf_bodies.links(chain.model, chain.base, moving[0]), *of_joints]
 
 
-def _corners(chain: Chain, urdf: Path, links: set[str]) -> Any:
-    """The triangles of each visible shape of the links, all joints at 0, (N, 3, 3) in mm, in the base's frame."""
+def _corners(chain: Chain, urdf: Path, links: set[str], collision: bool = False) -> Any:
+    """The triangles of each shape of the links, all joints at 0, (N, 3, 3) in mm, in the base's frame.
+
+    Those that are seen; with ``collision`` those for that, of links that have some.
+    """
     chain.model.update_cfg({joint.name: 0.0 for joint in chain.joints})
     for link in chain.model.robot.links:
         if link.name not in links:
             continue
-        for visual in link.visuals:
-            origin = np.eye(4) if visual.origin is None else visual.origin
+        for part in (collision and link.collisions) or link.visuals:
+            origin = np.eye(4) if part.origin is None else part.origin
             pose = chain.model.get_transform(link.name, chain.base) @ origin
-            corners = np.asarray(_shape(visual.geometry, urdf).triangles, dtype=float)
+            corners = np.asarray(_shape(part.geometry, urdf).triangles, dtype=float)
             yield MM * (corners @ pose[:3, :3].T + pose[:3, 3])
 
 

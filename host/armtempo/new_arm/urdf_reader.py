@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError, MissingPackageError
-from armtempo.formats.atomic_file import why
 from armtempo.model.parts_file import MAX_ANGLE_DEG
 from armtempo.new_arm import urdf_bodies, urdf_tip
 from armtempo.new_arm.urdf_bodies import Body
@@ -25,7 +25,7 @@ CONTINUOUS_DEG = (-180.0, 180.0)
 """Range that a continuous joint gets: a URDF gives it none."""
 
 _WHEEL_JOINTS = 2
-"""An axle with its steering; a chain of so few joints is an arm only where each has limits."""
+"""An axle with its steering; a chain of so few joints is an arm only if each has limits."""
 _REASONS = {
     "prismatic": "it slides, and an arm file describes turning joints only",
     "floating": "it is free in all directions, and a motor turns about one axis",
@@ -181,7 +181,7 @@ def _refuse_wheels(path: Path, moving: list[Any]) -> None:
     endless = [joint.name for joint in moving if joint.type == "continuous"]
     if endless and (len(endless) == len(moving) or len(moving) <= _WHEEL_JOINTS):
         raise InputError(
-            f"{path}: {', '.join(map(repr, endless))} turn without end, as wheels do: this chain is not an arm",
+            f"{path}: turning without end, as wheels do: {', '.join(map(repr, endless))}; this chain is not an arm",
             "choose another chain with --base and --tip; a joint of an arm gets limits (type='revolute') in the URDF",
         )
 

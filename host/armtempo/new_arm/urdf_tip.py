@@ -1,4 +1,4 @@
-"""Which link of a URDF is the tool, where the user does not say."""
+"""Which link of a URDF is the tool, if the user does not say."""
 
 from __future__ import annotations
 

@@ -20,8 +20,7 @@ from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
-from armtempo.optimise.parameters import Parameter, Value
-from armtempo.optimise.tracker import Function, Result, Task
+from armtempo.optimise.task import Function, Parameter, Result, Task, Value
 
 __all__ = ["ALGORITHMS", "Function", "Result", "Settings", "minimise", "parameters"]
 

@@ -23,12 +23,11 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.optimise.cs import BETA, levy_scale
-from armtempo.optimise.parameters import Number, OneOf, Parameter
-from armtempo.optimise.tracker import Result, Task, Tracker
+from armtempo.optimise.task import Number, OneOf, Parameter, Result, Task, Tracker
 
 
 class Nests:
-    """Points and their values; a new point replaces its nest where it is better."""
+    """Points and their values; a new point replaces its nest if it is better."""
 
     def __init__(self, task: Task, a: float, b: float, pa: float, beta: float) -> None:
         self.tracker = Tracker(task)

@@ -12,8 +12,7 @@ import math
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.optimise.parameters import Number, Parameter
-from armtempo.optimise.tracker import Result, Task, Tracker
+from armtempo.optimise.task import Number, Parameter, Result, Task, Tracker
 
 BETA = Number(1.5, 0.3, 1.99, "index of the Lévy distribution, Eq. (23)")
 """The index of the distribution, in the range that Mantegna gives for his method (Physical Review E 49 (5),
@@ -59,7 +58,7 @@ def _new_nests(nests: Array, rng: np.random.Generator, pa: float) -> tuple[Array
 
 
 def _keep_better(nests: Array, values: Array, eggs: Array, egg_values: Array, index: np.ndarray) -> None:
-    """Puts each egg (K, d) into nest ``index[k]`` where it is better, in place."""
+    """Puts each egg (K, d) into nest ``index[k]`` if it is better, in place."""
     better = egg_values < values[index]
     nests[index[better]] = eggs[better]
     values[index[better]] = egg_values[better]

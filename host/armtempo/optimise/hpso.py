@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from armtempo.optimise import swarm
-from armtempo.optimise.parameters import Number
-from armtempo.optimise.tracker import Result, Task
+from armtempo.optimise.task import Number, Result, Task
 
 PARAMETERS = {**swarm.PARAMETERS, "rivals": Number(5, 1, 1000, "others that a particle is scored against")}
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.optimise.genes import BITS, crossover, decode, merits, mutate, random_bits, roulette
-from armtempo.optimise.parameters import Number, Parameter
-from armtempo.optimise.tracker import Result, Task, Tracker
+from armtempo.optimise.ga import BITS, crossover, decode, merits, mutate, random_bits, roulette
+from armtempo.optimise.task import Number, Parameter, Result, Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
     "bits": BITS,

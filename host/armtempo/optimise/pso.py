@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from armtempo.optimise import swarm
-from armtempo.optimise.tracker import Result, Task
+from armtempo.optimise.task import Result, Task
 
 PARAMETERS = swarm.PARAMETERS
 

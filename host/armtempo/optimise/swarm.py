@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.optimise.parameters import Number, Parameter
-from armtempo.optimise.tracker import Task, Tracker
+from armtempo.optimise.task import Number, Parameter, Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
     "inertia_start": Number(0.9, 0.0, 2.0, "inertia in the first iteration"),

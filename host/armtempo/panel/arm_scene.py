@@ -24,7 +24,7 @@ from armtempo.planning.room_check import Bodies
 COLOUR, GHOST, PATH, RUN, VIA, ROOM = "#4477aa", "#999999", "#228833", "#ee6677", "#ccbb44", "#aa3377"
 """Of Paul Tol's bright scheme, which the colour-blind can tell apart."""
 _THICK = 0.03
-"""Radius of a link as a share of the arm's reach, where the arm file gives none."""
+"""Radius of a link as a share of the arm's reach, if the arm file gives none."""
 _SHORT_MM = 1e-6
 _OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25

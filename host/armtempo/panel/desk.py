@@ -8,9 +8,9 @@ from pathlib import Path
 
 import tomlkit
 
+from armtempo.basics import toml_table
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
-from armtempo.formats import toml_table
-from armtempo.formats.atomic_file import replace_text
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan

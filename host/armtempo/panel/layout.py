@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from contextlib import suppress
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.panel_page import LOOK_S, PanelPage
+from armtempo.robot.board import Board
 
 TELL_S = 0.1
 _POINTS = 200
@@ -51,18 +53,17 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
 
 def _below_scene(page: PanelPage) -> None:
     """Views, how fast what moves continues, and where the arm is: in sight from every tab."""
-    operator = page.operator
     with ui.row():
         for view, text in words.VIEWS.items():
             ui.button(text, on_click=lambda view=view: page.scene.look(view)).props("flat dense")
         for text, call in (
-            (words.PAUSE, lambda: operator.board.pause()),
-            (words.RESUME, lambda: operator.board.resume()),
+            (words.PAUSE, Board.pause),
+            (words.RESUME, Board.resume),
         ):
             button = ui.button(text, on_click=lambda call=call: page.at_once(call, Needs.PAUSE))
             page.control(button.props("outline dense no-caps").classes("armtempo-pause"), Needs.PAUSE)
         speed = ui.slider(min=1, max=100, value=100).props(f'label aria-label="{words.SPEED_OF_MOTION}"')
-        speed.on("change", lambda event: page.at_once(lambda: operator.board.speed(float(event.args) / 100)))
+        speed.on("change", lambda event: page.at_once(lambda board: board.speed(float(event.args) / 100)))
         ui.label(words.SPEED_OF_MOTION).classes("text-caption")
         page.control(speed.classes("armtempo-speed"), Needs.BOARD)
     ui.label("").props('id="armtempo-where"')
@@ -93,7 +94,7 @@ class Paths:
 def _header(page: PanelPage) -> None:
     operator = page.operator
     with ui.header().classes("items-center no-wrap"):
-        stop = ui.button(words.STOP, icon="front_hand", color="negative", on_click=lambda: operator.stop())
+        stop = ui.button(words.STOP, icon="front_hand", color="negative", on_click=lambda: _stop(operator))
         stop.classes("armtempo-stop").tooltip(words.STOP_HINT)
         with ui.column().classes("armtempo-title"):
             ui.label(f"{words.TITLE} · {operator.arm.name}").classes("text-subtitle1 ellipsis")
@@ -138,6 +139,11 @@ def _tabs(page: PanelPage) -> None:
     show(words.TAB_MOVE)
 
 
+def _stop(operator: Operator) -> None:
+    """In a thread of its own: no page waits for a board that is silent."""
+    Thread(target=operator.stop, name="armtempo panel: stop", daemon=True).start()
+
+
 def _events(page: PanelPage) -> None:
     """What the page's script says."""
     operator, hold = page.operator, page.hold
@@ -147,7 +153,7 @@ def _events(page: PanelPage) -> None:
         if type(number) is int and 0 <= number < len(page.jogs):
             page.attempt(lambda: hold.press(page.client, page.jogs[number], page.jog_percent / 100))
 
-    ui.on("armtempo-stop", lambda: operator.stop())
+    ui.on("armtempo-stop", lambda: _stop(operator))
     ui.on("armtempo-press", press)
     ui.on("armtempo-held", lambda: hold.alive(page.client))
     ui.on("armtempo-release", lambda: hold.release(page.client))

@@ -11,6 +11,7 @@ from threading import Event as ThreadEvent
 from threading import Lock, Thread
 
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError, PortInUseError
+from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.plan import Plan
 from armtempo.panel import words
@@ -18,9 +19,8 @@ from armtempo.panel.desk import Desk
 from armtempo.panel.live import Lines, LiveArm
 from armtempo.panel.sequence_desk import SequenceDesk
 from armtempo.robot.board import Board
+from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.stop_request import Stopped
-from armtempo.robot.where import Where, posture_deg
-from armtempo.selftest.result import SelfTest
 
 LOOK_S = 0.25
 """Interval of the board's states while no samples come."""
@@ -116,17 +116,28 @@ class Operator:
             board.close()
             raise
         board.client.session.listeners.append(self.live.take_event)
+        board.client.session.tell = self._tell
         self._board, self.trouble = board, ""
+
+    def _tell(self, text: str) -> None:
+        """What happens to the connection; that is the trouble until the board has said its state again."""
+        self.trouble = text
+        self.say(text)
 
     def without_board(self, call: Callable[[], object]) -> None:
         """Free the port, do ``call``, which needs it, and open the board again."""
-        board, self._board, self.live.state = self._board, None, None
+        board, self._board = self._board, None
         if board is not None:
             board.close()
+        self.live.state = None  # once nobody reads it any more
         try:
             call()
         finally:
-            self._open()
+            try:
+                self._open()
+            except LinkError as error:
+                self.trouble = str(error)
+                raise
 
     def close(self) -> None:
         """Stop what moves, and let the board go."""

@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
-from nicegui import ui
+from nicegui import run, ui
 from nicegui.element import Element
 
 from armtempo.basics.arrays import Array
@@ -18,7 +18,9 @@ from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Needs, Operator
 from armtempo.planning.jog.jog_motion import JogMove
+from armtempo.robot.board import Board
 
+T = TypeVar("T")
 LOOK_S = 0.25
 """Interval at which a page looks at what has changed, but for what moves."""
 
@@ -105,22 +107,32 @@ class PanelPage:
         """Let the operator begin a command; what is refused is said."""
         self.attempt(lambda: self.operator.do(what, self.client, call, needs))
 
-    def attempt(self, call: Callable[[], object]) -> None:
-        """Do something at once; an error is said in the words of the library."""
+    def attempt(self, call: Callable[[], object]) -> bool:
+        """Do something at once; False if it fails, which is said in the words of the library."""
         try:
             call()
+            return True
         except ArmtempoError as error:
-            ui.notify(str(error), type="negative", multi_line=True, timeout=8000)
+            _say(error)
+            return False
 
-    def at_once(self, call: Callable[[], object], needs: Needs = Needs.BOARD) -> None:
-        """Do what is quick and needs no turn, also while something is under way."""
+    def check(self, needs: Needs) -> None:
+        """InputError, with the reason, if this page cannot do now what needs that."""
+        if reason := self.operator.why_not(self.client, needs):
+            raise InputError(reason, words.WAIT)
 
-        def checked() -> None:
-            if reason := self.operator.why_not(self.client, needs):
-                raise InputError(reason, words.WAIT)
-            call()
+    async def at_once(self, call: Callable[[Board], object], needs: Needs = Needs.BOARD) -> None:
+        """Tell the board what needs no turn, also while something is under way."""
+        if self.attempt(lambda: self.check(needs)):
+            await self.threaded(lambda: call(self.operator.board))
 
-        self.attempt(checked)
+    async def threaded(self, call: Callable[[], T]) -> T | None:
+        """What ``call`` gives, in a thread: no page waits for it, or for a board that is silent; an error is said."""
+        try:
+            return await run.io_bound(call)
+        except ArmtempoError as error:
+            _say(error)
+            return None
 
     def show_ghost(self, angles_deg: Array) -> None:
         """Show where the arm would be at these angles, (J,), besides where it is; on this page only."""
@@ -137,3 +149,8 @@ class PanelPage:
         for tab, listener in self.listeners:
             if tab in ("", self.shown):
                 listener()
+
+
+def _say(error: ArmtempoError) -> None:
+    """Show an error to who made it."""
+    ui.notify(str(error), type="negative", multi_line=True, timeout=8000)

@@ -10,9 +10,9 @@ import numpy as np
 from nicegui import run, ui
 
 from armtempo import pipeline
+from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
-from armtempo.formats import number_table
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.moved_tool import moved_tool_deg
 from armtempo.model import via_table
@@ -68,6 +68,9 @@ class PlanTab:
             for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
         ]
         page.on_look(self._look)
+        ui.context.client.on_connect(
+            self._changed
+        )  # what was typed while the connection broke has not arrived
 
     def _option(self, key: str, label: str) -> ui.select | ui.input:
         """The field of a key of the job."""

@@ -41,7 +41,7 @@ class RunTab:
             ):
                 button = ui.button(text).on_click(partial(self._do, text, call, needs))
                 page.control(button, needs | Needs.PLAN)
-            self._repeat = ui.number(words.REPEAT, value=1, max=99, precision=0).props("dense outlined")
+            self._repeat = ui.number(words.REPEAT, value=1, precision=0).props("dense outlined")
         ui.label(words.DOTTED).classes("armtempo-note")
         self._angles = CurveChart(self._operator.arm, words.ANGLE, 0)
         self._speeds = CurveChart(self._operator.arm, words.SPEED, 1)
@@ -87,12 +87,9 @@ class RunTab:
         if len(folders) > 1:
             ui.button(words.COMPARE, on_click=lambda: self._compare(chosen)).props("outline no-caps")
 
-    def _compare(self, folders: list[Path]) -> None:
-        def compare() -> None:
-            page = pipeline.compare(folders)
+    async def _compare(self, folders: list[Path]) -> None:
+        if page := await self._page.threaded(lambda: pipeline.compare(folders)):
             ui.navigate.to(_address(page), new_tab=True)
-
-        self._page.attempt(compare)
 
 
 def _choose(chosen: list[Path], folder: Path, wanted: bool) -> None:

@@ -8,17 +8,19 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT, Table
 
+from armtempo.basics import toml_table
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
-from armtempo.formats import toml_table
-from armtempo.formats.atomic_file import replace_text
 from armtempo.model.arm import Arm
+from armtempo.model.parts import NOTHING
 from armtempo.model.sequence import Sequence, is_sequence
 from armtempo.model.sequence_plan import SequencePlan
 
 KINDS: dict[str, tuple[str, ...]] = {
     "goto": (),
     "run": (),
-    "output": ("to", "wait_s"),
+    "output": ("to", "holds", "wait_s"),
+    "holds": (),
     "wait_s": (),
     "wait_input": ("active", "timeout_s", "on_timeout"),
     "count": (),
@@ -27,7 +29,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "call": (),
 }
 """What a step does, and what else can be said of it."""
-_FIRST = {"goto": "home", "wait_s": "1", "repeat": "for ever", "end": "repeat"}
+_FIRST = {"goto": "home", "holds": NOTHING, "wait_s": "1", "repeat": "for ever", "end": "repeat"}
 
 
 class SequenceDesk:

@@ -21,8 +21,10 @@ from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Operator
 
-_RECONNECT_S = 20.0
-"""A page whose connection breaks is kept for so long, so that a busy browser need not load it again."""
+_RECONNECT_S = 60.0
+"""A page whose connection breaks is kept for so long: a busy browser, or a tablet that slept, keeps it."""
+_KEPT_MESSAGES = 2000
+"""For such a page; some 15 come each second, and it takes up to 132 s until it is given up."""
 _NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
 """What a run folder holds, which may come from anybody, does nothing in the panel's name."""
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
@@ -45,6 +47,7 @@ class Panel:
             title=words.TITLE,
             dark=None,
             reconnect_timeout=_RECONNECT_S,
+            message_history_length=_KEPT_MESSAGES,
             tailwind=False,
             gzip_middleware_factory=lambda inner: GZipMiddleware(inner, compresslevel=1),
         )

@@ -81,6 +81,7 @@ STEP_KINDS = {
     "goto": "go to",
     "run": "run",
     "output": "set output",
+    "holds": "tool holds",
     "wait_s": "wait, s",
     "wait_input": "wait for input",
     "count": "count",
@@ -90,6 +91,7 @@ STEP_KINDS = {
 }
 STEP_KEYS = {
     "to": "to",
+    "holds": "tool holds",
     "wait_s": "wait, s",
     "active": "active",
     "timeout_s": "time-out, s",
@@ -106,7 +108,7 @@ STATE_KEYS = {
     "frames_bad": "damaged messages",
 }
 STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
-REFRESH, RENAME, REMOVE, NEW_NAME = "Read again", "Rename", "Remove", "New name"
+RENAME, REMOVE, NEW_NAME = "Rename", "Remove", "New name"
 A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
 SELFTEST, SURE_SELFTEST = (

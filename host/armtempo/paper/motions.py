@@ -11,7 +11,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.paper import printed
-from armtempo.paper.claims import BETTER, DIFFERS, SAME, Claim, compared
+from armtempo.paper.printed import BETTER, DIFFERS, SAME, Claim, compared
 from armtempo.planning import planner
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline

@@ -9,7 +9,7 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse
 from armtempo.model.arm import Arm
 from armtempo.paper import printed
-from armtempo.paper.claims import DIFFERS, SAME, Claim
+from armtempo.paper.printed import DIFFERS, SAME, Claim
 
 _ROUNDING_DEG = 0.1
 """The table prints one decimal; sums of such angles differ by up to this."""

@@ -17,8 +17,7 @@ from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Limits
-from armtempo.paper.claims import BETTER, DIFFERS, SAME, Claim
-from armtempo.paper.printed import SEARCHES_S
+from armtempo.paper.printed import BETTER, DIFFERS, SAME, SEARCHES_S, Claim
 from armtempo.planning import planner
 from armtempo.planning.fitness import Fitness
 from armtempo.report.plots import COLOURS, new_figure, theme

@@ -9,10 +9,10 @@ import numpy as np
 
 from armtempo.kinematics import chain
 from armtempo.paper import motions, searches
-from armtempo.paper.claims import DIFFERS, Claim
 from armtempo.paper.experiment import CUBIC, QUINTIC, Series
+from armtempo.paper.printed import DIFFERS, Claim
 from armtempo.paper.searches import Row
-from armtempo.report import arm_figure, drawing, html_page, plan_section, plots, run_report
+from armtempo.report import arm_picture, drawing, html_page, plan_section, plots, run_report
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -91,4 +91,4 @@ def _postures(made: motions.Plans) -> Figure:
     plan = made.quintic
     times = np.linspace(0.0, plan.trajectory.duration_s, 300)
     path = chain.tool_path_mm(made.arm, plan.trajectory, times)
-    return arm_figure.postures(chain.chains_mm(made.arm, plan.via_deg), path)
+    return arm_picture.postures(chain.chains_mm(made.arm, plan.via_deg), path)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
 
@@ -16,23 +17,29 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
+from armtempo.model.tool_way import ToolWay
 from armtempo.planning import checks, room_check, through_plan
-from armtempo.planning.free import free_plan
+from armtempo.planning.free import around
 from armtempo.splines import extremes
+from armtempo.splines.trajectory import Trajectory
+
+_LINE_REFINE = 4
+"""Time segments per path segment of a straight line: within 1 % of the fastest, and planned quickly."""
 
 
-@np.errstate(all="ignore")  # what overflows ends as not a number, which no check passes
+@np.errstate(all="ignore")  # an overflow becomes NaN, which every check refuses
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
-    """A motion through the job's via points, from rest to rest, as short as the search finds it.
+    """Plan the shortest motion that the search finds through the job's via points, from rest to rest.
 
-    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where
-    job and arm do not fit each other, PlanError if there is no motion under these limits and ranges; what
-    ``progress`` raises ends the planning.
+    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError if job
+    and arm do not fit each other, PlanError if there is no motion within the limits and ranges; an exception
+    of ``progress`` ends the planning.
     """
     checks.limits_of(arm)
+    holding = arm.holding(job.holds)
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
-    way = free_plan.motion if checks.is_free(job) else through_plan.motion
+    way = around.motion if checks.is_free(job) else through_plan.motion
     if checks.leads_tool(job):
         from armtempo.planning.line import line_plan  # here, because most jobs need no kinematics
 
@@ -43,13 +50,13 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
-    room_check.check(arm, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
+    room_check.check(holding, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
     return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())
 
 
 @cache
 def versions() -> Mapping[str, str]:
-    """What a plan's numbers depend on besides its input."""
+    """The versions on which a plan's numbers depend."""
     return {
         "armtempo": installed_version(),
         "numpy": np.__version__,
@@ -70,3 +77,34 @@ def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:
         angles, notes = np.array(job.via, dtype=float), ()
     checks.check_via(arm, job, angles)
     return angles, notes
+
+
+def straight_line(
+    arm: Arm,
+    start_deg: Sequence[float],
+    end: Sequence[float] | Pose,
+    speed_mm_s: float | None = None,
+    progress: Progress | None = None,
+    holds: str = "",
+) -> Trajectory:
+    """A single straight line of the tool from a posture (J,) to another one, or to a pose; errors as in ``plan``.
+
+    ``speed_mm_s``: the tool's limit; ``holds``: the load of the arm in it.
+    """
+    target = end if isinstance(end, Pose) else tuple(map(float, end))
+    job = Job(
+        "goto",
+        via=(tuple(map(float, start_deg)), target),
+        ways=(ToolWay(1, line=True, speed_mm_s=speed_mm_s),),
+        refine=_LINE_REFINE,
+        holds=holds,
+    )
+    return plan(arm, job, progress).trajectory
+
+
+def slower(trajectory: Trajectory, speed: float) -> Trajectory:
+    """The motion slowed down to the fraction ``speed``."""
+    joints = tuple(
+        replace(joint, time_points_s=np.asarray(joint.time_points_s / speed)) for joint in trajectory.joints
+    )
+    return replace(trajectory, joints=joints)

@@ -1,4 +1,4 @@
-"""Planning a sequence: every motion time-optimally, from where the one before it ends."""
+"""Planning a sequence: every motion time-optimally, from the end of the one before."""
 
 from __future__ import annotations
 
@@ -18,26 +18,24 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, planner, via_points
-from armtempo.planning.line import line_move
+from armtempo.planning import checks, planner, room_check, via_points
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
 _REFINE = 16
-"""Segments of a straight motion's time axis: within 1 % of its lower bound, and a record that the board checks soon."""
+"""Time segments of a straight motion: within 1 % of its lower bound, and quickly checked by the board."""
 _THEN = {kinds.NEXT: record.NEXT_THEN, kinds.FAULT: record.FAULT_THEN}
 _SAME_STEPS = 1 / 128
-"""Two angles as near as this are one: the board allows 1/64 step between two motions."""
+"""Tolerance for equal angles, steps: the board allows 1/64 step between two motions."""
 
 
 def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
-    """All motions of a sequence, equal ones once, and the rows that the board goes through.
+    """All different motions of a sequence, and the rows that the board executes.
 
-    Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or the
+    Raises InputError, naming file and step, if a motion does not begin at the end of the one before, or the
     sequence has no effect; PlanError if a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)
-    source = sequence.source or f"sequence {sequence.name!r}"
     source = sequence.source or f"sequence {sequence.name!r}"
     start = compiler.posture(sequence.start, f"{source}: start: ") if sequence.start else _End(None, "")
     rows, _ = compiler.rows(sequence.steps, start.angles_deg, start.name)
@@ -46,13 +44,19 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     check_size(len(rows), len(compiler.legs), len(compiler.counters), source)
     legs = [replace(leg, name=f"{sequence.name}-{number}") for number, leg in enumerate(compiler.legs, 1)]
     return SequencePlan(
-        arm, sequence.name, tuple(legs), tuple(rows), tuple(compiler.counters), planner.versions()
+        arm,
+        sequence.name,
+        tuple(legs),
+        tuple(rows),
+        tuple(compiler.counters),
+        planner.versions(),
+        tuple(compiler.loads),
     )
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where the arm is, and what the user calls that."""
+    """A posture of the arm, and its name for messages."""
 
     angles_deg: Angles
     name: str
@@ -60,7 +64,7 @@ class _Place:
 
 @dataclass(frozen=True)
 class _End:
-    """The same of where rows lead; None if nothing has moved yet."""
+    """The posture after some rows; None if nothing has moved yet."""
 
     angles_deg: Angles | None
     name: str
@@ -72,13 +76,17 @@ class _Compiler:
     progress: Progress | None
     legs: list[Trajectory] = field(default_factory=list)
     counters: list[str] = field(default_factory=list)
+    loads: list[str] = field(default_factory=list)
+    """The load in each leg."""
+    _holds: str = ""
+    """The present load."""
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
-    _plans: dict[int, Trajectory] = field(default_factory=dict)
+    _plans: dict[tuple[int, str], Trajectory] = field(default_factory=dict)
     _motions: dict[int, SourceMotion] = field(default_factory=dict)
     _depth: int = 0
 
     def rows(self, steps: tuple[Step, ...], here: Angles | None, name: str) -> tuple[list[SequenceRow], _End]:
-        """The rows of some steps from a posture on, and where they lead."""
+        """The rows of some steps from a posture on, and the posture after them."""
         end = _End(here, name)
         found: list[SequenceRow] = []
         for step in steps:
@@ -88,13 +96,24 @@ class _Compiler:
                 rows, end = self._goto(step, end)
             elif isinstance(step, kinds.RunMotion):
                 rows, end = self._run(step, end)
+            elif isinstance(step, kinds.Hold):
+                rows = self._hold(step)
             else:
                 rows = [self._still(step)]
             found += rows
         return found, end
 
+    def _hold(self, step: kinds.Hold) -> list[SequenceRow]:
+        """The following motions are planned with the load, which is not sent to the board."""
+        try:
+            self.arm.holding(step.load)
+        except InputError as error:
+            raise InputError(f"{step.where}{error.problem}", error.hint) from None
+        self._holds = step.load
+        return []
+
     def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
-        """The first pass comes before the others if it begins elsewhere than they do."""
+        """The rows of a repeat; its first pass is separate if it starts at another posture."""
         outermost = not self._depth
         self._depth += 1
         first, end = self.rows(step.steps, before.angles_deg, before.name)
@@ -118,14 +137,15 @@ class _Compiler:
         target = self._target(step)
         if here.angles_deg is None or here.angles_deg == target.angles_deg:
             return [], _End(target.angles_deg, target.name)
-        key = (here.angles_deg, target.angles_deg)
+        key = (self._holds, here.angles_deg, target.angles_deg)
         if key not in self._known:
-            self._known[key] = self._add(self._straight(step, here.angles_deg, target.angles_deg))
+            found = self._straight(step, here.angles_deg, target.angles_deg)
+            self._known[key] = self._add(found, self._holds)
         words = f"goto {target.name}"
         return [_move(self._known[key], step.step, words)], _End(target.angles_deg, target.name)
 
     def _line(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
-        """A straight line of the tool; to a posture given as a pose in the branch in which the arm is."""
+        """A straight line of the tool; to a pose in the present branch of the arm."""
         posture = self.arm.posture(step.target) if isinstance(step.target, str) else step.target
         pose = posture.where if isinstance(posture, ArmPosture) else None
         target = None if isinstance(pose, Pose) else self._target(step)
@@ -136,15 +156,17 @@ class _Compiler:
             )
         if target and target.angles_deg == here.angles_deg:
             return [], here
-        key = ("line", here.angles_deg, target.angles_deg if target else pose, step.speed_mm_s)
+        key = (self._holds, "line", here.angles_deg, target.angles_deg if target else pose, step.speed_mm_s)
         if key not in self._known:
             to = target.angles_deg if target else pose
             assert to is not None
             try:
-                found = line_move.straight_line(self.arm, here.angles_deg, to, step.speed_mm_s, self.progress)
+                found = planner.straight_line(
+                    self.arm, here.angles_deg, to, step.speed_mm_s, self.progress, self._holds
+                )
             except ArmtempoError as error:
                 raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
-            self._known[key] = self._add(found)
+            self._known[key] = self._add(found, self._holds)
         if target:
             end = _End(target.angles_deg, target.name)
         else:
@@ -162,15 +184,16 @@ class _Compiler:
                 f"{here.name or _words(here.angles_deg)} ({_words(here.angles_deg)})",
                 f"put a step before it that goes there: goto with the same file as run, {motion.name!r}",
             )
-        key = ("run", id(motion))
+        holds = _job(motion).holds or self._holds
+        key = ("run", id(trajectory), holds)
         if key not in self._known:
-            self._known[key] = self._add(trajectory)
+            self._known[key] = self._add(trajectory, holds)
         return [_move(self._known[key], step.step, f"run {motion.name}")], _End(
             end, f"the end of {motion.name}"
         )
 
     def _motion(self, motion: SourceMotion | Job | Plan) -> SourceMotion:
-        """The same object for the same motion."""
+        """One object for equal motions."""
         if isinstance(motion, SourceMotion):
             return motion
         if id(motion) not in self._motions:
@@ -193,16 +216,22 @@ class _Compiler:
         return _Place(_angles(trajectory(0.0)), f"the start of {motion.name}")
 
     def posture(self, posture: ArmPosture, where: str) -> _Place:
-        """Where the arm is then; PlanError if it cannot."""
+        """The arm at that posture; raises PlanError if it cannot be there."""
         try:
             return _Place(_angles(via_points.posture_deg(self.arm, posture)), posture.name)
         except ArmtempoError as error:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
-        if id(motion) not in self._plans:
-            self._plans[id(motion)] = self._of(motion.source, where)
-        return self._plans[id(motion)]
+        for (
+            known,
+            _,
+        ), found in self._plans.items():  # a plan with another load is accepted if it keeps to the room
+            arm = self.arm.holding(_job(motion).holds or self._holds)
+            if known == id(motion) and room_check.touch_of(arm, found) is None:
+                return found
+        found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
+        return found
 
     def _of(self, source: Job | Plan, where: str) -> Trajectory:
         if isinstance(source, Plan):
@@ -210,20 +239,22 @@ class _Compiler:
                 raise InputError(
                     f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
                 )
+            room_check.check(self.arm.holding(source.job.holds or self._holds), source.trajectory)
             return source.trajectory
-        found = planner.plan(self.arm, source, self.progress).trajectory
+        job = replace(source, holds=source.holds or self._holds)
+        found = planner.plan(self.arm, job, self.progress).trajectory
         checks.check_held(found, self.arm)
         return found
 
     def _straight(self, step: kinds.Goto, start: Angles, end: Angles) -> Trajectory:
-        job = Job("goto", via_deg=[start, end], optimiser=GRADIENT, refine=_REFINE)
+        job = Job("goto", via_deg=[start, end], optimiser=GRADIENT, refine=_REFINE, holds=self._holds)
         try:
             return planner.plan(self.arm, job, self.progress).trajectory
         except ArmtempoError as error:
             raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
 
     def _still(self, step: kinds.SetOutput | kinds.Wait | kinds.WaitInput | kinds.Count) -> SequenceRow:
-        """The row of a step that moves nothing."""
+        """The row of a step without motion."""
         if isinstance(step, kinds.SetOutput):
             output = self.arm.output(step.output)
             raw = self.arm.outputs[output].raw(step.to)
@@ -249,8 +280,9 @@ class _Compiler:
             words,
         )
 
-    def _add(self, trajectory: Trajectory) -> int:
+    def _add(self, trajectory: Trajectory, holds: str) -> int:
         self.legs.append(trajectory)
+        self.loads.append(holds)
         return len(self.legs) - 1
 
     def _same(self, one: Angles, other: Angles) -> bool:
@@ -258,6 +290,10 @@ class _Compiler:
             abs(a - b) * joint.steps_per_deg <= _SAME_STEPS
             for a, b, joint in zip(one, other, self.arm.driven, strict=True)
         )
+
+
+def _job(motion: SourceMotion) -> Job:
+    return motion.source.job if isinstance(motion.source, Plan) else motion.source
 
 
 def _move(leg: int, step: int, words: str) -> SequenceRow:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
@@ -11,14 +13,22 @@ from armtempo.model.job import Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
-from armtempo.planning.planned import Planned
 from armtempo.planning.time_parameterization import Group, Timed
 from armtempo.splines import bspline
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A trajectory, its searches, and notes for the user."""
+
+    trajectory: Trajectory
+    searches: tuple[Search, ...]
+    notes: tuple[str, ...]
+
+
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
-    """The motion through via angles (n + 1, J); PlanError if the spline leaves a joint's range."""
+    """The motion through via angles (n + 1, J); raises PlanError if the spline leaves a joint's range."""
     limits = checks.limits_of(arm)
     points = bspline.fit(via_deg, job.degree)
     checks.check_ranges(arm, points, job.degree)
@@ -31,7 +41,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
 
 
 def _groups(points: Array, via: Array, limits: list[Limits], job: Job) -> list[Group]:
-    """The joints that move, together or one by one."""
+    """The moving joints, as one group or one group each."""
     moving = [int(joint) for joint in np.flatnonzero(np.ptp(via, axis=0) > checks.TOLERANCE)]
     together = [moving] if job.timing == "shared" else [[joint] for joint in moving]
     return [
@@ -40,7 +50,7 @@ def _groups(points: Array, via: Array, limits: list[Limits], job: Job) -> list[G
 
 
 def _trajectory(job: Job, points: Array, groups: list[Group], timed: list[Timed]) -> Trajectory:
-    """All joints on their time axes; one that does not move takes the longest axis."""
+    """All joints on their time axes; a joint that does not move gets the longest axis."""
     longest = max(timed, key=lambda axis: axis.total_s)
     axes = {joint: axis for group, axis in zip(groups, timed, strict=True) for joint in group.joints}
     joints = tuple(

@@ -1,31 +1,45 @@
-"""Torque that a motion asks of each motor, and what the motor holds at that speed."""
+"""Torque that a motion needs from each motor, and the motor's available torque at that speed; plans limited
+by torque, with the arm's acceleration and jerk limits times one factor."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError, PlanError
+from armtempo.basics.progress import Progress, part
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.dynamics import joint_torques
 from armtempo.model.arm import Arm
-from armtempo.model.parts import DrivenJoint
+from armtempo.model.job import Job
+from armtempo.model.parts import DrivenJoint, Limits
+from armtempo.model.plan import Plan
+from armtempo.planning import planner
 from armtempo.splines.trajectory import Trajectory
 
 ENOUGH = 1.5
-"""Motors are seldom as strong as their data sheet: less than half as much again is told."""
+"""Safety factor: motors are seldom as strong as in their data sheet; a smaller margin gives a warning."""
 _STEP_S, _FEWEST, _MOST = 1e-3, 1000, 20_000
-"""A motion is looked at each millisecond, but at no fewer moments than this and no more than that."""
+"""Sampling interval of a motion, and least and largest number of samples."""
+_TRIES = 10
+_NEAR = 1.03
+"""Ratio of factors at which the search ends: times differ by half as much."""
+_LEAST = 1.0 / 16.0
+"""Least factor: below it gravity or friction, not acceleration, is the limit."""
+_PAYS = 1e-3
+"""The search ends if a larger factor saves less than this fraction of the time: speed limits the motion."""
 
 
 class LeastMargin(NamedTuple):
-    """Where a motor has the least to spare."""
+    """The smallest torque margin of a motion."""
 
     margin: float
-    """Torque that it holds, of what it needs."""
+    """Available torque divided by needed torque."""
     joint: str
     time_s: float
     needed_nm: float
@@ -33,7 +47,7 @@ class LeastMargin(NamedTuple):
 
     @property
     def words(self) -> str:
-        """All of it but the joint."""
+        """Describe it, without the joint."""
         return (
             f"at {self.time_s:.2f} s its motor needs {self.needed_nm:.3g} Nm and holds {self.held_nm:.3g}, "
             f"{self.margin:.2f} times as much"
@@ -42,7 +56,7 @@ class LeastMargin(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MotorTorques:
-    """Of a motion at N moments."""
+    """Torques of a motion at N times."""
 
     joints: tuple[str, ...]
     times_s: Array
@@ -50,11 +64,11 @@ class MotorTorques:
     needed_nm: Array
     """At the motors' shafts, (N, J)."""
     held_nm: Array
-    """(N, J); not a number where the arm file does not say."""
+    """Available torque, (N, J); NaN if it is not in the arm file."""
 
     @property
     def margin(self) -> Array:
-        """Torque held of what is needed: (N, J)."""
+        """Available torque divided by needed torque: (N, J)."""
         needed = np.abs(self.needed_nm)
         return np.divide(self.held_nm, needed, out=np.full_like(needed, np.inf), where=needed > 0.0)
 
@@ -72,9 +86,10 @@ class MotorTorques:
 
 
 def held_nm(joint: DrivenJoint, motor_rad_s: ArrayLike) -> Array:
-    """Torque that a motor holds at speeds of its shaft (N,): of its curve, 0 beyond it; else as in the virtual arm.
+    """Available torque of a motor at shaft speeds (N,): from its curve, 0 beyond it; else from the virtual
+    arm's model.
 
-    There it falls to 0.71 of the holding torque at the corner speed. Not a number where the arm file says neither.
+    In the model it falls to 0.71 of the holding torque at the corner speed. NaN if the arm file has neither.
     """
     speed, model = np.abs(np.asarray(motor_rad_s, dtype=float)), joint.model
     if joint.motor.curve_rpm_nm:
@@ -87,7 +102,8 @@ def held_nm(joint: DrivenJoint, motor_rad_s: ArrayLike) -> Array:
 def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
     """The torques of a motion, None for an arm without ``dynamics``.
 
-    At the motor: what the joint needs by inverse dynamics and friction over the gear ratio, and the rotor's inertia.
+    At the motor: the joint's torque from inverse dynamics and friction, divided by the gear ratio, plus the
+    rotor's inertia.
     """
     if not any(joint.dynamics for joint in arm.joints):
         return None
@@ -108,6 +124,60 @@ def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
 
 
 def least_margin(arm: Arm, trajectory: Trajectory) -> LeastMargin | None:
-    """The smallest margin of a motion; None if the arm file does not say enough."""
+    """The smallest margin of a motion; None if the arm file lacks data."""
     found = of_motion(arm, trajectory)
     return found.least if found else None
+
+
+def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
+    """The fastest plan in which each motor's available torque is ``ENOUGH`` times the needed one at every sample.
+
+    Speed limits are kept; the plan's arm has the scaled limits. Raises InputError for an arm without
+    ``dynamics`` or without the torque of a motor, PlanError if slower motions do not help; otherwise as
+    ``planner.plan``.
+    """
+    held = [held_nm(joint, 0.0) for joint in arm.driven]
+    if np.any(np.isnan(held)) or not any(joint.dynamics for joint in arm.joints):
+        raise InputError(
+            f"arm {arm.name!r}: its motions cannot be planned by torque",
+            "give each joint with a motor its dynamics, and each motor its curve_rpm_nm",
+        )
+    best, short = None, ""
+    factor, low, high = 1.0, 0.0, math.inf
+    for number in range(_TRIES):
+        found = planner.plan(_scaled(arm, factor), job, part(progress, number, _TRIES))
+        least = least_margin(found.holding, found.trajectory)
+        if least is not None and least.margin < ENOUGH:
+            high, short = factor, f"{least.joint}: {least.words}"
+        elif best is not None and found.total_s > best.total_s * (1.0 - _PAYS):
+            break
+        else:
+            best, low = found, factor
+        factor = _between(low, high)
+        if high < _NEAR * low or factor < _LEAST:
+            break
+    if best is None:
+        raise PlanError(
+            f"job {job.name!r}: slower motions do not help: {short}",
+            "use a stronger motor or another gear ratio, or correct dynamics and curve_rpm_nm",
+        )
+    words = f"acceleration and jerk limits are {low:.3g} times the arm file's, as the motors' torque allows"
+    return replace(best, notes=(*best.notes, words))
+
+
+def _between(low: float, high: float) -> float:
+    """The next factor to try between a feasible ``low`` (0: none yet) and an infeasible ``high`` (infinite:
+    none yet)."""
+    if high == math.inf:
+        return 2.0 * low
+    return math.sqrt(low * high) if low else 0.5 * high
+
+
+def _scaled(arm: Arm, factor: float) -> Arm:
+    joints = []
+    for joint in arm.joints:
+        if limits := joint.limits:
+            speed, acceleration, jerk = limits.values
+            limits = Limits(speed, factor * acceleration, factor * jerk)
+        joints.append(replace(joint, limits=limits))
+    return replace(arm, joints=tuple(joints))

@@ -1,13 +1,14 @@
-"""Serial ports: their names, which exist, and one writer with many readers for each.
+"""Serial ports: names, list, default, and sharing: one program owns a port, others use it through that program.
 
 ::
 
-    names.py, listing.py  what a port is called, and which ports this machine has
+    names.py      names of ports
+    board_port.py  the ports of this machine, and which is meant if none is given
     claim.py      the file that says which program has a port and where that program listens
-    lines.py      messages over a socket, a line of JSON each
-    requests.py   what may be asked for, with which fields
-    server.py     the owner's end: requests in, samples and events out
-    caller.py     the other end: who has this port, ask it, subscribe
+    messages.py   messages over a socket, one line of JSON each; the requests and their fields
+    server.py     the owner's end: answers requests, publishes samples and events
+    caller.py     the other end: finds the owner, asks, subscribes
+    quick_stop.py  the beginning of ``armtempo stop``, which asks it before the rest is imported
 
 The messages: host/docs/sharing.md.
 """

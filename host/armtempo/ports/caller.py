@@ -1,4 +1,4 @@
-"""The other end: who has a port, what it answers, what it hands out."""
+"""The caller's end: find the program that has a port, ask it, subscribe to its messages."""
 
 from __future__ import annotations
 
@@ -7,21 +7,20 @@ import socket
 import time
 from collections.abc import Iterator
 from enum import Enum
-from types import TracebackType
 from typing import Any, Self
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortGivenUpError
 from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
-from armtempo.ports.lines import LineReader, Message, to_line
+from armtempo.ports.messages import LineReader, Message, to_line
 
 HUNG_S = 2.0
 """A program that has not answered ``hello`` for this long counts as hanging."""
 _REMEMBERED_S = 5.0
-"""That it hangs is not tried again for so long."""
+"""Time for which a hanging program is not asked again."""
 _END = "end that process, or let a command that needs the port take it over"
 _hung: dict[str, float] = {}
-"""When a claim's program was last found to hang, by the claim's number."""
+"""Time at which a claim's program was last found to hang, by the claim's number."""
 
 
 class Ownership(Enum):
@@ -29,7 +28,7 @@ class Ownership(Enum):
 
     ALIVE = "alive"
     HUNG = "hung"
-    """It is there, and does not answer."""
+    """The process exists and does not answer."""
     DEAD = "dead"
 
 
@@ -47,14 +46,14 @@ def ownership(claim: PortClaim) -> Ownership:
 
 
 def remember_hanging(number: str) -> None:
-    """The program of this claim was just found to hang; who asks next need not find it out again."""
+    """Note that the program of this claim hangs, so that the next call need not test it."""
     _hung[number] = time.monotonic()
 
 
 class Caller:
-    """A connection to the program that has a port; used as a context, or ended by ``close``.
+    """A connection to the program that has a port; use it as a context, or ``close`` it.
 
-    Raises NoAnswerError if that program hangs, LinkError if it is gone.
+    Raises NoAnswerError if that program hangs, LinkError if it has ended.
     """
 
     def __init__(self, claim: PortClaim) -> None:
@@ -74,8 +73,8 @@ class Caller:
     def ask(self, request: str, timeout_s: float, **fields: Any) -> Message:
         """The answer to a request.
 
-        Raises NoAnswerError after ``timeout_s``, BoardError or LinkError with the text of a refusal, LinkError
-        where the program is gone.
+        Raises NoAnswerError after ``timeout_s``, BoardError or LinkError with the text of a refusal,
+        LinkError if the program has ended.
         """
         number = next(self._numbers)
         limit_s = time.monotonic() + timeout_s
@@ -90,13 +89,13 @@ class Caller:
                 return _checked(message)
 
     def subscribe(self, *topics: str) -> None:
-        """Choose what ``messages`` gives: some of ``server.TOPICS``."""
+        """Subscribe to some of ``server.TOPICS``, for ``messages``."""
         self.ask("subscribe", HUNG_S, topics=list(topics))
 
     def messages(self, timeout_s: float | None = None) -> Iterator[Message]:
-        """What was subscribed to, as it comes, until the other program gives up the port.
+        """The subscribed messages, until the other program closes the port.
 
-        ``timeout_s``: after so long without a message the iteration ends too.
+        The iteration also ends after ``timeout_s`` without a message.
         """
         while True:
             while self._published:
@@ -111,15 +110,13 @@ class Caller:
                 self._published.append(message)
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._socket.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.close()
 
     def _send(self, line: bytes) -> None:

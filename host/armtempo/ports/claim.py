@@ -1,7 +1,7 @@
-"""Who has a port: one file for each port, in a folder that only this user can read.
+"""Claims: one file for each port that a program has open, in a folder that only this user can read.
 
-The folder is ``armtempo`` below ``$XDG_RUNTIME_DIR``, else a private one for temporary files (``claim_file``). A
-program that was killed leaves its file; nobody answers at its address then.
+The folder is ``armtempo`` in ``$XDG_RUNTIME_DIR``, else a private folder for temporary files
+(``claim_file``). A killed program leaves its file, but does not answer at its address.
 """
 
 from __future__ import annotations
@@ -17,44 +17,44 @@ from armtempo.ports import claim_file
 from armtempo.ports.claim_file import VERSION as VERSION
 
 PATIENCE_S = 3.0
-"""How long to wait for a port in use: what only asks, as ``status`` does, or was told to end, has it for less."""
+"""Time to wait for a port in use; ``status`` and programs that were told to end close it sooner."""
 
 LOCAL_SOCKETS = os.name == "posix"
-"""Whether sockets are files of the file system; else they are ports of localhost, and a token is asked for."""
+"""Whether sockets are files; otherwise they are TCP ports of localhost, with a token."""
 
 
 class PortClaim(NamedTuple):
     """One program's claim to one port. (A data class would take 10 ms to import, too long for a stop.)"""
 
     name: str
-    """The port, by a name that is the same for every program (``ports.names.same_for_all``)."""
+    """Canonical name of the port (``ports.names.same_for_all``)."""
     port: str
-    """The same as its user called it."""
+    """The port as its user wrote it."""
     device: str
-    """What can be opened: for a virtual board the device that it was given."""
+    """The device that can be opened; for a virtual board, its pseudo terminal."""
     program: str
-    """What the program was called with, in short."""
+    """The program's command line, shortened."""
     pid: int
     number: str
-    """Tells one claim from another."""
+    """Identifies the claim."""
     address: str
-    """Path of a socket, or a port of localhost."""
+    """Path of a socket, or a TCP port of localhost."""
     token: str
-    """What a caller must know; "" if the socket's permissions are enough."""
+    """Secret that a caller must send; "" if the socket's permissions suffice."""
     version: int = VERSION
 
     @property
     def who(self) -> str:
-        """The program as messages name it."""
+        """The program's description for messages."""
         return f"'{self.program}' (process {self.pid})"
 
     def write(self) -> None:
-        """Put the claim in place of an earlier one. OSError if that fails."""
+        """Write the claim, replacing an earlier one; raises OSError if that fails."""
         folder()
         for path in self._files():
             before = _read(path)
             if before is not None and before.number != self.number:
-                self._write(before._marker(path))  # it may wake up after this program has ended
+                self._write(before._marker(path))  # the other program may wake up after this one has ended
             self._write(path)
 
     def _write(self, path: Path) -> None:
@@ -64,17 +64,17 @@ class PortClaim(NamedTuple):
         os.replace(aside, path)
 
     def _marker(self, path: Path) -> Path:
-        """Who has taken the port over from this program, also when that has given it up again."""
+        """The file that records who took the port over from this program, kept after that program closes it."""
         return path.with_name(f"{self.number}.taken")
 
     def taken_by(self) -> PortClaim | None:
-        """The claim of another program that is, or was, in the place of this one."""
+        """The claim of the program that has taken the port over, if any."""
         files = self._files()
         found = [_read(path) for path in (*files, *(self._marker(file) for file in files))]
         return next((claim for claim in found if claim is not None and claim.number != self.number), None)
 
     def remove(self) -> None:
-        """Give the port up, unless another program has claimed it since."""
+        """Remove the claim, unless another program has claimed the port since."""
         with suppress(OSError):
             for path in self._files():
                 self._marker(path).unlink(missing_ok=True)
@@ -86,7 +86,7 @@ class PortClaim(NamedTuple):
                 Path(self.address).unlink()
 
     def _files(self) -> list[Path]:
-        """Where the claim to this port is: in the folder for new ones, and wherever an earlier one does."""
+        """The files of claims to this port: in the folder for new claims, and where an earlier claim is."""
         import hashlib
 
         name = hashlib.sha256(self.name.encode()).hexdigest()[:16] + claim_file.SUFFIX
@@ -95,7 +95,7 @@ class PortClaim(NamedTuple):
 
 
 def new(name: str, port: str, device: str) -> PortClaim:
-    """This program's claim, not yet written. OSError if there is no private folder for it."""
+    """This program's claim, not yet written; raises OSError if there is no private folder for it."""
     import secrets
 
     number = secrets.token_hex(8)
@@ -105,7 +105,8 @@ def new(name: str, port: str, device: str) -> PortClaim:
 
 
 def find(name: str, port: str) -> PortClaim | None:
-    """Who has claimed the port, dead or alive; ``port`` as the user calls it, for a link whose device is gone."""
+    """The claim to the port, even of an ended program; ``port``: as the user wrote it, in case its device has
+    disappeared."""
     for claim in claims():
         if claim.name == name or claim.port == port:
             return claim
@@ -121,16 +122,16 @@ def claims() -> Iterator[PortClaim]:
 
 
 def folder() -> Path:
-    """Where claims and sockets are, made where it is missing. OSError if it is not this user's alone."""
+    """The folder of claims and sockets, created if missing; raises OSError if others can access it."""
     place = Path(next(claim_file.folders()))
     place.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not claim_file.is_private(str(place)):
-        raise OSError(None, "is not this user's alone", str(place))
+        raise OSError(None, "others can access it", str(place))
     return place
 
 
 def program() -> str:
-    """This program's command line, in short."""
+    """This program's command line, shortened."""
     words = sys.argv[:1] and [Path(sys.argv[0]).name, *sys.argv[1:]]
     if words and words[0] in ("__main__.py", "-c"):
         words[0] = "armtempo" if words[0] == "__main__.py" else "python"
@@ -139,7 +140,7 @@ def program() -> str:
 
 
 def _read(path: Path) -> PortClaim | None:
-    """The claim in a file; None if it is gone, damaged or of another version."""
+    """The claim in a file; None if it is missing, damaged or of another version."""
     try:
         name, port, device, program, pid, number, address, token, version = claim_file.read(str(path))
         return PortClaim(name, port, device, program, int(pid), number, address, token, int(version))

@@ -1,7 +1,7 @@
-"""The files of claims: where they are, what is in one.
+"""The files of claims: their folders and format.
 
-A claim is a text of one field a line, in the order of ``claim.PortClaim``; a line end in a field is escaped. This
-imports little, because ``armtempo stop`` reads claims before all else.
+A file has one field of ``claim.PortClaim`` per line, in its order; line ends in a field are escaped. This
+module imports little, because ``armtempo stop`` reads claims first.
 """
 
 from __future__ import annotations
@@ -9,20 +9,20 @@ from __future__ import annotations
 import os
 import stat
 
-TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
+TYPE_CHECKING = False  # as in "typing", whose import takes longer than the rest of a stop
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 VERSION = 1
-"""Of the file and of what is said over the socket."""
+"""Version of the file and of the socket's messages."""
 SUFFIX = ".claim"
 _LONGEST_SOCKET_PATH = 100
-"""Bytes; an operating system takes 104 to 108."""
+"""Bytes; operating systems allow 104 to 108."""
 _TEMPORARY = ("/tmp", "/var/tmp")
 
 
 def folders() -> Iterator[str]:
-    """The folder for new claims, then one where another program of this user may have put its own."""
+    """The folder for new claims, then the other folder that programs of this user may have used."""
     runtime = os.environ.get("XDG_RUNTIME_DIR") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else "")
     if runtime and os.path.isdir(runtime):
         wanted = os.path.join(runtime, "armtempo")
@@ -33,7 +33,7 @@ def folders() -> Iterator[str]:
 
 
 def is_private(folder: str) -> bool:
-    """Whether the folder is there and this user's alone."""
+    """Whether the folder exists and only this user can access it."""
     try:
         found = os.lstat(folder)
     except OSError:
@@ -52,12 +52,12 @@ def paths() -> Iterator[str]:
 
 
 def text(fields: Iterable[str]) -> str:
-    """What a file holds."""
+    """The content of a claim's file."""
     return "".join(field.encode("unicode_escape").decode() + "\n" for field in fields)
 
 
 def read(path: str) -> list[str]:
-    """The fields in a file; none where it is gone, damaged or of another version."""
+    """The fields in a file; empty if it is missing, damaged or of another version."""
     try:
         with open(path, "rb") as file:
             fields = [line.decode("unicode_escape") for line in file.read().split(b"\n")[:-1]]
@@ -67,7 +67,7 @@ def read(path: str) -> list[str]:
 
 
 def _temporary() -> str:
-    """The folder for temporary files, as ``tempfile`` chooses it, whose import a stop does not wait for."""
+    """The folder for temporary files as ``tempfile`` chooses it, without the time for importing that."""
     wanted = [os.environ.get(name, "") for name in ("TMPDIR", "TEMP", "TMP")]
     if os.name == "posix":
         wanted += _TEMPORARY

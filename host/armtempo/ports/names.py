@@ -1,4 +1,4 @@
-"""What the name of a port means: a serial device, a URL, or a virtual board; and which boards are virtual."""
+"""Names of ports: a serial device, a URL, or a virtual board; and ids of virtual boards."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import os
 
 from armtempo.basics.errors import InputError
 
-TYPE_CHECKING = False  # as "typing" has it, which takes longer to import than the rest of a stop
+TYPE_CHECKING = False  # as in "typing", whose import takes longer than the rest of a stop
 if TYPE_CHECKING:
     from pathlib import Path
 
 SIM = "sim"
-"""The port name that stands for a virtual board; ``sim:FOLDER`` for one whose flash is that folder."""
+"""The port name of a virtual board; ``sim:FOLDER``: its flash is that folder."""
 
 
 VIRTUAL_ID = b"virt".hex()
@@ -25,14 +25,14 @@ def is_virtual(board_id: str) -> bool:
 
 
 def is_sim(port: str) -> bool:
-    """Whether the port stands for a virtual board."""
+    """Whether the port is a virtual board."""
     return port == SIM or port.startswith(SIM + ":")
 
 
 def sim_flash(port: str) -> Path | None:
-    """The folder that is the virtual board's flash; None: a new one that goes with the board.
+    """The virtual board's flash folder; None: a temporary one.
 
-    Raises InputError if the folder is not named.
+    Raises InputError if the folder is empty.
     """
     if port == SIM:
         return None
@@ -41,15 +41,15 @@ def sim_flash(port: str) -> Path | None:
             f"port '{port}' has no folder",
             "write sim:FOLDER to keep the flash there, or sim for a temporary one",
         )
-    from pathlib import Path  # here, because a stop does not wait for it
+    from pathlib import Path  # imported here, because a stop does not need it
 
     return Path(port[len(SIM) + 1 :])
 
 
 def same_for_all(port: str) -> str:
-    """A name of the port that is the same for every program: links followed, paths absolute.
+    """Canonical name of the port, the same for every program: links followed, paths absolute.
 
-    "" for a virtual board that nobody else can reach.
+    "" for a virtual board that other programs cannot reach.
     """
     if port == SIM:
         return ""

@@ -1,7 +1,7 @@
-"""The owner's end: answers requests of other programs, and hands out what they have subscribed to.
+"""The owner's end: answers requests of other programs, and publishes to subscribers.
 
-Each connection has two threads, one that reads its requests and answers them, one that writes; so a reader that
-is slow, or asks for what takes long, holds up nobody else.
+Each connection has two threads, one that answers requests and one that writes, so a slow caller or a slow
+request delays no other.
 """
 
 from __future__ import annotations
@@ -18,26 +18,24 @@ from threading import Lock, Thread
 from armtempo.basics.errors import ArmtempoError, BoardError, LinkError, PortError
 from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
-from armtempo.ports.lines import LineReader, Message, to_line
-from armtempo.ports.requests import REQUESTS, Fields, check, is_id
+from armtempo.ports.messages import REQUESTS, Fields, LineReader, Message, check, is_id, to_line
 
 Handler = Callable[[Message], Message]
-"""Answers one request; its ArmtempoError becomes an answer too."""
+"""Answers one request; an ArmtempoError is sent as an answer too."""
 
 _BACKLOG = 16
 _FLUSH_S = 0.5
-"""Time in which a caller must take the last messages."""
+"""Time for a caller to receive the last messages."""
 _CHECK_S = 0.02
-"""Whether another program has taken the port over is looked up this often at most."""
+"""Shortest interval of checks whether another program has taken the port over."""
 _QUEUE = 1000
-"""Messages that wait for a slow reader; those beyond are dropped, and their number is told."""
+"""Length of a slow reader's queue; further messages are dropped, and their number is reported."""
 
 
 class Server:
-    """Listens as the owner of a port, from the making on until ``close``.
+    """Listens as the owner of a port until ``close``.
 
-    ``handlers``: by the name of a request, which gets only what ``requests`` allows. OSError if nobody can be
-    listened to.
+    ``handlers``: by request name; called only with fields that ``requests`` allows. Raises OSError if listening fails.
     """
 
     def __init__(
@@ -56,11 +54,11 @@ class Server:
         self._thread.start()
 
     def wanted(self, topic: str) -> bool:
-        """Whether anybody has subscribed to a topic."""
+        """Whether a topic has subscribers."""
         return any(topic in connection.topics for connection in self._all())
 
     def publish(self, topic: str, content: Message) -> None:
-        """Send to all who have subscribed to a topic; never waits."""
+        """Send to all subscribers of a topic; never blocks."""
         listening = [connection for connection in self._all() if topic in connection.topics]
         if listening:
             line = to_line({"topic": topic, **content})
@@ -83,7 +81,7 @@ class Server:
         """Give up the port and end all connections."""
         self.claim.remove()
         with suppress(OSError):
-            self._socket.shutdown(socket.SHUT_RDWR)  # wakes the thread that accepts
+            self._socket.shutdown(socket.SHUT_RDWR)  # wakes the accepting thread
         self._socket.close()
         for connection in self._all():
             connection.close()
@@ -102,7 +100,7 @@ class Server:
             with self._lock:
                 self._connections.add(connection)
             Thread(target=self._serve, args=(connection,), name="armtempo reader", daemon=True).start()
-            connection.start_writing()  # after that: a stop need not wait for a second thread
+            connection.start_writing()  # started later, so that a stop need not wait for a second thread
 
     def _serve(self, connection: _Connection) -> None:
         try:
@@ -135,13 +133,13 @@ class _Connection:
         self._starting = Lock()
 
     def start_writing(self) -> None:
-        """Begin to send what waits; once begun, another call does nothing."""
+        """Start the writing thread, unless it runs."""
         with self._starting:
             if self._writer.ident is None:
                 self._writer.start()
 
     def serve(self) -> None:
-        """Answer requests until the caller hangs up or sends what is no message."""
+        """Answer requests until the caller closes the connection or sends an invalid message."""
         reader = LineReader(self._socket)
         try:
             while (request := reader.read()) is not None:
@@ -153,7 +151,7 @@ class _Connection:
             return
 
     def send(self, line: bytes) -> None:
-        """Put a line into the queue; dropped where the caller does not keep up."""
+        """Put a line into the queue; drop it if the queue is full."""
         try:
             if self._dropped:
                 self._lines.put_nowait(to_line({"topic": "lost", "messages": self._dropped}))
@@ -163,7 +161,7 @@ class _Connection:
             self._dropped += 1
 
     def close(self) -> None:
-        """End the connection, once what waits is sent, but soon."""
+        """End the connection after sending the queue, at most for _FLUSH_S."""
         self.start_writing()
         with suppress(queue.Full):
             self._lines.put_nowait(None)

@@ -15,7 +15,7 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 
 
 class StepScale(Protocol):
-    """Whatever knows a joint's step pulses per degree."""
+    """An object with a joint's step pulses per degree."""
 
     @property
     def steps_per_deg(self) -> float:
@@ -25,8 +25,8 @@ class StepScale(Protocol):
 def trajectory(data: bytes, joints: Sequence[StepScale], name: str, arm: str = "the arm") -> Trajectory:
     """The motion that a record holds, to the rounding of its integers; ``joints`` are the driven ones.
 
-    Raises InputError if the record is damaged or has another number of joints; ``name`` and ``arm`` are
-    what the message calls motion and arm.
+    Raises InputError if the record is damaged or has another number of joints; ``name`` and ``arm``: names of
+    motion and arm for the message.
     """
     try:
         motion = Motion(data)

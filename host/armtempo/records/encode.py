@@ -1,4 +1,4 @@
-"""From degrees and seconds to the board's steps, counts and ticks: arm record with its outputs, motion record."""
+"""From degrees and seconds to the board's steps, counts and ticks: arm record and motion record."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from armtempo.planning.brake_time import BrakeTimes
 from armtempo.splines.trajectory import Trajectory
 
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
-"""Of a joint: what may change while it stays where it is. (Driver and safety have fields of their own.)"""
+"""Fields of a joint that may change without changing its position. (Driver and safety have their own.)"""
 _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 
 def arm_record(arm: Arm) -> bytes:
     """The arm record (layout: ``armtempo_shared.armrecord``).
 
-    Raises InputError if a figure does not fit the board.
+    Raises InputError if a value does not fit the board.
     """
     joints = [_joint(joint) for joint in arm.driven]
     return armrecord.pack(_head(arm), joints, outputs(arm), inputs(arm))
@@ -45,9 +45,9 @@ def step_rates(arm: Arm) -> list[int]:
 def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = None) -> bytes:
     """The motion record (layout: ``armtempo_shared.motion``), tied to the arm by the checksum of its record.
 
-    ``brakes``: how long it takes to come to rest and to change its speed; None: it can do neither.
-    Raises InputError if trajectory and arm do not fit each other or the record's number range, PlanError
-    where the board could not hold the numbers.
+    ``brakes``: its times for braking and changes of speed; None: neither is possible. Raises InputError if
+    trajectory and arm do not fit each other or the record's number range, PlanError if the numbers are too
+    large for the board.
     """
     if len(trajectory.joints) != len(arm.driven):
         raise InputError(
@@ -111,7 +111,7 @@ def _head(arm: Arm) -> dict[str, Any]:
 
 
 def _identity(arm: Arm) -> int:
-    """A hash of what makes an angle of a joint mean a place of the arm: all but names, limits and models."""
+    """A hash of everything that maps joint angles to the arm's position: all but names, limits and models."""
     joints = [{k: v for k, v in asdict(joint).items() if k not in _NOT_IDENTITY} for joint in arm.joints]
     for joint in joints:
         if joint["encoder"]:
@@ -121,7 +121,7 @@ def _identity(arm: Arm) -> int:
 
 
 def _as_floats(value: Any) -> Any:
-    """The same with every number a float: 20 and 20.0 are one gear ratio."""
+    """The value with every number as a float: 20 and 20.0 are the same gear ratio."""
     if isinstance(value, dict):
         return {key: _as_floats(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
@@ -169,7 +169,7 @@ def _switch(where: int | str | None) -> int:
 
 
 def _max_rate(joint: DrivenJoint) -> int:
-    """The joint's speed limit in steps/s with a little room for rounding.
+    """The joint's speed limit in steps/s, with a margin for rounding.
 
     Raises InputError if the board cannot step that fast.
     """

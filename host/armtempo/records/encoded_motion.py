@@ -1,4 +1,4 @@
-"""A motion made ready for the board: its record, and the trajectory that the record holds."""
+"""A motion for the board: its record, and the trajectory that the record holds."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armtempo.splines.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class MotionKey:
-    """What the board knows a stored motion by: its name and the checksum of its record."""
+    """The board's identification of a stored motion: its name and the checksum of its record."""
 
     name: str
     crc: int
@@ -27,30 +27,30 @@ class MotionKey:
 
 @dataclass(frozen=True, eq=False)
 class EncodedMotion:
-    """A motion as the board stores and replays it, with all that the host knows of it."""
+    """A motion as the board stores and replays it, with the host's data about it."""
 
     name: str
-    """On the board."""
+    """Name on the board."""
     arm: Arm
     trajectory: Trajectory
     data: bytes
     """The motion record (layout: ``armtempo_shared.motion``)."""
     plan: Plan | None = None
-    """How it was planned, where that is known."""
+    """Its plan, if known."""
 
     @property
     def key(self) -> MotionKey:
-        """What the board knows it by."""
+        """Its identification on the board."""
         return MotionKey(self.name, record_crc(self.data))
 
     @property
     def start_deg(self) -> Array:
-        """Where it begins, degrees (J,)."""
+        """Start posture, degrees (J,)."""
         return self.trajectory(0.0)
 
 
 def of_trajectory(trajectory: Trajectory, arm: Arm) -> EncodedMotion:
-    """A trajectory of ``arm`` with the times in which it can brake to rest and change its speed.
+    """A trajectory of ``arm`` with its times for braking and changes of speed.
 
     Raises InputError or PlanError if the board could not replay it.
     """
@@ -59,9 +59,9 @@ def of_trajectory(trajectory: Trajectory, arm: Arm) -> EncodedMotion:
 
 
 def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
-    """The motion of a plan under ``name``, else under a name made of the job's.
+    """The motion of a plan; ``name``: default from the job's name.
 
-    Raises InputError for a name that the board does not take, and as ``of_trajectory``.
+    Raises InputError for an invalid name, and as ``of_trajectory``.
     """
     if name is not None and not re.fullmatch(f"[A-Za-z0-9_-]{{1,{MAX_NAME}}}", name):
         raise InputError(
@@ -74,6 +74,6 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
 
 
 def of_record(name: str, data: bytes, arm: Arm) -> EncodedMotion:
-    """The motion that a record from the board holds; InputError if it is damaged or does not fit the arm."""
+    """The motion of a record from the board; raises InputError if it is damaged or does not fit the arm."""
     trajectory = decode.trajectory(data, arm.driven, name, f"arm {arm.name!r}")
     return EncodedMotion(name, arm, trajectory, data)

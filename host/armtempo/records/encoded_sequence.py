@@ -1,4 +1,4 @@
-"""A sequence made ready for the board: its motions' records and its own."""
+"""A sequence for the board: its motions' records and its own."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ class EncodedSequence:
 
     @property
     def arm(self) -> Arm:
-        """The arm it was planned for."""
+        """The arm that it was planned for."""
         return self.plan.arm
 
     @property
     def key(self) -> MotionKey:
-        """What the board knows it by."""
+        """Its identification on the board."""
         return MotionKey(self.plan.name, record_crc(self.data))
 
 
 def of_plan(plan: SequencePlan) -> EncodedSequence:
-    """The records of a sequence; InputError or PlanError if the board could not run it."""
+    """The records of a sequence; raises InputError or PlanError if the board could not run it."""
     motions = tuple(encoded_motion.of_trajectory(leg, plan.arm) for leg in plan.legs)
     keys = [(motion.name, motion.key.crc) for motion in motions]
     data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys, plan.counters)

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import RunFolderError
-from armtempo.formats.atomic_file import replace_text
-from armtempo.report import drawing, html_page, plots
+from armtempo.report import analysis, drawing, html_page, plots
 from armtempo.report.evaluation import Evaluation, evaluate
-from armtempo.runs import analysis
 
 PAGE = "comparison.html"
 _COLUMNS = {

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,8 +12,8 @@ from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
-from armtempo.runs import analysis, peaks, reader, replayed, stretched
-from armtempo.runs.run_folder import COMPLETE
+from armtempo.report import analysis, peaks, replayed, run_reader
+from armtempo.report.run_folder import COMPLETE
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
@@ -22,10 +22,10 @@ from armtempo.splines.trajectory import Trajectory
 class Evaluation:
     """A run with its motion, its curves and what is wrong with its files.
 
-    ``plan`` is None for a motion that only the board had; ``arm`` too where the folder does not say.
+    ``plan`` is None for a motion that only the board had; ``arm`` too if the folder does not say.
     """
 
-    run: reader.RunData
+    run: run_reader.RunData
     trajectory: Trajectory
     arm: Arm | None
     plan: Plan | None
@@ -57,7 +57,7 @@ class Evaluation:
         return peaks.limit_checks(self.curves, self.trajectory, self.limits, resolutions)
 
     @property
-    def last(self) -> reader.RepetitionData:
+    def last(self) -> run_reader.RepetitionData:
         """The last repetition that has samples."""
         return [repetition for repetition in self.run.repetitions if len(repetition.time_s)][-1]
 
@@ -67,7 +67,7 @@ def evaluate(folder: Path) -> Evaluation:
 
     Raises RunFolderError if it is not known what was to move, or there is not one sample.
     """
-    run = reader.load(folder)
+    run = run_reader.load(folder)
     plan = replayed.plan_of(run)
     trajectory = plan.trajectory if plan else replayed.trajectory_of(run)
     if len(run.joints) != len(trajectory.joints):
@@ -79,11 +79,11 @@ def evaluate(folder: Path) -> Evaluation:
     if not usable:
         raise RunFolderError(f"{folder}: contains no samples", "run it again")
     found = complaints(run)
-    arm = plan.arm if plan else _arm(run, found)
+    arm = plan.holding if plan else _arm(run, found)
     return Evaluation(run, trajectory, arm, plan, analysis.curves(usable, trajectory), tuple(found))
 
 
-def _arm(run: reader.RunData, complaints: list[str]) -> Arm | None:
+def _arm(run: run_reader.RunData, complaints: list[str]) -> Arm | None:
     """The arm of a motion without a plan, if it is there and fits; else one more complaint."""
     try:
         arm = replayed.arm_of(run)
@@ -93,7 +93,7 @@ def _arm(run: reader.RunData, complaints: list[str]) -> Arm | None:
     return arm if arm and len(arm.driven) == len(run.joints) else None
 
 
-def complaints(run: reader.RunData) -> list[str]:
+def complaints(run: run_reader.RunData) -> list[str]:
     """What is missing or broken in each repetition, one sentence each."""
     found = []
     for repetition, entry in zip(run.repetitions, run.entries, strict=True):
@@ -108,7 +108,7 @@ def complaints(run: reader.RunData) -> list[str]:
             found.append(f"{repetition.file}: samples {first} to {last} are missing")
         if np.any(steps <= 0):
             found.append(f"{repetition.file}: the sample count starts again in the middle (a reset?)")
-        if words := stretched.note(repetition):
+        if words := replayed.speed_note(repetition):
             found.append(words)
         if repetition.state != COMPLETE:
             end = repetition.time_s[-1]

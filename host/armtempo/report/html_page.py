@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from armtempo.formats.text import visible
+from armtempo.basics.text import visible
 
 _STYLE = Path(__file__).with_name("page.css")
 
@@ -99,7 +99,7 @@ def escape(text: str) -> str:
 
 
 def number(value: float, form: str) -> str:
-    """A value as ``form`` has it; a dash if there is none (NaN), no sign where it rounds to 0."""
+    """A value as ``form`` has it; a dash if there is none (NaN), no sign if it rounds to 0."""
     if math.isnan(value):
         return "–"
     text = f"{value:{form}}"

@@ -12,12 +12,13 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import MissingPackageError
-from armtempo.formats.text import visible
+from armtempo.basics.text import aligned, visible
 from armtempo.model.parts import Limits
+from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.planning.torque import MotorTorques
+from armtempo.report import replayed
+from armtempo.report.analysis import Curves
 from armtempo.report.drawing import PAGE_COLOUR
-from armtempo.runs import stretched
-from armtempo.runs.analysis import Curves
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def _joint_figure(rows: int, names: Sequence[str], height: float) -> tuple[Figur
 
 
 def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
-    """Angle, speed, acceleration and jerk of every joint, with ``limits`` where there are any (Figs. 5 and 7)."""
+    """Angle, speed, acceleration and jerk of every joint, with ``limits`` if there are any (Figs. 5 and 7)."""
     figure, axes = _joint_figure(4, names, 8.0)
     times = np.linspace(0.0, trajectory.duration_s, _POINTS)
     for order in range(4):
@@ -89,7 +90,7 @@ def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], na
         planned = [trajectory(times, order) for order in range(4)]
     else:
         times = times[times <= found.times_s[-1]]
-        slower = stretched.theory(trajectory, times, np.interp(times, found.times_s, found.path_s))
+        slower = replayed.theory(trajectory, times, np.interp(times, found.times_s, found.path_s))
         jerk = np.gradient(slower[2], times, axis=0) if len(times) > 1 else np.zeros_like(slower[2])
         planned = [*slower, jerk]
     for order, theory in enumerate(planned):
@@ -125,7 +126,7 @@ def errors(found: Curves, names: Sequence[str]) -> Figure:
 
 
 def torque(found: MotorTorques, enough: float) -> Figure:
-    """Torque that each motor holds of what it needs, over time; dashed where it loses steps and where it is prudent."""
+    """Torque that each motor holds of what it needs, over time; dashed if it loses steps and where it is prudent."""
     figure, ((axis,),) = new_figure(1, 1, 6.8, 2.8)
     for joint, name in enumerate(found.joints):
         colour = COLOURS[joint % len(COLOURS)]
@@ -200,3 +201,42 @@ def theme(axis: Axes) -> None:
     if legend is not None:
         for text in legend.get_texts():
             text.set_color(PAGE_COLOUR)
+
+
+def corridor_lines(points: Sequence[CorridorTime], unit: str) -> list[str]:
+    """Motion time against corridor as a table, one string a line."""
+    first = points[0].total_s
+    rows = [["corridor", "time", "saved"], [unit, "s", "%"]]
+    for point in points:
+        name = "free" if point.corridor is None else f"{point.corridor:.4g}"
+        rows.append([name, f"{point.total_s:.4f}", f"{100.0 * (1.0 - point.total_s / first):.2f}"])
+    return aligned(rows, (10, 10, 8))
+
+
+def corridor_csv(points: Sequence[CorridorTime], unit: str) -> str:
+    """The same as CSV, a line for each corridor; that of the free path is empty."""
+    head = f"corridor_{unit},time_s\n"
+    return head + "".join(
+        f"{'' if point.corridor is None else repr(point.corridor)},{point.total_s!r}\n" for point in points
+    )
+
+
+def corridors(points: Sequence[CorridorTime], unit: str, name: str) -> Figure:
+    """The curve; lines for the spline itself and for the free path. MissingPackageError without matplotlib."""
+    drawn, grid = new_figure(1, 1, 6.4, 4.0)
+    axes = grid[0][0]
+    inner = [(point.corridor, point.total_s) for point in points if point.corridor]
+    axes.plot(*zip(*inner, strict=True), marker="o", markersize=3, label="in a corridor")
+    for point in points:
+        if not point.corridor:
+            label = "free" if point.corridor is None else "on the spline"
+            axes.axhline(
+                point.total_s, linestyle=":" if point.corridor is None else "--", label=label, linewidth=1
+            )
+    axes.set_xscale("log")
+    axes.set_xlabel(f"corridor ({'mm, tool' if unit == 'mm' else 'degrees, any joint'})")
+    axes.set_ylabel("motion time (s)")
+    axes.set_title(name)
+    axes.legend()
+    theme(axes)
+    return drawn

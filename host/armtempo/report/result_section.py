@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armtempo.report import html_page, verdict
+from armtempo.report import analysis, html_page, peaks, verdict
 from armtempo.report.evaluation import Evaluation
-from armtempo.runs import analysis, peaks
 
 _MEASURED = {
     "joint": "",
@@ -39,7 +38,7 @@ _PEAKS = {
     "kept exactly",
 }
 _MEASURED_PEAKS = ("measured", "verdict")
-"""Columns that a table has only where something was measured."""
+"""Columns that a table has only if something was measured."""
 _COLOURS = {
     peaks.EXCEEDED: html_page.BAD,
     peaks.KEPT: html_page.GOOD,

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armtempo.formats.atomic_file import replace_text
+from armtempo.basics.atomic_file import replace_text
 from armtempo.kinematics import chain
 from armtempo.model.arm import Arm
 from armtempo.planning import torque
-from armtempo.report import arm_figure, drawing, html_page, plan_section, plots, result_section
+from armtempo.report import arm_picture, drawing, html_page, plan_section, plots, result_section
 from armtempo.report.evaluation import Evaluation, evaluate
-from armtempo.runs.run_folder import COMPLETE
+from armtempo.report.run_folder import COMPLETE
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def _of_arm(arm: Arm, trajectory: Trajectory) -> dict[str, tuple[Figure, str]]:
         times = np.linspace(0.0, trajectory.duration_s, _PATH_POINTS)
         stops = trajectory(np.linspace(0.0, trajectory.duration_s, _POSTURES))
         drawn["postures"] = (
-            arm_figure.postures(chain.chains_mm(arm, stops), chain.tool_path_mm(arm, trajectory, times)),
+            arm_picture.postures(chain.chains_mm(arm, stops), chain.tool_path_mm(arm, trajectory, times)),
             f"The arm at {_POSTURES} equally spaced times, from its start to its end, and the path of its tool.",
         )
     return drawn

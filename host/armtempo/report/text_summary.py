@@ -8,13 +8,15 @@ from typing import Any
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
+from armtempo.basics.text import aligned
 from armtempo.diagnosis.resolution import findings as coarse_steps
-from armtempo.formats.text import aligned
+from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, path_deviation, torque
 from armtempo.planning.free import free_plan
-from armtempo.runs.replayed import JointResult
+from armtempo.report.replayed import JointResult
+from armtempo.splines.trajectory import Trajectory
 
 _HEAD = (
     ("joint", "time", "floor", "over", "speed", "acceleration", "jerk"),
@@ -30,7 +32,7 @@ _FLOORS = {
 }
 """What ``Search.floor_kind`` means."""
 _WORTH_SAYING = 0.03
-"""A free path is named where it might save more than this part of the motion time."""
+"""A free path is named if it might save more than this part of the motion time."""
 
 
 def lines(plan: Plan) -> list[str]:
@@ -51,14 +53,22 @@ def lines(plan: Plan) -> list[str]:
     if job.refine == AUTO:
         text.append(f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes")
     text.extend(f"note: {note}" for note in plan.notes)
-    if least := torque.least_margin(plan.arm, plan.trajectory):
-        level = "warning" if least.margin < torque.ENOUGH else "torque"
-        prudent = f"; {torque.ENOUGH:g} is prudent" if least.margin < torque.ENOUGH else ""
-        text.append(f"{level}: {least.joint} has the least to spare: {least.words}{prudent}")
+    text.extend(torque_lines([(plan.holding, plan.trajectory)]))
     text.extend(
         f"{each.level.value}: {each.where}: {each.what}; {each.next_step}" for each in coarse_steps(plan.arm)
     )
     return text
+
+
+def torque_lines(motions: Iterable[tuple[Arm, Trajectory]]) -> list[str]:
+    """Which motor has the least to spare in these motions, each with the arm as it is loaded there."""
+    found = [least for arm, motion in motions if (least := torque.least_margin(arm, motion))]
+    if not found:
+        return []
+    least = min(found)
+    level = "warning" if least.margin < torque.ENOUGH else "torque"
+    prudent = f"; {torque.ENOUGH:g} is prudent" if least.margin < torque.ENOUGH else ""
+    return [f"{level}: {least.joint} has the least to spare: {least.words}{prudent}"]
 
 
 def result_lines(results: Iterable[JointResult]) -> list[str]:
@@ -128,7 +138,7 @@ def _polished(search: Search) -> str:
 
 
 def _free_path(plan: Plan) -> list[str]:
-    """What a free path could save at most; nothing where that is little or the job gives the path."""
+    """What a free path could save at most; nothing if that is little or the job gives the path."""
     job, total_s = plan.job, plan.trajectory.duration_s
     if job.path != "through" or checks.leads_tool(job):
         return []
@@ -168,7 +178,7 @@ def values(plan: Plan) -> dict[str, Any]:
         "record_bytes": record_bytes(plan),
         "joints": [_joint_values(plan, joint) for joint in range(len(plan.extremes))],
         "notes": list(plan.notes),
-        "torque": least._asdict() if (least := torque.least_margin(plan.arm, plan.trajectory)) else None,
+        "torque": least._asdict() if (least := torque.least_margin(plan.holding, plan.trajectory)) else None,
     }
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armtempo.report import peaks, replayed
 from armtempo.report.evaluation import Evaluation
-from armtempo.runs import peaks, stretched
-from armtempo.runs.run_folder import COMPLETE
+from armtempo.report.run_folder import COMPLETE
 
 GOOD, BAD, OPEN = "good", "bad", "open"
 """What a finding is: as it should be, not so, or not to be told from what was recorded."""
@@ -37,7 +37,7 @@ class Verdict:
 
     @property
     def state(self) -> str:
-        """BAD where one finding is, else OPEN where one is, else GOOD."""
+        """BAD if one finding is, else OPEN if one is, else GOOD."""
         states = {finding.state for finding in self.findings}
         return BAD if BAD in states else OPEN if OPEN in states else GOOD
 
@@ -48,7 +48,7 @@ class Verdict:
 
     @property
     def line(self) -> str:
-        """The verdict on one line: where it is not plainly OK, with the findings that make it so."""
+        """The verdict on one line: if it is not plainly OK, with the findings that make it so."""
         reasons = [finding.text for finding in self.findings if finding.state == self.state != GOOD]
         return ": ".join([self.summary, "; ".join(reasons)]) if reasons else self.summary
 
@@ -77,7 +77,9 @@ def _repetitions(found: Evaluation) -> Iterator[VerdictItem]:
 
 def _samples(found: Evaluation) -> Iterator[VerdictItem]:
     """Cut-short repetitions are told by their number; here is what is missing or damaged of the record."""
-    missing = [text for text in found.complaints if "cut short" not in text and stretched.NOTE not in text]
+    missing = [
+        text for text in found.complaints if "cut short" not in text and replayed.SPEED_NOTE not in text
+    ]
     yield from (VerdictItem(OPEN, text) for text in missing)
     if not missing:
         yield VerdictItem(GOOD, "no sample is missing")

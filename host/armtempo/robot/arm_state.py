@@ -1,9 +1,9 @@
-"""The arm as the board knows it: its record, and the positions of the joints."""
+"""The arm's record on the board, its differences from another, and the positions of the joints."""
 
 from __future__ import annotations
 
 import numpy as np
-from armtempo_shared import wire
+from armtempo_shared import armrecord, wire
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
@@ -12,15 +12,40 @@ from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.records import encode
-from armtempo.robot import arm_difference, engine_room
+from armtempo.robot import engine_room
+
+_WORDS = {
+    "channel": "motor channel",
+    "dir_inverted": "motor direction",
+    "encoder": "encoder",
+    "encoder_inverted": "encoder direction",
+    "counts_num": "encoder counts a step",
+    "counts_den": "encoder counts a step",
+    "min_steps": "range",
+    "max_steps": "range",
+    "max_rate": "speed limit",
+    "following_counts": "following error",
+    "limit_low": "limit switches",
+    "limit_high": "limit switches",
+    "limit_active_high": "limit switches",
+    "flags": "E-stop, enable output or what a lost link does",
+    "pulse_ticks": "driver timing",
+    "low_ticks": "driver timing",
+    "dir_setup_ticks": "driver timing",
+    "dir_hold_ticks": "driver timing",
+    "link_timeout_ms": "link time-out",
+    "identity": "geometry, motors, encoders or switches",
+}
+_KEEPS = "which keeps the position, as only limits, outputs or inputs differ"
+_LOSES = "after which the position is unknown"
 
 
 def configure(client: Client, arm: Arm, replace: bool) -> None:
-    """Make sure the board has this arm's record; where it is new, positions are unknown.
+    """Send the arm's record to the board, unless the board already has it; positions are unknown afterwards.
 
-    ``replace``: also in the place of another record; where that differs in limits alone, the board keeps the
-    positions. Raises LinkError if the board has another record and ``replace`` is false, InputError where
-    the arm does not fit the board, which keeps the one it has, BoardError if it is moving.
+    ``replace``: replace another record; if only limits differ, the board keeps the positions. Raises
+    LinkError if the board has another record and ``replace`` is false, InputError if the arm does not fit the
+    board (which then keeps its record), BoardError during a motion.
     """
     data = encode.arm_record(arm)
     if client.info.arm_crc == wire.record_crc(data):
@@ -36,17 +61,16 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
 
 def _other_arm(arm: Arm, old: bytes, new: bytes) -> LinkError:
     return LinkError(
-        f"the board is set up for a different arm than {arm.name!r} ({arm.source}): "
-        f"{arm_difference.describe(old, new)}",
+        f"the board is set up for a different arm than {arm.name!r} ({arm.source}): {difference(old, new)}",
         f"give that arm's file with --arm; or, if this is the arm on the board "
-        f"now, 'armtempo configure' or --replace-arm sets the board up for it, {arm_difference.consequence(old, new)}",
+        f"now, 'armtempo configure' or --replace-arm sets the board up for it, {consequence(old, new)}",
     )
 
 
 def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:
     """Declare the arm's position: ``angles_deg`` (J,), or the arm file's home posture.
 
-    Raises InputError for a posture that does not fit the arm, BoardError if the board is moving.
+    Raises InputError for a posture that does not fit the arm, BoardError during a motion.
     """
     posture = point_to_point.posture(arm.home_deg if angles_deg is None else angles_deg, arm)
     client.home([round(steps) for steps in posture * _steps_per_deg(arm)])
@@ -64,7 +88,7 @@ def home_unknown(client: Client, arm: Arm) -> None:
 
 
 def posture_deg(client: Client, arm: Arm) -> Array:
-    """Where the joints are by the steps commanded, degrees (J,); LinkError if that is unknown."""
+    """Joint angles from the commanded steps, degrees (J,); raises LinkError if a position is unknown."""
     status = client.status()
     unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
     if unknown:
@@ -76,9 +100,42 @@ def posture_deg(client: Client, arm: Arm) -> Array:
 
 
 def is_at(client: Client, arm: Arm, target_deg: Array) -> bool:
-    """Whether every joint is within half a step of ``target_deg`` (J,); LinkError if that is unknown."""
+    """Whether every joint is within half a step of ``target_deg`` (J,); raises LinkError if a position is unknown."""
     return bool(np.all(np.abs(posture_deg(client, arm) - target_deg) * _steps_per_deg(arm) <= 0.5))
 
 
 def _steps_per_deg(arm: Arm) -> Array:
     return np.array([joint.steps_per_deg for joint in arm.driven])
+
+
+def difference(old: bytes, new: bytes) -> str:
+    """Describe the differences between the new and the old record."""
+    try:
+        (old_head, old_joints, _), (new_head, new_joints, _) = armrecord.unpack(old), armrecord.unpack(new)
+        wiring = [*zip(armrecord.unpack_outputs(old), armrecord.unpack_outputs(new), strict=True)]
+    except armrecord.ArmRecordError:
+        return "the board's record is of another version"
+    if len(old_joints) != len(new_joints):
+        return f"it has {len(new_joints)} driven joints, the board's arm {len(old_joints)}"
+    found = [_words(old_head, new_head)]
+    for number, rows in enumerate(zip(old_joints, new_joints, strict=True), 1):
+        words = _words(*rows)
+        found.append(f"joint {number}: {words}" if words else "")
+    found += [
+        what for what, (before, after) in zip(("outputs", "inputs"), wiring, strict=True) if before != after
+    ]
+    return "other " + "; ".join(filter(None, found))
+
+
+def consequence(old: bytes, new: bytes) -> str:
+    """Describe the consequences for the position and stored motions if the new record replaces the old one."""
+    try:
+        (old_head, old_joints, _), (new_head, new_joints, _) = armrecord.unpack(old), armrecord.unpack(new)
+    except armrecord.ArmRecordError:
+        return _LOSES
+    same = armrecord.without_limits(old_head, old_joints) == armrecord.without_limits(new_head, new_joints)
+    return _KEEPS if same else _LOSES
+
+
+def _words(old: dict[str, int], new: dict[str, int]) -> str:
+    return ", ".join(dict.fromkeys(_WORDS.get(key, key) for key in old if old[key] != new[key]))

@@ -1,10 +1,10 @@
-"""A board in use: everything that can be done with it, from its arm to a recorded run."""
+"""A connected board: configure, home, move, replay, record, stop."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -17,6 +17,8 @@ from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
+from armtempo.diagnosis.selftest import selftest
+from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMotion
 from armtempo.model.arm import Arm
@@ -26,6 +28,7 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.records import encoded_motion, encoded_sequence
 from armtempo.records.encoded_motion import EncodedMotion, MotionKey
+from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot import (
     arm_state,
     board_state,
@@ -39,6 +42,7 @@ from armtempo.robot import (
 )
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.by_hand import HandGuided
+from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardInput, BoardOutput
@@ -48,19 +52,19 @@ from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.stored_motion import TURN_S
-from armtempo.robot.where import Where, posture_deg
-from armtempo.runs.sequence_reader import SequenceRun
-from armtempo.selftest import selftest
-from armtempo.selftest.result import SelfTest
+
+_MOST_REPETITIONS = 99
+"""Their files are numbered with two digits."""
 
 
 @checked
 class Board:
     """A board and the arm that it moves; ``connect`` gives one.
 
-    Nothing moves before the arm's position is known (``home``), and a motion only starts from where it begins
-    (``goto``). Every method raises BoardError if the board refuses or a fault ends a motion, LinkError
-    where it cannot be reached. What moves stops at Ctrl-C, and with Stopped at a ``StopRequest``.
+    Nothing moves before the arm's position is known (``home``), and a motion only starts if the arm is at its
+    start (``goto``). Every method raises BoardError if the board refuses or a fault ends a motion, and
+    LinkError if the board cannot be reached. Ctrl-C, or a ``StopRequest``, brakes a motion and raises
+    Stopped.
     """
 
     def __init__(self, client: Client, port: str, stack: ExitStack | None = None) -> None:
@@ -68,25 +72,30 @@ class Board:
         """The protocol's commands one by one."""
         self.port = port
         self.arm: Arm | None = None
-        """The arm that the board was last set up for through this object."""
+        """The arm that this object last set the board up for."""
         self.stops: list[StopRequest] = []
-        """The stop requests of what this object has under way."""
+        """The stop requests of running calls of this object."""
         self.last_jog_ends = ""
-        """Why the last jog ended before it was to, in words; "" if it did not."""
+        """Why the last jog ended early; "" if it did not."""
         self._stack = stack or ExitStack()
         self._start = goto.StartPosition(client, port)
         self._last_folder: Path | None = None
         self._last_sequence: Path | None = None
 
     def close(self) -> None:
-        """Free the port; a virtual board ends. Nothing else can be done with this object then."""
+        """Close the port; a virtual board ends. Other methods raise LinkError afterwards."""
         with self._last_turn():
             self._stack.close()
-            self.client.session.check = self._closed
 
-    def _last_turn(self) -> AbstractContextManager[bool]:
-        """While no other thread is within a command: it would open a port again that was closed under it."""
-        return self.client.session.in_a_hurry(TURN_S)
+    @contextmanager
+    def _last_turn(self) -> Iterator[None]:
+        """While no other thread is within a command: it would open a port again that was closed under it.
+
+        One that waits longer, for a cable that is out, finds that the board is closed.
+        """
+        with self.client.session.in_a_hurry(TURN_S):
+            self.client.session.check = self._closed
+            yield
 
     def _closed(self) -> None:
         raise LinkError(f"the board on {self.port} was closed", "open it again with armtempo.connect")
@@ -105,26 +114,26 @@ class Board:
 
     @property
     def info(self) -> Hello:
-        """Who the board is: program, protocol, arm record, room, step rates."""
+        """The board's identity: program, protocol, arm record, memory, step rates."""
         return self.client.info
 
     def status(self) -> Status:
-        """What the board is doing, its fault, and where the joints are in steps and counts."""
+        """The board's state, its fault, and the joints' positions in steps and counts."""
         return self.client.status()
 
     def state(self, arm: Arm | Path | str | None = None) -> BoardState:
-        """The same with what the board says of itself, in degrees and with the names of the joints.
+        """``info`` and ``status`` in one object, with the joints' names and angles in degrees.
 
-        ``arm``: where the board is set up for it; None: the one that was named to this object.
+        ``arm``: used if the board is set up for it; None: ``self.arm``.
         """
         return board_state.read(self.client, self.port).named(self.arm if arm is None else Arm.of(arm))
 
     def configure(self, arm: Arm | Path | str, replace: bool = False) -> None:
-        """Make sure that the board has this arm's record; ``arm``: or its file, or the name of one that ships.
+        """Set the board up for ``arm``: an object, its file, or the name of a shipped arm.
 
-        ``replace``: put it in the place of another one. All positions are unknown then, unless the two differ
-        in limits alone; stored motions of the other record are refused. Raises LinkError if the board has
-        another record and ``replace`` is false, InputError if a figure of the arm does not fit the board.
+        ``replace``: replace another arm's record. All positions are unknown afterwards, unless only limits
+        differ; stored motions of the other record are refused. Raises LinkError if the board has another
+        record and ``replace`` is false, InputError if a value of the arm does not fit the board.
         """
         arm = Arm.of(arm)
         arm_state.configure(self.client, arm, replace)
@@ -140,11 +149,12 @@ class Board:
         progress: Progress | None = None,
         replace: bool = False,
     ) -> EncodedMotion:
-        """Store a motion, unless the board has just this one already; ``progress`` counts bytes.
+        """Store a motion, unless the board already has it; ``progress`` counts bytes.
 
-        ``motion``: a plan or its file. ``name``: on the board, else made of the job's name. ``default``: let the
-        board's button start it. ``replace``: also in the place of another motion of this name, which the button then
-        starts no longer. Raises LinkError if there is such a motion, or the board is set up for another arm.
+        ``motion``: a plan or its file. ``name``: on the board; default: from the job's name. ``default``: let
+        the board's button start it. ``replace``: replace another motion of this name; if that was the
+        default, the button starts nothing. Raises LinkError if there is such a motion and ``replace`` is
+        false, or the board is set up for another arm.
         """
         if isinstance(motion, Path | str):
             motion = Plan.load(motion)
@@ -162,7 +172,7 @@ class Board:
         progress: Progress | None = None,
         replace: bool = False,
     ) -> MotionKey:
-        """Store a planned sequence and its motions, unless the board has just these; as ``upload`` for a motion."""
+        """Store a planned sequence and its motions; arguments and errors as in ``upload``."""
         encoded = encoded_sequence.of_plan(sequence)
         self.configure(encoded.arm)
         key = sequence_run.store(self.client, encoded, progress, replace)
@@ -175,9 +185,10 @@ class Board:
         return tuple(self.client.stored())
 
     def read(self, name: str, arm: Arm | Path | str | None = None) -> EncodedMotion:
-        """A stored motion of ``arm``, else of the arm that the board is set up for, read back.
+        """Read a stored motion back.
 
-        InputError if the record is damaged or does not fit the arm.
+        ``arm``: the arm it was made for; default: the board's. Raises InputError if the record is damaged or
+        does not fit the arm.
         """
         data = self.client.fetch(self._stored_name(name))
         if data.startswith(MAGIC[:KIND_BYTES]):
@@ -185,11 +196,11 @@ class Board:
         return encoded_motion.of_record(name, data, self._known_arm() if arm is None else Arm.of(arm))
 
     def _stored_name(self, name: str) -> str:
-        """The name, where it can be one: InputError with what is meant else."""
+        """``name`` if it is valid for a stored motion; raises InputError otherwise."""
         if not is_name(name):
             raise InputError(
                 f"{name!r} is not a valid name of a motion on the board",
-                f"give the name of a stored one: {NAME_RULE}; armtempo.Plan.load reads a file",
+                f"give the name of a stored motion: {NAME_RULE}; armtempo.Plan.load reads a file",
             )
         return name
 
@@ -202,13 +213,13 @@ class Board:
         self.client.rename(self._stored_name(old), self._stored_name(new))
 
     def set_default(self, name: str) -> None:
-        """What the board's button starts; "" for nothing."""
+        """Set the motion or sequence that the board's button starts; "" for none."""
         self.client.set_default(self._stored_name(name) if name else name)
 
     # where the arm is
 
     def home(self, arm: Arm | Path | str, where: Where | None = None) -> None:
-        """Declare that ``arm`` is at ``where``, or at its home posture; nothing moves.
+        """Declare that ``arm`` is at ``where`` (default: its home posture); nothing moves.
 
         Raises InputError for a posture that does not fit the arm, LinkError if the board is set up for another.
         """
@@ -219,7 +230,7 @@ class Board:
     def home_to_switches(self, arm: Arm | Path | str, stop: StopRequest | None = None) -> None:
         """Home the joints that have a switch of known angle: to it, off it, slowly to it again, to their home angle.
 
-        Raises InputError if no joint has one, LinkError if a switch does not trip.
+        Raises InputError if no joint has such a switch, LinkError if a switch does not trip.
         """
         arm = Arm.of(arm)
         self.configure(arm)
@@ -228,17 +239,17 @@ class Board:
             homing.home_to_switches(self.client, arm, wanted)
 
     def posture_deg(self) -> Array:
-        """Where the joints are by the steps commanded, degrees (J,); LinkError if that is unknown."""
+        """Joint angles from the commanded steps, degrees (J,); raises LinkError if a position is unknown."""
         return arm_state.posture_deg(self.client, self._known_arm())
 
     # outputs and inputs
 
     def output(self, name: str) -> BoardOutput:
-        """An output of the arm by its name; InputError if the arm has none of this name or is not known."""
+        """An output of the arm by name; raises InputError if the arm has no such output or is not known."""
         return BoardOutput(self.client, self._configured_arm(), name)
 
     def input(self, name: str) -> BoardInput:
-        """An input of the arm by its name; raises as ``output``."""
+        """An input of the arm by name; raises as ``output``."""
         return BoardInput(self.client, self._configured_arm(), name)
 
     # moving
@@ -253,11 +264,12 @@ class Board:
     ) -> None:
         """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
 
-        ``where``: also the file of a plan, for where it begins. ``speed``: part of the quickest, 0.01 to 1.
-        ``line``: the tool goes in a straight line. Raises LinkError if the position is unknown, InputError for a
-        posture that does not fit the arm, PlanError if the arm cannot follow the line.
+        ``where``: a posture, or a plan, sequence or its file (the start). ``speed``: fraction of the fastest
+        move, 0.01 to 1. ``line``: move the tool in a straight line. Raises LinkError if the position is
+        unknown, InputError for a posture that does not fit the arm, PlanError if the arm cannot follow the
+        line.
         """
-        permille(speed)  # InputError for one that is none
+        permille(speed)  # raises InputError for an invalid speed
         arm = self._known_arm()
         target_deg = posture_deg(where, arm)
         with self._stoppable(stop) as wanted:
@@ -273,13 +285,13 @@ class Board:
         speed: float = SPEED,
         stop: StopRequest | None = None,
     ) -> Array:
-        """Move a little, straight, and wait: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
+        """Move a joint or the tool: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
 
-        ``joint``: number, from 1, or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y", "tool-z", along
-        which the tool moves by ``by_mm``, or about which it turns by ``by_deg``; ``speed``: part of the speed limits,
-        0.01 to 1. The jog ends at the end of a range, or where the tool cannot continue along the line, at the latest.
-        Gives the posture in degrees, (J,); ``last_jog_ends`` says why it ended early. Raises LinkError if the
-        position is unknown, InputError if nothing can move that way.
+        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y",
+        "tool-z": the tool moves along it by ``by_mm``, or turns about it by ``by_deg``; ``speed``: fraction
+        of the speed limits, 0.01 to 1. The jog ends early at the end of a range, or if the tool cannot
+        continue along the line (``last_jog_ends`` says why). Returns the posture in degrees, (J,). Raises
+        LinkError if the position is unknown, InputError if no motion in that direction is possible.
         """
         arm = self._known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
@@ -296,10 +308,10 @@ class Board:
         turn: bool = False,
         speed: float = SPEED,
     ) -> HeldJog:
-        """A jog to the end of the range that continues only while its ``hold`` is called, in a ``with`` statement.
+        """A jog towards the end of the range that continues only while its ``hold`` is called; use it in ``with``.
 
-        ``direction``: 1 or -1; ``turn``: about ``axis`` instead of along it; the rest as in ``jog``. Where the calls
-        cease the board brakes; leaving the context brakes too, and waits for rest.
+        ``direction``: 1 or -1; ``turn``: about ``axis`` instead of along it; the rest as in ``jog``. If the
+        calls stop, the board brakes. Leaving the context brakes and waits for rest.
         """
         arm = self._known_arm()
         by = math.copysign(math.inf, direction)
@@ -309,8 +321,9 @@ class Board:
         return HeldJog(self.client, arm, jog.plan(self.client, arm, move, speed))
 
     def by_hand(self) -> HandGuided:
-        """The arm without its motors' current, to be moved by hand while its encoders are followed, in a ``with``
-        statement: its ``angles_deg()``. Hold the arm before: it sinks.
+        """A context without motor current: move the arm by hand, and read the encoders with ``angles_deg()``.
+
+        Hold the arm before: it sinks.
 
         Raises InputError for a driven joint without an encoder, LinkError if the position is unknown.
         """
@@ -325,17 +338,18 @@ class Board:
         watcher: Watcher | None = None,
         stop: StopRequest | None = None,
     ) -> Run:
-        """Replay a motion ``repeat`` times and record what comes back in a new run folder below ``out``.
+        """Replay a motion ``repeat`` times, 1 to 99, and record it in a new run folder in ``out``.
 
-        ``motion``: a plan, its file (FILE.json), or the name of a motion on the board. The arm must be homed and be
-        where the motion begins, else LinkError, as where the board keeps another motion under its name (``upload``
-        can replace it) or is set up for another arm. The arm of a virtual board is brought there. Between repetitions
-        it returns along the same path, all at the speed that ``speed`` was told last. ``progress`` counts seconds of
-        motion; ``watcher`` sees folder, samples and repetitions. Whatever ends the run early raises, and what was
-        recorded until then is ``last_run``.
+        ``motion``: a plan, its file (FILE.json), or the name of a motion on the board. The arm must be homed
+        and at the start of the motion; the arm of a virtual board is moved there. Between repetitions it
+        returns along the same path. The speed is that of the last ``speed`` call. ``progress`` counts seconds
+        of motion; ``watcher`` is called with folder, samples and repetitions. If the run ends early, it
+        raises, and ``last_run`` holds the recording. Raises LinkError if the arm is not homed or not at the
+        start, the board has another motion of this name (``upload`` can replace it), or is set up for another
+        arm.
         """
-        if repeat < 1:
-            raise InputError(f"repeat = {repeat} is not allowed", "give 1 or more")
+        if not 1 <= repeat <= _MOST_REPETITIONS:
+            raise InputError(f"repeat: {repeat} is not in the range 1<=x<={_MOST_REPETITIONS}", "change it")
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._stoppable(stop) as wanted:
@@ -355,12 +369,13 @@ class Board:
         replace: bool = False,
         out: Path | str | None = None,
     ) -> SequenceState:
-        """Run a planned sequence, or the stored one of that name, to its end, and say how it ended and where.
+        """Run a planned sequence, or the stored sequence of that name; returns its last state.
 
-        Its rows and samples are recorded in a new run folder below ``out``; None: nowhere. The arm must be homed and
-        be where the sequence begins, else LinkError or BoardError; the arm of a virtual board is brought there.
-        ``watcher`` gets its state. What an input that does not come does is the sequence's affair: an end as
-        ``timed_out``, or BoardError. With Stopped, its end is what ``client.sequence()`` says.
+        Its rows and samples are recorded in a new run folder in ``out``; None: not recorded. ``watcher`` is
+        called with each new state. The arm must be homed and at the start of the sequence, otherwise
+        LinkError or BoardError; the arm of a virtual board is moved there. If a wait for an input times out,
+        the sequence ends as ``timed_out`` or raises BoardError, as its step says. After Stopped,
+        ``client.sequence()`` has the last state.
         """
         with self._stoppable(stop) as wanted:
             key = self._sequence(sequence, wanted, replace)
@@ -377,14 +392,14 @@ class Board:
 
     @property
     def counters(self) -> dict[str, int]:
-        """Values of the counters of the sequence that runs, or of the last one, by name.
+        """Counters of the running or the last sequence, by name.
 
-        They begin at 0 whenever a sequence starts; the board keeps them until then, or until its power goes.
+        A start of a sequence sets them to 0; a power cycle loses them.
         """
         return self.client.counters()
 
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
-        """What the board has it as; a virtual arm is brought to its start."""
+        """Store the sequence if it is a plan, and move a virtual arm to its start; returns its key."""
         if isinstance(sequence, str):
             found = self.client.find(self._stored_name(sequence))
             if found is None or not found.sequence:
@@ -404,19 +419,19 @@ class Board:
 
     @property
     def last_run(self) -> Run | None:
-        """The last run that this object recorded, however it ended; None before the first."""
+        """The last run that this object recorded, even if it ended early; None before the first."""
         return Run.load(self._last_folder) if self._last_folder else None
 
     @property
     def last_sequence(self) -> SequenceRun | None:
-        """The last sequence that this object recorded, however it ended; None before the first."""
+        """The last sequence that this object recorded, even if it ended early; None before the first."""
         return SequenceRun.load(self._last_sequence) if self._last_sequence else None
 
     def fetch(self, motion: Plan | EncodedMotion | Path | str | None = None, out: Path | str = "runs") -> Run:
-        """The samples that the board keeps of its last run, in a new run folder below ``out``.
+        """Write the samples that the board kept of its last run into a new run folder in ``out``.
 
-        ``motion`` is what was run; None: the motion that the button starts. Such a run needs no host; one under
-        way is followed to its end. Raises LinkError if the board keeps no samples.
+        ``motion``: the motion of that run; None: the motion that the button starts. Waits for the end of a
+        run that is still in progress. Raises LinkError if the board has no samples.
         """
         encoded = self._encoded(self._default() if motion is None else motion)
         folder = recording.fetch(self.client, encoded, Path(out), self.port)
@@ -424,54 +439,55 @@ class Board:
         return Run.load(folder.path)
 
     def stop(self, now: bool = False) -> None:
-        """Brake along the path, or freeze where ``now``, and wait until the arm rests.
+        """Brake along the path (``now``: freeze the outputs), and wait until the arm is at rest.
 
-        For motions that this object does not wait for, such as one that the button started; else give ``run``
-        a ``StopRequest``.
+        For motions that no call of this object waits for, such as one started by the button. To stop ``run``,
+        give it a ``StopRequest``.
         """
         stored_motion.stop(self.client, now)
 
     def request_stop(self, now: bool = False, by: str = "another thread") -> bool:
-        """Stop what moves from another thread than the one that waits for it, which gets Stopped; whether
-        something moved. Does not wait for rest.
+        """Stop a motion from a thread other than the one that waits for it, where Stopped is raised. Does not wait.
 
-        ``by``: who asks for it, in words. NoAnswerError if the board is silent.
+        ``by``: who asks for the stop, for messages. Returns whether something moved. Raises NoAnswerError if
+        the board does not answer.
         """
         return stored_motion.request_stop(self.client, self.stops, now, by)
 
     def speed(self, fraction: float) -> None:
-        """Run at a fraction of the planned speed, 0.01 to 1: what this object starts from now on, and what moves.
+        """Set the speed as a fraction of the planned speed, 0.01 to 1, for the running and all later motions.
 
-        The path is unchanged; while it moves, the speed goes over smoothly in the motion's brake time: from a
-        ``Watcher``, from another thread than the one that waits in ``run``, or for what the button started.
-        Raises InputError for another fraction, BoardError if the board refuses.
+        The path does not change; a running motion changes its speed smoothly, within its brake time. Call it
+        from a ``Watcher``, from a thread other than the one that waits in ``run``, or for a motion started by
+        the button. Raises InputError for another fraction, BoardError if the board refuses.
         """
         change_speed(self.client, permille(fraction))
 
     def pause(self) -> None:
-        """Let what moves come to rest on its path, to continue with ``resume``; BoardError if nothing moves."""
+        """Bring the motion to rest on its path; ``resume`` continues it. Raises BoardError if nothing moves."""
         change_speed(self.client, 0)
 
     def resume(self) -> None:
-        """Continue along the path at the speed before the pause; BoardError if nothing moves."""
+        """Continue along the path at the speed before the pause; raises BoardError if nothing moves."""
         change_speed(self.client, RESUME)
 
     def selftest(self, progress: Progress | None = None) -> SelfTest:
-        """The board measures itself with its drivers off; ``progress`` tells how far it is.
+        """Let the board measure itself with its drivers off; ``progress`` reports the progress.
 
-        The board is reset at the end, so its positions are unknown. Raises LinkError if the drivers are on,
-        something moves, or the program is not a part of the board's firmware; nothing was done then.
+        The board is reset at the end, and its positions are unknown. Raises LinkError, before anything is
+        done, if the drivers are on, a motion runs, or the program is not built into the board's firmware.
         """
         return selftest.run(self.client, progress)
 
     def motor_test(
         self, arm: Arm | Path | str, ask: Callable[[str], bool], tell: Callable[[str], object] = print
     ) -> SelfTest:
-        """Try directions, encoders, switches and E-stop: each joint moves up to a degree there and back, slowly.
+        """Test directions, encoders, switches and E-stop: each joint moves slowly up to a degree there and back.
 
-        ``ask`` puts a question to the person at the arm, first one that names what will move, and gives True for
-        yes; ``tell`` says what to press. Lines to correct in the arm file are in the result's ``data["arm_file"]``.
-        Raises ArmtempoError without a yes, LinkError where a position is unknown; nothing moved then.
+        ``ask`` asks the person at the arm (first, whether the listed joints may move) and returns True for
+        yes; ``tell`` prints what to press. The result's ``data["arm_file"]`` has the lines to correct in the
+        arm file. Raises ArmtempoError without a yes, LinkError if a position is unknown, both before anything
+        moves.
         """
         arm = Arm.of(arm)
         self.configure(arm)
@@ -480,12 +496,12 @@ class Board:
             return MotorTest(self.client, arm, stop, ask, tell).run()
 
     def clear(self) -> None:
-        """Clear a fault; BoardError while its cause is still there."""
+        """Clear a fault; raises BoardError while its cause persists."""
         self.client.clear()
 
     @contextmanager
     def _stoppable(self, given: StopRequest | None) -> Iterator[StopRequest]:
-        """As ``stoppable``; other programs can ask for this stop as well."""
+        """As ``stoppable``; other programs can request this stop too."""
         with stoppable(given) as wanted:
             self.stops.append(wanted)
             try:
@@ -523,7 +539,7 @@ class Board:
         )
 
     def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
-        """Store the motion; bring a virtual arm to its start, and refuse where a real one is elsewhere."""
+        """Store the motion; move a virtual arm to its start; raises LinkError if a real arm is not there."""
         stored_motion.store(self.client, motion.name, motion.data)
         advice = "move it there with 'armtempo goto'"
         self._start.take(motion.arm, motion.start_deg, repr(motion.name), advice, stop)

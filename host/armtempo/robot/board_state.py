@@ -1,7 +1,6 @@
-"""What a board says of itself, in words and units of the arm file: the answer to 'armtempo status'.
+"""A board's state in the units of the arm file, as 'armtempo status' prints it.
 
-It goes to other programs as JSON, so it holds plain values only. Nothing heavy is imported: what asks another
-program to stop a motion loads this.
+It is sent to other programs as JSON, so it holds plain values only. It imports little, as 'armtempo stop' loads it.
 """
 
 from __future__ import annotations
@@ -20,31 +19,31 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class JointState:
-    """Where one joint is."""
+    """Position of one joint."""
 
     name: str
-    """As the arm file has it; "joint N" where the arm is not known."""
+    """Name in the arm file; "joint N" if the arm is not known."""
     known: bool
     """Whether the position is known."""
     steps: int
     """Steps commanded."""
     angle_deg: float | None
-    """The same in degrees; None if the arm is not known."""
+    """The commanded steps in degrees; None if the arm is not known."""
     counts: int
-    """Of the encoder, 0 without one."""
+    """Encoder counts; 0 without an encoder."""
     encoder_deg: float | None
-    """The same in degrees; None without an encoder, or where the arm is not known."""
+    """The encoder counts in degrees; None without an encoder, or if the arm is not known."""
 
 
 @dataclass(frozen=True)
 class SequenceStand:
-    """How far a sequence is, or where the last one since the board's start ended."""
+    """State of the running sequence, or of the last one since the board's start."""
 
     name: str
     ending: str
     """One of ``armtempo_shared.sequence.ENDINGS``."""
     step: int
-    """Of the sequence file, from 1."""
+    """Step of the sequence file, from 1."""
     cycle: int
     """Finished passes of its outermost repeats."""
     counters: dict[str, int]
@@ -52,7 +51,7 @@ class SequenceStand:
 
 @dataclass(frozen=True)
 class ToolPlace:
-    """Where the tool is by the steps commanded, in the frame of the base."""
+    """Pose of the tool from the commanded steps, in the frame of the base."""
 
     position_mm: tuple[float, float, float]
     rpy_deg: tuple[float, float, float]
@@ -61,7 +60,7 @@ class ToolPlace:
 
 @dataclass(frozen=True)
 class BoardState:
-    """A board, the arm it is set up for, and where that is."""
+    """A board, the arm that it is set up for, and the arm's position."""
 
     port: str
     virtual: bool
@@ -74,33 +73,33 @@ class BoardState:
     arm_crc: int
     """Checksum of its arm record; 0 if it has none."""
     arm: str
-    """Name of the arm whose record that is; "" if it is not known."""
+    """Name of the arm of that record; "" if it is not known."""
     arm_source: str
     """File of that arm."""
     free_flash: int
     free_heap: int
     max_rate: int
-    """Steps/s of one joint."""
+    """Highest step rate of one joint, steps/s."""
     max_rate_sum: int
-    """Steps/s of all joints together."""
+    """Highest step rate of all joints together, steps/s."""
     rates_measured: bool
-    """Whether its self-test measured them; else they are estimated."""
+    """Whether the step rates were measured by its self-test; otherwise they are estimates."""
     room: str
-    """What engines its memory has room for, in words."""
+    """Text: which arms fit into its memory."""
     arm_problem: str
-    """Why a stored arm record is not used; "" if it is, or there is none."""
+    """Why a stored arm record is not used; "" if it is used, or there is none."""
     state: str
     """One of ``armtempo_shared.messages.STATES``."""
     moving: bool
-    """Whether steps may still come."""
+    """Whether the board may still make steps."""
     speed_percent: float
-    """Of the planned speed, as it was asked for last; 0 in a pause."""
+    """Requested speed in percent of the planned one; 0 in a pause."""
     rest_s: float
-    """Until the arm rests after a stop, one that came before or one now; 0: at once."""
+    """Time until the arm is at rest, after a stop given earlier or now; 0: at once."""
     fault: str
     """Name of the pending fault, "" for none."""
     frames_bad: int
-    """Byte sequences that reached the board and were no message."""
+    """Number of damaged messages that reached the board."""
     samples_lost: int
     joints: tuple[JointState, ...]
     sequence: SequenceStand | None
@@ -114,7 +113,7 @@ class BoardState:
 
     @classmethod
     def of_json(cls, values: Mapping[str, Any]) -> BoardState:
-        """What ``to_json`` gave; LinkError if another version of armtempo gave it."""
+        """The state from ``to_json``; raises LinkError if another version of armtempo wrote it."""
         try:
             joints = tuple(JointState(**joint) for joint in values["joints"])
             stand = SequenceStand(**values["sequence"]) if values["sequence"] else None
@@ -126,7 +125,7 @@ class BoardState:
             ) from error
 
     def named(self, arm: Arm | None) -> BoardState:
-        """The same in degrees and with the joints' names, where ``arm`` is the one that the board is set up for."""
+        """The state in degrees and with the joints' names, if the board is set up for ``arm``; else unchanged."""
         if arm is None or self.arm or record_crc(arm) != self.arm_crc:
             return self
         joints = tuple(
@@ -153,7 +152,7 @@ def _tool(arm: Arm, joints: tuple[JointState, ...]) -> ToolPlace:
 
 
 def read(client: Client, port: str) -> BoardState:
-    """What the board says now, in steps and counts."""
+    """The board's present state, in steps and counts."""
     from armtempo.link.program_version import own_crc
     from armtempo.robot import engine_room
     from armtempo.robot.stored_motion import fault_name
@@ -209,7 +208,7 @@ def _arm_problem(info: Hello) -> str:
 
 
 def record_crc(arm: Arm) -> int:
-    """The checksum by which a board knows an arm."""
+    """The checksum by which a board identifies an arm."""
     from armtempo_shared import wire
 
     from armtempo.records import encode

@@ -1,4 +1,4 @@
-"""Guiding the arm by hand: the motors' current is off, and the encoders say where the arm is."""
+"""Guiding the arm by hand: the motors' current is off, and the encoders give the position."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from armtempo.model.arm import Arm
 from armtempo.robot import arm_state
 
 SETTLES_S = 0.3
-"""Motors that get their current again turn to the next place where they can hold, at most two full steps away."""
+"""Settling time after the current is switched on: motors turn to the next stable position, at most two full
+steps away."""
 
 
 class HandGuided:
-    """An arm without its motors' current, as a context; in the end it has it again, and its position by the encoders.
+    """A context in which the motors' current is off. At its end the position is set from the encoders.
 
-    The caller holds the arm: it sinks under its weight. Raises InputError for a driven joint without an
+    Someone must hold the arm: it sinks under its weight. Raises InputError for a driven joint without an
     encoder, LinkError if the position is unknown before.
     """
 
@@ -39,27 +40,27 @@ class HandGuided:
         self._arm = arm
 
     def __enter__(self) -> Self:
-        """Take the current away; the position is unknown to the board until the end."""
+        """Switch the current off; the position is unknown to the board until the end."""
         self._client.drivers(False)
-        self.button_pressed()  # what was before does not count
+        self.button_pressed()  # earlier presses do not count
         return self
 
     def button_pressed(self) -> bool:
-        """Whether the board's button was pressed since this was asked last; it starts nothing meanwhile."""
+        """Whether the board's button was pressed since the last call; it starts no motion meanwhile."""
         session, pressed = self._client.session, False
         while (event := session.poll(0.0)) is not None:
             pressed = pressed or (isinstance(event, Notice) and event.text.startswith(BUTTON_NOTICE))
         return pressed
 
     def angles_deg(self) -> Array:
-        """Where the joints are by their encoders, degrees (J,)."""
+        """Joint angles from the encoders, degrees (J,)."""
         counts = np.array(self._client.status().positions.counts, dtype=float)
         return np.asarray(counts / [joint.counts_per_deg for joint in self._arm.driven])
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give the current back and declare where the arm is; LinkError if a joint is beyond its range."""
+        """Switch the current on and declare the position; raises LinkError if a joint is outside its range."""
         self._client.drivers(True)
         time.sleep(SETTLES_S)
         scale = np.array([joint.steps_per_deg for joint in self._arm.driven])

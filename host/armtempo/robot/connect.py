@@ -1,4 +1,4 @@
-"""From the name of a port to a board in use, which other programs on this machine can look into and stop."""
+"""Connect to a board by its port; other programs on this machine can then watch and stop it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armtempo.basics.arguments import checked
 from armtempo.link.connect import open_board, patiently
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.arm import Arm
-from armtempo.project import board_port
+from armtempo.ports import board_port
 from armtempo.robot.board import Board
 from armtempo.robot.sharing import Sharing
 
@@ -28,19 +28,20 @@ def connect(
     any_program: bool = False,
     tell: Callable[[str], object] = LOG.warning,
 ) -> Board:
-    """The board on ``port``, which has answered; use it as a context, or ``close`` it.
+    """Connect to the board on ``port``; use the result as a context, or ``close`` it.
 
-    ``port``: a serial device or URL; ``"sim"`` starts a virtual board that lives until it is closed,
-    ``"sim:FOLDER"`` one that keeps its flash in FOLDER. None: what ARMTEMPO_PORT or the project folder's
-    ``armtempo.toml`` says, else the one board that is plugged in, which ``tell`` hears; a virtual one is never
-    taken unasked. ``arm``: what a virtual board's motors move; None: ideal motors. ``log_traffic``: file that
-    gets every byte both ways; ``sink`` takes the same. ``any_program``: also talk to a board whose program is
-    not the one installed here. ``tell`` hears what happens to the connection while other calls wait; by default
-    the logger "armtempo" does. Until the board is closed other programs on this machine can look in and stop it
-    (``attach``). A port in use is tried again for a few seconds: many programs only ask something.
+    ``port``: a serial device or URL; ``"sim"`` starts a virtual board that ends when it is closed,
+    ``"sim:FOLDER"`` one with its flash in FOLDER. None: ARMTEMPO_PORT or the project folder's
+    ``armtempo.toml``, else the only board plugged in (reported to ``tell``), never a virtual board. ``arm``:
+    moved by a virtual board's motors; None: ideal motors. ``log_traffic``: file for all bytes in both
+    directions; ``sink`` is called with the same. ``any_program``: accept a board whose program differs from
+    the installed one. ``tell`` is called with messages about the connection; default: the logger "armtempo".
+    Until the board is closed, other programs on this machine can watch and stop it (``attach``). A port in
+    use is retried for a few seconds, as many programs use it only briefly.
 
-    Raises InputError if there is no such port, or none is named and not exactly one board is there;
-    PortInUseError if another program keeps it, LinkError if it is silent or runs something else.
+    Raises InputError if there is no such port, or if none is set and not exactly one board is plugged in;
+    PortInUseError if another program has the port, LinkError if the board does not answer or runs another
+    program.
     """
     moved = None if arm is None else Arm.of(arm)
     chosen = board_port.choose(port)
@@ -62,7 +63,7 @@ def connect_now(
     any_program: bool = False,
     tell: Callable[[str], object] = LOG.warning,
 ) -> Board:
-    """``connect`` to the port that is named, without waiting; PortInUseError if another program has it."""
+    """As ``connect``, to a given port and without waiting; raises PortInUseError if another program has it."""
     stack = ExitStack()
     taps = _Taps(sink)
     log = Path(log_traffic) if log_traffic else None
@@ -75,17 +76,17 @@ def connect_now(
         sharing.open(port)
         taps.sinks.append(sharing.traffic)
     except OSError as error:
-        tell(f"no other program can look in or stop this one: {error}")
+        tell(f"other programs cannot watch or stop this one: {error}")
     return board
 
 
 class _Taps:
-    """Takes the traffic for several sinks."""
+    """A sink that passes the traffic to several sinks."""
 
     def __init__(self, *sinks: Sink | None) -> None:
         self.sinks = [sink for sink in sinks if sink is not None]
 
     def __call__(self, chunk: Chunk, words: list[str]) -> None:
-        """Hand a chunk on."""
+        """Pass a chunk on."""
         for sink in self.sinks:
             sink(chunk, words)

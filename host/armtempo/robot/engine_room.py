@@ -1,4 +1,4 @@
-"""Does the engine for an arm fit into the board's memory? By the board's own formula, before anything is sent."""
+"""Whether the engine for an arm fits into the board's memory, by the board's formula, before anything is sent."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from armtempo.records import encode
 class Room:
     """Heap for an engine and its objects: ``size`` bytes.
 
-    Besides it the board has memory for step generators, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
+    Step generators have more memory outside the heap, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
     """
 
     size: int
 
     @classmethod
     def of_board(cls, info: Hello) -> Room:
-        """What a board states."""
+        """The memory that a board reports."""
         return cls(info.engine_room)
 
     def holds(self, rates: list[int]) -> bool:
@@ -35,7 +35,7 @@ class Room:
         return self.holds(encode.step_rates(arm))
 
     def words(self) -> str:
-        """What fits: bytes, joints, steps/s."""
+        """Describe what fits: bytes, joints, steps/s."""
         return f"{self.size} bytes: {', '.join(self._fitting()) or 'no arm fits'}"
 
     def _fitting(self) -> list[str]:
@@ -43,7 +43,7 @@ class Room:
         return [f"{joints} x {rate} steps/s" for joints, rate in found if rate]
 
     def _highest_rate(self, joints: int) -> int:
-        """The highest step rate, in whole 1000 steps/s, at which that many joints fit; 0 if none do."""
+        """The highest step rate, in whole 1000 steps/s, at which ``joints`` joints fit; 0 if none."""
         for rate in range(limits.MAX_STEP_RATE_SUM // joints // 1000, 0, -1):
             if self.holds([1000 * rate] * joints):
                 return 1000 * rate
@@ -52,7 +52,7 @@ class Room:
 
 AS_FILES = Room(8_000)
 IN_FIRMWARE = Room(engine_memory.LARGEST_BYTES)
-"""The program as compiled files on MicroPython's own firmware for the STM32F4DISC, and built into it.
+"""Memory with the program as files on MicroPython's own firmware for the STM32F4DISC, and built into the firmware.
 
 Measured: ``python -m tests.benchmark.room MICROPYTHON``.
 """
@@ -60,7 +60,7 @@ _BUILD = "'armtempo flash'"
 
 
 def check(arm: Arm, info: Hello) -> None:
-    """InputError with the bytes needed, the bytes there and what to do, where the engine for the arm does not fit."""
+    """Raise InputError if the engine for the arm does not fit, with the bytes needed and available."""
     rates, room = encode.step_rates(arm), Room.of_board(info)
     if room.holds_arm(arm):
         return
@@ -72,7 +72,8 @@ def check(arm: Arm, info: Hello) -> None:
 
 
 def of_arm(arm: Arm, info: Hello | None = None) -> str:
-    """In a line: the memory that an arm needs, and whether a board has it; without one, where it fits."""
+    """One line: the memory that an arm needs, and whether the board has it (without ``info``: which boards
+    have it)."""
     rates = encode.step_rates(arm)
     needs = f"memory on the board: {engine_memory.needed_bytes(rates)} bytes for {len(rates)} joints"
     if info is not None:
@@ -86,7 +87,7 @@ def of_arm(arm: Arm, info: Hello | None = None) -> str:
 
 
 def of_board(info: Hello) -> list[str]:
-    """What fits on a board, and what more would with the program in its firmware."""
+    """Lines: what fits on a board, and what would fit with the program in its firmware."""
     room = Room.of_board(info)
     lines = [f"memory for an arm: {room.words()}"]
     if room.size < IN_FIRMWARE.size:
@@ -97,7 +98,7 @@ def of_board(info: Hello) -> list[str]:
 
 
 def _or_firmware(arm: Arm) -> str:
-    """The firmware as a way out, where it is one."""
+    """The advice to flash the firmware, if the arm fits there."""
     if not IN_FIRMWARE.holds_arm(arm):
         return ""
     return f", or put the program into the board's firmware, where this arm fits ({_BUILD})"

@@ -1,11 +1,13 @@
-"""Motions that are not kept on the board: to a posture, to a start, and backwards between repetitions."""
+"""Temporary motions: to a posture, to a start, and back between repetitions."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from armtempo_shared import limits
+from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
@@ -13,7 +15,9 @@ from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
-from armtempo.planning import point_to_point, room_check
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
+from armtempo.planning import point_to_point, room_check, via_points
 from armtempo.ports.names import is_sim
 from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
@@ -22,15 +26,19 @@ from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import TEMPORARY, SampleSink, raise_fault, replay, store
 from armtempo.splines.trajectory import Trajectory
 
+Where = Plan | EncodedMotion | SequencePlan | Path | str | ArrayLike
+"""A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
+(or of its file) or sequence."""
+
 
 @dataclass(frozen=True)
 class MovePace:
-    """How to go to a posture."""
+    """How to move to a posture."""
 
     speed: float = 1.0
-    """Part of the quickest."""
+    """Fraction of the fastest move."""
     line: bool = False
-    """The tool goes in a straight line, instead of the joints each at an even pace."""
+    """Move the tool in a straight line instead of the joints."""
 
 
 def go_to(
@@ -41,10 +49,10 @@ def go_to(
     progress: Progress | None = None,
     pace: MovePace | None = None,
 ) -> None:
-    """Move straight to a posture (J,); nothing happens if it is there.
+    """Move straight to a posture (J,); does nothing if the arm is there.
 
     Raises LinkError if the position is unknown, BoardError if the board refuses or a fault ends the move,
-    PlanError if the arm would leave its room, or the tool cannot go there in a line.
+    PlanError if the arm would leave its room, or the tool cannot reach it in a straight line.
     """
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
@@ -59,11 +67,11 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
         found = point_to_point.straight(name, here_deg, target_deg, arm, pace.speed)
         room_check.check(arm, found)
         return found
-    from armtempo.planning.line import line_move  # here, because it loads the whole planner
+    from armtempo.planning import planner  # imported here, because it loads everything that plans
 
     target = point_to_point.posture(target_deg, arm)
-    trajectory = line_move.straight_line(arm, here_deg.tolist(), target.tolist())
-    return replace(line_move.slower(trajectory, pace.speed), name=name)
+    trajectory = planner.straight_line(arm, here_deg.tolist(), target.tolist())
+    return replace(planner.slower(trajectory, pace.speed), name=name)
 
 
 def go_back(client: Client, motion: EncodedMotion, stop: StopRequest) -> None:
@@ -75,17 +83,17 @@ def go_back(client: Client, motion: EncodedMotion, stop: StopRequest) -> None:
 def move_once(
     client: Client, motion: EncodedMotion, stop: StopRequest, progress: Progress | None = None
 ) -> None:
-    """Store a motion, run it and remove it; BoardError if a fault ends it."""
+    """Store a motion, run it and remove it; raises BoardError if a fault ends it."""
     key = store(client, motion.name, motion.data)
     try:
         raise_fault(replay(client, key, stop, shown(progress)))
     finally:
-        with suppress(LinkError):  # an earlier error says more
+        with suppress(LinkError):  # do not hide the earlier error
             client.remove(key.name)
 
 
 def shown(progress: Progress | None) -> SampleSink:
-    """A sink that tells how far the motion is, in seconds of its own time."""
+    """A sink that reports the progress in seconds of the motion's own time."""
 
     def show(sample: Sample, duration_s: float) -> None:
         if progress is not None:
@@ -96,23 +104,23 @@ def shown(progress: Progress | None) -> SampleSink:
 
 @dataclass
 class StartPosition:
-    """What is done about an arm's position before anything starts, on one board."""
+    """Moves a virtual arm of one board to a start position; checks the position of a real arm."""
 
     client: Client
     port: str
     moved: bool = False
-    """Whether this arm has been moved or homed through this object, so that nothing is assumed of its position."""
+    """Whether this arm was moved or homed by this object; then its position is not assumed."""
 
     def home_virtual_arm(self, arm: Arm) -> None:
-        """A virtual arm that has not moved yet is at home: nobody needs to look."""
+        """Declare that a virtual arm that has not moved yet is at home."""
         if is_sim(self.port) and not self.moved:
             arm_state.home_unknown(self.client, arm)
         self.moved = True
 
     def take(self, arm: Arm, start_deg: Array | None, name: str, advice: str, stop: StopRequest) -> None:
-        """Move a virtual arm to ``start_deg``, degrees (J,); None: it may begin anywhere.
+        """Move a virtual arm to ``start_deg``, degrees (J,); None: any start.
 
-        LinkError with ``advice`` if a real arm is not there.
+        Raises LinkError with ``advice`` if a real arm is not there.
         """
         if is_sim(self.port):
             self.home_virtual_arm(arm)
@@ -120,3 +128,22 @@ class StartPosition:
                 go_to(self.client, arm, start_deg, stop)
         elif start_deg is not None and not arm_state.is_at(self.client, arm, start_deg):
             raise LinkError(f"the arm is not at the start of {name}", advice)
+
+
+def posture_deg(where: Where, arm: Arm) -> Array:
+    """The driven joints' angles of a posture, degrees (J,); for a sequence without motions: the home posture.
+
+    Raises InputError for an unknown name, or a posture that does not fit the arm.
+    """
+    if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
+        where = Plan.load(where)
+    if isinstance(where, Plan):
+        return where.trajectory(0.0)
+    if isinstance(where, EncodedMotion):
+        return where.start_deg
+    if isinstance(where, SequencePlan):
+        start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
+        return point_to_point.posture(start_deg, where.arm)
+    if isinstance(where, str):
+        return via_points.posture_deg(arm, arm.posture(where))
+    return point_to_point.posture(where, arm)

@@ -1,8 +1,8 @@
 """Homing by switches: approach, back off, approach slowly, go home; joint by joint, or as the arm file groups them.
 
-The board takes these motions while a joint's position is unknown: it assumes that the joint is where the motion
-begins, and calls the position unknown again at the end. So the position is never wrong, only unknown, until it is
-declared. A switch that trips ends the motion for all joints that move in it; the others then continue in another one.
+The board accepts these motions while a joint's position is unknown: it assumes that the joint is at the
+motion's start, and marks the position as unknown again at the end, until it is declared. A switch that trips
+ends the motion of all its joints; the others continue in another motion.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from armtempo.robot.stored_motion import TEMPORARY, raise_fault, replay, store
 FAST, SLOW = 0.2, 0.04
 """Fractions of the joint's limits in the first and in the second approach."""
 BACK_DEG = 3.0
-"""How far a joint backs off from its switch."""
+"""Distance by which a joint backs off from its switch."""
 _TOLERANCE_DEG = 0.1
-"""A motion that ends this near to its end has not been stopped by a switch; more than a step of any joint."""
+"""A motion that stops this close to its end was not stopped by a switch; more than a step of any joint."""
 
 
 @dataclass(frozen=True)
 class _Switch:
-    """Where a joint's switch is."""
+    """Position of a joint's switch."""
 
     side: int
-    """-1 at the low end of the range, 1 at the high one."""
+    """-1 at the low end of the range, 1 at the high end."""
     trip_deg: float
     edge_deg: float
     """The end of the range on that side."""
@@ -43,15 +43,15 @@ class _Switch:
 
     @property
     def outside_deg(self) -> float:
-        """How far beyond the range it trips."""
+        """Distance beyond the range at which it trips."""
         return max(0.0, self.side * (self.trip_deg - self.edge_deg))
 
 
 def home_to_switches(client: Client, arm: Arm, stop: StopRequest) -> None:
-    """Home every joint that has a switch of known angle, then bring it to its home posture; the others stay.
+    """Home every joint that has a switch of known angle, in the order of ``arm.homing``; the others do not move.
 
-    In the order of ``arm.homing``. Raises InputError if no joint has one, LinkError if a switch does not trip,
-    BoardError if the board refuses or a fault ends it, Stopped after a stop request.
+    Ends at the home posture. Raises InputError if no joint has such a switch, LinkError if a switch does not
+    trip, BoardError if the board refuses or a fault ends it, Stopped after a stop request.
     """
     groups = _groups(arm)
     if not groups:
@@ -85,7 +85,7 @@ def _switch(joint: DrivenJoint) -> _Switch | None:
 
 @dataclass(frozen=True)
 class _GroupHoming:
-    """Homing some joints together. A distance to go is positive towards the joint's switch."""
+    """Homing of some joints together. Distances are positive towards the joint's switch."""
 
     client: Client
     arm: Arm
@@ -93,7 +93,7 @@ class _GroupHoming:
     switches: dict[int, _Switch]
 
     def run(self) -> None:
-        """Both approaches, then the positions are declared, a little away from the switches, and the joints go home."""
+        """Make both approaches, back off, declare the positions, and move the joints home."""
         whole = {
             index: abs(switch.far_deg - switch.edge_deg) + switch.outside_deg
             for index, switch in self.switches.items()
@@ -115,7 +115,7 @@ class _GroupHoming:
         self._go_home()
 
     def _approach(self, ways_deg: dict[int, float], fraction: float) -> dict[int, float]:
-        """Move joints towards their switches until all have tripped; how far each has gone, degrees."""
+        """Move joints towards their switches until all have tripped; returns the distance of each, degrees."""
         left = dict(ways_deg)
         gone = dict.fromkeys(left, 0.0)
         while left:
@@ -139,7 +139,8 @@ class _GroupHoming:
         return gone
 
     def _towards(self, left: dict[int, float], fraction: float) -> tuple[dict[int, float], int]:
-        """One motion towards the switches, over a range at most; how far each joint came, and whose switch tripped."""
+        """One motion towards the switches, at most over a range; returns each joint's distance, and whose
+        switch tripped."""
         ways = {}
         for index, way_deg in left.items():
             switch = self.switches[index]
@@ -156,7 +157,7 @@ class _GroupHoming:
         self._move(ways, FAST)
 
     def _declare(self, away_deg: dict[int, float]) -> None:
-        """The joints are this far from their switches."""
+        """Declare that the joints are this far from their switches, and move them home."""
         steps: list[int | None] = [None] * len(self.arm.driven)
         for index, way_deg in away_deg.items():
             switch, joint = self.switches[index], self.arm.driven[index]
@@ -182,7 +183,7 @@ class _GroupHoming:
     ) -> tuple[dict[int, float], int]:
         """Move joints at a fraction of their limits, each from and to an angle.
 
-        Gives the angles at which they came to rest, degrees, and the joint whose switch ended it (NO_JOINT).
+        Returns the angles at which they came to rest, degrees, and the joint whose switch ended it (or NO_JOINT).
         """
         start_deg = self._posture_deg()
         end_deg = list(start_deg)
@@ -201,7 +202,7 @@ class _GroupHoming:
         return {index: steps[index] / self.arm.driven[index].steps_per_deg for index in ways_deg}, tripped
 
     def _posture_deg(self) -> list[float]:
-        """Where the joints are; for one that is unknown any angle will do, as it does not move."""
+        """The joints' angles; joints of unknown position, which do not move, get their home angle."""
         status = self.client.status()
         joints = enumerate(zip(self.arm.driven, status.positions.commanded_steps, strict=True))
         return [

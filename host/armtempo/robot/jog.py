@@ -1,4 +1,4 @@
-"""Jogging: a step, or a motion that continues only while somebody says so."""
+"""Jogging: a step, or a motion that continues only while it is held."""
 
 from __future__ import annotations
 
@@ -28,29 +28,29 @@ from armtempo.robot.stop_request import StopRequest
 
 NAME = stored_motion.TEMPORARY + "jog"
 HOLD_S = 0.08
-"""Interval at which the board is told that a held jog is still wanted: three may be lost."""
+"""Interval of the hold messages of a held jog: three in a row may be lost."""
 BEFORE_BRAKING_S = 0.15
-"""From a stop command until the board brakes: what is in its rings is still stepped, and one more step where these come
-slowly."""
+"""From a stop command until the board brakes: it finishes the steps in its rings, and one more step at low speed."""
 _ANSWER_S = 1.0
-_FIRST = 2  # times it is said at once: a virtual board keeps to real time from then on
+_FIRST = 2  # holds sent at the start: a virtual board keeps to real time from then on
 
 
 def rest_s(motion: JogMotion, told: bool = False) -> float:
-    """A held jog rests so long after the board heard its last hold; ``told``: after a stop that arrives."""
+    """Longest time until a held jog is at rest, after the last hold (``told``: after the stop) reached the
+    board, seconds."""
     silence_s = 0.0 if told else HOLD_TIMEOUT_MS / 1000.0
     return silence_s + BEFORE_BRAKING_S + motion.brakes.longest_rest_s
 
 
 def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog_motion.SPEED) -> JogMotion:
-    """The jog from where the arm is; LinkError if that is unknown, else errors as of ``jog_motion.plan``."""
+    """Plan the jog from the arm's position; raises LinkError if that is unknown, else as ``jog_motion.plan``."""
     return jog_motion.plan(NAME, arm, arm_state.posture_deg(client, arm).tolist(), move, speed)
 
 
 def step(client: Client, arm: Arm, move: JogMove, speed: float, stop: StopRequest) -> JogMotion:
-    """Move by so much, or to the end of the range, and wait for it.
+    """Make the jog, at most to the end of the range, and wait for it.
 
-    BoardError if the board refuses or a fault ends it; the rest as ``plan``.
+    Raises BoardError if the board refuses or a fault ends it; otherwise as ``plan``.
     """
     motion = plan(client, arm, move, speed)
     goto.move_once(client, _encoded(motion, arm), stop)
@@ -63,19 +63,19 @@ def _encoded(motion: JogMotion, arm: Arm) -> EncodedMotion:
 
 
 class HeldJog:
-    """A jog that continues while ``hold`` is called, and no longer; a context that ends with the arm at rest.
+    """A jog that continues only while ``hold`` is called; a context that ends with the arm at rest.
 
-    The caller of ``hold`` is the dead man's switch: no thread does it. Where the calls cease, or nothing of them
-    reaches the board for HOLD_TIMEOUT_MS, the board brakes by itself; ``rest_s`` says when it rests at the latest.
+    ``hold`` is a dead man's switch: no thread calls it. If the board receives no hold for HOLD_TIMEOUT_MS, it
+    brakes by itself and is at rest after ``rest_s`` at the latest.
     """
 
     def __init__(self, client: Client, arm: Arm, motion: JogMotion) -> None:
         self.motion = motion
         self.arm = arm
         self.moving = False
-        """Whether it still continues, as far as the board has said."""
+        """Whether it still moves, by the last message of the board."""
         self.fault: Fault | None = None
-        """What ended it, where that was one."""
+        """The fault that ended it, if any."""
         self._client = client
         self._run = 0
         self._said_s = 0.0
@@ -83,7 +83,7 @@ class HeldJog:
         self._reopen: Callable[[], Transport] | None = None
 
     def __enter__(self) -> Self:
-        """Upload and start it; BoardError if the board refuses."""
+        """Upload and start it; raises BoardError if the board refuses."""
         client = self._client
         client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
@@ -91,7 +91,7 @@ class HeldJog:
         self._reopen, client.session.reopen = (
             client.session.reopen,
             None,
-        )  # nobody holds it while a port is waited for
+        )  # nothing holds the jog while a broken port is waited for
         try:
             self._run = client.start(encoded.name, encoded.key.crc, START_HELD).run
         except BaseException:
@@ -104,21 +104,21 @@ class HeldJog:
 
     @property
     def rest_s(self) -> float:
-        """The arm rests at the latest so long after the last hold that the board heard."""
+        """Longest time from the last received hold until the arm is at rest, seconds."""
         return rest_s(self.motion)
 
     @property
     def angles_deg(self) -> Array:
-        """Where the joints were commanded to be by the last message of the board, (J,)."""
+        """Commanded joint angles by the last message of the board, degrees (J,)."""
         if self._positions is None:
             return self.motion.trajectory(0.0)
         scale = np.array([joint.steps_per_deg for joint in self.arm.driven])
         return np.asarray(np.array(self._positions.commanded_steps, dtype=float) / scale)
 
     def hold(self, seconds: float = 0.05) -> bool:
-        """Hold it for so long, looking at what the board says; False once it has ended.
+        """Hold the jog for ``seconds`` and read the board's messages; returns False once it has ended.
 
-        Raises LinkError if the board cannot be reached any more: it brakes by itself then.
+        Raises LinkError if the board cannot be reached any more; it then brakes by itself.
         """
         session = self._client.session
         until_s = session.clock() + seconds
@@ -152,18 +152,18 @@ class HeldJog:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Brake, and wait for rest; BoardError if a fault ended it."""
+        """Brake and wait for rest; raises BoardError if a fault ended the jog."""
         try:
             self._rest()
         except LinkError:
             self._client.session.reopen = self._reopen
-            if value is None:  # the first error says more
+            if value is None:  # do not hide the first error
                 raise
             return
         with suppress(LinkError):
             self._clean_up()
         if self.fault is not None and value is None:
-            raise refusal("the jog ended by a fault", self.fault.code, self.fault.joint)
+            raise refusal("a fault ended the jog", self.fault.code, self.fault.joint)
 
     def _rest(self) -> None:
         client = self._client

@@ -1,6 +1,6 @@
 """The self-test with motors: each joint moves a degree there and back, slowly; switches and E-stop are pressed.
 
-It uses the board program and the moves that everybody has, so whatever stops a motion stops these.
+It uses the usual moves of the board program, so everything that stops a motion stops these.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from armtempo_shared import codes
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, BoardError, InputError
 from armtempo.diagnosis.finding import Level
+from armtempo.diagnosis.selftest.result import Measurement, SelfTest, judged
+from armtempo.diagnosis.selftest.selftest import UNIQUE_ID_DIGITS
 from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning.jog.jog_motion import SLOWEST, move_of
 from armtempo.robot import arm_state, jog
 from armtempo.robot.stop_request import StopRequest
-from armtempo.selftest.result import Measurement, SelfTest, judged
-from armtempo.selftest.selftest import UNIQUE_ID_DIGITS
 
 PART = "motors"
 ARM_FILE = "arm_file"
-"""In the data: lines to put into the arm file."""
+"""Key of the data: lines to correct in the arm file."""
 MOST_DEG = 1.0
 _OF_FOLLOWING = 0.4
-"""Part of the joint's following error by which it moves at most: an encoder that counts backwards trips none then."""
+"""Largest move as a fraction of the following error: an encoder that counts backwards then causes no fault."""
 _SPEED = 0.05
 _NOISE_COUNTS = 2
 _RATIO_OFF = 0.03
@@ -39,7 +39,7 @@ _WIRING = "check its wire, its pin in the arm file, and the level at which it tr
 
 
 def question(arm: Arm, posture_deg: Array) -> str:
-    """What is to be confirmed: names all that moves, from this posture (J,)."""
+    """The question to confirm: lists all moves from this posture, degrees (J,)."""
     ways = zip(arm.driven, posture_deg, strict=True)
     joints = ", ".join(f"{joint.name} by {way_deg(joint, at_deg):+.2g}°" for joint, at_deg in ways)
     return (
@@ -49,7 +49,7 @@ def question(arm: Arm, posture_deg: Array) -> str:
 
 
 def way_deg(joint: DrivenJoint, at_deg: float) -> float:
-    """By how much a joint moves, towards the end of its range that is further away."""
+    """The move of a joint, degrees, towards the farther end of its range."""
     low_deg, high_deg = joint.range_deg
     following_deg = joint.encoder.following_error_deg if joint.encoder else 0.0
     size_deg = min(MOST_DEG, _OF_FOLLOWING * following_deg) if following_deg else MOST_DEG
@@ -57,7 +57,7 @@ def way_deg(joint: DrivenJoint, at_deg: float) -> float:
 
 
 class MotorTest:
-    """``ask``: a question to the person there, True for yes; ``tell``: what to do now."""
+    """``ask``: asks the person at the arm, True for yes; ``tell``: prints what to do."""
 
     def __init__(
         self,
@@ -73,7 +73,8 @@ class MotorTest:
         self._client, self._arm, self._stop, self._ask, self._tell = client, arm, stop, ask, tell
 
     def run(self) -> SelfTest:
-        """All of it. Raises LinkError where a position is unknown, ArmtempoError without a yes; nothing moved then."""
+        """Run the test. Raises LinkError if a position is unknown, ArmtempoError without a yes, before
+        anything moves."""
         posture_deg = arm_state.posture_deg(self._client, self._arm)
         if not self._ask(question(self._arm, posture_deg)):
             raise ArmtempoError(
@@ -96,8 +97,8 @@ class MotorTest:
         is_right = self._ask(f"did {joint.name} just turn towards {way} angles?")
         self._moved(joint, -by_deg)
         motor = judged(
-            PART, f"{joint.name}: direction", "as the arm file has it" if is_right else "the other way",
-            "as the arm file has it", is_right, "change the motor's direction in the arm file",
+            PART, f"{joint.name}: direction", "as in the arm file" if is_right else "the other way",
+            "as in the arm file", is_right, "change the motor's direction in the arm file",
         )  # fmt: skip
         turned, encoder = judge_encoder(joint, steps, counts if is_right else -counts)
         self.found.add([motor, turned])
@@ -105,7 +106,7 @@ class MotorTest:
         self.found.data[ARM_FILE] += [f"{joint.name}: {line}" for line in (*lines, *encoder)]
 
     def _moved(self, joint: DrivenJoint, by_deg: float) -> tuple[int, int]:
-        """Steps and counts of a jog."""
+        """Jog a joint; returns its steps and encoder counts."""
         index = self._arm.driven.index(joint)
         before = self._client.status().positions
         self._jog(joint, by_deg, _SPEED)
@@ -121,23 +122,23 @@ class MotorTest:
 
     def _switches(self, joint: DrivenJoint) -> None:
         for end, side, switch in (("low", -1, joint.switches.low), ("high", 1, joint.switches.high)):
-            if isinstance(switch, int):  # one on a pin ends homing only
+            if isinstance(switch, int):  # a switch on a pin is used for homing only
                 self._press(f"the switch at the {end} end of {joint.name}", codes.LIMIT_SWITCH, joint, side)
 
     def _estop(self) -> None:
         if self._arm.safety.estop_fitted:
             self._press("the E-stop", codes.ESTOP, self._arm.driven[0], 1)
         else:
-            self.found.add([Measurement(PART, "E-stop", "none is fitted by the arm file")])
+            self.found.add([Measurement(PART, "E-stop", "the arm file has none")])
 
     def _press(self, what: str, code: int, joint: DrivenJoint, side: int) -> None:
-        """Let ``joint`` move away and towards ``side``, slowly, until what is to be pressed stops it."""
+        """Move ``joint`` slowly away from and towards ``side`` until the pressed switch stops it."""
         self._tell(f"press {what} now, while {joint.name} moves slowly to and fro; keep clear of the arm")
         size_deg = abs(way_deg(joint, joint.home_deg))
         seen = 0
         for by_deg in (-side * size_deg, side * size_deg) * _TRIES:
             try:
-                with suppress(InputError):  # it is at the end of its range
+                with suppress(InputError):  # the joint is at the end of its range
                     self._jog(joint, by_deg, SLOWEST)
             except BoardError as error:
                 seen = error.code
@@ -148,7 +149,7 @@ class MotorTest:
         self.found.add([judged(PART, what, measured, "stops the joint", is_seen, _WIRING)])
 
     def _released(self, what: str) -> None:
-        """Clear the fault as soon as that is possible; BoardError where it is not in time."""
+        """Clear the fault once its cause is gone; raises BoardError if that takes too long."""
         limit_s = time.monotonic() + _RELEASE_S
         self._tell(f"release {what}")
         while True:
@@ -161,13 +162,13 @@ class MotorTest:
 
 
 def judge_encoder(joint: DrivenJoint, steps: int, counts: int) -> tuple[Measurement, list[str]]:
-    """What an encoder counted while its joint made this many steps; lines of the arm file's encoder to correct.
+    """Compare the encoder's counts with the joint's steps; also returns lines to correct in the arm file.
 
-    ``counts``: as they are where the motor turns the right way.
+    ``counts``: with the sign for a motor that turns the right way.
     """
     what = f"{joint.name}: encoder"
     if joint.encoder is None:
-        return Measurement(PART, what, "none by the arm file"), []
+        return Measurement(PART, what, "the arm file has none"), []
     due = float(joint.counts_per_step * steps)
     allowed = _NOISE_COUNTS + _RATIO_OFF * abs(due)
     off_deg = abs(counts - due) / joint.counts_per_deg
@@ -185,7 +186,7 @@ def judge_encoder(joint: DrivenJoint, steps: int, counts: int) -> tuple[Measurem
 
 
 def _corrections(joint: DrivenJoint, due: float, counts: int) -> Iterator[str]:
-    """Nothing where the encoder hardly turned."""
+    """Lines for the arm file; none if the encoder hardly turned."""
     assert joint.encoder is not None
     if abs(counts) <= _NOISE_COUNTS:
         return

@@ -1,4 +1,4 @@
-"""The outputs and inputs of the arm on a board, by the names of its file."""
+"""The arm's outputs and inputs on a board, by the names in its file."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _LOOK_S = 0.02
 
 
 class Way(Protocol):
-    """How to reach the board: a client, or a program that has its port."""
+    """Access to the board: a client, or a program that has its port."""
 
     def set_output(self, number: int, value: int) -> None:
         """Set an output of the arm record, from 0, to a value of 0 to 65535."""
 
     def levels(self) -> Levels:
-        """What inputs and outputs are now."""
+        """The levels of inputs and outputs."""
 
 
 class BoardOutput:
@@ -30,28 +30,29 @@ class BoardOutput:
         self._way = way
         self._number = arm.output(name)
         self.output: Output = arm.outputs[self._number]
-        """What the arm file says of it."""
+        """Its description in the arm file."""
 
     def set(self, value: float | str) -> None:
-        """Give it a value in its own unit (0 or 1, duty 0 to 1, degrees), or a state by its name; also while moving.
+        """Set a value in the output's unit (0 or 1, duty 0 to 1, degrees), or a state by its name; also
+        during a motion.
 
-        Raises InputError for what it cannot take, BoardError while a fault is pending.
+        Raises InputError for a value outside its range, BoardError while a fault is pending.
         """
         self._way.set_output(self._number, self.output.raw(value))
 
     @property
     def raw(self) -> int:
-        """What the board has last set it to, 0 to 65535 for its whole range."""
+        """The value that the board last set, 0 to 65535 for its whole range."""
         return self._way.levels().outputs[self._number]
 
     @property
     def value(self) -> float:
-        """The same in its own unit."""
+        """The value that the board last set, in the output's unit."""
         return self.output.value(self.raw)
 
     @property
     def state(self) -> str:
-        """The state that it is in, by its name; "" if its value is none of them."""
+        """The name of its state; "" if no state has its value."""
         return self.output.state(self.raw)
 
 
@@ -62,14 +63,14 @@ class BoardInput:
         self._way = way
         self._number = arm.input(name)
         self.input: Input = arm.inputs[self._number]
-        """What the arm file says of it."""
+        """Its description in the arm file."""
 
     def read(self) -> bool:
         """Whether it is active, debounced."""
         return self._way.levels().active(self._number)
 
     def wait(self, active: bool = True, timeout_s: float | None = None) -> None:
-        """Return when it is active, or not; LinkError if that does not come within ``timeout_s``."""
+        """Wait until the input is ``active``; raises LinkError after ``timeout_s``."""
         limit_s = None if timeout_s is None else time.monotonic() + timeout_s
         while self.read() != active:
             if limit_s is not None and time.monotonic() > limit_s:

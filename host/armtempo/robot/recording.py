@@ -1,4 +1,4 @@
-"""Runs that are recorded: a run folder, the repetitions into it, and the samples of a run without a host."""
+"""Recording runs: the run folder, its repetitions, and the samples of a run without a host."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.model import arm_json
 from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.report import run_folder
+from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
 from armtempo.robot.goto import go_back
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
-from armtempo.runs import run_folder
-from armtempo.runs.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
 
 _END_S = 1e-3
 """A run that ended earlier than its motion by more than this was stopped."""
 
 
 class Watcher:
-    """Sees a run while it runs; override what you want to see."""
+    """Callbacks during a run; override those that you need."""
 
     def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
-        """The run folder is there, and the arm where the motion begins."""
+        """The run folder was made, and the arm is at the start of the motion."""
 
     def on_sample(self, sample: Sample, duration_s: float) -> None:
-        """One sample of a motion that lasts ``duration_s``."""
+        """A sample of a motion of ``duration_s`` has arrived."""
 
     def end(self, repetition: Repetition) -> None:
-        """A repetition has ended, however."""
+        """A repetition has ended, also by a stop or a fault."""
 
 
 class ProgressWatcher(Watcher):
-    """Tells the progress of a run of several repetitions, in seconds of motion; hands on what it sees."""
+    """Reports the progress of a run of several repetitions, in seconds of motion, and calls another watcher."""
 
     def __init__(self, progress: Progress | None, repetitions: int, inner: Watcher) -> None:
         self._progress = progress
@@ -64,7 +64,7 @@ class ProgressWatcher(Watcher):
 
 
 def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> RunFolder:
-    """A run folder with everything that is needed to repeat the run."""
+    """A new run folder with everything that is needed to repeat the run."""
     origin = {
         "arm": motion.arm.name,
         "port": port,
@@ -92,9 +92,9 @@ def repeat(
     stop: StopRequest,
     watcher: Watcher,
 ) -> Iterator[Repetition]:
-    """Replay a stored motion ``times`` times into the run folder, with the motion backwards in between.
+    """Replay a stored motion ``times`` times into the run folder, and return along the path in between.
 
-    Gives each repetition when it has ended. A stop request ends the series, a fault too: BoardError.
+    Yields each repetition when it has ended. A stop request ends the series; a fault raises BoardError.
     """
     for number in range(times):
         if number:
@@ -110,7 +110,7 @@ def repeat(
 def _recorded(
     client: Client, motion: EncodedMotion, folder: RunFolder, stop: StopRequest, watcher: Watcher
 ) -> RunEnd:
-    """One repetition into the run folder, however it ends."""
+    """Record one repetition in the run folder, also if it ends early."""
     with folder.begin_repetition() as file:
 
         def take(sample: Sample, duration_s: float) -> None:
@@ -125,15 +125,15 @@ def _recorded(
 
 
 def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> RunFolder:
-    """The samples that the board keeps of its last run, one of ``motion``, in a new run folder.
+    """Write the samples that the board kept of its last run (of ``motion``) into a new run folder.
 
-    A run under way is followed to its end. Raises LinkError if the board keeps no samples.
+    Waits for the end of a run in progress. Raises LinkError if the board has no samples.
     """
     status = client.status()
     if not status.run or not (status.moving or status.samples_kept):
         raise LinkError(
-            "the board keeps no samples: nothing was run since it started, or they were fetched",
-            "fetch before the next run and before a reset; a new run: 'armtempo run'",
+            "the board has no samples: nothing ran since it started, or they were fetched",
+            "fetch samples before the next run and before a reset; 'armtempo run' starts a new run",
         )
     follower = Follower(client, status.run)
     folder = new_run(folder_in, motion, port, client)

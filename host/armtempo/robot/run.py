@@ -1,4 +1,4 @@
-"""A run that was recorded: its samples, its results, its report."""
+"""A recorded run: its samples, results and report."""
 
 from __future__ import annotations
 
@@ -11,24 +11,23 @@ import numpy as np
 
 from armtempo.basics.arguments import checked
 from armtempo.model.plan import Plan
-from armtempo.report import run_report
-from armtempo.runs import reader, replayed
-from armtempo.runs.replayed import JointResult, results
-from armtempo.runs.run_folder import COMPLETE, Repetition
+from armtempo.report import replayed, run_reader, run_report
+from armtempo.report.replayed import JointResult, results
+from armtempo.report.run_folder import COMPLETE, Repetition
 from armtempo.splines.trajectory import Trajectory
 
 
 @checked
 class Run:
-    """A run folder: what was run, and what came back."""
+    """A run folder: the motion, and its recorded samples."""
 
-    def __init__(self, content: reader.RunData) -> None:
+    def __init__(self, content: run_reader.RunData) -> None:
         self._content = content
 
     @classmethod
     def load(cls, path: Path | str) -> Run:
-        """The run in a folder, whole or cut short; RunFolderError if it is none or contradicts itself."""
-        return cls(reader.load(Path(path)))
+        """The run in a folder, also if it ended early; raises RunFolderError if the folder is none or inconsistent."""
+        return cls(run_reader.load(Path(path)))
 
     def __repr__(self) -> str:
         states = ", ".join(repetition.state for repetition in self.repetitions) or "nothing recorded"
@@ -46,21 +45,22 @@ class Run:
 
     @property
     def meta(self) -> dict[str, Any]:
-        """What run.json says: when, on which board, how each repetition ended."""
+        """The content of run.json: when, on which board, how each repetition ended."""
         return self._content.meta
 
     @property
-    def repetitions(self) -> tuple[reader.RepetitionData, ...]:
+    def repetitions(self) -> tuple[run_reader.RepetitionData, ...]:
         """The samples of each repetition as arrays."""
         return self._content.repetitions
 
     @property
     def entries(self) -> tuple[Repetition, ...]:
-        """What run.json says of each repetition: how it ended, fault, lost samples, last position."""
+        """The repetitions in run.json: how each ended, fault, lost samples, last position."""
         return self._content.entries
 
     def to_json(self) -> dict[str, Any]:
-        """The run folder, how each repetition ended, and where each joint came to rest in the last one."""
+        """Plain values: the run folder, how each repetition ended, and where each joint came to rest in the
+        last one."""
         return {
             "name": self.name,
             "folder": str(self.path),
@@ -71,17 +71,17 @@ class Run:
 
     @property
     def complete(self) -> bool:
-        """Whether every repetition came to its end without a stop, a fault or a broken connection."""
+        """Whether every repetition reached its end without a stop, a fault or a broken connection."""
         return bool(self.repetitions) and all(one.state == COMPLETE for one in self.repetitions)
 
     @cached_property
     def plan(self) -> Plan | None:
-        """The plan that was run; None if it is not known, as with a motion that only the board had."""
+        """The plan of the motion; None if it is not known, as for a motion that only the board had."""
         return replayed.plan_of(self._content)
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The motion that was run: as planned, or as the board's record has it.
+        """The motion: as planned, or from the board's record.
 
         Raises RunFolderError if neither can be read.
         """
@@ -91,9 +91,9 @@ class Run:
     def samples(self) -> np.ndarray[Any, np.dtype[np.void]]:
         """All samples of all repetitions, (N,), as a structured array.
 
-        Its fields: ``repetition`` from 1, ``index`` of the sample in its repetition from 0, ``time_s`` by the
-        board's motion clock and ``path_s`` in the motion's own time; with an entry for each driven joint, (J,):
-        ``commanded_steps``, ``commanded_deg``, and ``angle_deg`` by the encoder, NaN for a joint without one.
+        Fields: ``repetition`` (from 1), ``index`` of the sample in its repetition (from 0), ``time_s`` by the
+        board's motion clock and ``path_s`` in the motion's own time; and for each driven joint, (J,):
+        ``commanded_steps``, ``commanded_deg``, and ``angle_deg`` from the encoder (NaN without an encoder).
         """
         joints = len(self._content.joints)
         kind = np.dtype(
@@ -119,13 +119,12 @@ class Run:
 
     @property
     def results(self) -> tuple[JointResult, ...]:
-        """How each joint ended the last repetition; empty if it is not known how that ended."""
+        """The final position of each joint in the last repetition; empty if it is not known."""
         return results(self._content, self.trajectory)
 
     def report(self) -> Path:
-        """Write report.html and its figures into the run folder; gives the page.
+        """Write report.html and its figures into the run folder; returns the page.
 
-        Raises RunFolderError if it is not known what was to move or there is no sample, MissingPackageError without
-        matplotlib.
+        Raises RunFolderError if the motion is not known or there is no sample, MissingPackageError without matplotlib.
         """
         return run_report.write(self.path)

@@ -1,4 +1,4 @@
-"""A sequence that is recorded while it runs: its rows and samples, as the board tells them, into a run folder."""
+"""Recording a running sequence: its rows and samples, from the board's events, into a run folder."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.records import encoded_sequence
-from armtempo.runs import run_folder, sequence_folder
-from armtempo.runs.sequence_folder import SequenceFolder
+from armtempo.report import run_folder, sequence_folder
+from armtempo.report.sequence_folder import SequenceFolder
 
 ACKNOWLEDGED = 8
-"""The board is notified of samples that have arrived, this many at a time."""
+"""Received samples are acknowledged to the board after this many."""
 
 
 class Recorder:
-    """Sees a sequence while it runs; this one keeps nothing."""
+    """Receives a running sequence's events; the base class keeps nothing."""
 
     path: Path | None = None
-    """The run folder, where there is one."""
+    """The run folder, if any."""
 
     def take(self, event: Event) -> None:
-        """An event has come."""
+        """Handle an event."""
 
     def end(self, state: SequenceState) -> None:
-        """It has ended, however."""
+        """The sequence has ended, in whatever way."""
 
 
 @dataclass(frozen=True, eq=False)
 class SequenceContent:
-    """What the board is to run: the sequence's record and those of its motions."""
+    """The record of a sequence, and those of its motions."""
 
     name: str
     arm: Arm
@@ -49,7 +49,7 @@ class SequenceContent:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What each row does."""
+        """A description of each row."""
         if self.plan is not None:
             return tuple(row.words for row in self.plan.rows)
         names = [output.name for output in self.arm.outputs], [one.name for one in self.arm.inputs]
@@ -57,14 +57,14 @@ class SequenceContent:
 
 
 def of_plan(plan: SequencePlan) -> SequenceContent:
-    """Of a planned sequence."""
+    """Content of a planned sequence."""
     encoded = encoded_sequence.of_plan(plan)
     legs = tuple(motion.data for motion in encoded.motions)
     return SequenceContent(plan.name, plan.arm, SequenceData(encoded.data), legs, plan)
 
 
 def fetched(client: Client, name: str, arm: Arm) -> SequenceContent:
-    """Of one that the board keeps; InputError if its record is damaged or of another version."""
+    """Content of a stored sequence; raises InputError if its record is damaged or of another version."""
     try:
         record = SequenceData(client.fetch(name))
     except SequenceError as error:
@@ -77,7 +77,7 @@ def fetched(client: Client, name: str, arm: Arm) -> SequenceContent:
 
 @contextmanager
 def recorder(client: Client, content: SequenceContent, parent: Path, port: str) -> Iterator[Recorder]:
-    """Records into a new run folder below ``parent``, for one run."""
+    """A recorder that writes one run into a new run folder in ``parent``."""
     rows = [content.record.row(index) for index in range(content.record.rows)]
     path = run_folder.new_folder(parent, content.name)
     for number, leg in enumerate(content.legs, 1):
@@ -113,7 +113,7 @@ class _FolderRecorder(Recorder):
         self._client = client
         self._folder = folder
         self._begun_s = client.session.clock()
-        self._run, self._row = 0, -1  # the motion's run that was heard of last, and its row
+        self._run, self._row = 0, -1  # number of the motion's run that was reported last, and its row
         self._kept = 0
 
     def take(self, event: Event) -> None:
@@ -136,7 +136,7 @@ _THEN = {NEXT_THEN: "next", FAULT_THEN: "fault"}
 
 
 def row_words(record: SequenceData, outputs: Sequence[str], inputs: Sequence[str]) -> tuple[str, ...]:
-    """One text a row; ``outputs``, ``inputs``: their names by their number, as the arm has them."""
+    """One text per row; ``outputs``, ``inputs``: names in the order of the arm file."""
     return tuple(_words(record, record.row(index), outputs, inputs) for index in range(record.rows))
 
 

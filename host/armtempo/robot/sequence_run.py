@@ -1,4 +1,4 @@
-"""A sequence on the board: its motions and its record stored, started, followed to its end."""
+"""A sequence on the board: store it with its motions, start it, follow it to its end."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from armtempo.robot.sequence_recording import Recorder
 from armtempo.robot.stop_request import StopRequest
 
 LOOK_S = 0.1
-"""How often the board is asked where it is."""
+"""Interval at which the board is asked for the sequence's state."""
 SequenceWatcher = Callable[[SequenceState], object]
-"""Gets the state of the sequence, each time it changes."""
+"""Called with the state of the sequence at each change."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,10 @@ class _Record:
 def store(
     client: Client, encoded: EncodedSequence, progress: Progress | None = None, replace: bool = False
 ) -> MotionKey:
-    """Store a sequence: its motions first, itself last, so that it is whole or is not there.
+    """Store a sequence, its motions first, so that a stored sequence is always complete.
 
-    Motions of an earlier sequence of this name that nobody needs any more are removed. Raises LinkError if the
-    board keeps something else under one of the names, unless ``replace``.
+    Motions of an earlier sequence of this name that are no longer needed are removed. Raises LinkError if the
+    board has other content under one of the names and ``replace`` is false.
     """
     client.need("sequences", f"sequence {encoded.plan.name!r}")
     kept = {entry.name: entry for entry in client.stored()}
@@ -72,7 +72,7 @@ def store(
 
 
 def _legs_of(client: Client, old: StoredMotion) -> dict[str, int]:
-    """Names and checksums of the motions of a stored sequence; none where it cannot be read."""
+    """Names and checksums of the motions of a stored sequence; empty if it cannot be read."""
     try:
         found = record.SequenceData(client.fetch(old.name))
         return dict(found.motion(index) for index in range(found.motions))
@@ -89,9 +89,9 @@ def run(
 ) -> SequenceState:
     """Start a stored sequence and follow it to its end; a stop request makes the board brake and end it.
 
-    ``recorder`` gets the board's events and the end. A board that cannot be reached continues by itself; the host tries
-    to reconnect for RECONNECT_S. Raises BoardError if the board refuses to start or a fault ends the sequence,
-    LinkError if it cannot be reached any more.
+    ``recorder`` gets the board's events and the end. If the connection breaks, the board continues by itself,
+    and the host tries to reconnect for RECONNECT_S. Raises BoardError if the board refuses to start or a
+    fault ends the sequence, LinkError if it cannot be reached any more.
     """
     client.session.stopping = lambda: stop.wanted
     stop.wake = client.session.wake
@@ -104,7 +104,7 @@ def run(
         stored_motion.send_stop(client, now=True)
         raise
     if end.ending == "fault":
-        raise refusal(f"the sequence ended by a fault {where(end)}", end.code, client.status().fault_joint)
+        raise refusal(f"a fault ended the sequence {where(end)}", end.code, client.status().fault_joint)
     if end.ending == "refused":
         raise refusal(f"the sequence could not continue {where(end)}", end.code)
     return end
@@ -123,7 +123,7 @@ def _follow(
             if state != before and state.name == name:
                 watcher(state)
             if state.name != name or state.ending == "none":
-                last = f"; it was last heard of {where(before)}" if before and before.name == name else ""
+                last = f"; last known state: {where(before)}" if before and before.name == name else ""
                 raise OtherBoardError(
                     f"the board has restarted during the sequence: positions are unknown{last}",
                     "move the arm to its home posture and run 'armtempo home'",
@@ -142,7 +142,7 @@ def _follow(
 
 
 def _take_events(client: Client, recorder: Recorder) -> None:
-    """What the board says within LOOK_S; a stop request ends that early."""
+    """Pass on the board's events for LOOK_S; a stop request ends that early."""
     until_s = client.session.clock() + LOOK_S
     while (left_s := until_s - client.session.clock()) > 0:
         event = client.session.poll(left_s)
@@ -152,10 +152,10 @@ def _take_events(client: Client, recorder: Recorder) -> None:
 
 
 def where(state: SequenceState) -> str:
-    """Where it stood, in words."""
+    """Describe step and cycles."""
     return f"in step {state.step} after {cycles(state)}"
 
 
 def cycles(state: SequenceState) -> str:
-    """How many there were, in words."""
+    """Describe the number of cycles."""
     return f"{state.cycle} whole cycle{'s' * (state.cycle != 1)}"

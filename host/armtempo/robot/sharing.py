@@ -1,7 +1,6 @@
-"""What a program that has a board's port does for others: it answers, stops the board, and hands out samples.
+"""The owner of a board's port answers other programs, stops the board for them, and publishes samples.
 
-The requests come from threads of their own; they take turns with this program's commands (``Session.turns``),
-and a stop goes first.
+Each request runs in its own thread; requests and this program's commands take turns (``Session.turns``), a stop first.
 """
 
 from __future__ import annotations
@@ -20,8 +19,7 @@ from armtempo.link.board_messages import Done, Event, Fault, Sample
 from armtempo.link.traffic import Chunk
 from armtempo.model.arm import Arm
 from armtempo.ports import claim, names
-from armtempo.ports.lines import Message
-from armtempo.ports.requests import TOPICS
+from armtempo.ports.messages import TOPICS, Message
 from armtempo.ports.server import Server
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.speed import change_speed
@@ -29,14 +27,14 @@ from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import TURN_S, fault_name, request_stop
 
 EVERY_S = 0.5
-"""Interval of the states that are handed out."""
+"""Interval of the published states."""
 
 
 class Sharing:
     """Makes a board's port known to other programs, until ``close``.
 
-    ``state``: gives what the board says now; ``stops``: the stop requests of what this program has under way;
-    ``arm``: gives the arm that it moves, as far as that is known.
+    ``state``: returns the board's state; ``stops``: the stop requests of this program's running calls;
+    ``arm``: returns the arm, if known.
     """
 
     def __init__(
@@ -54,7 +52,7 @@ class Sharing:
         self._closed = Flag()
 
     def open(self, port: str) -> None:
-        """Listen; OSError if that cannot be. A virtual board that only this program can reach is not shared."""
+        """Listen; raises OSError if that fails. A virtual board that only this program can reach is not shared."""
         name = names.same_for_all(port)
         if not name:
             return
@@ -73,13 +71,13 @@ class Sharing:
         Thread(target=self._hand_out_states, name="armtempo states", daemon=True).start()
 
     def close(self) -> None:
-        """Give up the port."""
+        """Stop sharing the port."""
         self._closed.set()
         if self._server is not None:
             self._server.close()
 
     def traffic(self, chunk: Chunk, words: list[str]) -> None:
-        """Hand out what goes over the port."""
+        """Publish the port's traffic."""
         if self._server is not None and self._server.wanted("traffic"):
             content = {"time_s": chunk.time_s, "direction": chunk.direction, "data": chunk.data.hex()}
             self._server.publish("traffic", {**content, "words": words})
@@ -122,10 +120,12 @@ class Sharing:
     def _turn(self) -> Iterator[None]:
         with self._client.session.in_a_hurry(TURN_S) as mine:
             if not mine:
-                raise NoAnswerError("the program that has the port waits for the board's answer", "try again")
+                raise NoAnswerError(
+                    "the program that has the port is waiting for the board's answer", "try again"
+                )
             yield
 
-    # what is handed out
+    # published messages
 
     def _hand_out_states(self) -> None:
         while not self._closed.wait(EVERY_S):
@@ -148,7 +148,7 @@ class Sharing:
 
 
 def sample_json(sample: Sample, arm: Arm | None) -> dict[str, Any]:
-    """A sample as plain values; in degrees too where the arm is known."""
+    """A sample as plain values, also in degrees if the arm is known."""
     steps, counts = sample.positions.commanded_steps, sample.positions.counts
     found: dict[str, Any] = {
         "run": sample.run,

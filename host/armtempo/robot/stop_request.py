@@ -1,4 +1,4 @@
-"""A stop that somebody asks for while something moves: by Ctrl-C or SIGTERM, from a thread, from another program."""
+"""Requests to stop a motion: by Ctrl-C or SIGTERM, from a thread, from another program."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Stopped(KeyboardInterrupt):
-    """A motion was brought to rest before its end because a stop was asked for."""
+    """A motion was brought to rest before its end by a stop request."""
 
 
 class StopRequest:
-    """A stop that somebody asks for; what moves looks at ``wanted`` and brakes.
+    """A request to stop; the call that waits for a motion polls ``wanted`` and brakes.
 
-    As a context it also catches signals: the first sets ``wanted``, so that no frame is cut in the middle and
-    the board can be told to brake, a second one raises KeyboardInterrupt. A context whose stop was asked for
-    ends with Stopped. Any thread may set ``wanted``; signals only reach the main thread.
+    As a context it also catches signals: the first sets ``wanted``, so that no frame is cut and the board can
+    brake; the second raises KeyboardInterrupt. A context with a request raises Stopped at its end. Any thread
+    may set ``wanted``; signals only reach the main thread.
     """
 
     def __init__(self) -> None:
         self._wanted = False
         self.by = ""
-        """Who asked for it, in words; "" for a signal or this program."""
+        """Who asked for the stop; "" for a signal or this program."""
         self.wake: Callable[[], object] = lambda: None
-        """Called when the stop is asked for; wakes whatever waits for ``wanted``."""
+        """Called with the request; wakes the call that waits."""
 
     @property
     def wanted(self) -> bool:
-        """Whether the stop was asked for."""
+        """Whether the stop was requested."""
         return self._wanted
 
     @wanted.setter
@@ -43,7 +43,7 @@ class StopRequest:
             self.wake()
 
     def ask(self, by: str) -> None:
-        """Ask for the stop, as ``by`` in words."""
+        """Request the stop; ``by``: who asks, for messages."""
         self.by = by
         self.wanted = True
 
@@ -61,7 +61,7 @@ class StopRequest:
             self.check()
 
     def check(self) -> None:
-        """Raise Stopped where a stop was asked for."""
+        """Raise Stopped if the stop was requested."""
         if self.wanted:
             raise Stopped(*([f"{self.by} asked for a stop"] if self.by else []))
 
@@ -73,9 +73,9 @@ class StopRequest:
 
 @contextmanager
 def stoppable(given: StopRequest | None) -> Iterator[StopRequest]:
-    """A stop request for something that moves: the one that is ``given``, else a new one that catches signals.
+    """A stop request for a motion: ``given``, else a new one that catches signals.
 
-    Ends with Stopped where the stop was asked for.
+    Raises Stopped at its end if the stop was requested.
     """
     if given is None:
         with StopRequest() as own:

@@ -1,4 +1,4 @@
-"""A stored motion from its start to its end: start it, follow it, stop it, say how it ended."""
+"""Start, follow and stop a stored motion."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot.stop_request import StopRequest
 
 SampleSink = Callable[[Sample, float], object]
-"""Gets each sample and the length of the motion in seconds."""
+"""Called with each sample and the duration of the motion in seconds."""
 
 BRAKE_S = 5.0
-"""A board that does not rest after this, nor _LATER_S later than it said, is told to freeze."""
+"""A board that is not at rest after this time, nor _LATER_S after the announced time, is told to freeze."""
 _LATER_S = 1.0
 FREEZE_S = 2.0
-"""Freezing takes no longer than this."""
+"""Longest time that freezing takes."""
 TURN_S = 1.0
 """A request from another thread waits this long for its turn to talk to the board."""
 TEMPORARY = "tmp-"
-"""Names of motions that are removed after use begin so."""
+"""Prefix of the names of motions that are removed after use."""
 
 
 def store(
     client: Client, name: str, data: bytes, progress: Progress | None = None, replace: bool = False
 ) -> MotionKey:
-    """Upload a motion record under ``name``, unless the board has just this one already.
+    """Upload a motion record under ``name``, unless the board already has it.
 
-    Raises LinkError if the board keeps another motion under this name, unless ``replace``, or the name or what
-    is there is worth nothing: temporary or damaged.
+    Raises LinkError if the board has another motion of this name, unless ``replace`` is true, the name is
+    temporary, or that motion is damaged.
     """
     key = MotionKey(name, wire.record_crc(data))
     found = client.find(name)
@@ -68,8 +68,8 @@ def replay(
 ) -> RunEnd:
     """Start a stored motion and follow it to its end; a stop request makes the board brake.
 
-    Whatever fails here stops the board. Raises BoardError if the board refuses to start, LinkError if it
-    cannot be reached any more, Stopped where the stop was asked for before the start.
+    Any error here stops the board. Raises BoardError if the board refuses to start, LinkError if it cannot be
+    reached any more, Stopped if the stop was requested before the start.
     """
     client.session.stopping = lambda: stop.wanted
     stop.wake = client.session.wake
@@ -81,7 +81,7 @@ def replay(
         return _follow(client, follower, Brake(client, stop), lambda sample: sink(sample, motion_s))
     except OtherBoardError as error:
         raise LinkError(
-            f"{error.problem}; what followed the last sample is not known",
+            f"{error.problem}; what happened after the last sample is not known",
             f"{error.hint}",
         ) from error
 
@@ -95,8 +95,8 @@ def _follow(client: Client, follower: Follower, brake: Brake, take: Callable[[Sa
                 take(sample)
         except OtherBoardError:
             raise
-        except NoAnswerError as error:  # silent, though its port is there: as if the cable were out
-            if not client.session.stopping():  # else the stop continues, until it is given up
+        except NoAnswerError as error:  # silent although its port exists: treated like a pulled cable
+            if not client.session.stopping():  # otherwise the stop continues until it is abandoned
                 if client.session.clock() - heard_s > RECONNECT_S:
                     raise
                 client.session.reconnect(error)
@@ -107,22 +107,22 @@ def _follow(client: Client, follower: Follower, brake: Brake, take: Callable[[Sa
 
 
 def _stop_after(client: Client, error: BaseException) -> None:
-    """Stop what is moving because of ``error``, as far as the board can be reached."""
+    """Stop a motion because of ``error``, if the board can be reached."""
     if isinstance(error, BoardError) and error.code == wire.ERROR_CODES["no_session"]:
         raise LinkError(
             (
-                "the board restarted during the motion: the arm's position, and what followed the last sample, are "
-                "not known"
+                "the board restarted during the motion: the arm's position is not known, nor what happened after "
+                "the last sample"
             ),
             "find the cause, then 'armtempo home'",
         ) from error
-    client.session.reopen = None  # a cable that is out is not waited for
-    with suppress(LinkError):  # the first error says more
+    client.session.reopen = None  # do not wait for a pulled cable
+    with suppress(LinkError):  # do not hide the first error
         client.stop(now=isinstance(error, KeyboardInterrupt))
 
 
 class Brake:
-    """Called between two messages: passes a stop request on; freezes a board that does not come to rest."""
+    """Called between two messages: sends a requested stop; freezes a board that does not come to rest."""
 
     def __init__(self, client: Client, stop: StopRequest, now: bool = False) -> None:
         self._client = client
@@ -150,11 +150,11 @@ class Brake:
 
 
 def _does_not_stop() -> None:
-    raise LinkError("the board was told to stop and does not", "switch off the motors' power")
+    raise LinkError("the board was told to stop but still moves", "switch off the motors' power")
 
 
 def send_stop(client: Client, now: bool = False) -> bool:
-    """Tell the board to brake along the path, or to freeze; False if nothing moves, and nothing happens."""
+    """Tell the board to brake along the path, or to freeze; returns False if nothing moves."""
     try:
         client.stop(now)
         return True
@@ -165,9 +165,9 @@ def send_stop(client: Client, now: bool = False) -> bool:
 
 
 def request_stop(client: Client, stops: Iterable[StopRequest], now: bool, by: str) -> bool:
-    """Ask for a stop from another thread than the one that waits for the motion; whether something moved.
+    """Stop a motion from a thread other than the one that waits for it; returns whether something moved.
 
-    ``stops``: the requests of what this program has under way, which end. NoAnswerError if the board is silent.
+    ``stops``: the requests of this program's running calls. Raises NoAnswerError if the board is silent.
     """
     for request in [*stops]:
         request.ask(by)
@@ -181,7 +181,7 @@ def request_stop(client: Client, stops: Iterable[StopRequest], now: bool, by: st
 
 
 def stop(client: Client, now: bool) -> None:
-    """Stop and wait until the arm rests; LinkError if it does not come to rest."""
+    """Stop and wait until the arm is at rest; raises LinkError if that takes too long."""
     request = StopRequest()
     request.wanted = True
     brake = Brake(client, request, now)
@@ -198,16 +198,16 @@ def fault_name(code: int) -> str:
 
 
 def raise_fault(end: RunEnd) -> None:
-    """Raise BoardError, with the sentence for the fault, where a run ended by one."""
+    """Raise BoardError, with the text of the fault, if a fault ended the run."""
     if end.fault:
         said = "".join(f"; the board says: {text.strip()}" for text in readable(end.notices))
-        raise refusal(f"the motion ended by a fault{said}", end.fault, end.fault_joint)
+        raise refusal(f"a fault ended the motion{said}", end.fault, end.fault_joint)
 
 
 def readable(notices: tuple[str, ...]) -> tuple[str, ...]:
-    """Texts of the board with the names of the source, where the board has the compiled program."""
+    """The board's texts, with shortened names of a compiled program replaced by those of the source."""
     if not notices:
         return ()
-    from armtempo.deploy.program_files import in_full  # reads the whole program: only where it is needed
+    from armtempo.deploy.program_files import in_full  # imported here, because it reads the whole program
 
     return tuple(map(in_full, notices))

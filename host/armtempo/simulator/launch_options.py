@@ -9,9 +9,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from armtempo_shared import armrecord
+
 from armtempo.basics.arguments import checked_fields
+from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
+from armtempo.model.parts import DrivenJoint
 from armtempo.ports.names import VIRTUAL_ID
+from armtempo.records import encode
 
 DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 
@@ -26,7 +31,7 @@ class InjectedFault:
     ``counts``), ``silence`` (the serial cable is out for ``ms``), ``hang`` (the program stops for ever) or
     ``crash`` (the next look at the time raises).
 
-    From power-up on where ``run`` is 0: ``dead_pin`` (``name`` does not toggle), ``short`` (``name`` "A15-A1": the
+    From power-up on if ``run`` is 0: ``dead_pin`` (``name`` does not toggle), ``short`` (``name`` "A15-A1": the
     second pin toggles with the first), ``half_clock`` (TIM2 counts at half its rate), ``slow_flash`` (each operation
     takes ``ms`` more), ``late_interrupts`` (by ``ms``), ``dead_stream`` (DMA1's stream ``joint`` answers no request).
     """
@@ -120,3 +125,36 @@ class ProcessOptions:
 def unique_id(seed: int) -> str:
     """A virtual board's 24 hex digits, another for each seed."""
     return (VIRTUAL_ID + hashlib.sha256(b"virtual board %d" % seed).hexdigest())[:24]
+
+
+def describe(arm: Arm, start_deg: Sequence[float] | None = None) -> dict[str, Any]:
+    """The arm record's fields and, per joint, where it is at power-up and its drive's model.
+
+    ``start_deg`` (J,): None means the home posture. Raises InputError if a model makes no sense.
+    """
+    head, rows, _ = armrecord.unpack(encode.arm_record(arm))
+    angles = start_deg if start_deg is not None else [joint.home_deg for joint in arm.driven]
+    return {
+        "head": head,
+        "joints": [
+            {**row, "start_deg": float(angle), **_joint(joint)}
+            for row, angle, joint in zip(rows, angles, arm.driven, strict=True)
+        ],
+    }
+
+
+def _joint(joint: DrivenJoint) -> dict[str, Any]:
+    model, motor = joint.model, joint.motor
+    if model.holding_torque_nm and not (model.inertia_kg_m2 or model.rotor_inertia_kg_m2):
+        raise InputError(
+            f"{joint.name}: model.holding_torque_nm without an inertia",
+            "give model.inertia_kg_m2 or model.rotor_inertia_kg_m2 in the arm file",
+        )
+    return {
+        "steps_per_deg": motor.steps_per_deg,
+        "gear_ratio": motor.gear_ratio,
+        "microsteps": motor.microsteps,
+        "low_deg": joint.switches.low_deg,
+        "high_deg": joint.switches.high_deg,
+        "model": asdict(model),
+    }

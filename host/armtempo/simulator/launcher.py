@@ -1,4 +1,4 @@
-"""Starts a virtual board as a process of its own and gives it a serial port."""
+"""Starts a virtual board as a process of its own and gives it a serial port and a temporary folder."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 
 from armtempo.basics.errors import InputError, LinkError
-from armtempo.simulator.describe import describe
-from armtempo.simulator.launch_options import LaunchOptions, ProcessOptions, unique_id
-from armtempo.simulator.temporary_folder import TemporaryFolder
+from armtempo.simulator.launch_options import LaunchOptions, ProcessOptions, describe, unique_id
 
 INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
 _CHOOSE_INTERPRETER = (
@@ -25,6 +23,8 @@ _MAIN = Path(__file__).with_name("main.py")
 _HEAP = "4M"
 _START_S = 60.0
 _STOP_S = 1.0
+PREFIX = "armtempo-virtual-"
+_LOCK = "lock"
 
 
 class VirtualBoard:
@@ -108,9 +108,7 @@ class VirtualBoard:
     def __enter__(self) -> VirtualBoard:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.stop()
         self._folder.remove()
 
@@ -243,3 +241,41 @@ def is_micropython(interpreter: str) -> bool:
             _CHOOSE_INTERPRETER,
         )
     return answer.stdout.strip() == "micropython"
+
+
+class TemporaryFolder:
+    """A new folder; ``lock`` is a file descriptor that keeps it, also in a process that inherits it.
+
+    Making one removes those whose owners were killed.
+    """
+
+    def __init__(self) -> None:
+        import fcntl  # of POSIX, and so are virtual boards
+
+        _sweep()
+        self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
+        unlocked = self.path / "new"
+        self.lock = os.open(unlocked, os.O_CREAT | os.O_RDWR, 0o600)
+        fcntl.flock(self.lock, fcntl.LOCK_EX)
+        unlocked.rename(self.path / _LOCK)  # under this name it is always locked, or abandoned
+
+    def remove(self) -> None:
+        """Remove it with all that is in it; nothing happens the second time."""
+        if self.lock >= 0:
+            shutil.rmtree(self.path, ignore_errors=True)
+            os.close(self.lock)
+            self.lock = -1
+
+
+def _sweep() -> None:
+    import fcntl
+
+    for lock in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/{_LOCK}"):
+        try:
+            descriptor = os.open(lock, os.O_RDWR)
+        except OSError:  # another user's, or just removed
+            continue
+        with suppress(OSError):  # it is in use
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(lock.parent, ignore_errors=True)
+        os.close(descriptor)

@@ -1,4 +1,4 @@
-"""Polynomials on [0, 1] in scaled Bernstein form, where a product is a convolution and bounds are free.
+"""Polynomials on [0, 1] in scaled Bernstein form: a product is a convolution, and coefficients give bounds.
 
 A polynomial of degree k is stored as b_i * C(k, i), i = 0..k, with b its Bernstein coefficients, in the
 last axis of an array; all functions work on any number of leading axes.

@@ -23,7 +23,7 @@ the second and first of the quintic."""
 
 @cache
 def basis(degree: int) -> Array:
-    """Eq. (15) without its powers of u: (degree + 1, degree + 1), power by control point.
+    """The matrix of Eq. (15): (degree + 1, degree + 1), rows: powers of u, columns: control points.
 
     Raises InputError for a degree other than 3 or 5.
     """
@@ -37,11 +37,12 @@ def basis(degree: int) -> Array:
 def fit(points_deg: ArrayLike, degree: int, rests: Sequence[int] = ()) -> Array:
     """Control points of the spline through ``points_deg`` that starts and ends at rest.
 
-    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J): Eq. (13) or (14), solved as a full
-    matrix, as scipy's banded solver takes longer to load than most commands. The cubic rests in speed, the quintic
-    also in acceleration. A quintic rests at the points ``rests`` too, where it may continue in any direction, and
-    only comes near to the two points before and after each; they are at least ``degree`` apart and from the ends.
-    Raises InputError for fewer than two points or values that are not finite.
+    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J): Eq. (13) or (14), solved
+    with a full matrix, as importing scipy's banded solver takes longer than most commands. The cubic rests in
+    speed, the quintic also in acceleration. A quintic also rests at the points ``rests``, and may leave them
+    in any direction; it does not pass exactly through the two points before and after each. They must be at
+    least ``degree`` points apart, and from the ends. Raises InputError for fewer than two points or values
+    that are not finite.
     """
     points = np.asarray(points_deg, dtype=float)
     row = basis(degree)[0, :-1]
@@ -80,15 +81,15 @@ def polynomials(control_points: Array, degree: int) -> Array:
     windows = np.lib.stride_tricks.sliding_window_view(control_points, degree + 1, axis=0)
     middle = windows[..., degree // 2]
     pieces = np.einsum("pc,s...c->sp...", basis(degree), windows - middle[..., None])
-    pieces[:, 0] += middle  # apart, so that a small motion far from zero keeps its digits
+    pieces[:, 0] += middle  # subtracted first, so that a small motion far from zero keeps its digits
     return np.asarray(pieces)
 
 
 def refined(control_points: Array, parts: int, degree: int) -> Array:
     """Control points of the same spline with each segment cut into ``parts``.
 
-    ``control_points``: (n + degree, ...). Returns (n * parts + degree, ...). A finer knot row takes them over by
-    ``degree`` + 1 sums over ``parts`` neighbours.
+    ``control_points``: (n + degree, ...). Returns (n * parts + degree, ...). Method: ``degree`` + 1 moving
+    sums over ``parts`` neighbours.
     """
     mask = np.full(1, float(parts))
     for _ in range(degree + 1):
@@ -132,7 +133,7 @@ def derivative(coefficients: Array, order: int = 1) -> Array:
 
 
 def evaluate(coefficients: Array, segment: NDArray[np.intp], u: Array) -> Array:
-    """Value at ``u`` of the given ``segment``, arrays of one shape; ``coefficients`` (n, k + 1)."""
+    """Values at ``u`` in [0, 1] of the given ``segment``, arrays of the same shape; ``coefficients``: (n, k + 1)."""
     value = coefficients[segment, -1]
     for power in range(coefficients.shape[1] - 2, -1, -1):
         value = value * u + coefficients[segment, power]

@@ -1,4 +1,4 @@
-"""Largest speed, acceleration and jerk of a motion, as proven bounds and not from samples.
+"""Largest speed, acceleration and jerk of a motion, as proven bounds instead of samples.
 
 All three are quotients of polynomials in u whose denominator is a power of t' > 0 (Eqs. 17 to 19). With
 both in Bernstein form of one degree, each quotient of coefficients bounds the quotient on the segment;
@@ -18,15 +18,15 @@ from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline
 
 GAP = 1e-11
-"""How far, relative, the bound returned may lie above the true maximum."""
+"""Largest relative distance of a returned bound above the true maximum."""
 
 _DEPTH = 48
-"""Halvings after which a piece is narrower than the doubles that describe it."""
+"""Halvings after which a piece is narrower than the resolution of a double."""
 
 
 @dataclass(frozen=True)
 class Extremes:
-    """Largest magnitudes of one joint's motion: none is exceeded, and each is reached to within GAP."""
+    """Upper bounds of one joint's motion, at most GAP (relative) above the true maxima."""
 
     speed_deg_s: float
     acceleration_deg_s2: float
@@ -44,7 +44,7 @@ def of_joint(joint: JointSpline) -> Extremes:
 
 
 def of_joints(joints: Sequence[JointSpline]) -> tuple[Extremes, ...]:
-    """The extremes of each joint's whole motion; all joints with the same number of segments."""
+    """The extremes of each joint's whole motion; all joints must have the same number of segments."""
     angle = np.stack([joint.angle_polynomials for joint in joints])
     time = np.stack([joint.time_polynomials for joint in joints])
     return tuple(Extremes(*map(float, values)) for values in magnitudes(angle, time))
@@ -104,7 +104,7 @@ def largest_quotients(top: Array, bottom: Array, group: NDArray[np.intp], groups
 
 
 def range_of(polynomials: Array) -> tuple[Array, Array]:
-    """Lowest and highest angle that each joint reaches, short by at most GAP of its span: two arrays (J,).
+    """Lowest and highest angle of each joint, within GAP of its span: two arrays (J,).
 
     ``polynomials``: (J, m, k + 1), power coefficients.
     """

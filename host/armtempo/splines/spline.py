@@ -28,7 +28,7 @@ class Spline:
     degree: int = 5
 
     def __post_init__(self) -> None:
-        """InputError for what is no spline."""
+        """Raise InputError if the control points do not make a spline."""
         object.__setattr__(self, "control_points", np.asarray(self.control_points, dtype=float))
         if self.degree not in DEGREES or self.control_points.ndim not in (1, 2) or self.segments < 1:
             raise InputError(
@@ -38,7 +38,7 @@ class Spline:
 
     @classmethod
     def through(cls, points: ArrayLike, degree: int = 5) -> Spline:
-        """The spline through ``points``, (n + 1,) or (n + 1, J): at u = 0, 1, … n; at rest at both ends.
+        """The spline that passes ``points``, (n + 1,) or (n + 1, J), at u = 0, 1, … n, and rests at both ends.
 
         The cubic rests in its first derivative, the quintic in its second too (Eqs. 13 and 14). Raises
         InputError for another degree, fewer than two points or values that are not finite.
@@ -58,7 +58,7 @@ class Spline:
     def __call__(self, u: ArrayLike, order: int = 0) -> Array:
         """Value at ``u``, or its derivative of the given ``order`` with respect to u.
 
-        ``u`` of any shape gives an array of that shape, with J in a last axis where the points have it. Raises
+        ``u`` of any shape gives an array of that shape, with J in a last axis if the points have it. Raises
         InputError for a u outside of 0 to n.
         """
         if not 0 <= order <= self.degree:

@@ -1,4 +1,4 @@
-"""The time axis: time over u as a uniform B-spline whose control points increase, so time never turns.
+"""The time axis: time over u as a uniform B-spline with increasing control points, so time increases.
 
 Its control points are 0, X1, X1 + X2, ... of the intervals X, mirrored at both ends; then t = 0 at the
 start, t = sum of X at the end, and t' is a B-spline of the positive X, hence positive everywhere.
@@ -15,7 +15,7 @@ from armtempo.splines import bspline
 from armtempo.splines.bspline import Array
 
 _NEWTON_STEPS = 60
-"""More than enough: each step at least halves the bracket, and Newton doubles the digits."""
+"""Bound: each step at least halves the bracket, and Newton's method doubles the digits."""
 
 
 def control_points(intervals_s: ArrayLike, degree: int) -> Array:
@@ -35,10 +35,9 @@ def mirrored(count: int, edge: int) -> NDArray[np.intp]:
 
 @cache
 def free_map(count: int, degree: int) -> Array:
-    """The linear map from all differences of control points, (count + degree - 1), to control points.
+    """The linear map from all differences of control points to control points, with t = 0 at the start.
 
-    Gives a refined axis the freedom that the mirrored ends take away; t = 0 at the start still.
-    Shape (count + degree - 1, count + degree).
+    Unlike ``step_map`` it has free ends. Shape (count + degree - 1, count + degree).
     """
     differences = count + degree - 1
     points = np.zeros((differences, count + degree))
@@ -77,7 +76,7 @@ def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Arr
     wanted, at = np.ravel(time_s), np.ravel(segment)
     found, now = np.full(wanted.shape, 0.5), np.full(wanted.shape, 0.5)
     low, high = np.zeros(wanted.shape), np.ones(wanted.shape)
-    moving = np.arange(len(wanted))  # the others stay where they are, whatever follows
+    moving = np.arange(len(wanted))  # the others have converged
     for _ in range(_NEWTON_STEPS):
         error = bspline.evaluate(coefficients, at, now) - wanted
         low, high = np.where(error <= 0, now, low), np.where(error >= 0, now, high)
@@ -92,7 +91,7 @@ def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Arr
 
 
 def cut(differences_s: Array, before: int, refine: int, degree: int) -> Array:
-    """The axis with ``refine`` instead of ``before`` segments; the same where that is a multiple, else much like it."""
+    """The axis with ``refine`` instead of ``before`` segments; equal if that is a multiple, else an approximation."""
     if refine % before == 0:
         return refined(differences_s, refine // before, degree)
     fine = refined(differences_s, refine, degree)

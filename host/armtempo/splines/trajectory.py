@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import InputError
-from armtempo.formats import json_codec
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 
@@ -47,7 +47,7 @@ class JointSpline:
 
     @cached_property
     def via_times_s(self) -> Array:
-        """When the joint passes each via point: (n + 1,)."""
+        """Times at which the joint passes each via point, seconds (n + 1,)."""
         knots = np.append(self.time_polynomials[:: self.refine, 0], self.duration_s)
         return knots if self.via_segments is None else np.asarray(knots[list(self.via_segments)])
 
@@ -66,7 +66,7 @@ class JointSpline:
 
 
 def derivatives(angle: Array, time: Array, segment: NDArray[np.intp], u: Array, order: int) -> Array:
-    """The ``order``-th derivative of angle by time at (segment, u), from power coefficients of both."""
+    """The ``order``-th time derivative of the angle at (segment, u), from power coefficients of both."""
 
     def at(coefficients: Array, n: int) -> Array:
         return bspline.evaluate(bspline.derivative(coefficients, n), segment, u)

@@ -18,6 +18,7 @@ class BoardCodes(Directive):
 
     def run(self) -> list[nodes.Node]:
         """One table."""
+        self.state.document.settings.env.note_reread()  # made of the code, which no page's date tells
         rows = [
             (str(code), name, meaning, cure)
             for code, (name, meaning, cure) in sorted(meanings.ERRORS.items())
@@ -30,6 +31,7 @@ class Commands(Directive):
 
     def run(self) -> list[nodes.Node]:
         """The sections, in the order of the help page."""
+        self.state.document.settings.env.note_reread()
         group = click.Context(main, info_name="armtempo")
         return [self._section(group, name) for name in main.list_commands(group)]
 
@@ -44,10 +46,12 @@ class Commands(Directive):
         )
         for paragraph in (command.help or "").split("\n\n"):
             section += nodes.paragraph(text=" ".join(paragraph.replace("\b", "").split()))
-        arguments = [(name, described(command, name)) for name in names_of_arguments(command)]
+        names = [name for name in names_of_arguments(command) if "{" not in name]  # that one says it itself
+        arguments = [(name, described(command, name)) for name in names]
         if arguments:
             section += table(("argument", "what it is"), arguments)
-        records = [_plain(parameter.get_help_record(context)) for parameter in command.params]
+        options = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
+        records = [_plain(option.get_help_record(context)) for option in options]
         if any(records):
             section += table(("option", "what it does"), [record for record in records if record])
         return section

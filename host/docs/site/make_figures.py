@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,9 @@ import numpy as np
 from armtempo import optimise
 from armtempo.kinematics import chain
 from armtempo.model import engine_pins
+from armtempo.model.room import FAR_MM, ArmRoom, KeepOut
 from armtempo.report import plots, run_report
+from armtempo.report.arm_picture import arm_picture
 from armtempo.report.evaluation import evaluate
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
@@ -110,6 +113,26 @@ def lines() -> Figure:
     return figure
 
 
+def room() -> Figure:
+    """An arm and a box between two via points: the tool on a free path without it and with it."""
+    radii_mm = (45.0, 40.0, 35.0, 30.0, 30.0, 25.0)
+    bare = armtempo.Arm.load("parol6")
+    joints = (replace(joint, radius_mm=radius) for joint, radius in zip(bare.joints, radii_mm, strict=True))
+    bare = replace(bare, joints=tuple(joints))
+    box = KeepOut("feeder", (-40.0, 130.0, 0.0), (40.0, 300.0, 290.0))
+    arm = replace(bare, room=ArmRoom((box,), low_mm=(-FAR_MM, -FAR_MM, 0.0)))
+    vias = np.tile(arm.home_deg, (2, 1))
+    vias[:, 0] += (-33.0, 33.0)
+    vias[:, 1] += 25.0
+    figure = arm_picture(arm)
+    for each, line in ((bare, ":"), (arm, "-")):
+        plan = armtempo.plan(each, armtempo.Job("around", via_deg=vias.tolist(), path="free"))
+        way = armtempo.forward(arm, plan.trajectory(np.linspace(0.0, plan.total_s, 400)))[:, :3, 3]
+        for field, seen in ((0, [1, 2]), (1, [0, 1])):
+            figure.axes[field].plot(*way[:, seen].T, line, color=plots.COLOURS[1])
+    return figure
+
+
 def searches() -> Figure:
     """How the six searches close in on the least of a narrow curved valley in five dimensions (Rosenbrock's)."""
 
@@ -186,6 +209,7 @@ DRAWN: dict[str, Callable[[], Figure]] = {
     "solutions.png": solutions,
     "motion.png": motion,
     "lines.png": lines,
+    "room.png": room,
     "searches.png": searches,
     "steps.png": steps,
     "tracking.png": tracking,

@@ -12,7 +12,7 @@ import pytest
 from armtempo.basics.errors import LinkError
 from armtempo.deploy.firmware import image, write
 from armtempo.link.program_version import own_crc
-from armtempo.ports.listing import Port
+from armtempo.ports.board_port import Port
 
 from tests.host.firmware.fakes import DFU, MACHINE, ONE, ST_INFO, STLINK, dfu_list, no_progress, outcome
 

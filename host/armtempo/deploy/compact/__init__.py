@@ -19,7 +19,7 @@ from armtempo.deploy.compact.constants import fold
 from armtempo.deploy.compact.frames import Function, Functions, functions, label
 from armtempo.deploy.compact.join import join
 from armtempo.deploy.compact.merge import CORE, merge, used_whole
-from armtempo.deploy.compact.set_up import move, set_up_methods
+from armtempo.deploy.compact.set_up import SET_UP, move, set_up_methods
 from armtempo.deploy.compact.shorten import short_names, shorten
 
 
@@ -37,7 +37,7 @@ def compact(
     entries: Collection[str],
     keep: Collection[str],
     together: Mapping[str, Collection[str]] = MappingProxyType({}),
-    at_rest: Mapping[str, Collection[str]] = MappingProxyType({}),
+    at_rest: Collection[str] = (),
 ) -> Compact:
     """A program of fewer modules and shorter names that does the same.
 
@@ -45,7 +45,7 @@ def compact(
     module ``core`` of its package. ``entries``: modules that are imported from outside, ``main`` among
     them. ``keep``: names that must stay, as they are used from outside or made at run time. ``together``: modules that
     become part of another one (``join``). ``at_rest``: methods, by module, class and name, that are called only
-    while nothing moves, under the name of the module that is to hold them (``set_up``). Raises ValueError where a
+    while nothing moves (``set_up``). Raises ValueError if a
     module asks another for a name that is not there, or a package cannot be made flat.
     """
     trees, flat = _flatten({module: _at_run_time(ast.parse(text)) for module, text in sources.items()})
@@ -54,22 +54,22 @@ def compact(
     join(trees, {flat[home]: [flat[module] for module in modules] for home, modules in together.items()})
     merged = merge(trees, flat[main], {flat[entry] for entry in entries}, keep)
     core = f"{main.split('.', 1)[0]}.{CORE}"
-    apart = {
-        target: set_up_methods(merged[core], {_in_core(name) for name in names})
-        for target, names in at_rest.items()
-    }
+    apart = set_up_methods(merged[core], {_in_core(name) for name in at_rest})
     names = short_names(merged, keep, whole)
     known = functions(merged, names)
-    labels = {
-        target: [label(CORE, method.name, node.name) for node, method in methods]
-        for target, methods in apart.items()
-    }
+    labels = [label(CORE, method.name, node.name) for node, method in apart]
     shorten(merged, names)
-    for target, methods in apart.items():
-        for name, of in zip(move(merged, core, target, methods), labels[target], strict=True):
-            known[target, name] = [Function(of, name, frozenset(), named=True)]
+    for name, of in zip(move(merged, core, apart), labels, strict=True):
+        known[SET_UP, name] = [Function(of, name, frozenset(), named=True)]
     texts = {module: ast.unparse(ast.fix_missing_locations(tree)) for module, tree in merged.items()}
     return Compact(texts, known)
+
+
+def without_constants(text: str) -> str:
+    """A module by itself, without names of constants and what only type checkers read."""
+    trees = {"": _at_run_time(ast.parse(text))}
+    fold(trees, ())
+    return ast.unparse(ast.fix_missing_locations(trees[""]))
 
 
 def _in_core(method: str) -> str:
@@ -91,8 +91,8 @@ def _is_for_checkers(node: ast.stmt) -> bool:
 def _flatten(trees: Mapping[str, ast.Module]) -> tuple[dict[str, ast.Module], dict[str, str]]:
     """The modules by names of two parts at most, and that name by the one before; ``trees`` is used up.
 
-    Packages within packages go; they may hold nothing but a docstring. Raises ValueError where one holds more, or
-    where two modules would have one name.
+    Packages within packages go; they may hold nothing but a docstring. Raises ValueError if one holds more, or
+    if two modules would have one name.
     """
     inner = {
         module for module in trees if "." in module and any(each.startswith(f"{module}.") for each in trees)

@@ -7,13 +7,14 @@ from collections.abc import Collection, Iterator
 
 from armtempo.deploy.compact.scopes import Scoped, top_names
 
+SET_UP = "set_up"
 Method = tuple[ast.ClassDef, ast.FunctionDef]
 
 
 def set_up_methods(tree: ast.Module, wanted: Collection[str]) -> list[Method]:
     """The methods of a module's classes that are ``wanted``: class and method, with a dot between.
 
-    Raises ValueError where one is not there.
+    Raises ValueError if one is not there.
     """
     found = {
         f"{node.name}.{method.name}": (node, method)
@@ -27,8 +28,8 @@ def set_up_methods(tree: ast.Module, wanted: Collection[str]) -> list[Method]:
     return [found[name] for name in found if name in wanted]
 
 
-def move(trees: dict[str, ast.Module], home: str, target: str, methods: Collection[Method]) -> list[str]:
-    """Move methods of the module ``home`` to the new module ``target`` of its package; returns their names there.
+def move(trees: dict[str, ast.Module], home: str, methods: Collection[Method]) -> list[str]:
+    """Move methods of the module ``home`` to the new module SET_UP of its package; returns their names there.
 
     Each leaves a call of itself. The names are some that the module has already, which cost nothing.
     """
@@ -42,12 +43,13 @@ def move(trees: dict[str, ast.Module], home: str, target: str, methods: Collecti
         body = qualifier.visit(ast.FunctionDef("", method.args, method.body, [])).body
         moved[name] = ast.FunctionDef(name, nothing, body, [])
         given: list[ast.expr] = [ast.Name(argument.arg, ast.Load()) for argument in arguments]
-        call = ast.Call(ast.Attribute(ast.Name(target, ast.Load()), name, ast.Load()), given, [])
+        call = ast.Call(ast.Attribute(ast.Name(SET_UP, ast.Load()), name, ast.Load()), given, [])
         result = ast.Expr(call) if method.name == "__init__" else ast.Return(call)
-        method.body = [ast.ImportFrom(package, [ast.alias(target)], 0), result]
+        method.body = [ast.ImportFrom(package, [ast.alias(SET_UP)], 0), result]
     imports = _needed([*trees[home].body], moved.values())
     own_import = ast.ImportFrom(package, [ast.alias(core)], 0)
-    trees[f"{package}.{target}"] = ast.Module([own_import, *imports, *moved.values()], [])
+    if moved:
+        trees[f"{package}.{SET_UP}"] = ast.Module([own_import, *imports, *moved.values()], [])
     return list(moved)
 
 

@@ -95,13 +95,13 @@ def short_names(trees: Mapping[str, ast.Module], keep: Collection[str], whole: C
 
 
 def shorten(trees: Mapping[str, ast.Module], names: Names) -> None:
-    """Rename what is in ``names``, and the parameters of functions to single letters."""
+    """Rename what is in ``names``, and the parameters of functions to what MicroPython has built in."""
     keywords = {name for tree in trees.values() for name in _keywords(list(ast.walk(tree)))}
     for module, tree in trees.items():
+        _Renamer(module, tree, names).visit(tree)
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef):
                 _shorten_parameters(node, keywords)
-        _Renamer(module, tree, names).visit(tree)
 
 
 class _Renamer(Scoped):
@@ -118,7 +118,7 @@ class _Renamer(Scoped):
     def visit_Name(self, node: ast.Name) -> ast.AST:
         """Names of functions' own cost nothing.
 
-        ValueError where a class reads a name of the module whose short one is that of what it has assigned: it would
+        ValueError if a class reads a name of the module whose short one is that of what it has assigned: it would
         get its own.
         """
         if not self.hides(node.id):
@@ -252,9 +252,9 @@ def _shorten_parameters(function: ast.FunctionDef, keywords: Collection[str]) ->
     """Positions are all that calls know of a parameter, unless one names it."""
     inner = list(ast.walk(function))
     used = {name for node in inner for name in _mentioned(node)}
-    letters = (letter for letter in ascii_lowercase if letter not in used)
+    shorts = (name for name in _BUILT_IN.split() if name not in used)
     arguments = [*function.args.args, *([function.args.vararg] if function.args.vararg else [])]
-    names = {each.arg: next(letters) for each in arguments if each.arg not in keywords and len(each.arg) > 1}
+    names = {each.arg: next(shorts) for each in arguments if each.arg not in keywords}
     for node in inner:
         if isinstance(node, ast.Name):
             node.id = names.get(node.id, node.id)

@@ -23,7 +23,7 @@ from armtempo.deploy.firmware.image import Image
 from armtempo.deploy.install import end_program
 from armtempo.deploy.remote import Remote
 from armtempo.link.program_version import own_crc
-from armtempo.ports.listing import find_ports
+from armtempo.ports.board_port import find_ports
 from armtempo.ports.names import is_sim
 
 DFU, STLINK = "dfu-util", "st-flash"

@@ -10,7 +10,6 @@ import stand_in
 
 from app_rig import ROOT  # isort: skip  it puts the stand-ins into place
 
-from armtempo_board import heap
 from armtempo_board.app import board
 from armtempo_board.app.app import App
 from armtempo_shared import armrecord, engine_memory, wire
@@ -129,30 +128,6 @@ def case_an_engine_that_cannot_be_made_is_named():
         finally:
             board.Engine = engine
         assert (hello[1], wire.ERRORS[hello[PROBLEM]][0]) == (0, problem)
-
-
-def case_an_engine_is_made_beside_a_piece_that_is_held_if_memory_is_short():
-    """Or without it, if there is no room for both."""
-    engine = board.Engine
-    tried = []
-
-    def looked(parts):
-        tried.append(sum([len(piece) for piece in heap._held]))
-        if heap._held:
-            raise MemoryError
-        return engine(parts)
-
-    board.Engine = looked
-    try:
-        for stand_in.Workspace.is_short in (True, False):
-            app, _, hello = started(folder_with(stand_in.arm()))
-            assert app.controller.board.engine.joints == 2
-            assert (hello[1], hello[PROBLEM]) == (2, 0)
-            assert heap._held == [], "the motion's code finds no room"
-    finally:
-        board.Engine = engine
-        stand_in.Workspace.is_short = False
-    assert tried == [board.MOTION_CODE_BYTES, 0, 0], tried
 
 
 def case_a_damaged_motion_is_listed_and_refused():

@@ -6,7 +6,6 @@ import cases
 from armtempo_board import heap
 
 NAME = "armtempo_shared.basis"
-HELD_BYTES = 2000
 
 
 def load():
@@ -32,14 +31,10 @@ def case_code_that_is_kept_stays_until_it_is_not():
     heap.keep_code(True)
     heap.forget()
     heap.tidy()
-    heap.hold(HELD_BYTES)
-    assert NAME in sys.modules and not heap._held
+    assert NAME in sys.modules
     heap.keep_code(False)
-    heap.hold(HELD_BYTES)
-    assert heap._held
-    heap.release()
     heap.tidy()
-    assert NAME not in sys.modules and not heap._held
+    assert NAME not in sys.modules
 
 
 def case_the_heap_is_collected_seldom_while_code_is_kept_and_not_while_a_motion_runs():

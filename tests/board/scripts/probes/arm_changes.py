@@ -9,7 +9,7 @@ import random
 import sys
 
 sys.path.insert(0, __file__.rsplit("/", 2)[0] + "/rigs/bare")
-sys.path.append(__file__.rsplit("/", 5)[0] + "/host/armtempo/selftest/on_board")
+sys.path.append(__file__.rsplit("/", 5)[0] + "/host/armtempo/diagnosis/selftest/on_board")
 
 import machine
 import stand_in

@@ -8,6 +8,10 @@ from firmware.pin_api import Pin
 _RISING, _FALLING = 1, 2
 
 
+def _nothing(_):
+    """An edge that was pending when its callback was taken away."""
+
+
 class ExtInt:
     """Calls ``callback(line)`` at an edge of a pin; one object a line number."""
 
@@ -27,7 +31,7 @@ class ExtInt:
         self._level = pin.line.read()
         self.enabled = callback is not None
         machine_state.board.extints[self._line] = self
-        machine_state.board.callbacks[("exti", self._line)] = (callback, self._line)
+        machine_state.board.callbacks[("exti", self._line)] = (callback or _nothing, self._line)
         machine_state.board.call()
 
     def line(self):

@@ -1,0 +1,72 @@
+"""Writing a file completely or not at all, without overwriting files that should be kept."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from armtempo.basics.errors import InputError
+
+
+def replace_text(path: Path, text: str, newline: str | None = None) -> None:
+    """Write a temporary file and rename it, so that the file is never incomplete.
+
+    ``newline``: as in ``open``. A symbolic link is followed; a pipe or a device, such as /dev/stdout, is
+    written directly. Raises InputError if it cannot be written; the old file is kept.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            path.write_text(text, encoding="utf-8", newline=newline)
+        else:
+            _replace(path.resolve(), text, newline)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {why(error)}", "choose another place") from None
+
+
+def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
+    """Raise InputError if ``target`` is one of the ``inputs``: inputs are never overwritten."""
+    for file in inputs:
+        with suppress(OSError):
+            if file and target.exists() and os.path.samefile(target, file):
+                raise InputError(
+                    f"{target} is an input of this command and is not overwritten", "choose another name"
+                )
+
+
+def check_replaceable(target: Path, text: str, force: bool, rule: str = "") -> None:
+    """Raise InputError if ``target`` exists with content other than ``text``, unless ``force``.
+
+    ``rule``: when it is replaced without ``force``, for the message.
+    """
+    if force or not target.is_file() or _holds(target, text):
+        return
+    kept = f" ({rule})" if rule else ""
+    raise InputError(
+        f"{target} exists with other content and is not replaced{kept}",
+        "choose another name, or replace it with --force",
+    )
+
+
+def _holds(path: Path, text: str) -> bool:
+    try:
+        return path.read_text(encoding="utf-8") == text
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def why(error: Exception) -> str:
+    """The reason as the operating system or a decoder gives it, without the path."""
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _replace(path: Path, text: str, newline: str | None) -> None:
+    aside = path.with_name(f".{path.name}.{os.getpid()}.new")
+    try:
+        aside.write_text(text, encoding="utf-8", newline=newline)
+        os.replace(aside, path)
+    except OSError:
+        if aside.is_file():
+            aside.unlink()
+        raise

@@ -1,0 +1,41 @@
+"""Whether the encoders stand still while the arm's pins step: if one turns, its driver is on in spite of ENABLE."""
+
+_STILL = 2  # counts by which an encoder between two marks may jump
+
+
+def measure(record, motion, start_steps, idle_us):
+    """How far each encoder turned, in counts (None: there is none), and by how much it had to for its joint's steps.
+
+    The motion ends as soon as one turns.
+    """
+    from array import array
+    from binascii import unhexlify
+
+    from armtempo_board.buffers import COMMANDED
+
+    feed()
+    engine, joints = make_engine(record, encoders=True)
+    sample = array("i", [0] * (COMMANDED + 2 * len(joints)))
+    ends = [None] * len(joints)
+    try:
+        load(engine, unhexlify(motion), start_steps)
+        engine.snapshot(sample)
+        begins = list(sample)[COMMANDED:]
+        engine.start()
+        turned = False
+        while engine.moving and not turned:
+            serve(engine, idle_us)
+            engine.snapshot(sample)
+            ends = [now - before for now, before in zip(list(sample)[COMMANDED:], begins)]
+            turned = max([abs(counts) for counts in ends[len(joints) :]]) > _STILL
+    finally:
+        engine.freeze()
+        off = enable()
+        engine.close()
+    rows = list(zip(joints, ends, ends[len(joints) :]))
+    return {
+        "turned": [None if row["encoder"] == armrecord.NONE else counts for row, _, counts in rows],
+        "due": [abs(steps * row["counts_num"]) // row["counts_den"] for row, steps, _ in rows],
+        "fault": engine.fault,
+        "enable": off,
+    }

@@ -1,0 +1,100 @@
+"""Goes in front of parts that make steps: the engine for the board's own arm, without its drivers."""
+
+from armtempo_shared import armrecord
+
+
+class NoPin:
+    """In the place of ENABLE: the engine cannot switch the drivers on."""
+
+    def value(self, level=None):
+        """Nothing."""
+        return 0
+
+
+_SEEN_TICKS = 168  # 2 us: a capture at 1 MHz has each pulse twice
+_RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
+
+
+def make_engine(record, switches=False, rates=None, encoders=False, workspace=None):
+    """(engine, rows of its joints); it steps the pins of this arm and no others, and the arm's E-stop stops it.
+
+    ``switches``: E-stop and a limit switch 1 for the first joint are fitted, whatever the arm has. ``rates``: of that
+    many joints, instead of the arm's; they can go anywhere then.
+    ``encoders``: they are read, but no joint is checked against them. ``workspace``: of a program that has one already.
+    """
+    from armtempo_board.app import room
+    from armtempo_board.motion.engine import Engine
+    from armtempo_board.motion.engine_parts import EngineParts
+
+    with open(record, "rb") as file:
+        head, joints, _ = armrecord.unpack(file.read())
+    kept = armrecord.FLAG_ENABLE_HIGH | armrecord.FLAG_ESTOP_ACTIVE_HIGH | armrecord.FLAG_ESTOP_FITTED
+    head["flags"] = head["flags"] & kept | (armrecord.FLAG_ESTOP_FITTED if switches else 0)
+    head["pulse_ticks"] = max(head["pulse_ticks"], _SEEN_TICKS)
+    for joint in joints:
+        joint["limit_low"] = joint["limit_high"] = armrecord.NONE
+        joint["following_counts"] = 0
+        if not encoders:
+            joint["encoder"] = armrecord.NONE
+    if switches:
+        joints[0]["limit_high"] = 0
+    if rates:
+        joints = joints[: len(rates)]
+        for joint, rate in zip(joints, rates):
+            joint["max_rate"], joint["min_steps"], joint["max_steps"] = rate, -_RANGE, _RANGE
+    if workspace is None:
+        workspace = room.workspace()
+    else:
+        room.share(workspace, len(joints))
+    engine = Engine(EngineParts(head, joints, workspace))
+    engine.inputs.enable_pin = NoPin()
+    if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
+        pull_inactive(engine)
+    return engine, joints
+
+
+def pulls(pin, level):
+    """(register, its value to draw an input to a level, to the other one) of its pull resistor."""
+    from armtempo_board.hardware import pins
+
+    at = getattr(stm, "GPIO" + pins.port(pin)) + stm.GPIO_PUPDR
+    shift = 2 * pins.line(pin)
+    others = mem32[at] & ~(3 << shift)
+    down_up = others | 2 << shift, others | 1 << shift
+    return at, down_up[level], down_up[1 - level]
+
+
+def pull_inactive(engine):
+    """An E-stop that is not wired would be tripped: draw it to the other level. A switch is stronger.
+
+    ValueError if one is pressed.
+    """
+    from armtempo_board.hardware import pins
+
+    at, _, rest = pulls(pins.ESTOP, engine.inputs._estop_level)
+    mem32[at] = rest
+    time.sleep_ms(1)
+    engine.service()  # notes what tripped until now
+    if not engine.clear():
+        engine.close()
+        raise ValueError("the E-stop is pressed, or wired for the other level")
+
+
+def serve(engine, idle_us):
+    """A turn of the loop. ``idle_us``: what it takes in simulated time, which the chip needs by itself."""
+    engine.service()
+    if idle_us:
+        time.sleep_us(idle_us)
+
+
+def load(engine, motion, start_steps):
+    """Put the joints at its start and load it; the motion. ValueError if the drivers are not off."""
+    from armtempo_shared.motion import Motion
+
+    output, driven, level = enable()
+    if not output or driven != level or level == engine.inputs.on_level:
+        raise ValueError("ENABLE is not inactive: no steps are made")
+    engine.home((1 << len(start_steps)) - 1, start_steps)
+    motion = Motion(motion)
+    engine.load(motion)
+    return motion

@@ -1,0 +1,149 @@
+"""MicroPython's prompt of a board, through mpremote: code goes there, what it measured comes back as JSON."""
+
+from __future__ import annotations
+
+import json
+import time
+from binascii import unhexlify
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout, suppress
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import serial
+
+from armtempo.basics.errors import LinkError
+
+_FOLDER = Path(__file__).with_name("on_board")
+_SILENCE_S = 20.0
+"""Longest time without a byte from code that runs: longer than the board's watchdog takes."""
+_READ_S = 5.0
+_ENTER_S = 30.0
+_BULK = b"#"
+_BLOCKS, _BLOCK = 32, 512
+"""What is sent to measure the rates: 16 KB each way. To the board it is a comment, which takes no heap."""
+CONTINUE = "import armtempo_board\narmtempo_board.start()"
+"""The board program continues as it was before it was left; only before a soft reset."""
+RESET = "import machine\nmachine.reset()"
+"""As the reset button: the program starts anew, and nothing is left of what was done at the prompt."""
+WATCHDOG_RESET = f"""import machine, time
+from armtempo_board.app.watchdog import _kept
+if _kept: _kept.deinit()
+machine.WDT(timeout=100)
+time.sleep(2)
+{RESET}"""
+"""The same by the watchdog, which nobody feeds; by ``RESET`` if it does not come."""
+_DROP = " [globals().pop(name) for name in [name for name in globals() if name not in before]]\n"
+"""What a part defined goes, ``before`` included: a program that continues has its heap back."""
+PARTS = ("drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep")
+"""By their numbers, from 1 on, the board remembers over a reset which one it is in."""
+
+
+class PartError(LinkError):
+    """The code of a part raised an exception on the board."""
+
+
+class SilentError(LinkError):
+    """The board does not answer in ``part``."""
+
+    def __init__(self, part: str, problem: str) -> None:
+        super().__init__(problem, _cure(part))
+        self.part = part
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a part gave: its values, and its bulk data."""
+
+    values: dict[str, Any]
+    bulk: bytes
+
+
+class Prompt:
+    """The raw prompt at a port; raises LinkError, which names the part, if it does not answer."""
+
+    def __init__(self, port: Any) -> None:
+        self._port = port
+        self.at_end = CONTINUE
+        """Code that is run when the prompt is left, however."""
+
+    def enter(self, soft_reset: bool) -> None:
+        """Get in; ``soft_reset``: with an empty heap, and without the board program."""
+        with _as_link_error("start"):
+            self._port.enter_raw_repl(soft_reset, timeout_overall=_ENTER_S)
+
+    def measure(self, *parts: str, **arguments: Any) -> Measured:
+        """Send files of ``on_board``, call ``measure`` of the last one with these arguments, and drop them."""
+        part = parts[-1]
+        text = "".join((_FOLDER / f"{name}.py").read_text(encoding="utf-8") for name in ("common", *parts))
+        number = PARTS.index(part) + 1
+        call = f"noted = note({number})\ntry: tell(measure(**{arguments!r}))\nfinally:\n note(0)\n{_DROP}"
+        return self._run(part, f"before = list(globals())\n{text}\n{call}")
+
+    def rates(self) -> dict[str, float]:
+        """Kilobytes a second, from the board and to it."""
+        with _as_link_error("link"):
+            self._port.exec_raw_no_follow(f"for _ in range({_BLOCKS}): print(end='x' * {_BLOCK})")
+            begin_s = time.perf_counter()
+            left = _BLOCKS * _BLOCK
+            while left and (got := self._port.serial.read(min(left, self._port.serial.in_waiting or 1))):
+                left -= len(got)
+            down_s = time.perf_counter() - begin_s
+            self._port.follow(_SILENCE_S)
+            begin_s = time.perf_counter()
+            self._port.exec_raw(f"#{'x' * (_BLOCKS * _BLOCK)}", timeout=_SILENCE_S)
+            up_s = time.perf_counter() - begin_s
+        size_kb = _BLOCKS * _BLOCK / 1000
+        return {"down_kb_s": round(size_kb / down_s, 1), "up_kb_s": round(size_kb / up_s, 1)}
+
+    def _run(self, part: str, code: str) -> Measured:
+        with _as_link_error(part):
+            output, errors = self._port.exec_raw(code, timeout=_SILENCE_S)
+        if errors:
+            last = errors.decode(errors="replace").strip().splitlines()[-1]
+            raise PartError(f"self-test, {part}: {last}", _cure(part))
+        lines = output.splitlines()
+        bulk = b"".join(unhexlify(line[1:].strip()) for line in lines if line.startswith(_BULK))
+        values = next((line for line in reversed(lines) if line.startswith(b"{")), b"{}")
+        return Measured(json.loads(values), bulk)
+
+
+@contextmanager
+def at_prompt(device: str) -> Iterator[Prompt]:
+    """The prompt of the board on ``device``, whose program was left; whatever ends it, the program runs again."""
+    from mpremote.transport import TransportError  # here, as few commands need it
+    from mpremote.transport_serial import SerialTransport
+
+    try:
+        port = SerialTransport(device, timeout=_READ_S)
+    except (TransportError, OSError) as error:
+        raise LinkError(
+            f"port {device} cannot be opened again: {error}", "run the self-test again"
+        ) from error
+    prompt = Prompt(port)
+    try:
+        yield prompt
+    finally:
+        with suppress(Exception):
+            port.serial.write(b"\r\x03\x03\x01" + prompt.at_end.encode() + b"\x04")
+            port.serial.flush()
+        port.close()
+
+
+@contextmanager
+def _as_link_error(part: str) -> Iterator[None]:
+    from mpremote.transport import TransportError
+
+    try:
+        with redirect_stdout(StringIO()):  # mpremote prints what it got instead of an answer
+            yield
+    except (TransportError, serial.SerialException, OSError) as error:
+        raise SilentError(
+            part, f"the board fell silent in {part!r} ({error}); its watchdog resets it within 10 s"
+        ) from error
+
+
+def _cure(part: str) -> str:
+    return f"run the self-test again; if {part!r} fails each time, please report it with the output"

@@ -1,0 +1,155 @@
+"""What was taught, as text: a posture in an arm file, of which everything else is unchanged; a job of via points."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from armtempo_shared.limits import MAX_NAME
+
+from armtempo.basics.atomic_file import replace_text, why
+from armtempo.basics.errors import InputError
+from armtempo.model import posture as named
+from armtempo.model.arm import Arm
+
+_HEADER = re.compile(r"\s*\[\[?[\w.\"' -]+\]\]?\s*(#.*)?")
+_ANGLES = re.compile(r"(?m)^(\s*angles_deg\s*=\s*)\[[^\]]*\]")
+_MARK = "\ufeff"
+_HEAD = """\
+# Via points that were taught with 'armtempo teach'; every key: armtempo help files
+name = "{name}"
+"""
+_VIA = """
+[[via]]
+angles_deg = [{angles}]
+"""
+
+
+def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool) -> None:
+    """Write ``[posture.NAME]`` into the file of ``arm``, atomically, keeping its comments and layout.
+
+    Raises InputError if the name is invalid, the arm cannot take the posture, the file has it and ``replace``
+    is false, or the file cannot be read, written, or changed in this one place.
+    """
+    if problem := named.name_problem(name):
+        raise InputError(f"posture {name!r}: {problem}", "choose another name")
+    if problem := arm.angles_problem(angles_deg):
+        raise InputError(f"posture {name!r}: {problem}", "move the arm into its ranges")
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            text = file.read()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {why(error)}", "check the path") from None
+    known = _parsed(text, path).get("posture", {})
+    if name in known and not replace:
+        raise InputError(
+            f"{path} already has a posture {name!r}",
+            "choose another name, or replace it with --replace",
+        )
+    replace_text(path, with_posture(text, name, angles_deg, path), newline="")
+
+
+def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
+    """The angles with the fewest digits that give the same steps, within their ranges."""
+    found = []
+    for joint, angle in zip(arm.driven, angles_deg, strict=True):
+        low, high = joint.range_deg
+        steps = round(angle * joint.steps_per_deg)
+        rounded = (min(max(round(angle, places), low), high) + 0.0 for places in range(2, 12))
+        found.append(next((value for value in rounded if round(value * joint.steps_per_deg) == steps), angle))
+    return found
+
+
+def with_posture(text: str, name: str, angles_deg: list[float], path: Path) -> str:
+    """The text of an arm file with the posture; raises InputError if that would change anything else."""
+    end = "\r\n" if "\r\n" in text else "\n"
+    values = f"[{', '.join(f'{angle:.12g}' for angle in angles_deg)}]"
+    before = _parsed(text, path)
+    wanted = {**before, "posture": {**before.get("posture", {}), name: {"angles_deg": [*angles_deg]}}}
+    try:
+        changed = _changed(text, name, values, end)
+        same = _content(changed) == wanted
+    except ValueError:
+        same = False
+    if not same:
+        raise InputError(
+            f"{path}: its postures are written in a way that cannot be changed here",
+            f"write it yourself: [posture.{name}] angles_deg = {values}",
+        )
+    return changed
+
+
+def _changed(text: str, name: str, values: str, end: str) -> str:
+    lines = text.splitlines(keepends=True)
+    place = _place(lines, name)
+    if place is None:
+        gap = "" if not text else end if text.endswith("\n") else 2 * end
+        return f"{text}{gap}[posture.{name}]{end}angles_deg = {values}{end}"
+    head, tail = place
+    return "".join([*lines[: head + 1], *_replaced(lines[head + 1 : tail], values, end), *lines[tail:]])
+
+
+def _place(lines: list[str], name: str) -> tuple[int, int] | None:
+    """The first line of the table, and the line after its last; None if there is no such table."""
+    header = re.compile(rf"\s*\[\s*posture\s*\.\s*[\"']?{re.escape(name)}[\"']?\s*\]\s*(#.*)?")
+    heads = [number for number, line in enumerate(lines) if header.fullmatch(line.rstrip("\r\n"))]
+    for head in heads[:1]:
+        for tail in range(head + 1, len(lines)):
+            if _HEADER.fullmatch(lines[tail].rstrip("\r\n")) and _is_whole(lines[:tail]):
+                return head, tail
+        return head, len(lines)
+    return None
+
+
+def _is_whole(lines: list[str]) -> bool:
+    try:
+        _content("".join(lines))
+    except ValueError:
+        return False
+    return True
+
+
+def _replaced(table: list[str], values: str, end: str) -> list[str]:
+    """The lines of a table with new values; comments are kept."""
+    text = "".join(table)
+    keys = tomllib.loads(text.replace("\r\n", "\n"))
+    if [*keys] == ["angles_deg"]:
+        return [_ANGLES.sub(lambda found: found[1] + values, text, count=1)]
+    plain = [
+        number for number, line in enumerate(table) if line.strip() and not line.lstrip().startswith("#")
+    ]
+    first, last = (plain[0], plain[-1]) if plain else (0, -1)
+    return [*table[:first], f"angles_deg = {values}{end}", *table[last + 1 :]]
+
+
+def _content(text: str) -> dict[str, Any]:
+    return tomllib.loads(text.removeprefix(_MARK).replace("\r\n", "\n"))
+
+
+def _parsed(text: str, path: Path) -> dict[str, Any]:
+    try:
+        return _content(text)
+    except ValueError as error:
+        raise InputError(f"{path}: not valid TOML: {error}", "correct that place") from None
+
+
+def name_of(path: Path) -> str:
+    """A valid job name made from the file's name."""
+    name = "".join(
+        letter if letter.isascii() and (letter.isalnum() or letter in "-_") else "-" for letter in path.stem
+    )
+    return name[:MAX_NAME].strip("-") or "taught"
+
+
+def of_points(name: str, points_deg: Sequence[Sequence[float]]) -> str:
+    """The text of a job through via points, each (J,) in degrees; raises InputError for fewer than two."""
+    if len(points_deg) < 2:
+        raise InputError(
+            f"{len(points_deg)} via point{'' if len(points_deg) == 1 else 's'} are no motion, so no job was written",
+            "store at least 2 points with different postures",
+        )
+    vias = [_VIA.format(angles=", ".join(f"{angle:.12g}" for angle in row)) for row in points_deg]
+    return "".join([_HEAD.format(name=name), *vias])

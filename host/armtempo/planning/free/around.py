@@ -1,0 +1,230 @@
+"""A free path around obstacles: auxiliary via points, found by two rapidly exploring random trees (RRT-connect)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import PlanError
+from armtempo.basics.progress import Progress, alive, stage
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.planning import room_check
+from armtempo.planning.free import free_plan
+from armtempo.planning.room_check import Bodies, Touch
+from armtempo.planning.through_plan import Planned
+
+_ROUNDS = 5
+"""Largest number of planned motions, each closer to the collision-free way."""
+_NODES = 400
+"""Largest number of postures in the trees of one way."""
+_STEP = 0.15
+"""Length of a branch, as a fraction of the sampled space."""
+_SHORTCUTS = 100
+_ASIDE_DEG = 90.0
+"""Postures are sampled up to this far outside of the two via points."""
+_CLEAR_MM = 10.0
+"""Clearance of the way, so that the path may cut its corners; less if a via point is closer."""
+_SAMPLE_MM = 8.0
+"""Largest motion of a link between checked postures."""
+_MOST_SAMPLES = 300
+
+
+def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
+    """The motion of ``free_plan.motion``, around obstacles if a way is found.
+
+    Otherwise the motion that touches something.
+    """
+    first = planned = free_plan.motion(arm, job, via_deg, progress)
+    holding = arm.holding(job.holds)
+    touch = room_check.touch_of(holding, first.trajectory)
+    fixed = job.timing != "shared" or job.corridor_deg is not None or job.corridor_mm is not None
+    if touch is None or fixed:
+        return first
+    space = _Space(holding)
+    if not space.is_free(via_deg):
+        return first
+    ways = [via_deg[number : number + 2] for number in range(len(via_deg) - 1)]
+    names = set()
+    rng = np.random.default_rng([job.seed, len(via_deg)])
+    for _ in range(_ROUNDS):
+        if touch is None:
+            return _without_help(arm, job, via_deg, planned, ways, names)
+        names.add(touch.other)
+        stage(f"looking for a way around {touch.other}")
+        stretch, part = _place(planned, touch, ways)
+        if len(ways[stretch]) == 2:
+            found = space.way(ways[stretch][0], ways[stretch][1], rng)
+            if found is None:
+                break
+            ways[stretch] = found
+        else:  # the path cuts a corner too much: keep it closer to the way
+            middle = 0.5 * (ways[stretch][part] + ways[stretch][part + 1])
+            ways[stretch] = np.insert(ways[stretch], part + 1, middle, axis=0)
+        helped = _helped(job, via_deg, ways)
+        try:
+            planned = free_plan.motion(arm, helped, np.array(helped.via), progress)
+        except PlanError:
+            break
+        touch = room_check.touch_of(holding, planned.trajectory)
+    return first if touch else _without_help(arm, job, via_deg, planned, ways, names)
+
+
+def _places(ways: Sequence[Array]) -> Array:
+    """Indices of the job's via points among all: (n + 1,)."""
+    return np.cumsum([0, *(len(way) - 1 for way in ways)])
+
+
+def _place(planned: Planned, touch: Touch, ways: Sequence[Array]) -> tuple[int, int]:
+    """The stretch in which a motion touches something, and the part of its way."""
+    times = planned.trajectory.joints[0].via_times_s
+    part = int(np.clip(np.searchsorted(times, touch.time_s) - 1, 0, len(times) - 2))
+    places = _places(ways)
+    stretch = int(np.searchsorted(places, part, side="right")) - 1
+    return stretch, part - int(places[stretch])
+
+
+def _helped(job: Job, via_deg: Array, ways: Sequence[Array]) -> Job:
+    """The job with auxiliary via points between its own."""
+    places = _places(ways)
+    via = [*job.via[:1]]
+    for number, way in enumerate(ways, 1):
+        via += [*(tuple(map(float, angles)) for angles in way[1:-1]), job.via[number]]
+    stops = tuple(replace(stop, via=int(places[stop.via])) for stop in job.stops)
+    return replace(job, via=tuple(via), stops=stops)
+
+
+def _without_help(
+    arm: Arm, job: Job, via_deg: Array, planned: Planned, ways: Sequence[Array], names: set[str]
+) -> Planned:
+    """The motion described by the job's own via points only."""
+    places = _places(ways)
+    joints = []
+    for joint in planned.trajectory.joints:
+        assert joint.via_segments is not None  # a free path has these
+        joints.append(replace(joint, via_segments=tuple(joint.via_segments[place] for place in places)))
+    searches = []
+    for search in planned.searches:
+        floor = free_plan.floor_of(arm, job, via_deg, list(search.joints))
+        searches.append(replace(search, floor_s=floor.time_s, floor_kind=floor.kind))
+    note = f"the path goes around {', '.join(sorted(names))}"
+    trajectory = replace(planned.trajectory, joints=tuple(joints))
+    return Planned(trajectory, tuple(searches), (*planned.notes, note))
+
+
+@dataclass(frozen=True, eq=False)
+class _Space:
+    """The space of postures of an arm."""
+
+    arm: Arm
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """Its links and its load."""
+        return Bodies(self.arm)
+
+    def is_free(self, driven_deg: Array, clear_mm: Array | float = 0.02) -> bool:
+        """Whether all clearances at postures (N, J) are at least ``clear_mm``."""
+        return bool(np.all(self.bodies.distances(driven_deg) > clear_mm))
+
+    def way(self, start: Array, end: Array, rng: np.random.Generator) -> Array | None:
+        """Collision-free postures (K, J) from one to another, connected by straight lines; None if none is found."""
+        clear = np.minimum(_CLEAR_MM, 0.5 * self.bodies.distances(np.stack([start, end])).min(axis=0))
+        low, high = np.array([joint.range_deg for joint in self.arm.driven]).T
+        inside = 0.01 * (high - low)
+        low = np.maximum(low + inside, np.minimum(start, end) - _ASIDE_DEG)
+        high = np.minimum(high - inside, np.maximum(start, end) + _ASIDE_DEG)
+        tree, other = _Tree(self, clear, high - low, start), _Tree(self, clear, high - low, end)
+        forwards = True
+        while len(tree.postures) + len(other.postures) < _NODES:
+            alive()
+            new = tree.grown(rng.uniform(low, high))
+            if new is not None and other.reaches(tree.postures[new]):
+                found = np.concatenate([tree.branch(new), other.branch(len(other.postures) - 1)[-2::-1]])
+                return self._shortened(found if forwards else found[::-1], clear, rng)
+            tree.tries += 1
+            if tree.tries > 10 * _NODES:
+                break
+            if len(tree.postures) > len(other.postures):
+                tree, other, forwards = other, tree, not forwards
+        return None
+
+    def leads(self, start: Array, end: Array, clear: Array) -> bool:
+        """Whether the straight line between two postures is free, checked in small steps."""
+        farthest = float(self.bodies.speeds_mm_s(np.abs(end - start)).max())
+        count = min(_MOST_SAMPLES, int(np.ceil(farthest / _SAMPLE_MM)) + 2)
+        return self.is_free(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start), clear)
+
+    def _shortened(self, way: Array, clear: Array, rng: np.random.Generator) -> Array:
+        """The way with random straight shortcuts."""
+        speeds = np.array([joint.limits.speed_deg_s for joint in self.arm.driven])
+        for _ in range(_SHORTCUTS):
+            alive()
+            takes = np.abs(np.diff(way, axis=0) / speeds).max(axis=1)
+            passed = np.concatenate([[0.0], np.cumsum(takes)])
+            if len(way) == 2:
+                break
+            first, last = np.sort(rng.uniform(0.0, passed[-1], 2))
+            before, after = (int(np.searchsorted(passed, each, side="right")) for each in (first, last))
+            if before == after:
+                continue
+            begin, end = (
+                np.array([np.interp(each, passed, angles) for angles in way.T]) for each in (first, last)
+            )
+            if self.leads(begin, end, clear):
+                way = np.concatenate([way[:before], begin[None], end[None], way[after:]])
+        return self._straightened(way, clear)
+
+    def _straightened(self, way: Array, clear: Array) -> Array:
+        """The way without unnecessary postures."""
+        number = 1
+        while number < len(way) - 1:
+            if self.leads(way[number - 1], way[number + 1], clear):
+                way = np.delete(way, number, axis=0)
+            else:
+                number += 1
+        return way
+
+
+class _Tree:
+    """A tree of postures connected by straight lines."""
+
+    def __init__(self, space: _Space, clear: Array, size: Array, root: Array) -> None:
+        self.space, self.clear, self.size = space, clear, size
+        self.postures, self.parents, self.tries = [root], [-1], 0
+
+    def grown(self, towards: Array) -> int | None:
+        """Add a posture, one step from the nearest one ``towards`` a posture; returns its number, None if it
+        is not free."""
+        away = (np.array(self.postures) - towards) / self.size
+        nearest = int(np.argmin(np.sum(away**2, axis=1)))
+        length = float(np.linalg.norm(away[nearest]))
+        here = self.postures[nearest]
+        new = here + (towards - here) * min(1.0, _STEP / max(length, 1e-9))
+        if not self.space.leads(here, new, self.clear):
+            return None
+        self.postures.append(new)
+        self.parents.append(nearest)
+        return len(self.postures) - 1
+
+    def reaches(self, posture: Array) -> bool:
+        """Grow step by step towards a posture; returns whether it is reached."""
+        for _ in range(_NODES):
+            new = self.grown(posture)
+            if new is None:
+                return False
+            if np.allclose(self.postures[new], posture):
+                return True
+        return False
+
+    def branch(self, number: int) -> Array:
+        """The postures from the root to one."""
+        found = []
+        while number >= 0:
+            found.append(self.postures[number])
+            number = self.parents[number]
+        return np.array(found[::-1])

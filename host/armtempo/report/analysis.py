@@ -1,0 +1,147 @@
+"""What the samples of a run say: mean and scatter over repetitions, deviation from theory, lag."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
+from numpy.typing import NDArray
+
+from armtempo.basics.arrays import Array
+from armtempo.report import replayed
+from armtempo.report.differentiation import of_curves
+from armtempo.report.run_folder import COMPLETE
+from armtempo.report.run_reader import RepetitionData
+from armtempo.splines.trajectory import Trajectory
+
+SAMPLE_S = SAMPLE_TICKS / TICK_HZ
+"""Time between two samples, by the board's motion clock."""
+ORDERS = ("angle", "speed", "acceleration")
+_SAME_S = 1e-3
+EDGE_S = 1.0
+"""Length of the intervals at start and end over which the lag is estimated."""
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Angle, speed and acceleration on the common time grid.
+
+    ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN if samples are missing; ``mean``,
+    ``sem`` (standard error of the mean; NaN with one repetition), ``theory``, and ``shown``, what the same
+    differentiation shows of theory's angles, each (3, K, J). Deviations are taken from ``shown``, so that
+    they show the arm's errors and not those of the differentiation. ``measured`` (J,): whether the joint has an
+    encoder; the curves of one without are those of the step pulses that the board made.
+    """
+
+    times_s: Array
+    each: Array
+    mean: Array
+    sem: Array
+    theory: Array
+    shown: Array
+    path_s: Array
+    """(K,), the motion's own time; less than ``times_s`` if the speed was below 100 %."""
+    measured: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Mean curve against theory as differentiation shows it, for one joint and one of ORDERS."""
+
+    rms: float
+    largest: float
+
+
+def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Curves:
+    """Mean, scatter and theory of the repetitions of one trajectory.
+
+    Those that ran at another speed than the one that went furthest are left out; theory is the plan at that speed.
+    Raises ValueError if there is no sample at all.
+    """
+    count = max((_grid_size(repetition) for repetition in repetitions), default=0)
+    if count == 0:
+        raise ValueError("no samples to analyse")
+    times: Array = np.arange(count, dtype=np.float64) * SAMPLE_S
+    measured = np.any([~np.isnan(one.angle_deg).all(axis=0) for one in repetitions], axis=0)
+    paths = [replayed.path_times(one, times) for one in repetitions]
+    path_s = max(paths, key=lambda path: float(path[-1]))
+    each = np.stack(
+        [
+            of_curves(_on_grid(one, count, measured), SAMPLE_S, one.state == COMPLETE)
+            for one, path in zip(repetitions, paths, strict=True)
+            if _same_speed(one, path, path_s)
+        ]
+    )
+    theory: Array = replayed.theory(trajectory, times, path_s)
+    shown = of_curves(theory[0], SAMPLE_S, ended=True)
+    present = np.sum(~np.isnan(each), axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean: Array = np.nansum(each, axis=0) / present
+        spread = np.sqrt(np.nansum((each - mean) ** 2, axis=0) / (present - 1))
+        sem: Array = np.where(present > 1, spread / np.sqrt(present), np.nan)
+    return Curves(times, each, mean, sem, theory, shown, path_s, measured)
+
+
+def deviations(found: Curves) -> list[list[Deviation]]:
+    """``[order][joint]``: how far the mean curve is from theory."""
+    error = found.mean - found.shown
+    return [[_deviation(error[order, :, joint]) for joint in range(error.shape[2])] for order in range(3)]
+
+
+def final_errors(repetition: RepetitionData, trajectory: Trajectory) -> Array:
+    """Measured minus planned angle (J,) at the last sample, in degrees."""
+    planned: Array = trajectory(repetition.path_s[-1], 0)
+    return np.asarray(repetition.angle_deg[-1] - planned)
+
+
+def lags_s(found: Curves, trajectory: Trajectory) -> Array:
+    """How far the mean speed lags behind theory, in seconds: (2, J), over the first and the last EDGE_S.
+
+    The shift that fits best in the sense of least squares, to first order: positive is late.
+    """
+    ends = np.array([spline.duration_s for spline in trajectory.joints])
+    lags = np.full((2, len(ends)), np.nan)
+    for joint, end in enumerate(ends):
+        for row, (low, high) in enumerate(((0.0, EDGE_S), (end - EDGE_S, end))):
+            inside = (found.path_s >= low) & (found.path_s <= high) & ~np.isnan(found.mean[1, :, joint])
+            slope = found.theory[2, inside, joint]
+            error = found.mean[1, inside, joint] - found.shown[1, inside, joint]
+            if slope @ slope > 0.0:
+                lags[row, joint] = -(error @ slope) / (slope @ slope)
+    return lags
+
+
+def _same_speed(repetition: RepetitionData, path_s: Array, reference_s: Array) -> bool:
+    """Whether a repetition's own time goes as that of another, as far as it has samples."""
+    known = _indices(repetition)
+    known = known[known >= 0]
+    return bool(np.all(np.abs(path_s[known] - reference_s[known]) < _SAME_S))
+
+
+def _deviation(error: Array) -> Deviation:
+    known = error[~np.isnan(error)]
+    if not len(known):
+        return Deviation(np.nan, np.nan)
+    return Deviation(float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()))
+
+
+def _indices(repetition: RepetitionData) -> NDArray[np.int64]:
+    """Index of each sample on the 0.1 s grid; -1 for the one at the end, which falls between."""
+    place = repetition.time_s / SAMPLE_S
+    index = np.rint(place).astype(np.int64)
+    return np.where(np.abs(place - index) < 1e-3, index, -1)
+
+
+def _grid_size(repetition: RepetitionData) -> int:
+    return int(_indices(repetition).max(initial=-1)) + 1
+
+
+def _on_grid(repetition: RepetitionData, count: int, measured: NDArray[np.bool_]) -> Array:
+    """Angles (count, J), measured or else as commanded; NaN if a sample is missing."""
+    index = _indices(repetition)
+    angles = np.where(measured, repetition.angle_deg, repetition.commanded_deg)
+    grid = np.full((count, angles.shape[1]), np.nan)
+    grid[index[index >= 0]] = angles[index >= 0]
+    return grid

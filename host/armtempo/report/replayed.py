@@ -1,0 +1,120 @@
+"""What a run folder says was replayed: the plan, else the motion that the board had; the arm; how each joint ended;
+and the theory for a run at another speed than planned, by the motion's own time of the samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import why
+from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.model import arm_json
+from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.records import decode
+from armtempo.report.run_folder import ARM, MOTION
+from armtempo.report.run_reader import RepetitionData, RunData
+from armtempo.splines.trajectory import Trajectory
+
+_EQUAL_S = 1e-6
+"""Times that differ by less are the same: a tick is 12 ns."""
+_SHORT_S = 0.01
+SPEED_NOTE = "of the planned speed"
+"""In every text of ``speed_note``."""
+
+
+def plan_of(run: RunData) -> Plan | None:
+    """The plan; None if only the board had the motion. InputError if its file is damaged."""
+    return Plan.load(run.trajectory_path) if run.trajectory_path else None
+
+
+def trajectory_of(run: RunData) -> Trajectory:
+    """The motion as the board's record has it, to the rounding of its integers.
+
+    Raises RunFolderError if that is not there or not whole.
+    """
+    path = run.path / MOTION
+    try:
+        return decode.trajectory(path.read_bytes(), run.joints, str(run.meta["name"]))
+    except OSError as error:
+        raise RunFolderError(
+            f"{run.path}: neither a plan nor {MOTION} can be read ({why(error)}), so the planned motion is not known",
+            "restore one of them from a copy, or run again",
+        ) from error
+    except InputError as error:
+        raise RunFolderError(f"{path}: {error.problem}", "restore it from a copy, or run again") from error
+
+
+def arm_of(run: RunData) -> Arm | None:
+    """The arm of a motion without a plan; None if the folder does not say. InputError if it is damaged."""
+    path = run.path / ARM
+    return arm_json.load(path) if path.is_file() else None
+
+
+@dataclass(frozen=True)
+class JointResult:
+    """How one joint ended."""
+
+    name: str
+    steps_sent: int
+    """Step pulses from start to end, signed."""
+    angle_deg: float
+    """Where it ended: by its encoder, without one by the steps."""
+    error_deg: float
+    """That less where the trajectory ends."""
+
+
+def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
+    """The joints of the last repetition; empty if run.json does not say how that ended."""
+    last = run.entries[-1] if run.entries else None
+    steps, counts = (last.commanded_steps, last.counts) if last else ((), ())
+    start_deg, end_deg = trajectory(0.0), trajectory(trajectory.duration_s)
+    found = []
+    for joint, scale in enumerate(run.joints[: len(steps)]):
+        angle_deg = steps[joint] / scale.steps_per_deg
+        if scale.counts_per_deg:
+            angle_deg = counts[joint] / scale.counts_per_deg
+        sent = steps[joint] - round(start_deg[joint] * scale.steps_per_deg)
+        found.append(JointResult(scale.name, sent, angle_deg, float(angle_deg - end_deg[joint])))
+    return tuple(found)
+
+
+def is_stretched(repetition: RepetitionData) -> bool:
+    """Whether the motion's own time ever was slower than the clock."""
+    return bool(np.any(np.abs(repetition.time_s - repetition.path_s) > _EQUAL_S))
+
+
+def path_times(repetition: RepetitionData, times_s: Array) -> Array:
+    """The motion's own time (K,) at real times (K,); between samples and after the last by straight lines."""
+    if len(repetition.time_s) < 2 or not is_stretched(repetition):
+        return times_s
+    inside = np.interp(times_s, repetition.time_s, repetition.path_s)
+    return np.where(times_s > repetition.time_s[-1], repetition.path_s[-1], inside)
+
+
+def theory(trajectory: Trajectory, times_s: Array, path_s: Array) -> Array:
+    """Angle, speed and acceleration of a trajectory over real time, (3, K, J).
+
+    ``path_s`` (K,): the motion's own time at the evenly spaced ``times_s`` (K,). By the chain rule; its rate and
+    the change of that by differences.
+    """
+    orders = [trajectory(path_s, order) for order in range(3)]
+    if len(times_s) > 1 and np.any(np.abs(path_s - times_s) > _EQUAL_S):
+        rate = np.gradient(path_s, times_s)[:, None]
+        change = np.gradient(rate[:, 0], times_s)[:, None]
+        orders = [orders[0], orders[1] * rate, orders[2] * rate**2 + orders[1] * change]
+    return np.stack(orders)
+
+
+def speed_note(repetition: RepetitionData) -> str:
+    """At what speed a repetition ran, in words; "" for the planned one."""
+    if not is_stretched(repetition):
+        return ""
+    passed_s = np.diff(repetition.time_s)
+    whole = passed_s > _SHORT_S  # the last sample may come right after another
+    rates = 100 * np.diff(repetition.path_s)[whole] / passed_s[whole]
+    low, high = round(float(rates.min()), 1), round(float(rates.max()), 1)
+    speed = f"at {high:g} %" if high - low < 1.0 else f"between {low:g} and {high:g} %"
+    return f"{repetition.file}: ran {speed} {SPEED_NOTE}; it is checked against the plan at that speed"

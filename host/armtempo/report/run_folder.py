@@ -1,0 +1,240 @@
+"""The run folder: what was run and what was measured, readable at any moment of the run.
+
+::
+
+    run.json          what ran, when, on which board; how each repetition ended; the columns' meaning
+    trajectory.json   the plan, if it is known
+    arm.json          else the arm
+    motion.bin        what the board replayed
+    samples-01.csv    one file a repetition, one line a sample (columns: see ``columns``)
+
+``run.json`` is replaced as a whole; sample lines are appended and flushed one by one. An interrupted run
+is thus readable up to its last whole line.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from armtempo_shared import limits
+
+from armtempo.basics.atomic_file import replace_text
+from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.basics.installation import installed_version
+from armtempo.link.board_messages import Positions, Sample
+from armtempo.link.follow import Gap
+from armtempo.model.arm import Arm
+
+FORMAT = "armtempo run"
+VERSION = 1
+META = "run.json"
+TRAJECTORY = "trajectory.json"
+ARM = "arm.json"
+MOTION = "motion.bin"
+RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrupted", "fault", "broken"
+
+
+@dataclass(frozen=True)
+class JointScale:
+    """Scales of one joint's steps and counts; ``counts_per_deg`` 0: it has no encoder."""
+
+    name: str
+    steps_per_deg: float
+    counts_per_deg: float
+
+
+def scales(arm: Arm) -> tuple[JointScale, ...]:
+    """The scales of an arm's driven joints."""
+    return tuple(JointScale(joint.name, joint.steps_per_deg, joint.counts_per_deg) for joint in arm.driven)
+
+
+def columns(joints: Sequence[JointScale]) -> dict[str, str]:
+    """Column names of a sample file with their meaning and unit, in order."""
+    found = {
+        "index": "number of the sample in its repetition, from 0",
+        "ticks": f"motion clock of the board, ticks of 1/{limits.TICK_HZ} s",
+        "time_s": "the same in seconds",
+        "path_s": "the motion's own time in seconds: behind the clock where the speed was below 100 %",
+    }
+    for number, joint in enumerate(joints, start=1):
+        found |= {
+            f"j{number}_commanded_steps": f"{joint.name}: step pulses made, signed",
+            f"j{number}_commanded_deg": f"{joint.name}: the same in degrees of the joint",
+        }
+        if joint.counts_per_deg:
+            found |= {
+                f"j{number}_counts": f"{joint.name}: encoder counts",
+                f"j{number}_angle_deg": f"{joint.name}: the same in degrees of the joint",
+            }
+    return found
+
+
+def row(sample: Sample, joints: Sequence[JointScale]) -> list[str]:
+    """One line of a sample file."""
+    cells = [str(sample.index), str(sample.ticks), f"{sample.ticks / limits.TICK_HZ:.9f}"]
+    cells.append(f"{sample.path_ticks / limits.TICK_HZ:.9f}")
+    for joint, steps, counts in zip(
+        joints, sample.positions.commanded_steps, sample.positions.counts, strict=True
+    ):
+        cells += [str(steps), f"{steps / joint.steps_per_deg:.6f}"]
+        if joint.counts_per_deg:
+            cells += [str(counts), f"{counts / joint.counts_per_deg:.6f}"]
+    return cells
+
+
+@dataclass
+class Repetition:
+    """How one repetition went, as run.json tells it."""
+
+    file: str
+    state: str = RUNNING
+    samples: int = 0
+    lost: tuple[Gap, ...] = ()
+    """Samples that never arrived."""
+    duration_s: float = 0.0
+    fault: str = ""
+    commanded_steps: tuple[int, ...] = ()
+    counts: tuple[int, ...] = ()
+    notices: tuple[str, ...] = ()
+    """Texts from the board."""
+
+    def end(self, state: str, fault: str, ticks: int, positions: Positions, lost: tuple[Gap, ...]) -> None:
+        """Note the end of the motion."""
+        self.state, self.fault, self.lost = state, fault, lost
+        self.duration_s = ticks / limits.TICK_HZ
+        self.commanded_steps, self.counts = positions.commanded_steps, positions.counts
+
+
+@dataclass
+class RunFolder:
+    """A run folder being written."""
+
+    path: Path
+    name: str
+    joints: tuple[JointScale, ...]
+    origin: dict[str, Any] = field(default_factory=dict)
+    """Further entries of run.json: port, board, arm, checksum of the motion."""
+    started: str = field(default_factory=lambda: now())
+    repetitions: list[Repetition] = field(default_factory=list)
+
+    def write(self) -> None:
+        """Write run.json anew with what is known now."""
+        meta = {
+            "format": FORMAT,
+            "version": VERSION,
+            **written_head(self.name, self.started),
+            "joints": [vars(joint) for joint in self.joints],
+            "columns": columns(self.joints),
+            **self.origin,
+            "repetitions": [vars(repetition) for repetition in self.repetitions],
+        }
+        write_meta(self.path, meta)
+
+    def write_motion(self, data: bytes) -> None:
+        """Keep the record that the board replays; RunFolderError if it cannot be written."""
+        with writing(self.path / MOTION):
+            (self.path / MOTION).write_bytes(data)
+
+    def begin_repetition(self) -> SampleFile:
+        """A new sample file; it must be used as a context."""
+        repetition = Repetition(f"samples-{len(self.repetitions) + 1:02d}.csv")
+        self.repetitions.append(repetition)
+        self.write()
+        return SampleFile(self, repetition)
+
+
+class SampleFile:
+    """The sample file of a repetition under way; leaving it notes how the repetition ended."""
+
+    def __init__(self, folder: RunFolder, repetition: Repetition) -> None:
+        self.repetition = repetition
+        self._folder = folder
+        self._path = folder.path / repetition.file
+        with writing(self._path):
+            self._file = self._path.open("x", newline="", encoding="utf-8")
+        self._csv = csv.writer(self._file, lineterminator="\n")
+        self._line(list(columns(folder.joints)))
+
+    def append(self, sample: Sample) -> None:
+        """Add one sample; RunFolderError if it cannot be written."""
+        self._line(row(sample, self._folder.joints))
+        self.repetition.samples += 1
+
+    def _line(self, cells: list[str]) -> None:
+        with writing(self._path):
+            self._csv.writerow(cells)
+            self._file.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with suppress(OSError):  # what could not be written has been said
+            self._file.close()
+        if self.repetition.state == RUNNING:
+            self.repetition.state = INTERRUPTED if kind is KeyboardInterrupt else BROKEN
+        with unless(value):
+            self._folder.write()
+
+
+def new_folder(parent: Path, name: str) -> Path:
+    """A fresh folder ``parent/name-001`` (or the next free number); InputError if none can be made."""
+    try:
+        for number in range(1, 10_000):
+            path = parent / f"{name}-{number:03d}"
+            with suppress(FileExistsError):  # another run may be making it at this moment
+                path.mkdir(parents=True)
+                return path
+    except OSError as error:
+        raise InputError(
+            f"{parent}: the run folder cannot be made: {error.strerror}",
+            "choose another place with --out",
+        ) from error
+    raise InputError(f"{parent} holds 9999 runs of {name!r}", "move some away")
+
+
+@contextmanager
+def unless(error: BaseException | None) -> Iterator[None]:
+    """Let an InputError pass, unless there was an error before: that says more."""
+    try:
+        yield
+    except InputError:
+        if error is None:
+            raise
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """RunFolderError if what is done cannot write ``path``."""
+    try:
+        yield
+    except OSError as error:
+        raise RunFolderError(
+            f"{path}: cannot be written: {error.strerror}; what came before is kept",
+            "free disk space, then run again",
+        ) from None
+
+
+def written_head(name: str, started: str) -> dict[str, Any]:
+    """What run.json says of any run, after its format: by which version, of what, when."""
+    return {"armtempo": installed_version(), "name": name, "started": started, "written": now()}
+
+
+def write_meta(folder: Path, meta: dict[str, Any]) -> None:
+    """Write run.json into a run folder, whole or not at all."""
+    replace_text(folder / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
+
+
+def now() -> str:
+    """Date and time, UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -1,0 +1,299 @@
+"""README, help, pages, pictures and workflows name what exists: every command once, in groups, and current."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import click
+import pytest
+from armtempo.cli import main
+from armtempo.cli.commands import COMMANDS, GROUPS
+from armtempo.model import engine_pins
+from click.testing import CliRunner
+
+from tests import sources
+from tests.interpreters import ROOT
+
+FILES = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+SCRIPT = sources.script(ROOT / "host" / "docs" / "make_tables.py")
+IMAGES = ROOT / "host" / "docs" / "images"
+FIGURES_SCRIPT = (ROOT / "host" / "docs" / "site" / "make_figures.py").read_text(encoding="utf-8")
+MADE = set(re.findall(r'^    "([\w-]+\.(?:png|gif))": ', FIGURES_SCRIPT, re.MULTILINE))
+PAGES = [ROOT / "README.md", *ROOT.glob("*/docs/*.md")]
+PAGE = (ROOT / "host" / "docs" / "cli.md").read_text(encoding="utf-8")
+TOUR = (ROOT / "host" / "docs" / "architecture.md").read_text(encoding="utf-8")
+SOURCES = {
+    "host": ROOT / "host" / "armtempo",
+    "shared": ROOT / "shared" / "armtempo_shared",
+    "board": ROOT / "board" / "armtempo_board",
+}
+LINKING = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("*/docs/*.md"))]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_table_says_of_a_command_what_its_docstring_says(name: str) -> None:
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    assert command.name == name
+    assert command.help is not None
+    assert command.help.split("\n\n")[0].replace("\n", " ") == COMMANDS[name].summary
+    assert COMMANDS[name].examples
+
+
+def test_the_help_page_and_the_tab_key_import_no_command() -> None:
+    count = "len([name for name in sys.modules if name.startswith('armtempo.cli.')])"
+    code = (
+        "import sys, click; from armtempo.cli import main; "
+        f"before = {count}; context = click.Context(main); main.get_help(context); main.shell_complete(context, ''); "
+        f"print({count} - before, 'numpy' in sys.modules)"
+    )
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).split() == ["0", "False"]
+
+
+def test_the_help_page_shows_the_groups_and_their_commands() -> None:
+    page = CliRunner().invoke(main, ["--help"]).output
+    for title, names in GROUPS.items():
+        section = page[page.index(f"{title}:\n") :]
+        for name in names:
+            assert re.search(rf"^  {name} ", section, re.MULTILINE), name
+    for line in re.findall(r"^    armtempo (\S+)", page, re.MULTILINE):
+        assert line == "COMMAND" or line in COMMANDS
+
+
+@pytest.mark.parametrize("line", [line for entry in COMMANDS.values() for line in entry.examples])
+def test_an_example_is_a_command_that_can_be_given(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name, *arguments = shlex.split(re.sub(r" >>? .*", "", line))
+    for argument in arguments:  # what must be there is made
+        if argument.startswith("runs/"):
+            (tmp_path / argument).mkdir(parents=True)
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    command.make_context(name, arguments)
+    page = CliRunner().invoke(main, [name, "--help"]).output
+    assert f"  armtempo {line}\n" in page
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_completion_script_for(shell: str) -> None:
+    done = CliRunner().invoke(main, ["completion", shell])
+    assert done.exit_code == 0
+    assert "_ARMTEMPO_COMPLETE" in done.output
+
+
+def completed(line: str) -> set[str]:
+    """What the script is answered: kind and word."""
+    words = {
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(len(line.split(" ")) - 1),
+        "_ARMTEMPO_COMPLETE": "bash_complete",
+    }
+    command = [sys.executable, "-m", "armtempo"]
+    done = subprocess.run(command, env={**os.environ, **words}, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+@pytest.mark.slow
+def test_what_the_script_asks_is_answered() -> None:
+    assert completed("armtempo st") == {"plain,stop", "plain,status"}
+    assert completed("armtempo plan --timing p") == {"plain,per-joint"}
+    assert completed("armtempo check --arm mo") == {"plain,moveo"}
+    assert completed("armtempo check --arm my") == {"file,my"}
+
+
+@pytest.mark.parametrize("name", ["run", "fetch", "goto", "home"])
+def test_files_complete_where_an_argument_may_be_one(name: str) -> None:
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    offered = command.params[0].shell_complete(click.Context(command), "fir")
+    assert [(item.type, item.value) for item in offered] == [("file", "fir")]
+
+
+LINES = [
+    (file.name, command.strip())
+    for file in FILES
+    for line in re.findall(r"run: (.*?)(?: #.*)?$", file.read_text(encoding="utf-8"), re.MULTILINE)
+    for command in line.split("&&")
+]
+
+
+def test_there_are_workflows() -> None:
+    assert len(FILES) == 3
+    assert len(LINES) > 10
+
+
+@pytest.mark.parametrize(("file", "line"), LINES)
+def test_what_a_workflow_runs_is_there(file: str, line: str) -> None:
+    program, *arguments = shlex.split(line)
+    if program == "armtempo" and arguments != ["--version"]:
+        command = main.get_command(click.Context(main), arguments[0])
+        assert command is not None, line
+        command.make_context(arguments[0], arguments[1:], resilient_parsing=False)
+    elif program == "make":
+        makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+        assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in arguments)
+    elif "/" in program or (program == "python" and arguments[0].endswith(".py")):
+        script = ROOT / (program if "/" in program else arguments[0])
+        assert script.is_file()
+        assert "/" not in program or script.stat().st_mode & 0o100
+
+
+def test_a_workflow_that_another_one_calls_is_there_and_may_be_called() -> None:
+    for file in FILES:
+        for called in re.findall(r"uses: \./(\S+)", file.read_text(encoding="utf-8")):
+            assert "workflow_call:" in (ROOT / called).read_text(encoding="utf-8")
+
+
+# interpreters for the tests: the file that the lock names, or none
+
+
+@pytest.mark.parametrize("content", [b"another file", None])
+def test_a_file_that_is_not_the_locked_one_is_not_unpacked(content: bytes | None, tmp_path: Path) -> None:
+    names = runpy.run_path(str(ROOT / ".ci" / "get_micropython.py"))
+    unpack = names["unpack"]
+    unpack.__globals__.update(CACHE=tmp_path / "cache", archive_address=tmp_path.as_uri)
+    for line in names["LOCK"].read_text().splitlines():
+        package = tmp_path / line.split()[1]
+        package.parent.mkdir(parents=True, exist_ok=True)
+        if content is not None:
+            package.write_bytes(content)
+    with pytest.raises(names["Missing"], match=r"micropython_.*_armhf\.deb.*debian\.lock"):
+        unpack("armhf")
+    assert not (tmp_path / "cache").exists()
+
+
+@pytest.mark.parametrize("name", SCRIPT.TABLES)
+def test_page_is_current(name: str) -> None:
+    text = (ROOT / "host" / "docs" / name).read_text(encoding="utf-8")
+    assert SCRIPT.page(name) == text, "run: python host/docs/make_tables.py"
+
+
+# every figure of the pages is made by the script that makes them all
+
+
+def shown() -> set[Path]:
+    """All pictures that a page shows."""
+    return {
+        (page.parent / target).resolve()
+        for page in PAGES
+        for target in re.findall(r"!\[[^\]]+\]\(([^)]+)\)", page.read_text(encoding="utf-8"))
+    }
+
+
+def test_figures_are_made_shown_and_there() -> None:
+    assert {path.name for path in IMAGES.iterdir()} == MADE
+    assert {path.name for path in shown()} == MADE | {"wiring.svg"}
+    for path in shown():
+        assert path.parent == IMAGES or path.name == "wiring.svg"
+        assert path.stat().st_size > 10_000
+
+
+def test_the_wiring_diagram_shows_the_pins_of_the_board_program() -> None:
+    """``python host/docs/site/make_wiring.py`` makes it anew."""
+    made = sources.script(ROOT / "host" / "docs" / "site" / "make_wiring.py")
+    drawn = made.svg()
+    assert made.TARGET.read_text(encoding="utf-8") == drawn
+    pins = engine_pins.table()
+    shown_pins = re.findall(r">(P[A-E]\d+)<", drawn)
+    wired = [row[0] for row in pins["STEP"]] + [*pins["DIR"], *pins["LIMIT"], pins["ENABLE"], pins["ESTOP"]]
+    wired += [pin for row in pins["ENCODER"] for pin in row[1:3]]
+    assert sorted(shown_pins) == sorted(f"P{pin}" for pin in wired)
+
+
+# the page on the command line has one row for every command; their options are on a page that is generated
+
+
+def row(name: str) -> str:
+    """The line of the tables of commands that describes this one."""
+    page = re.sub(r"^## JSON\n.*?^## ", "## ", PAGE, flags=re.MULTILINE | re.DOTALL)
+    found = [line for line in page.splitlines() if re.search(rf"^\|[^|]*`{name}[ `]", line)]
+    assert len(found) == 1, f"{name}: {found}"
+    return found[0]
+
+
+@pytest.mark.parametrize("name", main.list_commands(click.Context(main)))
+def test_no_command_is_left_out(name: str) -> None:
+    assert row(name)
+
+
+def test_examples_are_commands() -> None:
+    for line in PAGE.splitlines():
+        words = line.split()
+        if words[:1] == ["armtempo"]:
+            assert main.get_command(click.Context(main), words[1]) is not None, line
+
+
+@cache
+def names(side: str) -> frozenset[str]:
+    """Modules and classes of a side, and what they define: ``module``, ``module.function``, ``Class.method``."""
+    found = set()
+    for path in SOURCES[side].rglob("*.py"):
+        if "hardware" in path.parts and side == "host":
+            continue
+        module = path.parent.name if path.name == "__init__.py" else path.stem
+        found.add(module)
+        for node in sources.tree(path).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                found.add(f"{module}.{node.name}")
+            if isinstance(node, ast.ClassDef):
+                found.add(node.name)
+                found |= {
+                    f"{node.name}.{part.name}" for part in node.body if isinstance(part, ast.FunctionDef)
+                }
+    return frozenset(found)
+
+
+def mentioned() -> list[tuple[str, str]]:
+    """(side, name) of each call or place in the second column of the tables of the way and of places."""
+    rows = [line.split("|") for line in TOUR.splitlines()]
+    cells = [row[2] for row in rows if len(row) > 3 and not set(row[1]) <= set("- ")]
+    found = []
+    for text in re.findall(r"`([^`]+)`", " ".join(cells)):
+        side, _, name = text.rpartition(": ")
+        if not name.startswith("["):
+            found.append((side or "host", name))
+    return found
+
+
+def test_the_tables_were_found() -> None:
+    assert {side for side, _ in mentioned()} == set(SOURCES)
+    assert len(set(mentioned())) >= 25
+
+
+@sources.TOGETHER
+@pytest.mark.parametrize(("side", "name"), sorted(set(mentioned())))
+def test_what_the_tour_names_exists(side: str, name: str) -> None:
+    assert name in names(side)
+
+
+@pytest.mark.parametrize("page", LINKING, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        assert "://" in target or (page.parent / target).exists(), target
+
+
+def test_the_pages_on_arms_and_kinematics_name_modules_that_exist() -> None:
+    for name in ("arms.md", "kinematics.md"):
+        text = (ROOT / "host" / "docs" / name).read_text(encoding="utf-8")
+        rows = "".join(line for line in text.splitlines() if line.startswith("|"))
+        modules = set(re.findall(r"`(?:\.\./)?([\w/]+\.py)", rows))
+        assert len(modules) >= 8
+        places = (SOURCES["host"], SOURCES["host"] / "kinematics", ROOT / "shared")
+        for module in modules:
+            assert any((place / module).is_file() for place in places), f"{name}: {module}"
+
+
+def test_the_tour_names_every_package() -> None:
+    tour = TOUR[TOUR.index("host/armtempo/  basics") : TOUR.index("shared/armtempo_shared/   ")]
+    packages = {path.parent.name for path in SOURCES["host"].glob("*/__init__.py")} | {"pipeline"}
+    assert packages <= set(re.findall(r"\w+", tour))
