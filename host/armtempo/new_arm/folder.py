@@ -91,7 +91,7 @@ def from_shipped(name: str) -> ArmText:
 
 
 def from_urdf(urdf: Path) -> ArmText:
-    """The arm of a URDF; its motors are left as comments. Raises InputError as ``urdf.reader`` does."""
+    """The arm of a URDF; its motors are left as comments. Raises InputError as ``urdf_reader`` does."""
     from armtempo.new_arm import arm_text
     from armtempo.new_arm import urdf_fitting as fitting
     from armtempo.new_arm import urdf_reader as reader
