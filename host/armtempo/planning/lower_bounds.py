@@ -29,8 +29,8 @@ _WORK = 10_000
 class Floor:
     """A proven lower bound of a motion time under speed, acceleration and jerk limits.
 
-    ``kind``: ``"rests"``: from turn to turn of one joint; ``"path"``: along the common path; through the via points, for
-    any path, ``"vias"``: of one joint, ``"together"``: of all of them.
+    ``kind``: ``"rests"``: from turn to turn of one joint; ``"path"``: along the common path; through the via points,
+    for any path, ``"vias"``: of one joint, ``"together"``: of all of them.
     """
 
     time_s: float
