@@ -42,20 +42,16 @@ class Lines:
 
 @dataclass
 class LiveCurves:
-    """The samples of the running or last motion, one row per sample."""
+    """The samples of one run, one row per sample."""
 
+    run: int
     time_s: list[float] = field(default_factory=list)
     path_s: list[float] = field(default_factory=list)
     commanded_deg: list[list[float]] = field(default_factory=list)
     angle_deg: list[list[float | None]] = field(default_factory=list)
-    run: int = -1
 
     def take(self, sample: dict[str, Any]) -> None:
-        """Add a sample, as ``sharing.sample_json`` gives it; a new run begins anew."""
-        if sample["run"] != self.run:
-            self.run = sample["run"]
-            for name in reversed(_ROWS):
-                setattr(self, name, [])
+        """Add a sample, as ``sharing.sample_json`` gives it."""
         for name in _ROWS:
             getattr(self, name).append(sample[name])
 
@@ -93,7 +89,8 @@ class LiveArm:
         self.state: BoardState | None = None
         self.angles_deg: Array = np.array(arm.home_deg)
         """Commanded angles by the last message, (J,)."""
-        self.curves = LiveCurves()
+        self.curves = LiveCurves(run=-1)
+        """Of the running or last motion; a new object for each run, for threads that read it."""
         self.plan: Plan | None = None
         """The plan of the running or last motion."""
         self.target_deg: Array | None = None
@@ -128,6 +125,8 @@ class LiveArm:
         if isinstance(event, Sample):
             sample = sample_json(event, self.arm)
             if "commanded_deg" in sample:
+                if sample["run"] != self.curves.run:
+                    self.curves = LiveCurves(sample["run"])
                 self.curves.take(sample)
                 self.angles_deg = np.array(sample["commanded_deg"])
 
@@ -137,8 +136,9 @@ class LiveArm:
 
     def draw(self) -> None:
         """The tool's path by the samples, if there are new ones."""
-        if self._seen != (seen := (self.curves.run, len(self.curves.time_s))) and seen[1] > 1:
-            self.run_path_mm = chains_mm(self.arm, self.curves.thinned(_MOST_POINTS).angle_deg)[:, -1]
+        curves = self.curves
+        if self._seen != (seen := (curves.run, len(curves.time_s))) and seen[1] > 1:
+            self.run_path_mm = chains_mm(self.arm, curves.thinned(_MOST_POINTS).angle_deg)[:, -1]
         self._seen = seen
 
     def ask(self, board: Board) -> None:

@@ -259,11 +259,11 @@ class Operator:
 
     def _look(self) -> None:
         while not self._closed.wait(LOOK_S):
-            self.live.draw()
             board = self._board
-            if board is None:
-                continue
             try:
+                self.live.draw()
+                if board is None:
+                    continue
                 with board.client.session.in_a_hurry(LOOK_S) as mine:
                     if not mine:
                         continue

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import socket
 from contextlib import suppress
 from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import Client, app, ui
+from nicegui import Client, app, background_tasks, ui
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, PlainTextResponse
 
@@ -27,6 +28,7 @@ _KEPT_MESSAGES = 2000
 """For such a page; some 15 come each second, and it takes up to 132 s until it is given up."""
 _NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
 """Files of run folders may come from anybody and must not run scripts."""
+_LOG = logging.getLogger("armtempo")
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 
 
@@ -81,7 +83,7 @@ class Panel:
         self._operator.monitors.discard(client)
 
     async def _tell(self) -> None:
-        asyncio.create_task(self._tell_all())  # noqa: RUF006  it lives as long as the server
+        background_tasks.create(self._tell_all())
 
     async def _tell_all(self) -> None:
         """Compute a message once, and send it to every page."""
@@ -89,8 +91,13 @@ class Panel:
             await asyncio.sleep(layout.TELL_S)
             if not any(client.has_socket_connection for client in Client.instances.values()):
                 continue
-            told = layout.message(self._operator, self._shape)
-            code = f"armtempo.hear({json.dumps(told)})"
+            try:
+                code = f"armtempo.hear({json.dumps(layout.message(self._operator, self._shape))})"
+            except (
+                Exception
+            ):  # a fault of ours: logged, and the next is told; the pages cover themselves meanwhile
+                _LOG.exception("panel: what the pages are told")
+                continue
             for client in list(Client.instances.values()):
                 if client.has_socket_connection:
                     client.run_javascript(code)
