@@ -33,11 +33,11 @@ ROWS, SAMPLES = "rows.csv", "samples.csv"
 ROW_COLUMNS = {
     "passed": "how many rows had begun since the start, with this one; a jump is a gap",
     "time_s": "when it was heard of, by the host's clock, seconds since the start",
-    "run": "the board's number of the motion that ran last; of this row, if it moves",
+    "run": "the board's number of the motion that ran last; of this row, where it moves",
     "row": "number of the row in run.json, from 0",
     "step": "number of the step in the sequence file, from 1",
     "cycle": "finished passes of the outermost repeats",
-    "value": "of the counter, if the row counts",
+    "value": "of the counter, where the row counts",
     "words": "what it does",
 }
 
@@ -51,7 +51,7 @@ def sample_columns(joints: Sequence[JointScale]) -> dict[str, str]:
     """Column names of the sample file with their meaning and unit, in order."""
     return {
         "run": "the board's number of the motion's run",
-        "row": "number of its row in run.json; empty if the row was not heard of",
+        "row": "number of its row in run.json; empty where the row was not heard of",
         **run_folder.columns(joints),
         "index": "number of the sample in its motion, from 0",
     }
