@@ -35,7 +35,7 @@ class Finding:
 
 
 def error(where: str, what: str, next_step: str) -> Finding:
-    """A finding that stands in the way."""
+    """A finding that prevents use."""
     return Finding(Level.ERROR, where, what, next_step)
 
 
