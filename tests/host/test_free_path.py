@@ -167,6 +167,7 @@ def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
     assert any("no faster path" in note for note in plan.notes)
     assert faults(plan) == []
     assert max(seen) <= 3 * corridor._MOST_PIECES
+    assert 'with refine = 6; try refine = "auto" (--refine auto)' in plan.notes[-1]
     assert len(seen) < 500
 
 
@@ -259,7 +260,7 @@ def test_a_seed_repeats_and_starts_are_reported() -> None:
         ({"corridor_deg": -1.0}, "0 or more"),
         ({"degree": 3}, "degree 5"),
         ({"timing": "per-joint", "stops": (Stop(1),)}, 'needs timing = "shared"'),
-        ({"timing": "per-joint", "corridor_deg": 1.0}, 'needs timing = "shared"'),
+        ({"timing": "per-joint", "corridor_deg": 1.0}, 'needs timing = "shared".*; give timing = "shared"'),
         ({"stops": (Stop(0),)}, "between the ends"),
         ({"stops": (Stop(2), Stop(2))}, "two stops at one via point"),
         ({"stops": (Stop(2, 1.0),), "corridor_deg": 1.0}, "corridor and a dwell"),

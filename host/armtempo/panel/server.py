@@ -23,17 +23,17 @@ from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Operator
 
 _RECONNECT_S = 60.0
-"""A page whose connection breaks is kept for so long: a busy browser, or a tablet that slept, keeps it."""
+"""Time for which a page is kept after its connection breaks (a busy browser, a sleeping tablet)."""
 _KEPT_MESSAGES = 2000
 """For such a page; some 15 come each second, and it takes up to 132 s until it is given up."""
 _NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
-"""What a run folder holds, which may come from anybody, does nothing in the panel's name."""
+"""Files of run folders may come from anybody and must not run scripts."""
 _LOG = logging.getLogger("armtempo")
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 
 
 class Panel:
-    """The panel of one board; ``serve`` runs until it is told to end."""
+    """The panel of one board; ``serve`` runs until it is ended."""
 
     def __init__(self, operator: Operator) -> None:
         self._operator = operator
@@ -78,7 +78,7 @@ class Panel:
         client.on_delete(lambda: self._gone(client.id))
 
     def _gone(self, client: str) -> None:
-        """A page was closed, or its connection did not come back."""
+        """A page was closed, or did not reconnect."""
         self._operator.release(client)
         self._operator.monitors.discard(client)
 
@@ -108,7 +108,7 @@ class Panel:
         return FileResponse(file) if file else PlainTextResponse("no such mesh", 404)
 
     async def _run_file(self, name: str, file: str) -> Any:
-        """A file of a run folder, to read; nothing else of the disk."""
+        """Serve a file of a run folder, and no other file."""
         runs = self._operator.runs.resolve()
         path = (runs / name / file).resolve()
         if path.suffix not in _SUFFIXES or not path.is_relative_to(runs) or not path.is_file():
@@ -117,7 +117,7 @@ class Panel:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket bound to an address; ``port`` 0: one that is free. InputError if it cannot be had."""
+    """A socket bound to an address; ``port`` 0: any free port. Raises InputError if that fails."""
     try:
         return socket.create_server((host, port), reuse_port=False)
     except OSError as error:

@@ -106,6 +106,8 @@ def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planne
         )
     )
     note = "no faster path was found in the corridor than the spline through the via points itself"
+    if job.refine != "auto":
+        note += f', with refine = {job.refine}; try refine = "auto" (--refine auto)'
     return replace(planned, searches=tuple(searches), notes=(*planned.notes, note))
 
 
