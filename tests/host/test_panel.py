@@ -17,6 +17,7 @@ import pytest
 from armtempo.basics.errors import InputError, LinkError, PortInUseError
 from armtempo.kinematics import Geometry, all_frames
 from armtempo.kinematics.chain import all_angles_deg
+from armtempo.link.board_messages import Positions, Sample
 from armtempo.model import mesh_files, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -25,6 +26,7 @@ from armtempo.panel.access import COOKIE, MOST_BYTES, Access
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.desk import Desk
 from armtempo.panel.held_jog import ALIVE_S, ButtonHold
+from armtempo.panel.live import LiveArm
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.sequence_desk import SequenceDesk
 from armtempo.planning.jog.jog_motion import JogMove
@@ -385,6 +387,20 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
     assert "cable" in made.why_not(ME, Needs.BOARD)
     assert "cable" in made.log.last[-1]
     made.close()
+
+
+def test_curves_that_are_read_stay_whole_when_a_run_begins() -> None:
+    live = LiveArm(ARM)
+    for number in range(4):
+        sample = Sample(number // 3, 0, number, number, 0, Positions((0, 0, 0), (0, 0, 0)))
+        before = live.curves
+        live.take_event(sample)
+    assert live.curves is not before
+    assert [len(rows) for rows in (before.time_s, before.thinned(9).angle_deg, live.curves.angle_deg)] == [
+        3,
+        3,
+        1,
+    ]
 
 
 def test_a_fault_of_ours_does_not_end_the_states(

@@ -24,7 +24,7 @@ from armtempo.robot.board_state import BoardState
 from armtempo.robot.outputs import BoardOutput
 from armtempo.simulator import LaunchOptions, launch
 
-from tests import browser
+from tests import browser, interpreters
 from tests.system import commandline
 from tests.system.boards import SOURCES_BLOCKS
 from tests.system.held_jogs import Cable
@@ -190,7 +190,13 @@ def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "
     with ExitStack() as stack:
         moved = armtempo.Arm.of(arm) if arm else ARM
         package.fill(folder / "flash", _library())
-        options = LaunchOptions(folder / "flash", virtual_time=False, arm=moved, flash_blocks=SOURCES_BLOCKS)
+        options = LaunchOptions(
+            folder / "flash",
+            virtual_time=False,
+            interpreter=interpreters.starter("cpython"),  # takes the sources
+            arm=moved,
+            flash_blocks=SOURCES_BLOCKS,
+        )
         virtual = stack.enter_context(launch(options))
         relay = stack.enter_context(Relay(virtual.port, folder / "port", *ways))
         made = Panels(folder, relay.port, ways, ("--arm", arm or "arm.toml", *job))

@@ -228,7 +228,10 @@ run = "job.toml"
 [[step]]
 output = "gripper"
 to = "open"
+holds = "nothing"
 wait_s = 0.5
+[[step]]
+holds = "nothing"
 [[step]]
 wait_s = 1
 [[step]]
@@ -271,7 +274,7 @@ def refusal(folder: Path, name: str, text: str, command: str = "plan --arm arm.t
 
 @pytest.mark.parametrize(
     ("tab", "file", "button", "count"),
-    [("Plan", "job.toml", "Plan", 9), ("Sequence", "all.toml", "Save the sequence", 14)],
+    [("Plan", "job.toml", "Plan", 9), ("Sequence", "all.toml", "Save the sequence", 16)],
 )
 def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
     page: Any, panel: Panel, tmp_path: Path, tab: str, file: str, button: str, count: int
@@ -289,7 +292,7 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
     else:
         good = _SEQUENCE
         show(page, tab)
-        open_sequence(page, file, "step 9: end")
+        open_sequence(page, file, "step 10: end")
     fields = page.evaluate(_FIELDS)
     assert len(fields) == count
     for number, (label, kind) in enumerate(fields):

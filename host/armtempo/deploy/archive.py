@@ -1,4 +1,4 @@
-"""The compiled modules of the board program as one file, most deflated: what the board's ``archive.py`` reads."""
+"""The archive of compiled modules of the board program, most deflated, for the board's ``archive.py``."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import zlib
 from collections.abc import Collection, Mapping
 
 _WINDOW_BITS = 10
-"""Memory that the board needs while it imports a module: 1 KB and 1.4 KB for the decoder."""
+"""Window (1 KB) for modules imported with little memory; the decoder needs another 1.4 KB."""
 _WIDE_BITS = 13
-"""The same if there is plenty: 8 KB."""
+"""Window (8 KB) for modules imported with enough memory."""
 
 
 def pack(files: Mapping[str, bytes], wide: Collection[str], plain: Collection[str]) -> bytes:

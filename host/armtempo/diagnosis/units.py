@@ -1,4 +1,4 @@
-"""Figures that look as if they were in another unit: metres for millimetres, radians for degrees."""
+"""Checks for wrong units: metres instead of millimetres, radians instead of degrees."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import Joint
 
 _SHORT_MM, _TINY_MM = 2.0, 0.02
-"""A length between these may be one in metres: 2 m is a large robot's, 20 mm a small offset."""
+"""A value between these may be in metres: 2 m is a large robot, 20 mm a small offset."""
 _NARROW_DEG = (0.1, 2 * math.pi)
 """A range, and an end of one, that may be in radians."""
 _NEAR_RAD = 0.002

@@ -1,7 +1,7 @@
 """Joints 4 to 6 from many orientations: the algebraic half of section 2.1, Eqs. (8) to (11).
 
-If the paper divides by sin(theta4) or sin(theta5), this takes both sine and cosine of each angle from
-Eq. (8) and their arctan2: no quadrant to guess and nothing to divide by near zero.
+Unlike the paper, which divides by sin(theta4) or sin(theta5), this computes sine and cosine of each angle
+from Eq. (8) and their arctan2, so the quadrant is defined and there is no division by a value near zero.
 """
 
 from __future__ import annotations

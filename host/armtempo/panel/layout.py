@@ -1,4 +1,4 @@
-"""The layout of a page: header with stop, the arm, tabs; and what it is told ten times a second."""
+"""The layout of a page: header with stop, the arm, tabs; and the message sent to it ten times per second."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from armtempo.robot.board import Board
 TELL_S = 0.1
 _POINTS = 200
 _PRIMARY = "#2b5f8f"
-"""White on it has a contrast of 6.6 to 1, of which 4.5 is needed."""
+"""Contrast with white: 6.6 to 1 (4.5 is required)."""
 _SCRIPT = Path(__file__).with_name("panel.js").read_text(encoding="utf-8")
 _STYLE = Path(__file__).with_name("panel.css").read_text(encoding="utf-8")
 
 
 def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
-    """The page of the client that asks for it."""
+    """The page of a client."""
     client = ui.context.client
     page = PanelPage(operator, hold, shape, client.id)
     ui.add_css(_STYLE)
@@ -52,7 +52,7 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
 
 
 def _below_scene(page: PanelPage) -> None:
-    """Views, how fast what moves continues, and where the arm is: in sight from every tab."""
+    """Views, speed and position of the arm, visible on every tab."""
     with ui.row():
         for view, text in words.VIEWS.items():
             ui.button(text, on_click=lambda view=view: page.scene.look(view)).props("flat dense")
@@ -71,7 +71,7 @@ def _below_scene(page: PanelPage) -> None:
 
 
 class Paths:
-    """The tool's path of the plan, and of the motion that runs or ran last, in the scene of one page."""
+    """The tool's paths of the plan and of the running or last motion, in the scene of one page."""
 
     def __init__(self, page: PanelPage) -> None:
         self._page = page
@@ -128,7 +128,7 @@ def _tabs(page: PanelPage) -> None:
         places = {name: ui.tab_panel(name) for name in parts}
 
     def show(name: str) -> None:
-        """Each tab is built when it is first shown: the first view does not wait for charts and tables."""
+        """Build a tab when it is first shown, so that the first view does not wait for charts and tables."""
         page.shown = name
         if part := parts.pop(name, None):
             with places[name]:
@@ -140,12 +140,12 @@ def _tabs(page: PanelPage) -> None:
 
 
 def _stop(operator: Operator) -> None:
-    """In a thread of its own: no page waits for a board that is silent."""
+    """Stop in a separate thread, so that no page waits for a silent board."""
     Thread(target=operator.stop, name="armtempo panel: stop", daemon=True).start()
 
 
 def _events(page: PanelPage) -> None:
-    """What the page's script says."""
+    """Handle the events of the page's script."""
     operator, hold = page.operator, page.hold
 
     def press(event: Any) -> None:
@@ -162,7 +162,7 @@ def _events(page: PanelPage) -> None:
 
 
 def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
-    """What all pages are told: where the arm is, and the numbers that change while it moves."""
+    """The message to all pages: poses of the arm, and numbers that change during a motion."""
     angles = operator.live.angles_deg
     where = "  ".join(f"{angle:.2f}°" for angle in angles)
     with suppress(InputError):

@@ -63,11 +63,12 @@ class RunTab:
         if self._ended != operator.ended:  # perhaps a run, which has its report then
             self._ended = operator.ended
             self._past.refresh()
-        state = (operator.live.curves.run, len(operator.live.curves.time_s))
+        curves = operator.live.curves
+        state = (curves.run, len(curves.time_s))
         if state == self._shown or state[1] < 2:
             return
         self._shown = state
-        live, plan = operator.live.curves.thinned(_MOST_POINTS), operator.live.plan
+        live, plan = curves.thinned(_MOST_POINTS), operator.live.plan
         planned = [plan.trajectory(live.path_s, order) if plan else None for order in (0, 1)]
         self._angles.show(live.time_s, live.angle_deg, planned[0])
         self._speeds.show(live.time_s, np.gradient(live.angle_deg, live.time_s, axis=0), planned[1])

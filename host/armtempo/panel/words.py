@@ -1,4 +1,4 @@
-"""Every English text of the panel, but for what the library says: errors and their cures."""
+"""All texts of the panel, except errors of the library."""
 
 from __future__ import annotations
 

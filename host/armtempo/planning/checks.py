@@ -193,7 +193,7 @@ def _check_free(job: Job, where: str) -> None:
         if asked and job.timing != "shared":
             raise InputError(
                 f'{where}: {what} needs timing = "shared", where the joints pass via points together',
-                "leave timing out or leave that out",
+                'give timing = "shared" (--timing shared), or leave that out',
             )
     inner = range(1, len(job.via) - 1)
     for stop in job.stops:

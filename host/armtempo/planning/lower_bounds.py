@@ -11,7 +11,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import stage
 from armtempo.model.parts import Limits
-from armtempo.planning import dual_bound, dual_value, rest_to_rest
+from armtempo.planning import dual_bound, dual_value, rest_to_rest, via_bound
 from armtempo.planning.dual_bound import Cells
 from armtempo.splines import bspline
 
@@ -29,8 +29,8 @@ _WORK = 10_000
 class Floor:
     """A proven lower bound of a motion time under speed, acceleration and jerk limits.
 
-    ``kind``: ``"rests"``: from turn to turn of one joint; ``"path"``: along the common path; ``"vias"``:
-    through the via points, for any path.
+    ``kind``: ``"rests"``: from turn to turn of one joint; ``"path"``: along the common path; through the via points,
+    for any path, ``"vias"``: of one joint, ``"together"``: of all of them.
     """
 
     time_s: float
@@ -101,26 +101,42 @@ def _stationary(piece: Array) -> Array:
 
 
 def of_vias(
-    via_deg: Array, limits: Sequence[Limits], stops: Mapping[int, float], loose: Collection[int] = ()
+    via_deg: Array,
+    limits: Sequence[Limits],
+    stops: Mapping[int, float],
+    loose: Collection[int] = (),
+    times_s: Array | None = None,
 ) -> Floor:
     """A lower bound for all motions through via angles (n + 1, J), on any path.
 
     The sum over stretches between stops (dwells in seconds by via point) of the largest, over joints, of the
     least time through its turning via angles under its three limits: at a turning via angle the joint stands
-    still there or beyond. ``loose`` via points, which may be passed at other angles, are ignored.
+    still there or beyond. With several joints and ``times_s`` (n + 1,), when a plan arrives at the via points, or
+    what ``via_bound`` proves for the joints together, if that is more. ``loose`` via points, which may be passed at
+    other angles, are ignored.
     """
     last = len(via_deg) - 1
     ends = [0, *sorted(set(stops) - set(loose)), last]
-    total = sum(stops.values())
+    total, kind = sum(stops.values()), "vias"
+    values = np.array([limit.values for limit in limits])
     for first, end in pairwise(ends):
         exact = [via for via in range(first, end + 1) if via not in loose]
         rests = end not in loose
-        times = [
+        alone = max(
             rest_to_rest.floor_s(_turning(via_deg[exact, joint], rests), limit, to_rest=rests)
             for joint, limit in enumerate(limits)
-        ]
-        total += _ROUNDED * max(times)
-    return Floor(total, "vias")
+        )
+        together = 0.0
+        if times_s is not None and len(limits) > 1 and len(exact) > 1:
+            stage("proving the floor")
+            lasts_s = np.diff(times_s[exact]) - [
+                sum(dwell for via, dwell in stops.items() if here <= via < there)
+                for here, there in pairwise(exact)
+            ]
+            together = via_bound.floor_s(via_deg[exact], values, lasts_s, rests)
+        kind = "together" if together > alone else kind
+        total += _ROUNDED * max(alone, together)
+    return Floor(total, kind)
 
 
 def _turning(angles: Array, rests: bool) -> Array:

@@ -41,8 +41,8 @@ def write(found: SelfTest, folder: Path) -> None:
 
 def render(found: SelfTest) -> str:
     """The page."""
-    kind = "virtual board; its figures are simulated" if found.simulated else "board"
-    page = Page("Self-test", f"{kind} {found.board_id}, program {found.program_crc:08x}")
+    kind = "; a virtual board, its figures are simulated" if found.simulated else ""
+    page = Page("Self-test", f"board {found.board_id}, program {found.program_crc:08x}{kind}")
     wrong = [(BAD, f"{line.what}: {line.measured}. {line.cure}") for line in found.failed]
     page.verdict(BAD if wrong else GOOD, "Not OK" if wrong else "OK", wrong)
     for part in dict.fromkeys(line.part for line in found.lines):

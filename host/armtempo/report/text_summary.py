@@ -27,6 +27,7 @@ _RESULT_WIDTHS = (11, 11, 12, 12)
 _FLOORS = {
     "rests": "from turn to turn of a joint under its speed, acceleration and jerk limits",
     "path": "along the path under the speed, acceleration and jerk limits of all its joints",
+    "together": "through the via points under the speed, acceleration and jerk limits of all joints, whatever the path",
     "vias": "through the via angles of a joint under its speed, acceleration and jerk limits, whatever the path",
 }
 """What ``Search.floor_kind`` means."""

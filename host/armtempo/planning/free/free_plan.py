@@ -101,9 +101,13 @@ def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planne
     searches = (
         replace(search, floor_s=floor.time_s, floor_kind=floor.kind)
         for search in planned.searches
-        for floor in (floor_of(arm, job, via_deg, list(search.joints)),)
+        for floor in (
+            floor_of(arm, job, via_deg, list(search.joints), planned.trajectory.joints[0].via_times_s),
+        )
     )
     note = "no faster path was found in the corridor than the spline through the via points itself"
+    if job.refine != "auto":
+        note += f', with refine = {job.refine}; try refine = "auto" (--refine auto)'
     return replace(planned, searches=tuple(searches), notes=(*planned.notes, note))
 
 
@@ -222,7 +226,7 @@ def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
 
 
 def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shortest) -> Search:
-    floor = floor_of(arm, job, via_deg, joints)
+    floor = floor_of(arm, job, via_deg, joints, found.motion.via_times_s)
     return Search(
         joints=tuple(joints),
         intervals_s=found.motion.differences_s,
@@ -237,11 +241,14 @@ def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shorte
     )
 
 
-def floor_of(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Floor:
-    """Lower bound of the time of any path of some driven joints through via angles (n + 1, J)."""
+def floor_of(arm: Arm, job: Job, via_deg: Array, joints: list[int], times_s: Array | None = None) -> Floor:
+    """Lower bound of the time of any path of some driven joints through via angles (n + 1, J).
+
+    ``times_s``: see ``lower_bounds.of_vias``.
+    """
     limits = [arm.driven[joint].limits for joint in joints]
     demand = _demand(arm, job, via_deg, joints)
-    return lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances)
+    return lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances, times_s)
 
 
 def _notes(
