@@ -8,8 +8,8 @@ import pytest
 
 from tests.board import heap_use
 
-PEAK = 85_500
-MOTION = 68_000
+PEAK = 70_000
+MOTION = 64_700
 MACHINE_CODE = 31_000
 
 

@@ -1,30 +1,28 @@
-"""The compiled modules of the board program as one file, most deflated: what the board's ``archive.py`` reads."""
+"""The compiled modules of the board program as one file, each deflated: what the board's ``archive.py`` reads."""
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Collection, Mapping
 
-_WINDOW_BITS = 10
-"""Memory that the board needs while it imports a module: 1 KB and 1.4 KB for the decoder."""
+_WINDOW_BITS = 9
+"""Memory that the board needs while it imports a module: 0.5 KB and 1.3 KB for the decoder."""
 _WIDE_BITS = 13
 """The same where there is plenty: 8 KB."""
 
 
-def pack(files: Mapping[str, bytes], wide: Collection[str], plain: Collection[str]) -> bytes:
+def pack(files: Mapping[str, bytes], wide: Collection[str]) -> bytes:
     """The archive of files by their path from the library's folder on.
 
-    ``wide``: imported while the heap is empty; ``plain``: not deflated.
+    ``wide``: imported while the heap is empty.
     """
-    packed = {path: data if path in plain else _deflated(data, path in wide) for path, data in files.items()}
+    packed = {path: _deflated(data, path in wide) for path, data in files.items()}
     index = ""
     while True:  # as offsets grow in length with the index
         at = 2 + len(index)
         lines = []
         for path, data in packed.items():
-            lines.append(
-                f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {-at if path in plain else at}"
-            )
+            lines.append(f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {at}")
             at += len(data)
         made = "".join(lines) + "\n"
         if len(made) == len(index):
