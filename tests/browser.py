@@ -52,9 +52,9 @@ _FRAME = '<iframe src="{page}" style="width: {width}px; height: 900px; border: 0
 
 
 def needed() -> None:
-    """Skip the test where there is no Chromium; but in CI, where ``.ci/run`` installs it, fail."""
+    """Skip the test if there is no Chromium; but in CI, where ``.ci/run`` installs it, fail."""
     if BROWSER is None and os.environ.get("CI"):
-        pytest.fail("CI needs Chromium: .ci/run installs it where it is run by root")
+        pytest.fail("CI needs Chromium: .ci/run installs it if it is run by root")
     if BROWSER is None:
         pytest.skip("left out: no Chromium on this machine (CI has one)")
 

@@ -43,7 +43,7 @@ def environment(name: str) -> dict[str, str]:
 
 
 def run(name: str, script: Path | str, *arguments: str, timeout: float = 1200.0, heap: str = "") -> str:
-    """What the script prints; AssertionError with its error output where it fails.
+    """What the script prints; AssertionError with its error output if it fails.
 
     ``timeout``: seconds, generous for a busy machine.
     ``heap``: heap size for MicroPython, as its ``-X heapsize=`` takes it.

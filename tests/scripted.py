@@ -34,7 +34,7 @@ class Case:
         return f"{self.interpreter}-{self.script.stem}-{names}"
 
     def run(self, *arguments: str, **options: float | str) -> None:
-        """AssertionError with the script's traceback where the case does not hold; options of ``interpreters.run``."""
+        """AssertionError with the script's traceback if the case does not hold; options of ``interpreters.run``."""
         options = {"heap": HEAP[self.interpreter], **options}
         named = self.name.split()
         output = interpreters.run(self.interpreter, self.script, *arguments, *named, **options)  # type: ignore[arg-type]
@@ -71,7 +71,7 @@ def cases(*scripts: Path, on: Iterable[str] = interpreters.AVAILABLE) -> list[Ca
 
 
 def each(found: Iterable[Case]) -> pytest.MarkDecorator:
-    """A test for each case, as its argument ``case``; in the emulator and where a comment says so it is slow."""
+    """A test for each case, as its argument ``case``; in the emulator and if a comment says so it is slow."""
     return pytest.mark.parametrize(
         "case",
         [pytest.param(case, id=str(case), marks=[pytest.mark.slow] * _is_slow(case)) for case in found],
@@ -85,7 +85,7 @@ def _is_slow(case: Case) -> bool:
 
 
 def together(found: Iterable[Case]) -> list[Case]:
-    """The cases, those of a script in one process where that is the emulator, which takes long to start.
+    """The cases, those of a script in one process if that is the emulator, which takes long to start.
 
     The other interpreters run each case by itself; the output of a script ends with the case that did not hold.
     """

@@ -4,7 +4,7 @@ import gc
 import sys
 
 OFTEN = 64
-SELDOM = 16  # where memory is not short and time is: a collection takes 5 ms
+SELDOM = 16  # if memory is not short and time is: a collection takes 5 ms
 _SEQUENCE = "sequence"  # how the names of the modules begin that only sequences need
 _keeps = False
 _NOT_ALWAYS = """
@@ -17,7 +17,7 @@ _NOT_ALWAYS = """
 
 
 def keep_code(keeps: bool) -> None:
-    """Whether code stays that has been loaded, as a motion begins sooner then; where memory is not short.
+    """Whether code stays that has been loaded, as a motion begins sooner then; if memory is not short.
 
     ``forget`` and ``tidy`` do nothing then, and the heap is collected seldom. Not while a motion runs.
     """

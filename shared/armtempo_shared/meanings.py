@@ -221,7 +221,7 @@ COMMANDS: "dict[str, str]" = {
     "run and "
     "its length in ticks. Or starts a sequence, each of whose motions is a run of its own; then the answer has the "
     "number of the last run and 0.",
-    "stop": "`now` 0: brake along the path (freeze where the motion has no brake times); 1: freeze.",
+    "stop": "`now` 0: brake along the path (freeze if the motion has no brake times); 1: freeze.",
     "speed": "Sets the rate of the motion's own time in thousandths (10 to 1000), along the same path; 0: pause, "
     "65535: the rate before the pause. Refused with `fixed_speed`, or with `too_long` if the run would last longer "
     "than 1 h 49 min. While nothing moves: the rate of this session's next start.",

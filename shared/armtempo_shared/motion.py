@@ -122,7 +122,7 @@ class MotionHead:
         """How long a change of speed takes, in RAMP_UNIT_TICKS, that begins at a time of the motion.
 
         ``at``, and how long the motion lasts, in a unit of which that is less than 8192, so all are small integers of
-        the board: ``at`` rounded down, ``duration`` up. What is between two entries is taken up to 2 units later where
+        the board: ``at`` rounded down, ``duration`` up. What is between two entries is taken up to 2 units later if
         the next one is longer.
         """
         parts = RAMP_ENTRIES - 1

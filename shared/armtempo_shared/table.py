@@ -3,10 +3,10 @@
 ``wire.py`` encodes and decodes by it, ``shared/docs/protocol.md`` is generated from it. It is one text, so
 that the board can parse it and free the memory again.
 
-A row: kind (C command, A the answer to it; O and P the same of commands that a board only knows where its arm has
+A row: kind (C command, A the answer to it; O and P the same of commands that a board only knows if its arm has
 outputs or inputs, S and T of that which it knows when a sequence was started; E event, R reply), name, number in hex,
 fields as ``name:type`` in the letters of ``struct``, little endian without padding, then ``text`` (UTF-8) or ``bytes``
-where the rest of the payload is such a tail. A line that begins with a blank continues with the row.
+if the rest of the payload is such a tail. A line that begins with a blank continues with the row.
 """
 
 from struct import calcsize

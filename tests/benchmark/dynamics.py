@@ -2,8 +2,9 @@
 
     python -m tests.benchmark.dynamics [--count 1000]
 
-The test's URDFs with random masses, centres of mass and inertias in every link. Prints the largest difference of any
-joint's torque, as a part of the largest torque; exits with 1 if it exceeds 1e-9. pinocchio: pip install pin.
+The test's URDFs with random masses, centres of mass and inertias in every link, and of a load. Prints the largest
+difference of any joint's torque, as a part of the largest torque; exits with 1 if it exceeds 1e-9. pinocchio:
+pip install pin.
 """
 
 from __future__ import annotations
@@ -12,14 +13,15 @@ import argparse
 import re
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pinocchio
-from armtempo.kinematics import all_frames
+from armtempo.kinematics import Geometry, all_frames
 from armtempo.kinematics.dynamics import GRAVITY_M_S2, joint_torques
 from armtempo.model.arm import Arm
-from armtempo.model.parts import Joint
+from armtempo.model.parts import Joint, Load
 from armtempo.new_arm import urdf_reader
 from armtempo.new_arm import urdf_rows as dh
 
@@ -66,8 +68,19 @@ def difference(path: Path, count: int, rng: np.random.Generator) -> tuple[float,
     """Largest difference of torques and largest torque, Nm."""
     model = pinocchio.buildModelFromUrdf(str(path))
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY_M_S2])
-    data = model.createData()
     arm = arm_of(urdf_reader.read(path))
+    shape = rng.uniform(-0.1, 0.1, (3, 3))
+    tensor = np.trace(shape @ shape.T) * np.eye(3) - shape @ shape.T
+    centre = rng.uniform(-0.1, 0.1, 3)
+    inertia = (*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2])
+    load = Load("load", 0.8, centre_mm=tuple(1e3 * centre), inertia_kg_m2=tuple(map(float, inertia)))
+    arm = replace(arm, loads=(load,)).holding("load")
+    data = model.createData()
+    pinocchio.forwardKinematics(model, data, np.zeros(model.nq))
+    tool = all_frames(Geometry.of(arm), [0.0] * len(arm.joints))[-1]
+    at = data.oMi[model.njoints - 1].inverse() * pinocchio.SE3(tool[:3, :3], 1e-3 * tool[:3, 3])
+    model.appendBodyToJoint(model.njoints - 1, pinocchio.Inertia(0.8, centre, tensor), at)
+    data = model.createData()
     moving = [number for number, joint in enumerate(arm.joints) if joint.name != "fixed"]
     assert [arm.joints[number].name for number in moving] == list(model.names)[1:]
     motion = np.zeros((3, count, len(arm.joints)))

@@ -93,16 +93,13 @@ def moving(page: Any, ear: Ear) -> tuple[float, Sample]:
 def held_jog(play: Any, browser: Any, running: Panels, ear: Ear, how: str) -> float:
     """Hold a jog, end it, and give the seconds until the arm rested."""
     panel = running()
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        if how == "browser":
-            with panels.chromium_to_kill(play, Path(folder)) as (made, process):
-                return _ended(made.new_context(viewport=panels.SMALL), panel, ear, process.kill)
-        window = browser.new_context(viewport=panels.SMALL)
-        try:
-            return _ended(window, panel, ear, how)
-        finally:
-            window.close()
-            panel.cut(False)
+    made = panels.chromium(play) if how == "browser" else browser
+    window = made.new_context(viewport=panels.SMALL)
+    try:
+        return _ended(window, panel, ear, panels.killer(made) if how == "browser" else how)
+    finally:
+        window.close()
+        panel.cut(False)
 
 
 def _ended(window: Any, panel: Panel, ear: Ear, how: Any) -> float:

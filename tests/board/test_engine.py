@@ -28,7 +28,7 @@ def test_case(case: scripted.Case) -> None:
     reason="no MicroPython here: CI ends at the start, and the summary says so",
 )
 def test_more_changes_of_speed() -> None:
-    """Where it is quickest, on more motions; the other interpreters have a few of them above."""
+    """If it is quickest, on more motions; the other interpreters have a few of them above."""
     named = ["case_stops", "case_whole_path"]
     output = interpreters.run("micropython", CASES / "engine_override.py", "12", *named, heap="16M")
     assert output.split() == named

@@ -94,7 +94,7 @@ def _at_stops(plan: Plan, number: int) -> list[str]:
 def _rounding(spline: JointSpline, at: Sampled, points: int) -> np.ndarray:
     """What the last bit of each control point, a 64-bit float, does to the rates: (3, K).
 
-    Much where a segment far from angle 0 or late in a motion takes hardly any time, as between repeated via points.
+    Much if a segment far from angle 0 or late in a motion takes hardly any time, as between repeated via points.
     """
     rng = np.random.default_rng(1)
     largest = np.zeros_like(at.rates)

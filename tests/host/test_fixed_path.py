@@ -124,7 +124,7 @@ def test_refined_shared_timing(refine: int | str, most_s: float) -> None:
 
 @pytest.mark.slow
 def test_more_refinement_is_never_slower() -> None:
-    """Also where it is no multiple of what came before."""
+    """Also if it is no multiple of what came before."""
     totals = [refined([0, 1, 2], "shared", refine)[0] for refine in (1, 2, 3, 8)]
     assert np.all(np.diff(totals) < 0)
 

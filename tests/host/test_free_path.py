@@ -38,8 +38,8 @@ def test_the_shipped_motion_is_5_percent_faster_and_keeps_everything() -> None:
     plan = planner.plan(ARM, replace(FEED, refine="auto"))
     assert faults(plan) == []
     assert plan.total_s <= 6.83
-    assert plan.searches[0].floor_s <= plan.total_s
-    assert plan.searches[0].floor_kind == "vias"
+    assert 0.985 * plan.total_s <= plan.searches[0].floor_s <= plan.total_s
+    assert plan.searches[0].floor_kind == "together"
 
 
 @pytest.mark.slow
@@ -97,7 +97,7 @@ def test_the_motion_rests_at_stops_and_dwells() -> None:
     assert during == pytest.approx(np.tile(plan.via_deg[4], (50, 1)), abs=1e-9)
     assert np.abs(plan.trajectory(arrival[4] + 0.85) - plan.via_deg[4]).max() > 1e-4
     assert plan.total_s > 6.83 + 0.75  # longer than without stops, see above
-    assert plan.searches[0].floor_s <= plan.total_s
+    assert 0.985 * plan.total_s <= plan.searches[0].floor_s <= plan.total_s
 
 
 def _away_deg(plan: Plan) -> float:
@@ -167,6 +167,7 @@ def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
     assert any("no faster path" in note for note in plan.notes)
     assert faults(plan) == []
     assert max(seen) <= 3 * corridor._MOST_PIECES
+    assert 'with refine = 6; try refine = "auto" (--refine auto)' in plan.notes[-1]
     assert len(seen) < 500
 
 
@@ -259,7 +260,7 @@ def test_a_seed_repeats_and_starts_are_reported() -> None:
         ({"corridor_deg": -1.0}, "0 or more"),
         ({"degree": 3}, "degree 5"),
         ({"timing": "per-joint", "stops": (Stop(1),)}, 'needs timing = "shared"'),
-        ({"timing": "per-joint", "corridor_deg": 1.0}, 'needs timing = "shared"'),
+        ({"timing": "per-joint", "corridor_deg": 1.0}, 'needs timing = "shared".*; give timing = "shared"'),
         ({"stops": (Stop(0),)}, "between the ends"),
         ({"stops": (Stop(2), Stop(2))}, "two stops at one via point"),
         ({"stops": (Stop(2, 1.0),), "corridor_deg": 1.0}, "corridor and a dwell"),

@@ -191,7 +191,7 @@ def test_a_line_ends_before_a_singular_posture() -> None:
 def test_a_line_that_the_joints_cannot_follow_is_made_shorter(
     by: float, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And says so, where nothing else has ended it before."""
+    """And says so, if nothing else has ended it before."""
     lengths: list[float] = []
     on_line = jog_motion._on_line
 
@@ -261,6 +261,16 @@ def test_a_stretched_arm_is_said_to_be_singular(stretched: tuple[float, float]) 
     ) as refused:
         jog_motion.plan("jog", arm, here, JogMove(10.0, axis=axis))
     assert jog_motion.problem(arm, here, JogMove(INF, axis=axis)) == str(refused.value)
+
+
+@pytest.mark.parametrize(("axis", "about"), [("z", False), ("x", True)])
+def test_an_arm_without_the_joints_is_not_said_to_be_singular(axis: str, about: bool) -> None:
+    """No joint of the SCARA moves its tool up, stretched or bent."""
+    arm = Arm.load("scara")
+    for bent in (0.0, 40.0):
+        here = [0.0, bent, *[joint.home_deg for joint in arm.driven[2:]]]
+        with pytest.raises(InputError, match="too few joints"):
+            jog_motion.plan("jog", arm, here, JogMove(5.0, axis=axis, about=about))
 
 
 @pytest.mark.parametrize(

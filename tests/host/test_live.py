@@ -1,4 +1,4 @@
-"""What a run under way shows: the bar's text, and the window where there is a display."""
+"""What a run under way shows: the bar's text, and the window if there is a display."""
 
 from __future__ import annotations
 

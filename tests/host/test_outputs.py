@@ -279,7 +279,7 @@ def test_difference_in_words(tmp_path: Path) -> None:
 
 
 def test_placing_takes_the_timer_that_is_free(tmp_path: Path) -> None:
-    """PB8 has TIM10 and TIM4; PA6 TIM13, and TIM3 where no encoder has it."""
+    """PB8 has TIM10 and TIM4; PA6 TIM13, and TIM3 if no encoder has it."""
     arm = arm_files.load(tmp_path, GRIPPER + GRIPPER.replace("gripper", "hand").replace("PB8", "PA6") + DOOR)
     assert {name: place.timer for name, place in pin_use.timer_outputs(arm).items()} == {
         "gripper": 10,

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.basics.errors import InputError, LinkError
+from armtempo.basics.errors import InputError, LinkError, PortInUseError
 from armtempo.kinematics import Geometry, all_frames
 from armtempo.kinematics.chain import all_angles_deg
+from armtempo.link.board_messages import Positions, Sample
 from armtempo.model import mesh_files, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -25,6 +26,7 @@ from armtempo.panel.access import COOKIE, MOST_BYTES, Access
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.desk import Desk
 from armtempo.panel.held_jog import ALIVE_S, ButtonHold
+from armtempo.panel.live import LiveArm
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.sequence_desk import SequenceDesk
 from armtempo.planning.jog.jog_motion import JogMove
@@ -360,7 +362,7 @@ def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceDesk) -> None:
 
 def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_path: Path) -> None:
     board = Board()
-    answers = [LinkError("the board runs another program"), board]
+    answers = [LinkError("the board runs another program"), PortInUseError("in use by another"), board]
 
     def connect(sink: object) -> Board:
         answer = answers.pop(0)
@@ -374,12 +376,31 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
     assert "another program" in made.why_not(ME, Needs.BOARD)
     with pytest.raises(LinkError, match="another program"):
         made.board.list()
-    deployed = threading.Event()
-    made.do("deploy", ME, lambda: made.without_board(deployed.set), Needs.IDLE)
-    wait(lambda: not made.busy)
-    assert deployed.is_set()
+    deployed: list[int] = []
+    for trouble in ("in use by another", ""):
+        made.do("deploy", ME, lambda: made.without_board(lambda: deployed.append(1)), Needs.IDLE)
+        wait(lambda: not made.busy)
+        assert made.trouble == trouble
+    assert len(deployed) == 2
     assert made.board is board  # type: ignore[comparison-overlap]
+    board.client.session.tell("the cable is out; waiting for it to come back")
+    assert "cable" in made.why_not(ME, Needs.BOARD)
+    assert "cable" in made.log.last[-1]
     made.close()
+
+
+def test_curves_that_are_read_stay_whole_when_a_run_begins() -> None:
+    live = LiveArm(ARM)
+    for number in range(4):
+        sample = Sample(number // 3, 0, number, number, 0, Positions((0, 0, 0), (0, 0, 0)))
+        before = live.curves
+        live.take_event(sample)
+    assert live.curves is not before
+    assert [len(rows) for rows in (before.time_s, before.thinned(9).angle_deg, live.curves.angle_deg)] == [
+        3,
+        3,
+        1,
+    ]
 
 
 def test_a_fault_of_ours_does_not_end_the_states(

@@ -178,7 +178,7 @@ def test_an_arm_without_encoders_gets_a_report_of_what_is_known(tmp_path: Path) 
 
 
 def limited(joints: Sequence[Joint], limits: Sequence[Limits]) -> Iterator[Joint]:
-    """The joints with other limits where they are driven."""
+    """The joints with other limits if they are driven."""
     left = iter(limits)
     for joint in joints:
         yield replace(joint, limits=next(left)) if joint.motor else joint

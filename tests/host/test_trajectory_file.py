@@ -1,4 +1,4 @@
-"""The trajectory file: whole, repeatable, and refused where it is not what it should be."""
+"""The trajectory file: whole, repeatable, and refused if it is not what it should be."""
 
 from __future__ import annotations
 

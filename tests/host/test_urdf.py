@@ -87,7 +87,7 @@ def imported(tmp_path: Path, name: str, *options: str) -> tuple[Path, str]:
     ],
 )
 def test_the_written_arm_stands_where_the_urdf_does(tmp_path: Path, name: str, joints: str) -> None:
-    """With constant rows only where base or tool need them."""
+    """With constant rows only if base or tool need them."""
     out, said = imported(tmp_path, name)
     assert "worst error at 100 random postures" in said
     arm = Arm.read(out)

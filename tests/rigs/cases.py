@@ -6,7 +6,7 @@ _PREFIX = "case_"
 
 
 def wanted(names):
-    """The cases among ``names`` (a script's ``globals()``) that the arguments name; all where they name none."""
+    """The cases among ``names`` (a script's ``globals()``) that the arguments name; all if they name none."""
     named = [word for word in sys.argv[1:] if word.startswith(_PREFIX)]
     return named or sorted([name for name in names if name.startswith(_PREFIX)])
 

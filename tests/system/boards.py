@@ -12,6 +12,8 @@ from armtempo.planning import planner
 from tests.system import commandline
 
 ARM = Arm.paper()
+SOURCES_BLOCKS = 1200
+"""A flash in which the sources have room; the chip takes compiled files."""
 TIMEOUT_S = commandline.SLOW_S
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
@@ -11,17 +12,21 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import Any, TypeVar
 
 import armtempo
 from armtempo.basics import toml_table
+from armtempo.basics.errors import LinkError
+from armtempo.deploy import package, program_files
 from armtempo.model import shipped
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState
+from armtempo.robot.outputs import BoardOutput
 from armtempo.simulator import LaunchOptions, launch
 
-from tests import browser
+from tests import browser, interpreters
 from tests.system import commandline
+from tests.system.boards import SOURCES_BLOCKS
 from tests.system.held_jogs import Cable
 from tests.system.relay import Relay
 
@@ -39,13 +44,14 @@ pin = "PD0"
 """
 ARM = armtempo.Arm.of_table(toml_table.parse(_ARM_TEXT, "arm.toml"))
 """The paper's arm with an output and an input."""
+Answer = TypeVar("Answer")
 OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 WAIT_S = 120.0
 """Nothing here takes longer, on however loaded a machine."""
 DESKTOP = {"width": 1280, "height": 800}
 SMALL = {"width": 640, "height": 900}
 """Size of a window that is drawn quickly by a processor."""
-_SELDOM = "{const soon = requestAnimationFrame; requestAnimationFrame = (call) => setTimeout(() => soon(call), 200);}"
+_SELDOM = "{const soon = requestAnimationFrame; requestAnimationFrame = (call) => setTimeout(() => soon(call), 500);}"
 """The scene is drawn by the processor too, which has more to do than to draw it 20 times a second."""
 
 
@@ -63,28 +69,11 @@ def chromium(play: Any) -> Any:
     return play.chromium.launch(executable_path=browser.BROWSER, args=OPTIONS)
 
 
-@contextmanager
-def chromium_to_kill(play: Any, folder: Path) -> Iterator[tuple[Any, subprocess.Popen[bytes]]]:
-    """A browser with its process, for a context of its own."""
-    assert browser.BROWSER
-    told = folder / "DevToolsActivePort"
-    process = subprocess.Popen(
-        [
-            browser.BROWSER,
-            *OPTIONS,
-            "--headless",
-            "--remote-debugging-port=0",
-            f"--user-data-dir={folder}",
-            "about:blank",
-        ],
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        commandline.wait_for(lambda: told.is_file() and "\n" in told.read_text(), "the browser's port")
-        yield play.chromium.connect_over_cdp(f"http://127.0.0.1:{told.read_text().split()[0]}"), process
-    finally:
-        process.kill()
-        process.wait()
+def killer(chromium: Any) -> Callable[[], None]:
+    """Ends a browser at once."""
+    processes = chromium.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
+    number = next(int(one["id"]) for one in processes if one["type"] == "browser")
+    return lambda: os.kill(number, signal.SIGKILL)
 
 
 @dataclass
@@ -112,11 +101,19 @@ class Panel:
         with armtempo.connect(self.port, ARM, tell=lambda text: None) as board:
             return board.state(ARM)
 
+    def outputs(self) -> dict[str, str]:
+        """The states of the arm's outputs, as the board says."""
+        with shared_board.attach(self.port) as found:
+            return {one.name: BoardOutput(found, ARM, one.name).state for one in ARM.outputs}
+
     def end(self) -> None:
         """End its program."""
         if self.running:
             self.process.send_signal(signal.SIGINT)
-        self.process.wait(timeout=WAIT_S)
+        try:
+            self.process.wait(timeout=WAIT_S)
+        finally:
+            self.process.kill()
         assert self.process.stdout
         self.process.stdout.close()
 
@@ -178,16 +175,29 @@ def asked(address: str, request: bytes) -> bytes:
     return b""
 
 
+def _library() -> dict[str, bytes]:
+    files = program_files.library(None)
+    return {name.removeprefix(f"{program_files.ROOT}/"): data for name, data in files.items()}
+
+
 @contextmanager
 def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "") -> Iterator[Panels]:
-    """For an arm that ships, or for ``ARM`` with the paper's job."""
+    """For an arm that ships, or for ``ARM`` with the paper's job; all but the start files is deployed to the board."""
     (folder / "job.toml").write_text(shipped.job_path().read_text(encoding="utf-8"), encoding="utf-8")
     (folder / "arm.toml").write_text(_ARM_TEXT, encoding="utf-8")
     ways = cables or (Cable(), Cable())
     job = () if arm else ("--job", "job.toml")
     with ExitStack() as stack:
         moved = armtempo.Arm.of(arm) if arm else ARM
-        virtual = stack.enter_context(launch(LaunchOptions(virtual_time=False, arm=moved)))
+        package.fill(folder / "flash", _library())
+        options = LaunchOptions(
+            folder / "flash",
+            virtual_time=False,
+            interpreter=interpreters.starter("cpython"),  # takes the sources
+            arm=moved,
+            flash_blocks=SOURCES_BLOCKS,
+        )
+        virtual = stack.enter_context(launch(options))
         relay = stack.enter_context(Relay(virtual.port, folder / "port", *ways))
         made = Panels(folder, relay.port, ways, ("--arm", arm or "arm.toml", *job))
         stack.callback(made.close)
@@ -198,6 +208,7 @@ def opened(window: Any, address: str) -> Any:
     """The panel's page in a window (a Playwright context), in control of the board."""
     page = window.new_page()
     page.set_default_timeout(WAIT_S * 1000)
+    page.on("console", lambda message: print(message.text))  # why it was loaded again, say
     page.add_init_script(_SELDOM)
     page.goto(address)
     return in_control(page)
@@ -216,11 +227,14 @@ def in_control(page: Any) -> Any:
 
 def wait_for(page: Any, *words: str, place: str = "armtempo-state") -> None:
     """Until the line of the state, or another place, has all the words."""
-    page.wait_for_function(
-        "([place, words]) => words.every(word => document.getElementById(place).textContent.includes(word))",
-        arg=[place, words],
-        polling=50,
-    )
+    try:
+        page.wait_for_function(
+            "([place, words]) => words.every(word => document.getElementById(place).textContent.includes(word))",
+            arg=[place, words],
+            polling=50,
+        )
+    except Exception as error:
+        raise AssertionError(f"{words} were waited for; {page.inner_text('body')}") from error
 
 
 def answer(page: Any, button: str) -> None:
@@ -231,10 +245,15 @@ def answer(page: Any, button: str) -> None:
 
 
 def home(page: Any) -> None:
-    """Say that the arm is at home, on the tab where it is moved."""
+    """Say that the arm is at home, on the tab where it is moved, and wait until it is known there."""
     page.get_by_role("tab", name="Move").click()
+    before = page.inner_text("#armtempo-said")
     page.get_by_role("button", name="The arm is at home").click()
     answer(page, "The arm is at home")
+    page.wait_for_function(
+        "before => ![before, ''].includes(document.getElementById('armtempo-said').textContent)", arg=before
+    )
+    wait_for(page, "The arm is at home: done", place="armtempo-said")
     page.wait_for_selector('[aria-label$=" +"]:not([disabled])')
 
 
@@ -251,7 +270,7 @@ def hold(page: Any, by_key: bool = False) -> None:
                 """before => document.getElementById('armtempo-state').textContent.includes('moving')
                    && document.getElementById('armtempo-where').textContent != before""",
                 arg=before,
-                timeout=3000,
+                timeout=10_000,
                 polling=50,
             )
             return
@@ -260,10 +279,22 @@ def hold(page: Any, by_key: bool = False) -> None:
     raise AssertionError("the arm does not move")
 
 
+def again(ask: Callable[[], Answer]) -> Answer:
+    """What it gives; asked again where a busy machine has no answer in time."""
+    limit_s = time.monotonic() + WAIT_S
+    while True:
+        try:
+            return ask()
+        except LinkError:
+            if time.monotonic() > limit_s:
+                raise
+            time.sleep(0.1)
+
+
 def rest(state: Callable[[], BoardState]) -> BoardState:
     """The state in which the board comes to rest."""
     limit_s = time.monotonic() + WAIT_S
-    while (found := state()).moving:
+    while (found := again(state)).moving:
         assert time.monotonic() < limit_s, found
         time.sleep(0.02)
     return found

@@ -9,7 +9,6 @@ import tty
 from collections import deque
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from armtempo.basics.errors import LinkError
@@ -70,9 +69,7 @@ class Relay:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._gone.set()
         self._thread.join()
         if self._host >= 0:
@@ -83,7 +80,7 @@ class Relay:
 class ReplayTransport:
     """A transport whose board says what a recorded board said.
 
-    The host must say the same as in the recording (same session number, see Session); LinkError where
+    The host must say the same as in the recording (same session number, see Session); LinkError if
     it says something else or the recording is at its end.
     """
 

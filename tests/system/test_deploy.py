@@ -16,10 +16,8 @@ from armtempo_shared.messages import START_HELD
 
 from tests import interpreters
 from tests.system import commandline
-from tests.system.boards import armtempo, small_plan
+from tests.system.boards import SOURCES_BLOCKS, armtempo, small_plan
 
-SOURCES_BLOCKS = 1200
-"""A flash in which the sources have room; the chip takes compiled files."""
 INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
 
 

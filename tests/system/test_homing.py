@@ -1,4 +1,4 @@
-"""A homing run to limit switches on the virtual board, whose switches trip where the arm file says so."""
+"""A homing run to limit switches on the virtual board, whose switches trip if the arm file says so."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def test_files_while_the_program_runs(flash: Path) -> None:
 
 
 def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
-    """mpremote gives up; the motion comes to its end, where it should; then mpremote is let in."""
+    """mpremote gives up; the motion comes to its end, if it should; then mpremote is let in."""
     with launch(LaunchOptions(flash, interpreter=INTERPRETER, virtual_time=False)) as process:
         with open_board(process.port) as board:
             arm_state.home(board, boards.ARM)

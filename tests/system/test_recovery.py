@@ -64,7 +64,7 @@ def _steps(text: str) -> list[str]:
 SECTIONS = sections()
 MPREMOTE_S = 60.0
 TRIES = 4
-"""Where mpremote's Ctrl-C meets boot.py, that ends by it, main.py begins, and nobody answers. On a serial port mpremote
+"""If mpremote's Ctrl-C meets boot.py, that ends by it, main.py begins, and nobody answers. On a serial port mpremote
 gives up after 10 s, and its user tries again; on a pseudo terminal it waits for ever."""
 
 
@@ -167,7 +167,7 @@ def bench(deployed: Path, tmp_path: Path) -> Any:
 
 
 def module(bench: Bench, name: str, text: str) -> None:
-    """Replace a module of the program by a source file; the whole program where it is in an archive."""
+    """Replace a module of the program by a source file; the whole program if it is in an archive."""
     folder = bench.flash / "lib" / "armtempo_board"
     if not folder.exists():
         folder.mkdir()
@@ -281,7 +281,7 @@ def test_links_lead_to_sections() -> None:
 
 
 def test_what_the_page_quotes_of_messages_is_said() -> None:
-    """Except where the words are another program's, or MicroPython's."""
+    """Except if the words are another program's, or MicroPython's."""
     sources = "".join(
         path.read_text(encoding="utf-8") for path in (interpreters.ROOT / "host" / "armtempo").rglob("*.py")
     )

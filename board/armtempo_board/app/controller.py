@@ -133,7 +133,7 @@ class Controller:
         arm_setup.take_stored(self.board)
 
     def take_new_arm(self) -> None:
-        """Take the arm record that was uploaded; Refused where it cannot be, and the one in force stays that."""
+        """Take the arm record that was uploaded; Refused if it cannot be, and the one in force stays that."""
         from armtempo_board.app import arm_setup  # here, so that it can be forgotten
 
         arm_setup.take_new(self.board)

@@ -83,7 +83,7 @@ JOINT_WORDS = const(29)
 # words of a line after six joints: of an external interrupt, 8 to 15, or of the program itself
 FIRST_LINE = const(196)
 SOFTWARE_LINE = const(7)
-LINE_LEVELS = const(0)  # DIR pins that freeze where they are low,
+LINE_LEVELS = const(0)  # DIR pins that freeze if they are low,
 LINE_MASK = const(1)  # and all that freeze at one of their levels
 LINE_RELEASE = const(2)  # written to port E's BSRR
 LINE_TRIPPED = const(3)  # it has called for a freeze
@@ -145,9 +145,9 @@ def counter_kiticks(timer: ptr32) -> int:
 
 @micropython.viper
 def counters_agree(timer2: ptr32, timer5: ptr32) -> int:
-    """1 where both counters show the same time, as far as reads one after the other can tell; else 0.
+    """1 if both counters show the same time, as far as reads one after the other can tell; else 0.
 
-    0 also where an interrupt came between the reads.
+    0 also if an interrupt came between the reads.
     """
     before = timer2[CNT]
     other = timer5[CNT]
@@ -185,7 +185,7 @@ def matches(state: ptr32, dma: ptr32) -> int:
     """Matches of a ring since its stream was started.
 
     Fewer than the ring has entries can have come since MATCHED was written. So the difference is unambiguous, also
-    where the interrupt writes MATCHED meanwhile.
+    if the interrupt writes MATCHED meanwhile.
     """
     matched = state[MATCHED]
     return matched + ((state[NDTR_AT_START] - dma[state[NDTR_AT]] - matched) & state[MASK])
@@ -195,7 +195,7 @@ def matches(state: ptr32, dma: ptr32) -> int:
 def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
     """One bit per joint: three eighths of its ring are free, so up to ROOM entries are to be added. -1: no ring is fed.
 
-    130 instructions and 79 a joint, 126 where entries are to be added.
+    130 instructions and 79 a joint, 126 if entries are to be added.
     """
     found = 0
     fed = 0
@@ -237,7 +237,7 @@ def set_places(state: "array[int] | memoryview[int]", ring: object, queue: objec
 
 @micropython.viper
 def arm_channel(block: ptr32, timer: ptr32, ring: ptr32, at: int) -> int:
-    """Put the first entry into the compare register and let it toggle; 1 where it is too late for that.
+    """Put the first entry into the compare register and let it toggle; 1 if it is too late for that.
 
     ``at``: the joint's words in the block. Call it with interrupts off.
     """

@@ -42,7 +42,7 @@ class Outputs:
         self.writes[number](low + ((numbers[at + _HIGH] - low) * (value >> 2) + _HALF) // _FULL)
 
     def safe(self) -> None:
-        """All take their safe values; costs next to nothing where they have them."""
+        """All take their safe values; costs next to nothing if they have them."""
         if not self._is_safe:
             for number in range(len(self.writes)):
                 self.set(number, self._numbers[_NUMBERS * number + _SAFE])

@@ -83,7 +83,7 @@ class Ring:
         return before
 
     def fed_kiticks(self) -> int:
-        """Ki ticks (1024 ticks) from now to the last entry; NOT_FED where the interrupt does not write to the ring."""
+        """Ki ticks (1024 ticks) from now to the last entry; NOT_FED if the interrupt does not write to the ring."""
         return isr.kiticks_until(self.timer, self.state, _LAST_TIME) if self.state[_FED] else NOT_FED
 
     def stop(self) -> None:
@@ -99,7 +99,7 @@ class Ring:
     def run(self) -> int:
         """Entries were written from 0 on: switch the stream on and let the output toggle.
 
-        1 where the first entry came too late.
+        1 if the first entry came too late.
         """
         mem32[self._registers] = self._mode | isr.STREAM_ON
         self.state[isr.NDTR_AT_START] = mem32[self._ndtr] & 0xFFFF

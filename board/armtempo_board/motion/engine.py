@@ -9,7 +9,7 @@ set:
 end, brake, freeze     known: each pulse that has begun is finished, and all are counted
 limit switch           the same
 underrun               the same: the ring stops, no wrong step is made
-E-stop                 known, but unknown where the arm record releases the drivers
+E-stop                 known, but unknown if the arm record releases the drivers
 following error        unknown for the joint that was lost
 wrong steps            unknown for the joint that made others than its record has
 DIR turned too late    unknown for all joints

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-# Between two interrupts: 0.5 ms, or twice as long where each ring, when full, lasts _LONG_US. It is not filled before
+# Between two interrupts: 0.5 ms, or twice as long if each ring, when full, lasts _LONG_US. It is not filled before
 # three eighths are free, nor in its last 390 us.
 _PERIOD_TICKS = const(42000)
 _LONG_US = const(3150)

@@ -61,7 +61,7 @@ _LONGEST_GROUP = const(4)
 
 @micropython.viper
 def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
-    """Above 0 where two cubics of ``steps`` each, from FIRST_NODE over MIDDLE_NODE to END_NODE, keep the error bound.
+    """Above 0 if two cubics of ``steps`` each, from FIRST_NODE over MIDDLE_NODE to END_NODE, keep the error bound.
 
     Then the next ones may have that many eighths of these steps, as the error grows with their fourth power.
 
@@ -155,11 +155,11 @@ def put_cubics(steps: int, node: ptr32, queue: ptr32, held_back: int) -> object:
     """Put in the ``steps`` from FIRST_NODE (itself already there) to MIDDLE_NODE, and those to END_NODE, which becomes
     the first.
 
-    ``node``: the solver. ``held_back``: 1 where the last of the steps is left out.
+    ``node``: the solver. ``held_back``: 1 if the last of the steps is left out.
 
     With K = T - N s_a and D = N (s_b - s_a), the Hermite cubic is s_a k + (3 K - D) k**2 / N**2 + (D - 2 K) k**3 /
     N**3: T ticks over N steps, with slopes s_a, s_b at the two nodes.
-    Its differences are taken over groups of G steps. Within a group time grows evenly where that is true within 3/32
+    Its differences are taken over groups of G steps. Within a group time grows evenly if that is true within 3/32
     tick (second derivative times G**2 / 8) for eight steps or more; else as a square, if that is true within 1/16 tick
     (third derivative times G**3 / 125) for that many, and its rounding of G**2 / 16 units of time within another 1/16.
     What the third and the second difference lose by rounding goes into those below them, so that the cubic it leaves

@@ -1,4 +1,4 @@
-"""Through a monotone subinterval: its steps into the queue, as cubics where the error bound allows it, else singly."""
+"""Through a monotone subinterval: its steps into the queue, as cubics if the error bound allows it, else singly."""
 
 import micropython
 from micropython import const
@@ -80,12 +80,12 @@ _SCALE = const(0)
 
 @micropython.viper
 def begin(solver: object, queue: object, arrays: object, position: int, at_start: int, direction: int) -> int:
-    """Take up the steps of a subinterval. Returns twice as many as they are, below 0 where they go down; and 1 more
-    where the first of them is in the queue.
+    """Take up the steps of a subinterval. Returns twice as many as they are, below 0 if they go down; and 1 more
+    if the first of them is in the queue.
 
     ``arrays``: those of the subinterval (subintervals.py). ``position`` (+ bezier.BIAS):
-    where the steps so far lead; ``at_start``: 1 where all steps come at its start. Unless the law stretches the
-    motion's time, the first step is solved, and it is queued where more follow and they go in ``direction`` (0: never).
+    where the steps so far lead; ``at_start``: 1 if all steps come at its start. Unless the law stretches the
+    motion's time, the first step is solved, and it is queued if more follow and they go in ``direction`` (0: never).
     """
     words = ptr32(queue)  # type: ignore[arg-type]
     nodes = ptr32(solver)  # type: ignore[arg-type]
@@ -123,7 +123,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
     """Queue the subinterval's steps after REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
 
     _NODES are solved at most, or a few more; each takes about 2000 instructions. A last step that is
-    slow is not put in, but HELD_BACK is set. HALTED is set where by the law the next step never comes. Returns one of
+    slow is not put in, but HELD_BACK is set. HALTED is set if by the law the next step never comes. Returns one of
     the results above. The words of ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of
     ``law`` in time_law.py.
     """
@@ -189,7 +189,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                     words[_HELD_BACK] = 1
                     result = STOPPED
                 put_cubics(length, solver, queue, result - GOES_ON)
-                # The next ones: eighths of these, and longer than before only where it says so
+                # The next ones: eighths of these, and longer than before only if it says so
                 i = (length * verdict) >> 3
                 if i > _MOST_STEPS:
                     i = _MOST_STEPS

@@ -13,7 +13,7 @@ _ANGLE = const(0)
 _ANGLE_RATE = const(5)
 _TIME = const(10)
 _TIME_RATE = const(15)
-# their coefficients; angle and time are 0 where w is 0
+# their coefficients; angle and time are 0 if w is 0
 _W1 = const(0)
 _W2 = const(1)
 _W3 = const(2)
@@ -39,7 +39,7 @@ _LAST_ANGLE = const(27)
 FIRST_NODE = const(28)
 MIDDLE_NODE = const(33)
 END_NODE = const(38)
-HELD_NODE = const(43)  # the step held back, only where the law of real time moves it
+HELD_NODE = const(43)  # the step held back, only if the law of real time moves it
 _TREND = const(48)  # half of how LAST_RATE differs from the one before, + 2**29
 SOLVER_SIZE = const(49)
 
@@ -70,7 +70,7 @@ _LAST_ROUND = const(13)
 
 @micropython.viper
 def set_interval(solver: ptr32, angle: ptr32, angle_measures: ptr32, time_measures: ptr32) -> object:
-    """Take up a subinterval: its polynomials over w in [0, 1], mirrored where the angle falls, and its first half step.
+    """Take up a subinterval: its polynomials over w in [0, 1], mirrored if the angle falls, and its first half step.
 
     Each is five power coefficients, then five of a fifth of its derivative, with a bias of 2**30. As the differences
     are within a factor of two, none exceeds four times the range, below 2**30. TARGET holds twice the half step,
@@ -161,7 +161,7 @@ def solve(solver: ptr32, high: int, length: int) -> object:
             rate += solver[_TREND] - _BIAS
         rounds = 0
         while True:
-            if rate < 1:  # rounding, where a subinterval is a few units high
+            if rate < 1:  # rounding, if a subinterval is a few units high
                 rate = 1
             slope = rate * 5
             while slope < (1 << 27):

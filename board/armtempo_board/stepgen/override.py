@@ -114,7 +114,7 @@ class Override:
         time_law.to_motion_time(self.law, sample, at)
 
     def end_ticks(self) -> int:
-        """Real time at which the motion ends: of the ramp's end, where it ends within; LONGEST_RUN_TICKS: never."""
+        """Real time at which the motion ends: of the ramp's end, if it ends within; LONGEST_RUN_TICKS: never."""
         left = max(self._duration_ticks - self._motion_ticks, 0)
         if left and not self.rate:
             return LONGEST_RUN_TICKS

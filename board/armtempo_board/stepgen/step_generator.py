@@ -74,7 +74,7 @@ _MOTION_HIGH = const(22)
 _NOT_YET = const(0)
 _FOUND_AT_START = const(2)
 _END = const(3)
-# as in interval_steps.py: results, 0 where the queue has no room
+# as in interval_steps.py: results, 0 if the queue has no room
 _STOPPED = const(2)
 
 # as in isr.py: word of a ring's state
@@ -231,7 +231,7 @@ class StepGenerator:
 
         Nothing may be written meanwhile. That time must not lie before any ``until_kiticks`` that ``prepare`` was
         given. Only what was put into the queue last lies beyond that: steps of one subinterval, or one that was held
-        back. The ramp of the law before must be after what was written. ``is_last``: where the motion's time stands
+        back. The ramp of the law before must be after what was written. ``is_last``: if the motion's time stands
         still after the ramp, it is the end.
         """
         queue = self.queue
@@ -359,7 +359,7 @@ class StepGenerator:
             self._first_comes = comes
 
     def _queue_first(self) -> None:
-        """FIRST, where LAST is pending too against that."""
+        """FIRST, if LAST is pending too against that."""
         is_opposite = self._first_direction != self.direction
         if self._pending == _BOTH:
             if is_opposite and self._since_last(self._high(), self._first_ticks) <= self._gap_ticks:
@@ -431,7 +431,7 @@ class StepGenerator:
         self._interval_in = self.queue[_IN]
 
     def _since_last(self, high: int, ticks: int) -> int:
-        """Ticks of the motion's time from LAST to another step; any large number where it is far."""
+        """Ticks of the motion's time from LAST to another step; any large number if it is far."""
         high -= self._last_high
         if high > _FAR:
             high = _FAR

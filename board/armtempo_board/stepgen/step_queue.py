@@ -20,7 +20,7 @@ SHIFT = const(5)
 _BASE = const(6)  # ticks, modulo 2**32
 _REMAINDER = const(7)  # what the steps of a group have left over of its time, as FIRST
 _LEFT = const(8)  # steps left in the group that ``emit`` is in; single steps: where the next one's time is
-# log2 of the steps in a group, + 1, and SQUARE more where these steps' lengths change evenly; else they are all the
+# log2 of the steps in a group, + 1, and SQUARE more if these steps' lengths change evenly; else they are all the
 # same. 0: single steps, whose times are in words 0 to 7
 GROUP = const(9)
 _BASE_KITICKS = const(10)
@@ -188,7 +188,7 @@ def emit(now: int, ring: ptr32, timer: ptr32) -> int:
                 step = queue[_STEP]
                 change = queue[_CHANGE] - _BIAS
                 group = queue[GROUP] - 1
-                # Groups of one step, where the speed changes much
+                # Groups of one step, if the speed changes much
                 if not group:
                     while count:
                         count -= 1
@@ -311,7 +311,7 @@ def put_single(queue: ptr32, high: int, ticks: int) -> object:
 
 @micropython.viper
 def has_room(queue: ptr32, until_kiticks: int) -> int:
-    """1 where the queue has room for two items and does not continue beyond a time, the new UNTIL_KITICKS; else 0."""
+    """1 if the queue has room for two items and does not continue beyond a time, the new UNTIL_KITICKS; else 0."""
     queue[UNTIL_KITICKS] = until_kiticks
     if (queue[IN] - queue[OUT]) & _COUNT_MASK >= _FULL:
         return 0

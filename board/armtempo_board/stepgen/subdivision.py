@@ -38,7 +38,7 @@ PIECES_SIZE = const(78)
 
 # moves
 STAY = const(0)
-SKIP = const(1)  # continue after the subinterval, with one twice as long where the grid allows it
+SKIP = const(1)  # continue after the subinterval, with one twice as long if the grid allows it
 SPLIT = const(2)  # continue with its first half
 
 # results of a search
@@ -174,7 +174,7 @@ def search(
                     kept = ptr32(int(kept) - 4)
                     i -= 1
                 point = ptr32(int(kept) + 4 * _HIGH_5)
-            # The convex hull: of the high words, then, where it matters, of the rounded positions
+            # The convex hull: of the high words, then, if it matters, of the rounded positions
             bits = 28
             while True:
                 least = _BIAS

@@ -78,7 +78,7 @@ _LONGEST = const(1 << 28)
 _MOST = const((1 << 30) - 1)
 _LEAST_RATE = const(1 << 10)
 _FAR = const(1 << 17)  # in 4096 ticks: longer than any ramp and subinterval
-_AHEAD = const(4096)  # this many thousand units are added, where a time may lie before the ramp
+_AHEAD = const(4096)  # this many thousand units are added, if a time may lie before the ramp
 _MOST_ROUNDS = const(60)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
+from armtempo.basics.text import is_number
 
 _SEPARATORS = (";", "\t", ",")
 """Tried in this order; with the first two, a comma may be the decimal separator."""
@@ -62,7 +63,7 @@ def of_text(text: str, path: Path | str) -> NumberTable:
     except csv.Error as error:
         raise InputError(f"{path}: is not a table: {error}", "give a CSV file") from None
     rows = [(number, [cell.strip() for cell in row]) for number, row in lines if any(map(str.strip, row))]
-    header = rows.pop(0)[1] if rows and not all(map(_is_float, _pointed(rows[0][1], separator))) else None
+    header = rows.pop(0)[1] if rows and not all(map(is_number, _pointed(rows[0][1], separator))) else None
     return NumberTable(path, header, [(number, _pointed(row, separator)) for number, row in rows])
 
 
@@ -77,13 +78,4 @@ def _pointed(row: list[str], separator: str) -> list[str]:
 
 
 def _is_finite(text: str) -> bool:
-    return _is_float(text) and math.isfinite(float(text))
-
-
-def _is_float(text: str) -> bool:
-    """Whether ``text`` is a number, finite or not."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return is_number(text) and math.isfinite(float(text))

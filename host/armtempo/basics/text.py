@@ -10,6 +10,15 @@ def is_plain(text: str) -> bool:
     return text.isprintable()
 
 
+def is_number(text: str) -> bool:
+    """Whether the text is a number, finite or not."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def visible(text: str) -> str:
     r"""The text with control and format characters escaped, such as ``\x1b``; line ends are kept."""
     return "".join(

@@ -23,8 +23,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.pose import to_quaternion, to_rpy_deg
 
 
-# "-10,20,30" is a posture, not an option
-@click.command("fk", context_settings={"ignore_unknown_options": True})
+@click.command("fk", cls=options.TakesNumbers)
 @click.argument("where", nargs=-1)
 @options.job
 @options.arm

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Thread
-from types import TracebackType
 from typing import Self
 
 import click
@@ -264,9 +263,7 @@ class _StopKeys:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._done = True
         self._thread.join()
 

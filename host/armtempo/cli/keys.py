@@ -7,7 +7,6 @@ import select
 import sys
 import time
 from contextlib import suppress
-from types import TracebackType
 from typing import Any, Protocol, Self
 
 END, INTERRUPT = "end", "ctrl-c"
@@ -76,9 +75,7 @@ class PosixKeys:
         termios.tcsetattr(self._fd, termios.TCSADRAIN, now)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         import termios
 
         with suppress(termios.error):  # the terminal was closed
@@ -112,9 +109,7 @@ class WindowsKeys:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.flush()
 
     def read(self, timeout_s: float) -> str:

@@ -15,6 +15,23 @@ if TYPE_CHECKING:
 
 FC = TypeVar("FC", bound=Callable[..., Any] | click.Command)
 
+
+class TakesNumbers(click.Command):
+    """A command whose arguments may begin with a minus sign: "-10,20" is a posture, not an option; "--speed" is one."""
+
+    ignore_unknown_options = True
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """The rest of the arguments; UsageError for a word that is neither an option nor a number."""
+        rest = super().parse_args(ctx, args)
+        for argument in (one for one in self.params if isinstance(one, click.Argument)):
+            given = ctx.params[argument.name or ""]
+            for text in given if isinstance(given, tuple) else (given,):
+                if str(text)[:1] == "-" and str(text)[1:2] not in ".0123456789":
+                    ctx.fail(f"No such option {str(text)!r}.")
+        return rest
+
+
 _ELSE = "Default: variable ARMTEMPO_{}, else the project folder's armtempo.toml"
 _ARM = "Arm file (TOML), or the name of a shipped arm, such as ar4"
 

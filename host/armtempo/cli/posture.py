@@ -25,8 +25,7 @@ from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
 
 
-# "-10,20,30" is a posture, not an option
-@click.command("goto", context_settings={"ignore_unknown_options": True})
+@click.command("goto", cls=options.TakesNumbers)
 @click.argument("where", nargs=-1, required=True, shell_complete=options.files)
 @click.option("--line", is_flag=True, help="Move the tool in a straight line, turning evenly.")
 @options.holds
@@ -61,8 +60,7 @@ def goto(
         say_where_it_is(board, given.as_json)
 
 
-# "-10,20,30" is a posture, not an option
-@click.command("home", context_settings={"ignore_unknown_options": True})
+@click.command("home", cls=options.TakesNumbers)
 @click.argument("where", default=HOME, shell_complete=options.files)
 @click.option("--switches", is_flag=True, help="Find the position by moving to the limit switches.")
 @options.job

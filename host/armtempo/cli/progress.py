@@ -6,7 +6,6 @@ import shutil
 import sys
 import time
 from contextlib import ExitStack
-from types import TracebackType
 from typing import Any, Self
 
 import click
@@ -53,7 +52,5 @@ class ProgressBar:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._stack.close()

@@ -68,8 +68,8 @@ def _with_motors(given: BoardOptions) -> SelfTest:
 
 
 def _lines(found: SelfTest) -> list[str]:
-    kind = "virtual board: its figures are simulated" if found.simulated else "board"
-    lines = [f"self-test of {kind} {found.board_id}"]
+    kind = ", a virtual one: its figures are simulated" if found.simulated else ""
+    lines = [f"self-test of board {found.board_id}{kind}"]
     for line in found.lines:
         lines.extend(_words(line))
     if to_correct := found.data.get(ARM_FILE):

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from armtempo.basics.errors import InputError, LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link.board_messages import Levels
@@ -20,7 +20,7 @@ from armtempo.robot.outputs import BoardOutput, Way
 from armtempo.robot.shared_board import SharedBoard
 
 
-@click.command("output", context_settings={"ignore_unknown_options": True})  # "-10" is a value, not an option
+@click.command("output", cls=options.TakesNumbers)
 @click.argument("name", required=False)
 @click.argument("value", required=False)
 @options.board(options.arm_of_board)
@@ -31,8 +31,6 @@ def output(name: str | None, value: str | None, given: BoardOptions) -> None:
     duty of 0 to 1, degrees of a servo. Without VALUE it prints the value; without NAME, all outputs. Works
     during a motion, and while another armtempo program has the port.
     """
-    if name is not None and name.startswith("-"):
-        raise InputError(f"no such option: {name}", "see 'armtempo output --help'")
     with _board(given) as board:
         if name is not None:
             output = BoardOutput(board.way, board.arm, name)

@@ -1,4 +1,4 @@
-"""The compiled modules of the board program as one file, each deflated: what the board's ``archive.py`` reads."""
+"""The archive of compiled modules of the board program, each deflated, for the board's ``archive.py``."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import zlib
 from collections.abc import Collection, Mapping
 
 _WINDOW_BITS = 9
-"""Memory that the board needs while it imports a module: 0.5 KB and 1.3 KB for the decoder."""
+"""Window (0.5 KB) for modules imported with little memory; the decoder needs another 1.3 KB."""
 _WIDE_BITS = 13
-"""The same where there is plenty: 8 KB."""
+"""Window (8 KB) for modules imported with enough memory."""
 
 
 def pack(files: Mapping[str, bytes], wide: Collection[str]) -> bytes:

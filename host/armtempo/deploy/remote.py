@@ -1,4 +1,4 @@
-"""A board's file system and REPL through mpremote, run as a process of its own."""
+"""A board's file system and REPL through mpremote, in a separate process."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SILENCE_S = 30.0
 SLOWEST_BYTES_S = 2000.0
 """Lowest speed at which a file is copied."""
 _NOT_ENTERED = "could not enter raw repl"
-"""mpremote's words for a board with which it has done nothing yet."""
+"""mpremote's message before it has done anything with the board."""
 RECOVERY = "see 'armtempo help recovery'"
 _SURVEY = Path(__file__).with_name("survey.txt")
 
@@ -30,7 +30,7 @@ class Survey:
     """The firmware that runs, and the files in its flash."""
 
     machine: str
-    """What the firmware says it was built for."""
+    """Machine name of the firmware."""
     version: tuple[int, ...]
     """Of MicroPython."""
     mpy: int
@@ -39,7 +39,7 @@ class Survey:
     free_blocks: int
     block_size: int
     sd_card: bool
-    """The firmware has an SD card in, and would start from that."""
+    """Whether there is an SD card, from which the board would start."""
     firmware_crc: int | None
     """Hash of a program that is built into the firmware; None without one."""
     files: dict[str, tuple[int, str]]
@@ -54,15 +54,15 @@ class Survey:
 
 
 class Remote:
-    """One board by its port; raises LinkError, with the end of mpremote's output, where a step fails."""
+    """One board by its port; raises LinkError, with the end of mpremote's output, if a step fails."""
 
     def __init__(self, port: str) -> None:
         self.port = port
 
     def run(self, *commands: Sequence[str]) -> str:
-        """Run mpremote's commands one after the other in one session; gives what they print.
+        """Run mpremote's commands in one session; returns their output.
 
-        A board that is just being reset takes no prompt's keys: where mpremote has not got in, it tries once more.
+        A board that is being reset does not accept the prompt's keys: if mpremote could not enter, it tries once more.
         """
         try:
             return "".join(self.lines(*commands))
@@ -72,7 +72,7 @@ class Remote:
         return "".join(self.lines(*commands))
 
     def lines(self, *commands: Sequence[str]) -> Iterator[str]:
-        """The same, line by line as it comes."""
+        """As ``run``, line by line."""
         arguments = ["connect", self.port]
         for command in commands:
             arguments += ["+", *command]
@@ -98,7 +98,7 @@ class Remote:
                 )
 
     def survey(self) -> Survey:
-        """Look at firmware and files."""
+        """Examine firmware and files."""
         answer = self.run(["exec", _SURVEY.read_text(encoding="utf-8")])
         try:
             found: dict[str, Any] = json.loads(answer.strip().splitlines()[-1])
@@ -112,7 +112,7 @@ class Remote:
 
 
 def each(function: str, paths: Iterable[str]) -> list[str]:
-    """The command that applies a function of ``os`` to paths of the board; what fails is passed over."""
+    """The command that applies a function of ``os`` to paths of the board; errors are ignored."""
     return [
         "exec",
         f"import os\nfor path in {list(paths)!r}:\n try:\n  {function}(path)\n except OSError:\n  pass",
@@ -139,7 +139,7 @@ class _Watchdog:
         self.feed()
 
     def feed(self) -> None:
-        """Begin to count anew."""
+        """Restart the time."""
         self.stop()
         self._timer = threading.Timer(self._silence_s, self._process.kill)
         self._timer.daemon = True

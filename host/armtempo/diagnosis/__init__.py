@@ -1,1 +1,1 @@
-"""What looks wrong, and what to do about it: in an arm file and a job, on this machine, with the board."""
+"""Checks of an arm file and a job, of this machine, and of the board, with advice."""

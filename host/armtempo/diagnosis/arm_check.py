@@ -1,4 +1,4 @@
-"""Common sense about an arm file and a job: what looks wrong, and what to do about it."""
+"""Plausibility checks of an arm file and a job, with advice."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from armtempo.model.posture import HOME
 
 
 def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, list[Finding]]:
-    """The arm of the file, None if it cannot be read, and all findings on it and on the job.
+    """The arm of the file (None if it cannot be read), and all findings about it and the job.
 
-    What the readers refuse is a finding too.
+    Errors of the readers are findings too.
     """
     try:
         arm = Arm.read(arm_file)
@@ -33,10 +33,7 @@ def check(arm_file: Path, job_file: Path | None = None) -> tuple[Arm | None, lis
 
 
 def check_arm(arm: Arm) -> list[Finding]:
-    """Everything found in an arm that was read, errors first.
-
-    It need not be ready to be driven: ``Arm.read`` reads one without motors.
-    """
+    """All findings about an arm, errors first; it may have no motors (``Arm.read``)."""
     found = [*units.findings(arm), *geometry.findings(arm), *_motors(arm)]
     if arm.driven:
         for part in (drives, resolution, encoders, torque, wiring):
@@ -49,7 +46,7 @@ def check_arm(arm: Arm) -> list[Finding]:
 
 
 def _postures(arm: Arm) -> list[Finding]:
-    """Tool poses of the arm's named postures that it cannot take."""
+    """Findings about named postures whose tool pose has no solution."""
     from armtempo.planning import via_points  # here, because it imports the inverse kinematics
 
     try:
@@ -60,7 +57,7 @@ def _postures(arm: Arm) -> list[Finding]:
 
 
 def _room(arm: Arm) -> list[Finding]:
-    """What touches in the home posture and the others of the file."""
+    """Findings about touching parts in the home posture and the named postures."""
     from armtempo.planning import room_check, via_points  # here, as above
 
     found = []
@@ -97,7 +94,7 @@ def _motors(arm: Arm) -> list[Finding]:
 
 
 def examine_arm(path: Path) -> list[Finding]:
-    """Whether the arm file can be read, and how many errors and warnings a check finds in it."""
+    """Whether the arm file can be read, and the number of errors and warnings."""
     arm, findings = check(path)
     errors = sum(finding.level is Level.ERROR for finding in findings)
     warnings = sum(finding.level is Level.WARNING for finding in findings)

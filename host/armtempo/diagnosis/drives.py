@@ -12,13 +12,13 @@ from armtempo.planning.checks import ESTIMATED, rate_words
 from armtempo.records import encode
 
 _MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}
-"""What stepper drivers offer: powers of 2, and the decimal ones."""
+"""Microstep settings of stepper drivers: powers of 2, and decimal ones."""
 _FAST_RPM = 1500.0
-"""Above this few steppers have torque left."""
+"""Few steppers have torque above this speed."""
 _FEWEST_STEPS = 10
 _SLOW_STEPS_S = 10.0
 _SUDDEN_S = 0.01
-"""A joint that reaches its speed limit in less has an acceleration limit that limits nothing."""
+"""An acceleration limit that allows full speed in less time is probably wrong."""
 
 
 def top_rate_steps_s(joint: DrivenJoint) -> float:
@@ -32,7 +32,7 @@ def motor_rpm(joint: DrivenJoint) -> float:
 
 
 def findings(arm: Arm) -> list[Finding]:
-    """What looks wrong about the drives of all driven joints, and about them together."""
+    """Findings about the drives of all driven joints, and about their sum."""
     found = [finding for joint in arm.driven for finding in _of(joint, arm.driver)]
     rates = sum(top_rate_steps_s(joint) for joint in arm.driven)
     if rates > MAX_STEP_RATE_SUM:
@@ -47,7 +47,7 @@ def findings(arm: Arm) -> list[Finding]:
 
 
 def record_findings(arm: Arm) -> list[Finding]:
-    """What the board itself would refuse."""
+    """Findings about values that the board would refuse."""
     try:
         encode.arm_record(arm)
     except (ArmtempoError, OverflowError) as refused:

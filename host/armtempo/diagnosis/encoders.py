@@ -1,4 +1,4 @@
-"""Encoders: whether they can see what they are to watch."""
+"""Checks of encoders: resolution, rate, following error."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 
 _FASTEST_COUNTS_S = 1e6
-"""A reading is right while the encoder moves less than 32 768 counts between two of them (board/docs/hardware.md)."""
+"""Largest rate: fewer than 32 768 counts between two readings (board/docs/hardware.md)."""
 
 
 def findings(arm: Arm) -> list[Finding]:
-    """What looks wrong about the encoders."""
+    """Findings about the encoders."""
     found = [finding for joint in arm.driven if joint.encoder for finding in _of(joint)]
     without = [joint.name for joint in arm.driven if joint.encoder is None]
     if without:
@@ -51,6 +51,6 @@ def _of(joint: DrivenJoint) -> list[Finding]:
 
 
 def _ordinary_deg(joint: DrivenJoint, count_deg: float) -> float:
-    """How far a joint may be off its command without having lost a step."""
+    """Largest following error of a joint without a lost step, degrees."""
     full_step_deg = 360.0 / joint.motor.steps_per_rev / joint.motor.gear_ratio
     return full_step_deg + 2 * count_deg + joint.model.backlash_deg

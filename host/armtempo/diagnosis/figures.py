@@ -1,4 +1,4 @@
-"""The figures of each driven joint that a check rests on, as a table."""
+"""The values of each driven joint that are checked, as a table."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ _WIDTHS = (5, 11, 12, 17, 13, 11, 15)
 
 @dataclass(frozen=True)
 class JointFigures:
-    """What one driven joint can do."""
+    """Resolution, speed and torque of one driven joint."""
 
     name: str
     steps_per_deg: float
     step_deg: float
     step_at_tool_mm: float
-    """How far one step moves the tool at most."""
+    """Largest motion of the tool by one step."""
     top_steps_s: float
     """Step rate at the speed limit."""
     motor_rpm: float
-    """Speed of the motor there."""
+    """Motor speed at the speed limit."""
     torque_margin: float | None
-    """Torque of the motor over what is asked of it; None: not known, infinite: nothing is asked."""
+    """Torque of the motor divided by the needed torque; None: not known, infinite: none is needed."""
 
     @property
     def values(self) -> dict[str, Any]:
-        """For JSON, which knows no infinity."""
+        """Values for JSON, which has no infinity."""
         margin = None if self.torque_margin is None or math.isinf(self.torque_margin) else self.torque_margin
         return {**asdict(self), "torque_margin": margin}
 
@@ -57,7 +57,7 @@ def of(arm: Arm) -> tuple[JointFigures, ...]:
 
 
 def table(joints: Sequence[JointFigures]) -> list[str]:
-    """Lines for people; none where nothing is driven."""
+    """Lines for people; none if nothing is driven."""
     return aligned([_HEAD, *map(_row, joints)], _WIDTHS) if joints else []
 
 

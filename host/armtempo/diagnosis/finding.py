@@ -1,4 +1,4 @@
-"""What an examination found, of a file, a machine or a board: how bad, where, what, and what to do about it."""
+"""Findings of a check: severity, place, problem, advice."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from enum import Enum
 
 
 class Level(Enum):
-    """How bad a finding is."""
+    """Severity of a finding."""
 
     ERROR = "error"
-    """It cannot work, or would do something else than the file says."""
+    """It cannot work, or does not do what the file says."""
     WARNING = "warning"
-    """It may work, but is probably not meant so."""
+    """It may work, but is probably a mistake."""
     NOTE = "note"
-    """Worth knowing; nothing looks wrong."""
+    """Information only."""
     GOOD = "ok"
 
     @property
     def word(self) -> str:
-        """The level where something works or does not, as on a machine: ``ok``, ``note`` or ``wrong``."""
+        """The level as a word of ``doctor``: ``ok``, ``note`` or ``wrong``."""
         return "wrong" if self is Level.ERROR else self.value
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found."""
+    """One finding."""
 
     level: Level
     where: str
@@ -35,20 +35,20 @@ class Finding:
 
 
 def error(where: str, what: str, next_step: str) -> Finding:
-    """A finding that stands in the way."""
+    """A finding that prevents use."""
     return Finding(Level.ERROR, where, what, next_step)
 
 
 def warning(where: str, what: str, next_step: str) -> Finding:
-    """A finding that looks wrong."""
+    """A finding about a probable mistake."""
     return Finding(Level.WARNING, where, what, next_step)
 
 
 def note(where: str, what: str, next_step: str) -> Finding:
-    """A finding that is worth knowing."""
+    """A finding for information."""
     return Finding(Level.NOTE, where, what, next_step)
 
 
 def good(where: str, what: str) -> Finding:
-    """A finding that is as it should be."""
+    """A finding without a problem."""
     return Finding(Level.GOOD, where, what)

@@ -1,4 +1,4 @@
-"""The table and the ranges: postures in which the arm meets its base plane or itself."""
+"""Checks of the table and the ranges: postures in which the arm touches its base plane or itself."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from armtempo.model.parts import DrivenJoint
 
 _BELOW_MM = 1.0
 _NEAR = 0.01
-"""Links that come nearer than this share of the reach are told."""
+"""Distance of links, as a fraction of the reach, below which there is a finding."""
 _FULL_TURN_DEG = 360.0
 
 
 class End(NamedTuple):
-    """The arm at home, but for one joint at an end of its range."""
+    """The arm at home, with one joint at an end of its range."""
 
     joint: DrivenJoint
     angle_deg: float
@@ -30,7 +30,7 @@ class End(NamedTuple):
 
 
 def findings(arm: Arm) -> list[Finding]:
-    """What looks wrong about the table, the home posture and the ends of the ranges."""
+    """Findings about the table, the home posture and the ends of the ranges."""
     if Geometry.of(arm).reach == 0.0 and not any(joint.d_mm for joint in arm.joints):
         return [error("geometry", "all lengths are 0", "give d_mm and a_mm of the joints, in mm")]
     return [*_home(arm), *_ends(arm), *_wide(arm)]
@@ -62,7 +62,7 @@ def _home(arm: Arm) -> list[Finding]:
 
 
 def _ends(arm: Arm) -> list[Finding]:
-    """One note for each kind: nearly every arm can reach its table and itself, and the ranges do not stop it."""
+    """One note of each kind, as nearly every arm can touch its table and itself within its ranges."""
     near = _NEAR * Geometry.of(arm).reach
     below, crossing = [], []
     for end in ends(arm):
@@ -95,7 +95,7 @@ def _wide(arm: Arm) -> list[Finding]:
 def _gap_mm(points: Array, shortest: float) -> float:
     """Smallest distance between two lines of the outline that are not neighbours; infinite if there are none.
 
-    Lines shorter than ``shortest`` are left out: what is before and after them is near in any posture.
+    Lines shorter than ``shortest`` are left out, as their neighbours are close in any posture.
     """
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     links = [(points[i], points[i + 1]) for i in np.flatnonzero(lengths > max(shortest, _BELOW_MM))]

@@ -1,4 +1,4 @@
-"""A job against its arm: whether it can be read, reached and seen in steps."""
+"""Checks of a job for its arm: errors, poses, moves of less than a step."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armtempo.planning import checks, planner, room_check
 
 
 def findings(arm: Arm, path: Path) -> list[Finding]:
-    """What looks wrong about the job in the file ``path``."""
+    """Findings about the job in the file ``path``."""
     suspected: list[Finding] = []
     try:
         job = Job.load(path, arm)
@@ -52,7 +52,7 @@ def _units(arm: Arm, job: Job) -> list[Finding]:
 
 
 def _steps(arm: Arm, via_deg: Array) -> list[Finding]:
-    """Joints that are to move, but by less than a step."""
+    """Findings about joints that move by less than a step."""
     found = []
     for joint, angles in zip(arm.driven, via_deg.T, strict=True):
         way_deg = float(np.ptp(angles))

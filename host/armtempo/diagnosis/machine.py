@@ -38,14 +38,14 @@ def _flash_tool() -> Finding:
 
 
 def packages() -> list[Finding]:
-    """Each package that armtempo needs or can use, with its version, or how to get it."""
+    """Each required or optional package, with its version, or how to install it."""
     found: dict[str, Finding] = {}
     for requirement in requires("armtempo") or []:
         name = re.split(r"[^A-Za-z0-9._-]", requirement)[0]
         extra = re.search(r"extra == ['\"](\w+)['\"]", requirement)
         if extra is not None and extra[1] == "docs":  # for developers
             continue
-        if not (name in found or "platform_machine" in requirement):  # of that there is an extra too
+        if not (name in found or "platform_machine" in requirement):  # which also has an extra
             found[name] = _package(name, extra[1] if extra else "")
     return [*found.values()]
 
@@ -62,7 +62,7 @@ def _package(name: str, extra: str) -> Finding:
 
 
 def ports() -> list[Finding]:
-    """The serial ports, each with whether it can be opened by this user."""
+    """The serial ports, and whether this user can open them."""
     found = [_port(port) for port in find_ports()]
     return found or [note("ports", "none", _NO_PORT)]
 

@@ -1,4 +1,4 @@
-"""How fine each joint steps: in degrees, and in millimetres at the tool."""
+"""Resolution of each joint, in degrees and in millimetres at the tool."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 
 COARSE_MM = 0.5
-"""A step that moves the tool by more than this is told."""
+"""Motion of the tool by a step above which there is a finding."""
 
 _POSTURES, _SEED = 500, 1
 _STEP_RAD = 1e-5
@@ -27,11 +27,11 @@ class Resolution:
     joint: DrivenJoint
     step_deg: float
     lever_mm: float
-    """How far the tool moves at most for a radian of this joint: the longest lever within the ranges."""
+    """Largest motion of the tool per radian of this joint within the ranges."""
 
     @property
     def step_mm(self) -> float:
-        """How far one step moves the tool at most."""
+        """Largest motion of the tool by one step."""
         return float(np.radians(self.step_deg)) * self.lever_mm
 
 
@@ -88,7 +88,8 @@ def _levers_mm(arm: Arm) -> Array:
 
 
 def _postures_rad(arm: Arm) -> Array:
-    """Postures that reach far: each driven joint at an end of its range, at home, or anywhere; (K, joints)."""
+    """Postures for the search of the largest lever: driven joints at an end of the range, at home, or random;
+    (K, joints)."""
     rng = np.random.default_rng(_SEED)
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     home = np.array(arm.home_deg)

@@ -1,4 +1,4 @@
-"""Torque that the model in the arm file asks of each motor at its limits, against what it has; odd masses."""
+"""Checks of each motor's torque at its limits, by the model in the arm file, and of masses."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from armtempo.model.parts import DrivenJoint, Dynamics, Joint
 from armtempo.planning.torque import ENOUGH, held_nm
 
 _TRIANGLE = 1e-6
-"""A largest moment of inertia may exceed the sum of the two others by this part of it: by rounding."""
+"""Relative rounding allowed in the triangle inequality of the moments of inertia."""
 _HEAVY_KG = 50.0
-"""Heavier than any link that steppers carry."""
+"""Above the mass of any link of a stepper arm."""
 
 
 def margin(joint: DrivenJoint) -> float | None:
-    """Torque of a joint's motor over what gravity and its acceleration limit ask at its speed limit.
+    """Torque of a joint's motor at its speed limit, divided by that needed for gravity and its acceleration limit.
 
-    By ``joint.model``; None if the arm file says nothing of the torque; infinite if nothing is asked.
+    By ``joint.model``; None if the torque is not known; infinite if none is needed.
     """
     model, motor, limits = joint.model, joint.motor, joint.limits
     held = float(held_nm(joint, math.radians(limits.speed_deg_s) * motor.gear_ratio))
@@ -33,15 +33,15 @@ def margin(joint: DrivenJoint) -> float | None:
 
 
 def gravity_nm(joint: DrivenJoint) -> float:
-    """Largest torque that gravity asks of the motor within the joint's range."""
+    """Largest gravity torque at the motor within the joint's range, Nm."""
     low, high = joint.range_deg
-    level = math.ceil(low / 180.0) * 180.0 <= high  # the link comes to level somewhere
+    level = math.ceil(low / 180.0) * 180.0 <= high  # the link is horizontal somewhere in the range
     share = 1.0 if level else max(abs(math.cos(math.radians(angle))) for angle in (low, high))
     return abs(joint.model.gravity_torque_nm) * share / joint.motor.gear_ratio
 
 
 def findings(arm: Arm) -> list[Finding]:
-    """Joints whose motor is too weak, or nearly so; those of which nothing is known; dynamics that look wrong."""
+    """Findings about weak motors, unknown torques, and implausible dynamics."""
     found = [finding for joint in arm.driven for finding in _of(joint)]
     unknown = [joint.name for joint in arm.driven if np.isnan(held_nm(joint, 0.0))]
     if unknown:
@@ -58,7 +58,7 @@ def findings(arm: Arm) -> list[Finding]:
 
 
 def _body(joint: Joint, body: Dynamics) -> list[Finding]:
-    """What looks wrong about the masses of a row."""
+    """Findings about the masses of a row."""
     least, middle, most = np.linalg.eigvalsh(inertia_matrix(body.inertia_kg_m2))
     found = []
     if least < -_TRIANGLE * most or most > (least + middle) * (1.0 + _TRIANGLE):
@@ -68,7 +68,7 @@ def _body(joint: Joint, body: Dynamics) -> list[Finding]:
         )
     elif body.mass_kg and most == 0.0:
         text = "its inertia_kg_m2 is not given: its mass counts as a point"
-        found.append(note(joint.name, text, "give it where the link is large for the way it moves"))
+        found.append(note(joint.name, text, "give it if the link is large for the way it moves"))
     if body.mass_kg > _HEAVY_KG:
         found.append(warning(joint.name, f"a mass of {body.mass_kg:g} kg", "give mass_kg in kilograms"))
     return found

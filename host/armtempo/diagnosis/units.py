@@ -1,4 +1,4 @@
-"""Figures that look as if they were in another unit: metres for millimetres, radians for degrees."""
+"""Checks for wrong units: metres instead of millimetres, radians instead of degrees."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import Joint
 
 _SHORT_MM, _TINY_MM = 2.0, 0.02
-"""A length between these may be one in metres: 2 m is a large robot's, 20 mm a small offset."""
+"""A value between these may be in metres: 2 m is a large robot, 20 mm a small offset."""
 _NARROW_DEG = (0.1, 2 * math.pi)
 """A range, and an end of one, that may be in radians."""
 _NEAR_RAD = 0.002
@@ -24,7 +24,7 @@ def findings(arm: Arm) -> list[Finding]:
 
 
 def position_finding(name: str, position_mm: Array, reach_mm: float) -> Finding | None:
-    """A warning where a via point lies at the base, but would lie in reach if it were in metres."""
+    """A warning if a via point lies at the base, but would lie in reach if it were in metres."""
     distance = math.dist(position_mm, (0.0, 0.0, 0.0))
     if not 0.0 < distance < min(_SHORT_MM, 0.01 * reach_mm):
         return None

@@ -1,4 +1,4 @@
-"""Channels and inputs of the board: what collides, what stays unused (board/docs/hardware.md has the pins)."""
+"""Checks of channels and inputs of the board (pins: board/docs/hardware.md)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.pin_use import problems as pin_problems
 
 BUTTON_CHANNEL = 6
-"""Its STEP pin is the one of the button."""
+"""Its STEP pin is the pin of the button."""
 
 
 def findings(arm: Arm) -> list[Finding]:
-    """Channels and pins used twice, switches that contradict each other or their joint's range."""
+    """Findings about channels and pins used twice, and about contradicting switches."""
     found = _channels(arm)
     found += _levels(arm)
     found += [error(problem.where, problem.what, problem.next_step) for problem in pin_problems(arm)]
@@ -36,7 +36,7 @@ def _channels(arm: Arm) -> list[Finding]:
 
 
 def _levels(arm: Arm) -> list[Finding]:
-    """One input cannot trip at both levels."""
+    """Findings about inputs with two trip levels."""
     levels: dict[int, set[str]] = defaultdict(set)
     for joint in arm.joints:
         for number in (joint.switches.low, joint.switches.high):

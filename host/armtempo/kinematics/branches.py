@@ -11,11 +11,11 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.shape import Shape
 
 BORDER = 1e-9
-"""Sine, or length relative to the reach, below which an arm is between two branches."""
+"""Sine, or length relative to the reach, below which an arm is on the border of two branches."""
 
 
 class Branch(NamedTuple):
-    """Which of the two branches the arm is in; "" if between them."""
+    """Branch names of base, elbow and wrist; "" on a border."""
 
     base: str
     """"front": the arm reaches forwards over its shoulder; "rear": backwards."""
@@ -28,11 +28,11 @@ class Branch(NamedTuple):
         return " ".join(filter(None, self)) or "on the border of all branches"
 
     def after(self, before: Branch) -> Branch:
-        """This branch, with what it leaves open taken from the one before."""
+        """This branch, with undefined parts taken from the branch before."""
         return Branch(*(mine or theirs for mine, theirs in zip(self, before, strict=True)))
 
     def differs(self, other: Branch) -> tuple[str, ...]:
-        """Which of the three changes from this branch to ``other`` without doubt."""
+        """The parts that differ between this branch and ``other``, if both are defined."""
         return tuple(
             part
             for part, mine, theirs in zip(self._fields, self, other, strict=True)
@@ -46,7 +46,7 @@ BRANCHES = tuple(Branch(base, elbow, wrist) for base in BASES for elbow in ELBOW
 
 
 def branch_of(geometry: Geometry, angles_rad: ArrayLike) -> Branch:
-    """Name the branch of joint angles, shape (joints,). Raises InputError for an arm outside the class."""
+    """The branch of joint angles, rad (joints,). Raises InputError for an arm without a closed form."""
     shape = Shape.of(geometry)
     theta = np.asarray(angles_rad, dtype=np.float64)[geometry.core] + np.array(shape.joint_offset)
     stretch = shape.sign2 * theta[2] + shape.bend

@@ -1,4 +1,4 @@
-"""From the driven joints to the whole arm: angles of all joints, and where they bring its links and its tool."""
+"""From the driven joints to the whole arm: angles of all joints, positions of links and tool."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def all_angles_deg(arm: Arm, driven_deg: Array) -> Array:
 
 
 def spread_deg(arm: Arm, angles_deg: ArrayLike, what: str = "") -> Array:
-    """Angles of all joints (..., joints) from theirs or from those of the driven ones (..., J); others are at home.
+    """Angles of all joints (..., joints) from angles of all or of the driven joints (..., J); the others are at home.
 
     Raises InputError, which begins with ``what``, for another number of angles.
     """

@@ -34,9 +34,9 @@ class Candidate:
     usable: bool
     """Whether the arm can take these angles."""
     distance_rad: float
-    """Root of the sum of squares of the joints' ways from the previous posture."""
+    """Euclidean distance from the previous posture in joint space."""
     outside_rad: float
-    """How far the joint that is farthest out of its range is so; inf if unreachable."""
+    """Largest excess of a joint over its range; inf if unreachable."""
 
     @property
     def number(self) -> int:
@@ -45,7 +45,7 @@ class Candidate:
 
     @property
     def branch(self) -> Branch:
-        """Which of the arm's configurations it is."""
+        """Its branch."""
         return BRANCHES[self.index]
 
     @property
@@ -55,7 +55,7 @@ class Candidate:
 
     @property
     def rejections(self) -> tuple[Rejection, ...]:
-        """Why not; empty for a solution that can be used."""
+        """The reasons for rejection; empty for a usable solution."""
         if self.usable:
             return ()
         return reasons(self.of.wrist, self.of.solutions, self.index, self.of.ranges, self.placed_rad)
@@ -68,7 +68,7 @@ class Candidate:
 
 @dataclass(eq=False)
 class Choice:
-    """All solutions of a pose and the one chosen; words are made only when they are asked for."""
+    """All solutions of a pose and the chosen one; texts are only made on request."""
 
     geometry: Geometry
     pose: Sequence[float]
@@ -81,7 +81,7 @@ class Choice:
 
     @cached_property
     def chosen(self) -> Candidate | None:
-        """The nearest that can be used; None: none can."""
+        """The nearest usable solution; None if there is none."""
         usable = [candidate for candidate in self.candidates if candidate.usable]
         return min(usable, key=lambda candidate: candidate.distance_rad, default=None)
 
@@ -92,7 +92,7 @@ class Choice:
 
     @cached_property
     def _of_core(self) -> Sequence[float]:
-        """What the pose asks of the rows that turn, in row order."""
+        """The pose for the rows that turn, in row order."""
         if self.geometry.moving is self.geometry:
             return self.pose
         pose = np.append(self.pose[:12], (0.0, 0.0, 0.0, 1.0)).reshape(4, 4)
@@ -101,20 +101,20 @@ class Choice:
 
     @cached_property
     def wrist(self) -> WristCentre:
-        """Where the pose asks the wrist centre to be."""
+        """The wrist centre of the pose."""
         rows = self._of_core
         x, y, z = (wrist_centre(self.shape, *rows[start : start + 4]) for start in (0, 4, 8))
         return WristCentre(self.shape, (x, y, z), self.unit)
 
     @property
     def beyond(self) -> float:
-        """By how much the branch that is least out of reach is so; inf where none is."""
+        """Least excess of a branch over its reach; inf if no branch is out of reach."""
         if not any(math.isinf(each.outside_rad) for each in self.candidates):
             return math.inf
         return self.wrist.beyond
 
     def of_nearer_poses(self, previous: Sequence[float], by: float) -> list[list[float]]:
-        """Postures, (joints,) each, with the tool moved a little outwards or inwards: where the pose is on a border."""
+        """Postures, (joints,) each, for the tool moved slightly outwards or inwards, for a pose on a border."""
         x, y, z = self.wrist.position
         z -= self.shape.height
         found = []
@@ -134,7 +134,7 @@ class Choice:
 
     @property
     def region(self) -> str:
-        """Of Fig. 3, as in ``Regions.names``."""
+        """Region of Fig. 3, as in ``Regions.names``."""
         return self._region.names[0]
 
     @property
@@ -164,7 +164,7 @@ def choose(
 def choose_of_rows(
     geometry: Geometry, pose: Sequence[float], ranges: Ranges, previous: Sequence[float], unit: str = "mm"
 ) -> Choice:
-    """The same for the pose's 12 or 16 elements in row order, with plain numbers alone."""
+    """As ``choose``, for the pose's 12 or 16 elements in row order, with plain numbers."""
     solutions = inverse_of_pose(geometry, pose, previous)
     choice = Choice(geometry, pose, ranges, unit, solutions)
     for index, (angles, outcome) in enumerate(zip(solutions.angles_rad, solutions.outcome, strict=True)):

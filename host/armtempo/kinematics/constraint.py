@@ -1,4 +1,4 @@
-"""What a target asks of the tool, in the form that the numerical solver needs, and how far a tool is from it."""
+"""A target as constraints for the numerical solver, and the distance of a tool from it."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ Vector = tuple[float, float, float]
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 UPRIGHT = 1e-9
-"""Cosine of the pitch below which the tool's x axis is upright: then its whole direction is known."""
+"""Cosine of the pitch below which the tool's x axis is vertical: then its direction is completely constrained."""
 
 STIFFEST = 1e4
-"""Largest ratio of the two tolerances, each by its natural size (reach, 1 rad), that the search takes up."""
+"""Largest ratio of the two tolerances, relative to their scales (reach, 1 rad), used by the search."""
 
 
 class Miss(NamedTuple):
-    """How far a tool is from its target."""
+    """Distance of a tool from its target."""
 
     position_mm: float
     rotation_deg: float
-    """Angle between the orientations, the directions, or the one roll, pitch or yaw that is asked for."""
+    """Angle between the orientations, the directions, or the constrained roll, pitch or yaw."""
 
     def __str__(self) -> str:
         return f"{self.position_mm:.4g} mm and {self.rotation_deg:.4g} deg"
 
 
 class Turned(NamedTuple):
-    """How the squared error of orientation changes as joints turn about axes z, all vectors of length 3.
+    """The squared error of orientation and its derivatives by rotations about axes z; vectors of length 3.
 
     The error itself is ``square``. Half its gradient for a joint is -z·torque; the second derivatives, by Gauss
     and Newton, are ``both`` z_i·z_j + ``each`` (z_i·along)(z_j·along).
@@ -46,7 +46,7 @@ class Turned(NamedTuple):
 
 
 class Component(NamedTuple):
-    """One number: the component of a direction fixed to the tool along one fixed to the base."""
+    """Constraint: the component of a direction fixed to the tool along a direction fixed to the base."""
 
     tool: Vector
     base: Vector
@@ -54,7 +54,7 @@ class Component(NamedTuple):
 
 
 class Direction(NamedTuple):
-    """A direction fixed to the tool is to be one fixed to the base."""
+    """Constraint: a direction fixed to the tool equals a direction fixed to the base."""
 
     tool: Vector
     base: Vector
@@ -67,13 +67,13 @@ class Constraint:
     target: Pose
     position: Vector
     axes: tuple[Vector, Vector, Vector]
-    """x, y, z of the tool that the target's matrix shows."""
+    """x, y, z axes of the tool in the target's matrix."""
     partly: Component | Direction | None
-    """What is asked of the orientation, where that is not all of it (or nothing)."""
+    """The partial constraint on the orientation, if any."""
 
     @classmethod
     def of(cls, target: Pose) -> Constraint:
-        """Make ready."""
+        """The constraint of a target."""
         x, y, z, position = (_column(target, index) for index in range(4))
         return cls(target, position, (x, y, z), _partly(target, (x, y, z)))
 
@@ -90,7 +90,7 @@ class Constraint:
         return Turned(off * off, torque, 0.0, 1.0, across)
 
     def miss(self, tool: Frame[float]) -> Miss:
-        """How far the tool is off."""
+        """The distance of the tool from the target."""
         return Miss(math.sqrt(_apart(tool.origin, self.position)), math.degrees(self._turn_rad(tool)))
 
     def _turn_rad(self, tool: Frame[float]) -> float:
@@ -98,12 +98,12 @@ class Constraint:
             name = self.target.fixed[0]
             return abs(math.remainder(_angle(name, *tool[:3]) - _angle(name, *self.axes), math.tau))
         square = self.turned(tool).square
-        # The chord of one direction is 2 sin(angle / 2), that of three axes 2 sqrt(2) sin(angle / 2).
+        # the chord of one direction is 2 sin(angle / 2), that of three axes 2 sqrt(2) sin(angle / 2)
         longest = 4.0 if self.partly else 8.0
         return 2.0 * math.asin(min(math.sqrt(square / longest), 1.0))
 
     def reached(self, miss: Miss) -> bool:
-        """Whether this is near enough."""
+        """Whether the distance is within the tolerances."""
         return miss.position_mm <= self.target.tolerance_mm and miss.rotation_deg <= self.target.tolerance_deg
 
     def weights(self, reach: float) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Inverse dynamics of a serial arm, recursive Newton-Euler: torques at its rows for a motion, many moments at once."""
+"""Inverse dynamics of a serial arm by recursive Newton-Euler, vectorised over time."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _M = 1e-3
 
 
 def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) -> Array:
-    """Torque in Nm that each joint needs, friction included: (N, joints); a row without ``dynamics`` weighs nothing.
+    """Torque of each joint, including friction, Nm: (N, joints); a row without ``dynamics`` has no mass.
 
-    What the arm holds is part of the last link.
+    The load is part of the last link.
 
-    ``angles``, ``rates`` and ``rate_changes`` of all joints, each (N, joints) in rad, rad/s and rad/s^2. What a
-    parallel linkage turns is counted from the link before the previous one: its rods weigh nothing.
+    ``angles``, ``rates`` and ``rate_changes`` of all joints, each (N, joints) in rad, rad/s and rad/s^2.
+    Angles of a parallel linkage are relative to the link before the previous one; its rods have no mass.
     """
     bodies = [joint.dynamics or Dynamics(0.0) for joint in arm.joints]
     if arm.held:
@@ -50,7 +50,7 @@ def _with_load(link: Dynamics, load: Load) -> Dynamics:
 
 
 def as_one(mass: float, parts: Sequence[tuple[float, Array, Array]]) -> tuple[Array, Array]:
-    """Centre (3,) of bodies of ``mass`` in all, and their inertia (3, 3) about it.
+    """Centre of mass (3,) of bodies with the total ``mass``, and their inertia (3, 3) about it.
 
     ``parts``: mass, centre (3,) in m and inertia (3, 3) about that, of each.
     """
@@ -65,7 +65,7 @@ def as_one(mass: float, parts: Sequence[tuple[float, Array, Array]]) -> tuple[Ar
 def _row_torques(
     geometry: Geometry, bodies: Sequence[Dynamics], angles: Array, rates: Array, rate_changes: Array
 ) -> Array:
-    """The same about the axis of each row, without friction.
+    """Torques about the axis of each row, without friction.
 
     Recursive Newton-Euler (Luh, Walker, Paul 1980) with all vectors in the base's frame: speeds outwards; forces, and
     moments about the base's origin, are summed inwards.
@@ -73,7 +73,9 @@ def _row_torques(
     chained = array_frames(geometry, angles)
     turning, bending = (np.stack(geometry.turns(list(each.T))) for each in (rates, rate_changes))
     spin, spin_change = np.zeros((len(angles), 3)), np.zeros((len(angles), 3))
-    fall = np.tile([0.0, 0.0, GRAVITY_M_S2], (len(angles), 1))  # the base accelerates up: this is gravity
+    fall = np.tile(
+        [0.0, 0.0, GRAVITY_M_S2], (len(angles), 1)
+    )  # gravity as an upward acceleration of the base
     forces, moments = [], []
     for row, body in enumerate(bodies):
         before, after = chained[row], chained[row + 1]
@@ -100,7 +102,7 @@ def _row_torques(
 
 
 def _carried(arm: Array, spin: Array, spin_change: Array) -> Array:
-    """Acceleration of a point that a body carries at ``arm`` from its origin, less the origin's."""
+    """Acceleration of a point of a body at ``arm`` from its origin, relative to the origin."""
     return np.asarray(np.cross(spin_change, arm) + np.cross(spin, np.cross(spin, arm)))
 
 

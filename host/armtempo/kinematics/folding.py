@@ -1,4 +1,4 @@
-"""Rows at base and tool that never turn: taken out of a pose for the closed form, and put back into its angles."""
+"""Constant rows at base and tool: removed from a pose for the closed form, and added to its angles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armtempo.kinematics.geometry import Geometry
 
 
 def folded(geometry: Geometry, poses: Array) -> Array:
-    """What poses (..., 4, 4) ask of the joints of ``geometry.core`` alone."""
+    """Poses (..., 4, 4) relative to the joints of ``geometry.core``."""
     base, tool = _still(geometry)
     return np.asarray(base @ poses @ tool)
 
@@ -27,7 +27,7 @@ def unfolded(geometry: Geometry, angles_rad: Array) -> Array:
 
 
 def spread(geometry: Geometry, angles_rad: Sequence[float]) -> tuple[float, ...]:
-    """The same for one posture with plain numbers."""
+    """As ``unfolded``, for one posture with plain numbers."""
     still = dict(geometry.still)
     before = [still[index] for index in range(geometry.core.start)]
     return (*before, *angles_rad, *(still[index] for index in range(geometry.core.stop, geometry.joints)))

@@ -1,8 +1,8 @@
 """The formulas of the closed form, Eqs. (2) to (11), each once: for floats (``FLOATS``) and for arrays (``ARRAYS``).
 
-Every element is a float, or an array of any one shape. Cosines and sines come by algebra, and each joint angle
-by one arctan2: sums, products and square roots are rounded alike in both ways, so both give the same angles, but
-for the last digits of the arctan2. What depends on the case (borders, singular poses) is the callers' part.
+Every element is a float, or an array of any shape. Cosines and sines are computed algebraically, and each
+joint angle by one arctan2, so floats and arrays give the same angles except for the last digits of arctan2.
+Special cases (borders, singular poses) are handled by the callers.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def _wrapped(angles: Array) -> Array:
 
 
 class Functions(NamedTuple, Generic[T]):
-    """What floats and arrays do by different names."""
+    """Functions with different names for floats and arrays."""
 
     sqrt: Callable[[T], T]
     arctan2: Callable[[T, T], T]
@@ -44,7 +44,7 @@ def wrist_centre(shape: Shape, n: T, o: T, a: T, position: T) -> T:
 
 
 def before_flange(shape: Shape, o: T, a: T) -> Pair[T]:
-    """One component of the axes o and a as they were without the twist of row 6."""
+    """One component of the axes o and a before the twist of row 6."""
     cos, sin = shape.flange_twist
     return cos * o - sin * a, cos * a + sin * o
 
@@ -84,14 +84,14 @@ def base_turn(shape: Shape, x: T, y: T, forward: T) -> Pair[T]:
 
 
 def to_shoulder(shape: Shape, forward: T, z: T) -> Pair[T]:
-    """The wrist centre seen from the shoulder, in the arm's plane: outwards, and up (where sign1 is positive)."""
+    """The wrist centre seen from the shoulder, in the arm's plane: outwards, and up (if sign1 is positive)."""
     return forward - shape.shoulder, shape.sign1 * (z - shape.height)
 
 
 def triangle(functions: Functions[T], shape: Shape, r: T) -> Pair[T]:
     """Eq. (7): angle by which the elbow is bent, and the product that all sines of the triangle share.
 
-    The half-angle form keeps the full accuracy where the elbow is stretched or folded, where the arc cosines
+    The half-angle form keeps the full accuracy if the elbow is stretched or folded, where the arc cosines
     of the paper lose half the digits.
     """
     opened = functions.sqrt((shape.farthest - r) * (shape.farthest + r))
@@ -103,7 +103,7 @@ def upper_arm(functions: Functions[T], shape: Shape, out: T, up: T, square: T, s
     """Eq. (6): theta2, with the sine of ``triangle`` signed as the elbow is; ``square``: of r, above 0."""
     cosine = shape.turn2_sign * (square + shape.excess)
     sine = shape.turn2_sign * sine
-    # Adding 0 makes -0 to 0: elbow up and down get the same half turn, not one of them minus a half turn.
+    # adding 0 turns -0 into 0, so that elbow up and down get the same half turn
     return functions.arctan2(up * cosine - out * sine + 0.0, out * cosine + up * sine)
 
 

@@ -51,7 +51,8 @@ def postures(geometry: Geometry, angles_rad: ArrayLike) -> Array:
 
 
 def frames(geometry: Geometry, angles_rad: Sequence[float]) -> list[Frame[float]]:
-    """The base frame and the frame after each joint, with floats: one posture, ten times as fast as by arrays."""
+    """The base frame and the frame after each joint, with floats: for one posture, ten times as fast as with
+    arrays."""
     turns = [
         angle + link.offset for angle, link in zip(geometry.turns(angles_rad), geometry.links, strict=True)
     ]
@@ -59,7 +60,7 @@ def frames(geometry: Geometry, angles_rad: Sequence[float]) -> list[Frame[float]
 
 
 def array_frames(geometry: Geometry, angles_rad: Array) -> list[Frame[Array]]:
-    """The same with arrays, for angles of shape (..., joints): many postures cost little more than one."""
+    """As ``frames``, with arrays, for angles of shape (..., joints)."""
     columns = np.stack(geometry.turns(list(np.moveaxis(angles_rad, -1, 0))))
     turns = [column + link.offset for column, link in zip(columns, geometry.links, strict=True)]
     zero = np.zeros(angles_rad.shape[:-1])

@@ -36,7 +36,7 @@ class ArmPart(NamedTuple):
 def solve_arm(shape: Shape, wrist: Array, previous: Array) -> ArmPart:
     """Find joints 1 to 3 for wrist centres, shape (3, N).
 
-    ``previous``, (N, 6) or (6,), holds the Denavit-Hartenberg angles that decide where the pose leaves
+    ``previous``, (N, 6) or (6,), holds the Denavit-Hartenberg angles that decide if the pose leaves
     joint 1 (wrist centre on axis 1) or joint 2 (wrist centre on the shoulder axis) free.
     """
     x, y, z = wrist
@@ -83,7 +83,7 @@ def elbow_signs(shape: Shape) -> NDArray[np.float64]:
 def duplicates(shape: Shape, measured: Radii) -> Mask:
     """Postures that equal an earlier one, on a border: (2, 2, N).
 
-    Elbow up and down are one where the elbow is stretched or folded; front and rear are one on the border
+    Elbow up and down are one if the elbow is stretched or folded; front and rear are one on the border
     of the cylinder that a shoulder offset leaves free.
     """
     same = np.zeros((2, 2, measured.forward.size), dtype=bool)

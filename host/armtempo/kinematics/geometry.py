@@ -12,11 +12,11 @@ from armtempo.basics.arrays import Array
 from armtempo.model.arm import Arm
 
 T = TypeVar("T", float, Array)
-"""For formulas that serve floats and arrays alike, element by element."""
+"""Type of formulas for floats and arrays, element by element."""
 
 
 class Link(NamedTuple):
-    """One Denavit-Hartenberg row, ready to use."""
+    """One Denavit-Hartenberg row, with cosine and sine of its twist."""
 
     d: float
     a: float
@@ -45,13 +45,12 @@ class Geometry:
     offset: tuple[float, ...]
     """Added to each joint's angle."""
     linked: tuple[int, ...] = ()
-    """Indices of the joints that a parallel linkage turns: their angle less that of the joint before is what the
-    row turns by."""
+    """Indices of joints with a parallel linkage: their row turns by their angle minus that of the joint before."""
     still: tuple[tuple[int, float], ...] = ()
     """Indices and angles of rows that never turn: a pedestal under the arm, a tool on it."""
 
     def __hash__(self) -> int:
-        """Counted once: what is known of a geometry is looked up for every pose."""
+        """Computed once, as caches look up a geometry for every pose."""
         return self._hash
 
     @cached_property
@@ -81,7 +80,7 @@ class Geometry:
         return tuple(Link(d, a, *twist(alpha), offset) for d, a, alpha, offset in rows)
 
     def turns(self, angles: Sequence[T]) -> Sequence[T]:
-        """What each row turns by beyond its offset, for each joint's angle: floats or arrays, as many as joints."""
+        """The rotation of each row, without its offset, from the joints' angles (floats or arrays)."""
         if not self.linked:
             return angles
         turns = list(angles)
@@ -102,7 +101,7 @@ class Geometry:
 
     @cached_property
     def moving(self) -> Geometry:
-        """That of the joints of ``core`` alone; itself where these are all."""
+        """The geometry of the joints of ``core``; itself if these are all."""
         if self.core == slice(0, self.joints):
             return self
         first, end = self.core.start, self.core.stop
@@ -118,7 +117,7 @@ class Geometry:
 
     @property
     def reach(self) -> float:
-        """Sum of all lengths but the base height: no tool point is farther from the foot of joint 2."""
+        """Sum of all lengths except the base height: a bound of the tool's distance from the foot of joint 2."""
         return math.fsum(map(abs, self.d[1:])) + math.fsum(map(abs, self.a))
 
 

@@ -30,14 +30,15 @@ from armtempo.kinematics.solutions import (
 from armtempo.kinematics.wrist import WristPart, solve_wrist
 
 CHUNK = 8192
-"""Poses solved at once: many enough to hide the cost of a call, few enough to stay in the caches."""
+"""Poses per batch: enough to hide the cost of a call, few enough for the caches."""
 
 
 def inverse(geometry: Geometry, poses: ArrayLike, previous_rad: ArrayLike | None = None) -> Solutions:
     """Return all solutions for ``poses``, shape (N, 4, 4) or (4, 4), lengths in the geometry's unit.
 
-    ``previous_rad``, (joints,) or (N, joints), default all zero, decides what a singular pose leaves free. The rotation
-    part must be a rotation, see ``pose.checked``. Raises InputError for an arm outside the class.
+    ``previous_rad``, (joints,) or (N, joints), default zeros, determines the free angles of a singular pose.
+    The rotation part must be a rotation, see ``pose.checked``. Raises InputError for an arm outside the
+    class.
     """
     if geometry.moving is not geometry:
         own = None if previous_rad is None else np.asarray(previous_rad, dtype=float)[..., geometry.core]
@@ -71,7 +72,7 @@ def inverse(geometry: Geometry, poses: ArrayLike, previous_rad: ArrayLike | None
 def inverse_of_pose(
     geometry: Geometry, pose: Sequence[float], previous_rad: Sequence[float] | None = None
 ) -> PoseSolutions:
-    """Return all solutions for one pose with plain numbers alone, several times as fast as by arrays.
+    """Return all solutions for one pose with plain numbers, several times as fast as with arrays.
 
     ``pose``: its 12 or 16 elements in row order; ``previous_rad``: an angle for each joint. Otherwise as ``inverse``.
     """

@@ -1,4 +1,4 @@
-"""What is to say about a pose: its solutions as a table to read and as JSON values."""
+"""The solutions of a pose as a table and as JSON values."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def listings(
 
 
 def lines(answer: Answer) -> Iterator[str]:
-    """Write the table, the chosen solution marked by ``*``, angles in degrees, and where the tool then is."""
+    """The table, with the chosen solution marked by ``*``, angles in degrees, and the tool's pose."""
     if answer.choice:
         yield from _closed_form_lines(answer.choice)
     if answer.search and (answer.success or not answer.choice):
@@ -84,7 +84,7 @@ def _numerical_lines(search: NumericalSolutions) -> Iterator[str]:
 
 
 def _tool_lines(answer: Answer) -> Iterator[str]:
-    """Where the tool then is, and how far from the pose."""
+    """The tool's pose, and its distance from the wanted pose."""
     if not answer.success:
         yield f"nearest posture found, deg:{_row(answer.angles_rad)}"
     position = " ".join(_short(value, 4) for value in answer.tool[:3, 3])
@@ -122,13 +122,13 @@ def _short(value: float, digits: int) -> str:
 
 
 def _words(miss: Miss) -> str:
-    """Rounding is no miss."""
+    """Describe the distance; rounding counts as 0."""
     position, rotation = (0.0 if value < 1e-6 else value for value in miss)
     return f"{position:.3g} mm and {rotation:.3g} deg"
 
 
 def values(answer: Answer) -> dict[str, Any]:
-    """Give the same as JSON values; angles that do not exist are null."""
+    """The answer as JSON values; undefined angles are null."""
     target = answer.target
     found: dict[str, Any] = {
         "pose": [list(row) for row in target.matrix],

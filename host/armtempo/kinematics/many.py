@@ -1,4 +1,4 @@
-"""The library's inverse for many poses at once, of arms of the closed form's class."""
+"""The library's inverse for many poses at once, for arms with a closed form."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from armtempo.model.pose import checked_all
 
 @dataclass(frozen=True, eq=False)
 class ManySolutions:
-    """Joint angles that bring the tool to each of N poses."""
+    """Joint angles for each of N tool poses."""
 
     angles_deg: Array
     """(N, 8, joints): whole turns added to lie in the ranges, nearest to the posture to stay near to; NaN if out of
@@ -32,12 +32,13 @@ class ManySolutions:
     usable: NDArray[np.bool_]
     """(N, 8): within reach and all ranges, and not equal to an earlier one."""
     nearest_deg: Array
-    """(N, joints): the usable one nearest to that posture; NaN if there is none."""
+    """(N, joints): the usable solution nearest to that posture; NaN if there is none."""
 
 
 @checked
 def inverse_many(arm: Arm | Path | str, poses: ArrayLike, near_deg: ArrayLike | None = None) -> ManySolutions:
-    """The eight solutions of each of many poses, some hundred thousand a second; see ``inverse`` for why not.
+    """The eight solutions of each of many poses, some hundred thousand per second; ``inverse`` gives reasons
+    for rejection.
 
     ``poses``: (N, 4, 4) or (N, 3, 4), lengths in mm; ``near_deg``, (joints,) or (J,): the posture to stay near to;
     None: home. Raises InputError for what is not a pose, and for an arm without a closed form.
@@ -47,7 +48,7 @@ def inverse_many(arm: Arm | Path | str, poses: ArrayLike, near_deg: ArrayLike | 
     if reasons := refusals(geometry):
         raise InputError(
             f"arm {arm.name!r} has no closed-form inverse: {'; '.join(reasons)}",
-            "take armtempo.inverse for one pose after the other",
+            "use armtempo.inverse for each pose",
         )
     near = np.array(arm.all_home_deg) if near_deg is None else np.asarray(near_deg, dtype=float)
     if near.ndim != 1:

@@ -1,4 +1,4 @@
-"""The postures that bring the tool of an arm to another place."""
+"""The postures of an arm with the tool at another position."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _SAME_DEG = 0.01
 def moved_tool_deg(arm: Arm, angles_deg: Array, position_mm: Sequence[float]) -> list[Array]:
     """The postures of the driven joints, (J,) each, with the tool at ``position_mm``, nearest to ``angles_deg`` first.
 
-    An arm that drives six joints keeps the orientation of the tool, another one only reaches the place. Raises
-    PlanError, with the reason, if no such posture.
+    With six driven joints the tool's orientation is kept; with fewer only the position is reached. Raises
+    PlanError, with the reason, if there is no such posture.
     """
     solver = PoseSolver(arm)
     before = np.radians(all_angles_deg(arm, np.asarray(angles_deg, dtype=float)))

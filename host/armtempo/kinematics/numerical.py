@@ -19,31 +19,31 @@ from armtempo.model.tool_pose import Pose
 
 LEAST_STARTS, MOST_STARTS = 40, 240
 STARTS_PER_SOLUTION = 12
-"""The search continues until it has started this often for each solution that it found, and once more."""
+"""The search ends after this many starts for each found solution, plus one."""
 
 SAME_RAD = 1e-4
-"""Postures with all joints this near to each other, whole turns aside, are one."""
+"""Tolerance for equal postures, up to whole turns."""
 
 BOUNDED_STARTS = 12
-"""Starts within the ranges for the posture that misses a target by least."""
+"""Starts within the ranges for the posture nearest to an unreachable target."""
 
 MOST_SOLUTIONS = 16
-"""No arm of six revolute joints meets a whole pose in more isolated postures; what has more leaves joints free."""
+"""Largest number of isolated postures of six revolute joints for a complete pose; more means redundancy."""
 
 
 @dataclass(frozen=True)
 class MovingArm:
-    """An arm as the numerical solver sees it."""
+    """An arm with some moving joints, for the numerical solver."""
 
     geometry: Geometry
     """In mm."""
     ranges: Ranges
     moving: tuple[int, ...]
-    """Indices of the joints that move; the others stay where the search starts."""
+    """Indices of the moving joints; the others keep their start angles."""
 
     @classmethod
     def of(cls, arm: Arm) -> MovingArm:
-        """The joints with a motor move."""
+        """An arm whose driven joints move."""
         return cls(Geometry.of(arm), Ranges.of(arm), arm.driven_indices)
 
     @property
@@ -57,7 +57,7 @@ class MovingArm:
         return tuple(self.ranges.ends[joint] for joint in self.moving)
 
     def problem(self, constraint: Constraint, within: bool) -> PoseProblem:
-        """To meet the constraint, ``within`` the ranges or by any angle."""
+        """The problem of a constraint, ``within`` the ranges or with unbounded angles."""
         return PoseProblem(self.geometry, constraint, self.moving, self.bounds if within else None)
 
     def placed(self, angles_rad: Sequence[float], previous_rad: Sequence[float]) -> list[float]:
@@ -66,19 +66,19 @@ class MovingArm:
         return [placed[i] if i in self.moving else angle for i, angle in enumerate(angles_rad)]
 
     def underdetermined(self, target: Pose) -> bool:
-        """Whether more joints move than the target asks numbers for: then it leaves a choice of postures."""
+        """Whether more joints move than the target has constraints."""
         return len(self.moving) > target.constraints
 
 
 @dataclass(frozen=True, eq=False)
 class NumericalSolution:
-    """A posture that the search found."""
+    """A posture found by the search."""
 
     angles_rad: list[float]
     """(joints,): whole turns added to lie in the ranges, nearest to the previous posture."""
     miss: Miss
     rejections: tuple[Rejection, ...]
-    """Why it cannot be used: joints out of range; empty if it can."""
+    """The reasons for rejection: joints out of range; empty if it is usable."""
     distance_rad: float
     """Root of the sum of squares of the joints' ways from the previous posture."""
 
@@ -90,31 +90,31 @@ class NumericalSolution:
 
 @dataclass(frozen=True)
 class NumericalSolutions:
-    """What the search found for one target."""
+    """The result of the search for one target."""
 
     arm: MovingArm
     target: Pose
     solutions: tuple[NumericalSolution, ...]
-    """Each meets the target within its tolerances; those that can be used first, nearest first."""
+    """Postures within the tolerances; usable ones first, nearest first."""
     nearest: NumericalSolution
-    """The chosen one; where none can be used, the posture within the ranges that misses the target by least."""
+    """The chosen posture; if none is usable, the posture within the ranges nearest to the target."""
     starts: int
-    """Postures started from."""
+    """Number of starts."""
 
     @property
     def chosen(self) -> NumericalSolution | None:
-        """Of the solutions that can be used, the nearest to the previous posture."""
+        """The usable solution nearest to the previous posture."""
         usable = self.solutions and not self.solutions[0].rejections
         return self.solutions[0] if usable else None
 
     @property
     def leaves_free(self) -> bool:
-        """Whether there are more postures than can be listed, one turning into the next."""
+        """Whether there is a continuum of postures."""
         return self.arm.underdetermined(self.target) or len(self.solutions) >= MOST_SOLUTIONS
 
     @property
     def reason(self) -> str:
-        """Why no posture can be used, and what to do; empty if one can."""
+        """Why no posture is usable, and what to do; "" if one is."""
         if self.chosen:
             return ""
         return why_not(self) + (table(each.rejections for each in self.solutions) if self.solutions else "")
@@ -123,8 +123,8 @@ class NumericalSolutions:
 def search(arm: MovingArm, target: Pose, previous_rad: Sequence[float], seed: int = 0) -> NumericalSolutions:
     """Search the postures that meet ``target``, from ``previous_rad``, (joints,), and from random postures.
 
-    The same ``seed`` gives the same answer. A target that leaves joints free gets the one posture that the
-    descent from ``previous_rad`` leads to, or the first one found.
+    The same ``seed`` gives the same answer. For a redundant arm it returns the one posture of the descent
+    from ``previous_rad``, or the first one found.
     """
     previous = [float(angle) for angle in previous_rad]
     problem = arm.problem(Constraint.of(target), arm.underdetermined(target))
@@ -149,7 +149,7 @@ def search(arm: MovingArm, target: Pose, previous_rad: Sequence[float], seed: in
 def descents(
     arm: MovingArm, target: Pose, previous_rad: Sequence[float], starts_rad: Sequence[Sequence[float]]
 ) -> list[NumericalSolution]:
-    """The postures within the ranges that meet ``target``, of those that descents from the starts lead to."""
+    """The results of descents from the starts that meet ``target`` within the ranges."""
     problem, previous = arm.problem(Constraint.of(target), within=True), list(previous_rad)
     found: list[NumericalSolution] = []
     for start in starts_rad:
@@ -160,7 +160,7 @@ def descents(
 
 
 def _starts(arm: MovingArm, previous: list[float], seed: int) -> Iterator[list[float]]:
-    """The previous posture, then random ones: within the ranges, or within a turn where a range is wider."""
+    """The previous posture, then random ones: within the ranges, or within a turn if a range is wider."""
     yield previous
     rng = np.random.default_rng(seed)
     ends = [(low, min(high, low + math.tau)) for low, high in arm.bounds]
@@ -196,7 +196,7 @@ def _same(one: NumericalSolution, other: NumericalSolution) -> bool:
 
 
 def _least_miss(arm: MovingArm, target: Pose, previous: list[float], seed: int) -> NumericalSolution:
-    """The posture within the ranges that misses the target by least, of those that a few starts lead to."""
+    """The posture within the ranges nearest to the target, from a few starts."""
     problem = arm.problem(Constraint.of(target), within=True)
     best = descend(problem, previous)
     for _, start in zip(range(BOUNDED_STARTS), _starts(arm, previous, seed), strict=False):
@@ -207,7 +207,7 @@ def _least_miss(arm: MovingArm, target: Pose, previous: list[float], seed: int) 
 
 
 def why_not(answer: NumericalSolutions) -> str:
-    """Say why no posture can be used, and what to do."""
+    """Why no posture is usable, and what to do."""
     target, miss = answer.target, answer.nearest.miss
     where = " within the joint ranges" if answer.solutions else ""
     return (
@@ -229,4 +229,4 @@ def _next_step(answer: NumericalSolutions) -> str:
 
 
 FITTING = {4: "position and pitch", 5: "position and approach, or position, roll and pitch"}
-"""Poses that ask for as many numbers as the joints can give."""
+"""Suitable constraints by number of moving joints."""

@@ -1,4 +1,4 @@
-"""The kinematics of an arm in degrees and millimetres: what the library offers of this package."""
+"""The kinematics of an arm in degrees and millimetres: the public functions of this package."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from armtempo.model.pose import checked_rows
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 
 _MARGIN_DEG, _MARGIN_TOLERANCES = 5.0, 50.0
-"""No tolerance makes up for a joint outside its range by more than that, or by this many times the tolerance."""
+"""Largest excess over a range, degrees and in tolerances, for which a posture in range is searched."""
 _SWINGS = 3.0
-"""A joint that is outside its range by this many times what the tolerance lets it turn, to first order, stays out."""
+"""A joint out of range by more than this times its first-order change within the tolerance is rejected."""
 _BEHIND_RAD = 1e6
-"""Farther than any usable posture is."""
+"""Larger than the distance of any usable posture."""
 _COST = 2.0
-"""Of a posture at the edge of both tolerances, as ``descent`` counts it."""
+"""Cost (as in ``descent``) of a posture at the limit of both tolerances."""
 
 
 class Solution:
-    """Joint angles that bring the tool to a pose."""
+    """Joint angles for a pose of the tool."""
 
     __slots__ = ("_found", "usable")
 
@@ -57,27 +57,27 @@ class Solution:
 
     @property
     def branch(self) -> str:
-        """Which of the arm's configurations it is; empty for one that was found numerically."""
+        """The branch of the arm; "" for a numerical solution."""
         return str(self._found.branch) if isinstance(self._found, Candidate) else ""
 
     @property
     def rejections(self) -> tuple[str, ...]:
-        """Why it cannot be used: out of reach, out of a joint's range; empty for one that can."""
+        """The reasons for rejection: out of reach, out of a joint's range; empty if usable."""
         return tuple(reason.text for reason in self._found.rejections)
 
     @property
     def distance_deg(self) -> float:
-        """From the posture to stay near to: root of the sum of squares over the joints."""
+        """Euclidean distance in joint space from the posture to stay near to, degrees."""
         return math.degrees(self._found.distance_rad)
 
     @property
     def miss_mm(self) -> float:
-        """How far the tool then is from the pose, within its tolerance; 0 with the closed form."""
+        """Distance of the tool from the pose, mm, within its tolerance; 0 with the closed form."""
         return 0.0 if isinstance(self._found, Candidate) else self._found.miss.position_mm
 
     @property
     def miss_deg(self) -> float:
-        """The same for what the pose asks of the orientation."""
+        """Rotation of the tool from the constrained orientation, degrees, within its tolerance."""
         return 0.0 if isinstance(self._found, Candidate) else self._found.miss.rotation_deg
 
 
@@ -85,8 +85,9 @@ class Solution:
 def forward(arm: Arm | Path | str, angles_deg: ArrayLike) -> Array:
     """The tool's pose, Eq. (1): (..., 4, 4), lengths in mm, in the frame of the base.
 
-    ``arm``: or its file or name. ``angles_deg``: of all joints, (..., joints), or of the driven ones, (..., J), with
-    the others at their home angles. Raises InputError for another number of angles.
+    ``arm``: an arm, its file, or the name of a shipped arm. ``angles_deg``: of all joints, (..., joints), or
+    of the driven ones, (..., J), with the others at their home angles. Raises InputError for another number
+    of angles.
     """
     arm = Arm.shape(arm)
     return forward_rad(Geometry.of(arm), np.radians(spread_deg(arm, angles_deg)))
@@ -96,14 +97,14 @@ def forward(arm: Arm | Path | str, angles_deg: ArrayLike) -> Array:
 def inverse(
     arm: Arm | Path | str, pose: Pose | ArrayLike, near_deg: ArrayLike | None = None
 ) -> tuple[Solution, ...]:
-    """All solutions for a pose of the tool: those that can be used first, the nearest to ``near_deg`` first.
+    """All solutions for a pose of the tool: usable ones first, the nearest to ``near_deg`` first.
 
-    ``pose``: (4, 4) or (3, 4), lengths in mm, or a Pose, which may ask for less than the whole orientation.
-    ``near_deg``, (joints,) or (J,), is the posture to stay near to; None: home. A whole pose of an arm of the
-    closed form's class has eight solutions, some perhaps rejected. Any other arm or pose gets what a numerical
-    search finds with the joints that have a motor, perhaps nothing: of a pose that asks for fewer numbers than joints
-    move the one that the search comes to first, else all, but at most 16 where one turns into the next, as at a
-    singular pose. Raises InputError for a matrix that is not a pose.
+    ``pose``: (4, 4) or (3, 4), lengths in mm, or a Pose, possibly with a partial orientation. ``near_deg``,
+    (joints,) or (J,): the posture to stay near to; None: home. A complete pose of an arm with a closed form
+    has eight solutions, of which some may be rejected. For any other arm or pose, the result is that of a
+    numerical search with the driven joints, possibly empty: one solution if the arm is redundant for the
+    pose, else all, but at most 16 of a continuum, as at a singular pose. Raises InputError for a matrix that
+    is not a pose.
     """
     solver = _solver(arm)
     near = solver.home_rad if near_deg is None else tuple(_posture(solver.arm, near_deg).tolist())
@@ -123,7 +124,7 @@ def _listed(found: Sequence[Candidate | NumericalSolution]) -> tuple[Solution, .
 
 
 def _order(one: Candidate | NumericalSolution) -> float:
-    """Usable ones first, nearest first; last those that are out of reach."""
+    """Sort key: usable solutions first, nearest first; unreachable ones last."""
     distance = one.distance_rad
     if one.usable:
         return distance
@@ -134,7 +135,7 @@ _kept: tuple[Arm, PoseSolver] | None = None
 
 
 def _solver(arm: Arm | Path | str) -> PoseSolver:
-    """That of an arm, kept for its next pose."""
+    """The solver of an arm, cached for its next pose."""
     global _kept
     if _kept and _kept[0] is arm:
         return _kept[1]
@@ -147,8 +148,7 @@ def _solver(arm: Arm | Path | str) -> PoseSolver:
 def _within_tolerance(
     solver: PoseSolver, choice: Choice, given: Pose | None, near: Sequence[float]
 ) -> list[NumericalSolution]:
-    """Postures in range near to the exact ones, where a joint is so little out of range, or the pose out of reach,
-    that the tolerance may make up for it."""
+    """Postures in range within the pose's tolerance, if the exact ones are only slightly out of range or reach."""
     tolerance_mm, tolerance_deg = (
         (given.tolerance_mm, given.tolerance_deg) if given else (TOLERANCE_MM, TOLERANCE_DEG)
     )

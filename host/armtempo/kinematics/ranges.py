@@ -13,7 +13,7 @@ from armtempo.basics.arrays import Array
 from armtempo.model.arm import Arm
 
 TOLERANCE_RAD = 1e-9
-"""An angle this little outside its range is set onto the end of the range."""
+"""An angle outside its range by less than this is set to the end of the range."""
 
 
 def placed(angle: float, low: float, high: float, previous: float) -> float:
@@ -81,7 +81,7 @@ class Ranges:
         return self.fitted(angles, previous)[0]
 
     def fitted(self, angles: Sequence[float], previous: Sequence[float]) -> tuple[list[float], float]:
-        """The same, and how far the joint that is farthest outside is so then; 0 where all are inside."""
+        """As ``placed``, and the largest excess over a range; 0 if all are inside."""
         found, most = [], 0.0
         for angle, (low, high, near), before in zip(angles, self._whole, previous, strict=True):
             if not (low <= angle <= high and -near < angle - before < near):
@@ -91,7 +91,7 @@ class Ranges:
         return found, most
 
     def excess(self, angles: Sequence[float]) -> list[float]:
-        """How far angles lie outside: negative below the range, positive above it, 0 inside."""
+        """Excess of angles over their ranges: negative below, positive above, 0 inside."""
         return [
             min(angle - low, 0.0) + max(angle - high, 0.0)
             for angle, (low, high) in zip(angles, self.ends, strict=True)

@@ -1,4 +1,4 @@
-"""Why a solution is not to be had: each reason with its numbers and as a sentence."""
+"""Reasons for the rejection of a solution, as numbers and as text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Rejection:
     """"unreachable", "duplicate" or "range"."""
     text: str
     amount: float = 0.0
-    """How far: a length for "unreachable", degrees for "range" (negative below the range)."""
+    """Excess: a length for "unreachable", degrees for "range" (negative below the range)."""
     joint: int | None = None
     """For "range": 1 to 6."""
     inequality: int | None = None
@@ -40,7 +40,7 @@ class Rejection:
 
 @dataclass(frozen=True, eq=False)
 class WristCentre:
-    """The wrist centre that a pose asks for, as the regions of Fig. 3 see it."""
+    """The wrist centre of a pose, for the regions of Fig. 3."""
 
     shape: Shape
     position: tuple[float, float, float]
@@ -63,7 +63,7 @@ class WristCentre:
 
     @property
     def beyond(self) -> float:
-        """By how much the way of turning the base that is least out of reach is so; inf where none is."""
+        """Least excess over the reach, front or rear; inf if neither is out of reach."""
         if math.isnan(self._from_shoulder[0]):
             return abs(self.shape.offset) - math.hypot(*self.position[:2])
         gaps = [max(r - self.shape.farthest, self.shape.nearest - r) for r in self._from_shoulder]
@@ -100,7 +100,7 @@ def _in_offset(shape: Shape, planar: float, unit: str) -> Rejection:
 
 
 def _outer_line(shape: Shape, z: float) -> int:
-    """Line 2 or 3 of Eq. (3) where the wrist centre is too low or too high for any distance from axis 1."""
+    """Line 2 or 3 of Eq. (3) if the wrist centre is too low or too high for any distance from axis 1."""
     highest = math.sqrt(max(shape.farthest**2 - shape.shoulder**2, 0.0))
     if z <= shape.height - highest:
         return 2
@@ -134,7 +134,7 @@ def _range_text(ranges: Ranges, joint: int, angle: float) -> str:
 def reasons(
     wrist: WristCentre, solutions: PoseSolutions, index: int, ranges: Ranges, placed: Sequence[float]
 ) -> tuple[Rejection, ...]:
-    """Collect everything against solution ``index``, 0 to 7, with angles (6,) from ``Ranges.placed``."""
+    """All reasons against solution ``index``, 0 to 7, with angles (6,) from ``Ranges.placed``."""
     outcome = solutions.outcome[index]
     if outcome in OUT_OF_REACH:
         return (wrist.unreachable(index, outcome),)

@@ -1,8 +1,8 @@
-"""Which arms the closed form serves, and the constants it needs of them.
+"""The class of arms with a closed form, and their constants.
 
-The paper's class: shoulder axis square to the base axis, elbow axis parallel to the shoulder axis, and three
-wrist axes that meet in one point at right angles. Signs of the twists, a1, a2, a3, d1, d4, the shoulder
-offsets d2 and d3, and the whole last row (d6, a6, alpha6) are free.
+The paper's class: shoulder axis perpendicular to the base axis, elbow axis parallel to the shoulder axis, and
+three perpendicular wrist axes that intersect in one point. Signs of the twists, a1, a2, a3, d1, d4, the
+shoulder offsets d2 and d3, and the whole last row (d6, a6, alpha6) are free.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Shape:
     bend: float
     """Angle of L34 against the elbow's x axis, in rad: arctan(d4 / a3) of Eq. (7), with its signs."""
     turn2: float
-    """Half a turn where a2 is negative, else 0."""
+    """Half a turn if a2 is negative, else 0."""
     sign1: float
     sign2: float
     """+1 if alpha2 is 0, -1 if it is half a turn."""
@@ -139,9 +139,9 @@ class Shape:
 
 
 def refusals(geometry: Geometry) -> list[str]:
-    """Say why the closed form does not serve ``geometry``, one reason a line; empty if it does.
+    """The reasons why ``geometry`` has no closed form; empty if it has one.
 
-    Rows at the base and at the tool that never turn do not count.
+    Constant rows at the base and at the tool are ignored.
     """
     geometry = geometry.moving
     if geometry.joints != 6:

@@ -1,7 +1,7 @@
-"""All eight solutions of one pose with floats alone, for callers that ask for one pose at a time.
+"""All eight solutions of one pose with floats.
 
-The formulas are those of the arrays; here is only what they leave to the caller: borders, singular poses and
-the order of the solutions. About 30 us a pose, where numpy's calls take 200.
+It uses ``formulas`` and handles borders, singular poses and the order of the solutions. About 30 us per pose,
+with numpy 200 us.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ NOWHERE = (math.nan,) * 6
 
 
 class _Plane(NamedTuple):
-    """The tool's axes seen from the arm's plane, for one way of turning the base."""
+    """The tool's axes relative to the arm's plane, for one direction of the base."""
 
     theta1: float
     along: Three
@@ -42,7 +42,7 @@ class _Plane(NamedTuple):
 def solve_pose(shape: Shape, pose: Sequence[float], previous: Sequence[float]) -> PoseSolutions:
     """Find the solutions for a pose as its 12 or 16 elements in row order.
 
-    ``previous``, 6 Denavit-Hartenberg angles, decides what a singular pose leaves free.
+    ``previous``, 6 Denavit-Hartenberg angles, determines the free angles of a singular pose.
     """
     n_x, o_x, a_x, p_x, n_y, o_y, a_y, p_y, n_z, o_z, a_z, p_z = pose[:12]
     x = formulas.wrist_centre(shape, n_x, o_x, a_x, p_x)
@@ -157,7 +157,7 @@ def _leave_out(found: PoseSolutions, outcome: int, count: int) -> None:
 
 
 def _mark_axis(found: PoseSolutions, shape: Shape) -> None:
-    """Wrist centre on axis 1, or on the border of the shoulder offset: there front and rear are one."""
+    """Mark a wrist centre on axis 1, or on the border of the shoulder offset, where front and rear coincide."""
     if not shape.offset:
         found.singular[:] = [bits | ON_AXIS_1 for bits in found.singular]
         return

@@ -1,4 +1,4 @@
-"""What the closed form answers: angles of the eight solutions, the outcome of each, and what is singular."""
+"""Results of the closed form: angles of the eight solutions, their outcomes, and singularities."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ OK, TOO_FAR, TOO_NEAR, IN_OFFSET, DUPLICATE = range(5)
 """The outcome of a solution: there, or Eq. (3) violated at the outer or inner border, or the wrist centre
 nearer to axis 1 than the shoulder offset, or equal to an earlier solution."""
 OUT_OF_REACH = TOO_FAR, TOO_NEAR, IN_OFFSET
-"""Those that have no angles."""
+"""Outcomes without angles."""
 
 ON_AXIS_1, ELBOW_STRETCHED, WRIST_STRAIGHT = 1, 2, 4
 """Bits of ``singular``."""

@@ -1,7 +1,7 @@
-"""From a target to angles, whatever the arm: by the closed form where it serves, else numerically.
+"""Inverse kinematics of any arm: by the closed form if it has one, else numerically.
 
-``PoseSolver.nearest`` is for loops that follow a moving target (a jog in tool space): one answer, near to where
-the arm is. ``PoseSolver.solve`` finds all postures and says why some are not to be had.
+``PoseSolver.nearest`` is for following a moving target (a jog in tool space): one answer, near the present
+posture. ``PoseSolver.solve`` finds all postures, with reasons for rejected ones.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ CLOSED_FORM, NUMERICAL = "closed form", "numerical"
 
 @dataclass(frozen=True)
 class Nearest:
-    """The posture that meets a target nearest to where the arm is, or why there is none."""
+    """The posture that meets a target nearest to the start, or why there is none."""
 
     success: bool
     angles_rad: tuple[float, ...]
-    """(joints,), within the ranges; without success the posture that comes nearest to the target from there."""
+    """(joints,), within the ranges; without success the nearest approach to the target."""
     miss: Miss
-    """How far the tool then is from the target, in mm and deg."""
+    """Distance of the tool from the target, in mm and deg."""
     change_rad: float
-    """Largest change of a joint from the start: where it is large, the arm would change its branch."""
+    """Largest change of a joint from the start; a large one means a change of branch."""
     reason: str
-    """Why not; empty with success."""
+    """Reason of a failure; "" with success."""
     method: str
     """CLOSED_FORM or NUMERICAL."""
 
@@ -54,32 +54,32 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """All that is known of a target's postures."""
+    """The postures of a target."""
 
     target: Pose
     choice: Choice | None
-    """The eight solutions of the closed form, where it was asked."""
+    """The eight solutions of the closed form, if used."""
     search: NumericalSolutions | None
-    """What the numerical search found, where it was asked, or where none of the eight can be used."""
+    """The result of the numerical search, if used: without a closed form, or if none of the eight is usable."""
     angles_rad: tuple[float, ...]
-    """(joints,): the posture chosen; without success the one that comes nearest to the target."""
+    """(joints,): the chosen posture; without success the nearest approach to the target."""
     tool: Array
     """(4, 4): the pose that these angles lead to, lengths in mm."""
     miss: Miss
-    """How far it is from the target."""
+    """Its distance from the target."""
     miss_driven: Miss
-    """How far the tool is if only the joints with a motor take these angles and the others stay at home."""
+    """Distance of the tool with the undriven joints at home."""
     reason: str
-    """Why no posture can be used, and what to do; empty if one can."""
+    """Why no posture is usable, and what to do; "" if one is."""
 
     @property
     def success(self) -> bool:
-        """Whether a posture can be used."""
+        """Whether a posture is usable."""
         return not self.reason
 
     @property
     def usable_deg(self) -> list[tuple[float, ...]]:
-        """Every posture that can be used, (joints,) each, the nearest to the previous one first."""
+        """All usable postures, (joints,) each, the nearest to the previous one first."""
         found: list[Candidate | NumericalSolution] = []
         found += self.choice.candidates if self.choice else ()
         found += self.search.solutions if self.search else ()
@@ -126,9 +126,8 @@ class PoseSolver:
     def nearest(self, target: Pose, start_rad: Sequence[float]) -> Nearest:
         """The posture that meets ``target`` nearest to ``start_rad``, (joints,): well under a millisecond.
 
-        Joints without a motor stay where they start. Arms of the closed form's class with six driven joints get
-        the nearest of all solutions; others the one that a descent from the start leads to, and no other is
-        looked for.
+        Joints without a motor keep their start angles. An arm with a closed form and six driven joints gets
+        the nearest of all solutions; others the result of one descent from the start.
         """
         start = self._checked(start_rad)
         if target.fixed == WHOLE and not self.refusals and len(self.moving.moving) == 6:
@@ -151,8 +150,8 @@ class PoseSolver:
     def solve(self, target: Pose, previous_rad: Sequence[float], numerically: bool = False) -> Answer:
         """All postures that meet ``target``, the one nearest to ``previous_rad``, (joints,), chosen.
 
-        A whole pose is solved by the closed form where it serves the arm, unless ``numerically``, with all joints
-        moving. Otherwise the joints with a motor move, and all only where a whole pose needs them.
+        A complete pose is solved by the closed form if the arm has one, unless ``numerically``, with all
+        joints moving. Otherwise the driven joints move, and all joints only if a complete pose needs them.
         """
         previous = self._checked(previous_rad)
         choice = None

@@ -1,7 +1,7 @@
 """Joints 4 to 6 from many orientations: the algebraic half of section 2.1, Eqs. (8) to (11).
 
-Where the paper divides by sin(theta4) or sin(theta5), this takes both sine and cosine of each angle from
-Eq. (8) and their arctan2: no quadrant to guess and nothing to divide by near zero.
+Unlike the paper, which divides by sin(theta4) or sin(theta5), this computes sine and cosine of each angle
+from Eq. (8) and their arctan2, so the quadrant is defined and there is no division by a value near zero.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class WristPart(NamedTuple):
 def solve_wrist(shape: Shape, arm: ArmPart, axes: Array, previous4: Array) -> WristPart:
     """Find joints 4 to 6 for orientations ``axes``: (3, 3, N), [axis n, o, a of Eq. (1), component].
 
-    ``previous4``, (N,) or (), is the Denavit-Hartenberg angle theta4 to keep where theta5 = 0.
+    ``previous4``, (N,) or (), is the Denavit-Hartenberg angle theta4 to keep if theta5 = 0.
     """
     fore = arm.fore
     in_plane = [formulas.in_arm_plane(*arm.turn1, x, y) for x, y, _ in axes]

@@ -175,9 +175,14 @@ class Arm:
         return self._number("input", name, [entry.name for entry in self.inputs])
 
     def holding(self, load: str | None) -> Arm:
-        """The arm with a load of its file in its tool, "", "nothing" or None: with none; InputError for another."""
-        if not load or load == NOTHING:
-            return self if self.held is None else replace(self, held=None)
+        """The arm with a load of its file in its tool; "nothing": with none, "" or None: as it is.
+
+        InputError if it has no such load.
+        """
+        if not load:
+            return self
+        if load == NOTHING:
+            return replace(self, held=None)
         return replace(self, held=self.loads[self._number("load", load, [each.name for each in self.loads])])
 
     def _number(self, what: str, name: str, names: list[str]) -> int:

@@ -205,7 +205,7 @@ class Job:
 
 
 def held(top: Table, arm: Arm) -> str:
-    """``holds``: a load of the arm, or "nothing"; "" where it is not given."""
+    """``holds``: a load of the arm, or "nothing"; "" if it is not given."""
     name = top.text("holds") if top.has("holds") else ""
     try:
         arm.holding(name)

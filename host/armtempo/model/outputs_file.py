@@ -8,6 +8,7 @@ from typing import Any
 from armtempo_shared.limits import MAX_INPUTS, MAX_OUTPUTS
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.text import is_number
 from armtempo.basics.toml_table import Table
 from armtempo.model.outputs import KINDS, PWM, SERVO, SWITCH, Input, Output
 
@@ -81,7 +82,7 @@ def _states(output: Output, table: Table | None) -> tuple[tuple[str, float], ...
         return ()
     found = []
     for name in table.rest():
-        if not _NAME.fullmatch(name) or _is_number(name):
+        if not _NAME.fullmatch(name) or is_number(name):
             raise table.fail(name, "states with names of letters, digits, '-' and '_'")
         found.append((name, _checked(output, table, name, table.number(name))))
     return tuple(found)
@@ -122,11 +123,3 @@ def pin(table: Table, key: str = "pin", allowed: str = _PIN_WORDS) -> str:
     if not _PIN.fullmatch(found):
         raise table.fail(key, allowed)
     return found
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -20,7 +20,7 @@ from armtempo.new_arm.urdf_reader import Chain, TurningJoint
 from armtempo.new_arm.urdf_rows import DhRow, geometry
 
 _STILL_DEG = 0.001
-"""Half the range of a row that never moves: an arm file wants a range, and this one is none."""
+"""Half the range of a constant row, as an arm file requires a range."""
 
 _HEAD = """\
 # Imported from {source}, robot {robot}: from link {base} to link {tip}.
@@ -69,7 +69,7 @@ def arm_text(chain: Chain, fit: Fit, urdf: Path) -> str:
 
 
 def _joint(row: DhRow, chain: Chain, frame: Array, first: bool, radius_mm: float | None) -> str:
-    """Its table; ``frame``: after the row, all joints at 0."""
+    """The table of a row; ``frame``: the frame after the row, all joints at 0."""
     if row.joint is None:
         name = "base" if first else "tool"
         return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves", radius_mm)
@@ -92,7 +92,7 @@ def _dynamics(body: Dynamics) -> str:
 
 
 def _digits(value: float | tuple[float, ...]) -> str:
-    """A number, or a list of them, with as many digits as count."""
+    """A number, or a list of numbers, with the significant digits."""
     if isinstance(value, tuple):
         return f"[{', '.join(map(_digits, value))}]"
     return repr(float(f"{value:.7g}") + 0.0)
@@ -132,13 +132,13 @@ def _placeholders(channel: int, joint: TurningJoint) -> str:
 
 
 def _inside(range_deg: tuple[float, float]) -> tuple[float, float]:
-    """The range with four decimals, never wider than it was (but for what rad and degrees lose)."""
+    """The range with four decimals, rounded inwards."""
     low, high = range_deg
     return math.ceil(low * 1e4 - 0.01) / 1e4 + 0.0, math.floor(high * 1e4 + 0.01) / 1e4 + 0.0
 
 
 def _one_line(name: str) -> str:
-    """A name as an arm file takes it: a blank for each character that does not show."""
+    """A name for an arm file: unprintable characters become blanks."""
     return "".join(character if character.isprintable() else " " for character in name).strip()
 
 

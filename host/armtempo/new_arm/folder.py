@@ -1,4 +1,4 @@
-"""The files of a new project folder, written all or none; its arm file from a shipped arm, a URDF, or single joints."""
+"""The files of a new project folder, written atomically; its arm file from a shipped arm, a URDF, or single joints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armtempo.new_arm import joint_entry
 from armtempo.new_arm.joint_entry import JointEntry
 
 _SETTINGS = """\
-# What commands in this folder use where an option does not say otherwise; 'armtempo config' shows it.
+# What commands in this folder use if an option does not say otherwise; 'armtempo config' shows it.
 arm = "arm.toml"
 job = "first.toml"
 port = {port}
@@ -70,17 +70,17 @@ _PAGE = """\
 
 @dataclass(frozen=True)
 class ArmText:
-    """An arm file that is yet to be written."""
+    """The text of an arm file, not yet written."""
 
     text: str
     arm: Arm
-    """What the reader makes of it."""
+    """The arm read from the text."""
 
 
 def from_shipped(name: str) -> ArmText:
-    """The file of an arm that ships, to be changed to the user's own motors and wiring.
+    """The file of a shipped arm, to be adapted to the user's motors and wiring.
 
-    Raises InputError, naming those that ship, for another name.
+    Raises InputError, with the names of the shipped arms, for another name.
     """
     files = shipped.files()
     if name not in files:
@@ -91,7 +91,7 @@ def from_shipped(name: str) -> ArmText:
 
 
 def from_urdf(urdf: Path) -> ArmText:
-    """The arm of a URDF; its motors are left as comments. Raises InputError as ``urdf.reader`` does."""
+    """The arm of a URDF; its motors are left as comments. Raises InputError as ``urdf_reader`` does."""
     from armtempo.new_arm import arm_text
     from armtempo.new_arm import urdf_fitting as fitting
     from armtempo.new_arm import urdf_reader as reader
@@ -101,7 +101,7 @@ def from_urdf(urdf: Path) -> ArmText:
 
 
 def from_joints(name: str, joints: Sequence[JointEntry], modified: bool = False) -> ArmText:
-    """An arm of these joints, base first. Raises InputError for what an arm file does not allow.
+    """An arm of these joints, base first. Raises InputError for values that an arm file does not allow.
 
     ``modified``: ``a_mm`` and ``alpha_deg`` of a joint are those from the axis before to its own, as in J. J. Craig,
     Introduction to Robotics, section 3.4. In an arm file they belong to the row before; to a constant one at the base.
@@ -121,14 +121,14 @@ def from_joints(name: str, joints: Sequence[JointEntry], modified: bool = False)
 
 
 def _checked(text: str) -> ArmText:
-    """Raises InputError for a text that could not be read again."""
+    """Raise InputError for a text that could not be read again."""
     return ArmText(text, Arm.of_table(toml_table.parse(text, "arm.toml")))
 
 
 def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
-    """Make ``folder`` with the files of a project; gives their paths.
+    """Make ``folder`` with the files of a project; returns their paths.
 
-    Raises InputError if the folder is there and not empty, or cannot be written; nothing is left then.
+    Raises InputError, leaving nothing, if the folder exists and is not empty, or cannot be written.
     """
     check_free(folder)
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
@@ -144,13 +144,13 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
 
 
 def check_free(folder: Path) -> None:
-    """InputError if the folder is there and not empty."""
+    """Raise InputError if the folder exists and is not empty."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: already exists and is not empty", "choose another name")
 
 
 def _put(folder: Path, files: dict[str, str]) -> None:
-    """Written next to the folder, then put in its place in one step."""
+    """Write the files to a temporary folder, then rename it."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
     try:
@@ -165,7 +165,7 @@ def _put(folder: Path, files: dict[str, str]) -> None:
 
 
 def _rows(arm: Arm) -> str:
-    """Via points: home, then towards the farther end of each range."""
+    """Via points: home, then positions towards the farther end of each range."""
     rows = []
     for share in (0.0, 1 / 6, 1 / 3):
         angles = []

@@ -1,4 +1,4 @@
-"""One joint as a user gives it: the arm file's keys, with defaults and figures that help to choose."""
+"""One joint as a user describes it: the arm file's keys, defaults, and values that help to choose."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 from armtempo.basics.errors import InputError
 
 MOTOR_RPM = 300.0
-"""Speed up to which a common hybrid stepper (NEMA 17, 24 V) keeps most of its torque: a default, no promise."""
+"""Speed up to which a common hybrid stepper (NEMA 17, 24 V) keeps most of its torque; only a default."""
 
 
 @dataclass(frozen=True)
@@ -28,19 +28,19 @@ class JointEntry:
     microsteps: int = 16
     gear_ratio: float = 1.0
     speed_deg_s: float | None = None
-    """None: what ``most_speed_deg_s`` allows, or 60 if that is less."""
+    """None: 60, or the value of ``most_speed_deg_s`` if that is less."""
     encoder_counts: int = 0
-    """Counts for a turn of the joint; 0: no encoder."""
+    """Counts per turn of the joint; 0: no encoder."""
     parallel_linkage: bool = False
     """A parallelogram turns it: see the arm file's key."""
 
     @property
     def steps_per_deg(self) -> float:
-        """Steps for a degree of the joint."""
+        """Steps per degree of the joint."""
         return self.steps_per_rev * self.microsteps * self.gear_ratio / 360.0
 
     def most_speed_deg_s(self, joints: int) -> float:
-        """The speed that the board's step rate, shared by that many joints, and MOTOR_RPM allow, degrees/s."""
+        """The highest speed by MOTOR_RPM and the board's step rate divided by ``joints``, degrees/s."""
         rate = min(MAX_STEP_RATE, MAX_STEP_RATE_SUM / joints)
         return min(rate / self.steps_per_deg, MOTOR_RPM * 6.0 / self.gear_ratio)
 
@@ -82,7 +82,7 @@ def _number(number: int, key: str, value: str) -> float | int:
 
 
 def table(entry: JointEntry, channel: int, joints: int) -> str:
-    """The joint's ``[[joint]]`` table of an arm file of that many joints."""
+    """The joint's ``[[joint]]`` table in an arm file of ``joints`` joints."""
     most = entry.most_speed_deg_s(joints)
     speed = min(60.0, float(f"{0.9 * most:.2g}")) if entry.speed_deg_s is None else entry.speed_deg_s
     lines = [
@@ -106,5 +106,5 @@ def table(entry: JointEntry, channel: int, joints: int) -> str:
 
 
 def constant(name: str, a_mm: float, alpha_deg: float) -> str:
-    """The table of a row that never moves."""
+    """The table of a constant row."""
     return f'[[joint]]\nname = "{name}"\nd_mm = 0.0\na_mm = {a_mm!r}\nalpha_deg = {alpha_deg!r}\nfixed_deg = 0.0\n'

@@ -1,4 +1,4 @@
-"""What ``armtempo new`` asks: each question with its explanation, an example, and what its answer must be."""
+"""The questions of ``armtempo new``, with explanations, examples, and checks of the answers."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ CONVENTIONS = """\
     row i: turn theta, go d along axis i;   row i: go a, turn alpha from axis i-1;
            go a, turn alpha to axis i+1            turn theta, go d along axis i
 """
-"""Where the frame of a row is, and which axis its four figures belong to."""
+"""The frames of a row in both conventions, and the axes of its four parameters."""
 
 Answers = dict[str, str]
-"""What was answered, by the question's key, in the order of the questions."""
+"""Answers by the question's key, in the order of the questions."""
 Reader = Callable[[str], object]
 
 
@@ -40,7 +40,7 @@ class WrongAnswerError(ValueError):
 
 @dataclass(frozen=True)
 class Question:
-    """One question; ``read`` gives the answer's value or raises WrongAnswerError."""
+    """One question; ``read`` returns the answer's value or raises WrongAnswerError."""
 
     key: str
     text: str
@@ -50,7 +50,7 @@ class Question:
 
 
 def following(answers: Mapping[str, str]) -> Question | None:
-    """The question that comes after these answers; None if all is answered."""
+    """The next question after these answers; None if all are answered."""
     for question in _all(answers):
         if question.key not in answers:
             return question
@@ -58,7 +58,7 @@ def following(answers: Mapping[str, str]) -> Question | None:
 
 
 def joints(answers: Mapping[str, str]) -> list[JointEntry]:
-    """The joints that were described, base first."""
+    """The described joints, base first."""
     found = []
     for number in range(1, int(answers["count"]) + 1):
         of_joint = {
@@ -195,7 +195,7 @@ class _Joint:
         return [self._ask("encoder_counts", text, "Four times the lines of its disc.", _counts)]
 
     def speed(self) -> list[Question]:
-        """How fast; asked once steps and gear are known."""
+        """The question about the speed, once steps and gear are known."""
         keys = [f"{self._number}.{key}" for key in ("steps_per_rev", "microsteps", "gear_ratio")]
         if not all(key in self._answers for key in keys):
             return []

@@ -15,7 +15,7 @@ _MM = 1000.0
 
 
 class Body(NamedTuple):
-    """Links that move as one, while all joints are at 0, in the base link's frame; and the friction of their joint."""
+    """Links that move together, at joint angles 0, in the base link's frame; and the friction of their joint."""
 
     mass_kg: float
     centre_mm: Array
@@ -26,7 +26,7 @@ class Body(NamedTuple):
     viscous_nm_s: float
 
     def in_frame(self, frame: Array) -> Dynamics:
-        """The same in a frame (4, 4), mm, that is given in the base link's."""
+        """The body in a frame (4, 4), mm, given in the base link's frame."""
         turn = frame[:3, :3].T
         x, y, z = turn @ (self.centre_mm - frame[:3, 3])
         tensor = turn @ self.inertia_kg_m2 @ turn.T
@@ -37,9 +37,9 @@ class Body(NamedTuple):
 
 
 def of_joint(model: Any, base: str, joint: Any, after: Any) -> Body | None:
-    """What turns with a joint but not with the one ``after`` it in the chain; fingers as they are at 0.
+    """The links that turn with a joint but not with the one ``after`` it in the chain; fingers at 0.
 
-    None if the URDF gives nothing of it a mass. Raises InputError for figures that no body has.
+    None if the URDF has no mass for them. Raises InputError for values that no body has.
     """
     parts = [*_parts(model, base, links(model, joint.child, after))]
     if not parts:
@@ -62,7 +62,7 @@ def of_joint(model: Any, base: str, joint: Any, after: Any) -> Body | None:
 
 
 def links(model: Any, first: str, after: Any) -> set[str]:
-    """Names of a link and of all below it, but for those below joint ``after``."""
+    """Names of a link and of all its descendants, except those of joint ``after``."""
     found, names = set(), [first]
     while names:
         name = names.pop()

@@ -1,4 +1,4 @@
-"""The simplest rows that do what the URDF does: derived, rounded, checked against its own forward kinematics."""
+"""The simplest rows equivalent to the URDF: derived, rounded, checked against its forward kinematics."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armtempo.new_arm.urdf_reader import Chain
 POSTURES = 1000
 SEED = 1
 POSITION_MM, ROTATION_DEG = 0.01, 0.005
-"""Largest errors at which a table is taken."""
+"""Largest errors of an accepted table."""
 
 _NEAR = (
     dh.Near(1e-3, 1e-1),
@@ -29,7 +29,7 @@ _DECIMALS = (2, 3, 4, 6, 9, 12)
 
 @dataclass(frozen=True)
 class Fit:
-    """Rows, and how far off they are at worst."""
+    """Rows, and their worst errors."""
 
     rows: tuple[dh.DhRow, ...]
     position_mm: float
@@ -40,9 +40,9 @@ class Fit:
 def fit(chain: Chain) -> Fit:
     """The table with the roundest numbers within 0.01 mm and 0.005 degrees at 1000 random postures.
 
-    URDF files give angles in rad with few digits (1.5708), which makes axes that were meant to be parallel meet
-    kilometres away. So near ones are taken for parallel first, and the comparison says whether that was right.
-    Raises PlanError if no table comes that near.
+    URDF files have angles in rad with few digits (1.5708), so axes that should be parallel intersect
+    kilometres away. Nearly parallel axes are first taken as parallel, and the comparison tests that. Raises
+    PlanError if no table is accurate enough.
     """
     angles = _postures(chain)
     wanted = chain.poses(angles)

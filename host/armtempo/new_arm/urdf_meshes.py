@@ -1,4 +1,4 @@
-"""The shapes of a URDF's links, each in the frame of the arm file's row that it moves with."""
+"""The meshes of a URDF's links, each in the frame of its row in the arm file."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from armtempo.planning.capsules import point_distance
 
 
 def of_rows(chain: Chain, fit: Fit, urdf: Path) -> dict[int, Array]:
-    """Triangles (N, 3, 3) in mm of each row that carries something, and 0: of the base.
+    """Triangles (N, 3, 3) in mm of each row with a mesh; key 0: the base.
 
-    InputError for a mesh that cannot be read.
+    Raises InputError for a mesh that cannot be read.
     """
     frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))
     row_of = {row.joint: number for number, row in enumerate(fit.rows, 1) if row.joint is not None}
@@ -37,7 +37,7 @@ def of_rows(chain: Chain, fit: Fit, urdf: Path) -> dict[int, Array]:
 def radii_mm(chain: Chain, fit: Fit, urdf: Path) -> dict[int, float]:
     """Radii of rows, from 1, about whose d and a the links' shapes for collision are, or those that are seen.
 
-    A triangle is within a capsule where its corners are; constant rows carry what the one before them does. Rows
+    A triangle is within a capsule if its corners are; constant rows carry what the one before them does. Rows
     without shapes are left out. InputError for a mesh that cannot be read.
     """
     frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))
@@ -63,7 +63,7 @@ def radii_mm(chain: Chain, fit: Fit, urdf: Path) -> dict[int, float]:
 
 
 def _farthest(corners_mm: Array, begin: Array, end: Array) -> Array:
-    """Of triangles (N, 3, 3) the corner that is farthest from a segment: (N,)."""
+    """Distance of the farthest corner of triangles (N, 3, 3) from a segment: (N,)."""
     found = point_distance(corners_mm.reshape(-1, 3), begin[None], (end - begin)[None])
     return np.asarray(found.reshape(-1, 3).max(axis=1))
 

@@ -1,4 +1,4 @@
-"""A serial chain of revolute joints out of a URDF file, read by yourdfpy (the optional extra ``urdf``)."""
+"""A serial chain of revolute joints from a URDF file, read by yourdfpy (the optional extra ``urdf``)."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ MM = 1000.0
 """Millimetres in the URDF's unit, the metre."""
 
 CONTINUOUS_DEG = (-180.0, 180.0)
-"""Range that a continuous joint gets: a URDF gives it none."""
+"""Range of a continuous joint, which has none in a URDF."""
 
 _WHEEL_JOINTS = 2
-"""An axle with its steering; a chain of so few joints is an arm only where each has limits."""
+"""An axle with its steering; a chain with at most this many joints is an arm only if each has limits."""
 _REASONS = {
     "prismatic": "it slides, and an arm file describes turning joints only",
     "floating": "it is free in all directions, and a motor turns about one axis",
@@ -35,7 +35,7 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class TurningJoint:
-    """One revolute joint where it is while all joints are at 0, in the base link's frame."""
+    """One revolute joint at joint angles 0, in the base link's frame."""
 
     name: str
     point_mm: Array
@@ -46,7 +46,7 @@ class TurningJoint:
     speed_deg_s: float | None
     continuous: bool
     body: Body | None
-    """What it moves as far as the next joint; None if nothing of it has a mass."""
+    """The body up to the next joint; None without a mass."""
 
 
 @dataclass(frozen=True)
@@ -75,17 +75,15 @@ class Chain:
 def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     """The chain from link ``base`` (None: the root) to link ``tip`` (None: see ``urdf_tip.choose``).
 
-    Raises MissingPackageError without yourdfpy, InputError if the file is no URDF, the chain is not one, or
-    a joint in it is of a kind that an arm file cannot describe: with every reason.
+    Raises MissingPackageError without yourdfpy, InputError if the file is not a URDF, there is no such chain,
+    or an arm file cannot describe one of its joints (with all reasons).
     """
     urdf = _reader()
     _check_text(path)
     try:
         with np.errstate(all="ignore"):  # it divides by the length of an axis that has none
             model = urdf.load(str(path), load_meshes=False, build_scene_graph=True)
-    except (
-        Exception
-    ) as error:  # the reader raises whatever its parts do: KeyError, ValueError, AttributeError
+    except Exception as error:  # the reader raises various errors: KeyError, ValueError, AttributeError
         raise InputError(
             f"{path}: is XML, but not a URDF that can be read ({type(error).__name__}: {error})",
             "try it with another URDF tool, such as check_urdf, which names the place",
@@ -116,7 +114,7 @@ def _reader() -> Any:
 
 
 def _check_text(path: Path) -> None:
-    """Raise InputError unless the file is whole XML with a robot in it: the reader itself mends what is broken."""
+    """Raise InputError unless the file is valid XML with a robot, as the reader silently repairs errors."""
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except FileNotFoundError:
@@ -177,7 +175,7 @@ def _refuse(path: Path, joints: list[Any]) -> None:
 
 
 def _refuse_wheels(path: Path, moving: list[Any]) -> None:
-    """Raise InputError for a chain that is rather a wheel, steered or not."""
+    """Raise InputError for a chain that is probably a wheel."""
     endless = [joint.name for joint in moving if joint.type == "continuous"]
     if endless and (len(endless) == len(moving) or len(moving) <= _WHEEL_JOINTS):
         raise InputError(

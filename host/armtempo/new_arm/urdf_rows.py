@@ -21,7 +21,7 @@ class AxisLine(NamedTuple):
 
 
 class DhRow(NamedTuple):
-    """One row; ``joint`` is the number of the joint that it belongs to, None for a row that never moves."""
+    """One row; ``joint``: the index of its joint, None for a constant row."""
 
     joint: int | None
     theta_deg: float
@@ -32,7 +32,7 @@ class DhRow(NamedTuple):
 
 @dataclass(frozen=True)
 class Near:
-    """What counts as the same: directions so near count as parallel, lines so near as meeting."""
+    """Tolerances for parallel directions and intersecting lines."""
 
     angle_rad: float
     length_mm: float
@@ -48,9 +48,9 @@ class _Frame:
 def derive(axes: Sequence[AxisLine], tool: Array, near: Near) -> list[DhRow]:
     """Rows from the base frame over all axes to the frame ``tool`` (4, 4), all joints at 0.
 
-    The base's z axis is taken for an axis before the first one, the tool's z axis for one after the last: a
-    constant row comes before joint 1 if its axis is not the base's, and one after the last joint where
-    the tool is turned or shifted along its own z axis and no row before it can take that up.
+    The base's z axis is treated as an axis before the first, the tool's z axis as one after the last: there
+    is a constant row before joint 1 if its axis is not the base's, and one after the last joint if the tool
+    is turned or shifted along its z axis and no other row can include that.
     """
     frame = _Frame(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
     rows: list[DhRow] = []
@@ -72,7 +72,7 @@ def geometry(rows: Sequence[DhRow]) -> Geometry:
 
 
 def rounded(rows: Sequence[DhRow], decimals: int) -> list[DhRow]:
-    """The rows with that many decimals, no zero negative and no alpha of -180."""
+    """The rows rounded to ``decimals``, without -0 and alpha of -180."""
     table = []
     for row in rows:
         theta, d, a, alpha = (round(value, decimals) + 0.0 for value in row[1:])
@@ -124,7 +124,7 @@ def _row(
 
 
 def _finish(rows: list[DhRow], frame: _Frame, tool: Array) -> list[DhRow]:
-    """Turn and shift along the tool's z axis until its frame is reached: in the last row, or in one more."""
+    """Add the rotation and shift along the tool's z axis to the last row, or in one more row."""
     theta = math.degrees(_turn(frame.x, tool[:3, 0], frame.z))
     d = float((tool[:3, 3] - frame.origin) @ frame.z)
     *before, last = rows
@@ -138,10 +138,10 @@ def _finish(rows: list[DhRow], frame: _Frame, tool: Array) -> list[DhRow]:
 
 
 def _without_idle(rows: list[DhRow]) -> list[DhRow]:
-    """Leave out constant rows that do nothing, to a thousandth of a degree and of a millimetre."""
+    """Remove identity rows, within a thousandth of a degree and of a millimetre."""
     return [row for row in rows if row.joint is not None or any(round(value, 3) for value in row[1:])]
 
 
 def _turn(start: Array, end: Array, about: Array) -> float:
-    """Angle from one direction to another, both square to ``about``."""
+    """Angle from one direction to another, both perpendicular to ``about``."""
     return math.atan2(float(np.cross(start, end) @ about), float(start @ end))

@@ -1,4 +1,4 @@
-"""Which link of a URDF is the tool, where the user does not say."""
+"""The default tool link of a URDF."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any, NamedTuple
 from armtempo.basics.errors import InputError
 
 _MOST = 8
-"""Candidates that a message names."""
+"""Largest number of candidates in a message."""
 
 
 class _Candidate(NamedTuple):
-    """A link that can be the tool."""
+    """A possible tool link."""
 
     link: str
     turning: tuple[str, ...]
-    """The joints that turn on the way to it."""
+    """The revolute joints before it."""
     joints: int
-    """All joints on the way."""
+    """Number of joints before it."""
 
 
 def choose(path: Path, joints: Sequence[Any], first: str, reason: Callable[[Any], str]) -> str:
-    """The link that fingers follow, or the only end below ``first``.
+    """The parent link of the fingers, or the only leaf below ``first``.
 
-    ``reason``: why an arm file cannot describe a joint, "" if it can. Raises InputError if the tool is not clear,
-    naming each link that it may be with the joints that turn on the way, best first.
+    ``reason``: why an arm file cannot describe a joint, "" if it can. Raises InputError if the tool is
+    ambiguous, with the candidates and the revolute joints before them, best first.
     """
     below = [*_below(joints, first)]
     fingers = _fingers(joints)

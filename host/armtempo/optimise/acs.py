@@ -27,7 +27,7 @@ from armtempo.optimise.task import Number, OneOf, Parameter, Result, Task, Track
 
 
 class Nests:
-    """Points and their values; a new point replaces its nest where it is better."""
+    """Points and their values; a new point replaces its nest if it is better."""
 
     def __init__(self, task: Task, a: float, b: float, pa: float, beta: float) -> None:
         self.tracker = Tracker(task)

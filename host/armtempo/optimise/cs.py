@@ -58,7 +58,7 @@ def _new_nests(nests: Array, rng: np.random.Generator, pa: float) -> tuple[Array
 
 
 def _keep_better(nests: Array, values: Array, eggs: Array, egg_values: Array, index: np.ndarray) -> None:
-    """Puts each egg (K, d) into nest ``index[k]`` where it is better, in place."""
+    """Puts each egg (K, d) into nest ``index[k]`` if it is better, in place."""
     better = egg_values < values[index]
     nests[index[better]] = eggs[better]
     values[index[better]] = egg_values[better]

@@ -4,7 +4,7 @@
 
 Every iterate keeps the inequalities; the barrier -mu sum(log g) holds it off them, and mu falls. The matrix of
 Newton's step is the Hessian of f plus J' diag(multipliers / g) J, which is never indefinite, and with the second
-derivatives of g where they help. Where the straight step runs into a curved boundary, a second one from the same
+derivatives of g if they help. If the straight step runs into a curved boundary, a second one from the same
 matrix follows the curve. (Nocedal and Wright, Numerical Optimization, 2nd ed., chapters 18.3 and 19.)
 """
 
@@ -64,7 +64,7 @@ class Program(Protocol):
         """f."""
 
     def inequalities(self, x: Array) -> Array:
-        """g: (M,), scaled to about 1; entries not above 0, or no numbers, where x is not allowed."""
+        """g: (M,), scaled to about 1; entries not above 0, or no numbers, if x is not allowed."""
 
     def linearise(self, x: Array) -> Linearised:
         """Derivatives at an allowed x."""
@@ -78,7 +78,7 @@ class Schedule:
     last_barrier: float = 1e-6
     iterations: int = 200
     curvature: bool = True
-    """Use second derivatives of g where they help."""
+    """Use second derivatives of g if they help."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ _KEEP = 1e-3
 """Least part of an inequality that a step leaves."""
 _ARMIJO = 1e-4
 _NEAR_CENTRE, _DONE = 5.0, 0.1
-"""The barrier falls, and the method ends, where Newton's decrement is below this many barriers times the root of
+"""The barrier falls, and the method ends, if Newton's decrement is below this many barriers times the root of
 their number."""
 _SPREAD = 1e4
 """Multipliers stay within this factor of barrier / g."""
@@ -116,7 +116,7 @@ _MOST_VIOLATED = -0.5
 def minimise(program: Program, x: Array, settings: Schedule | None = None) -> Minimum:
     """The local optimum near ``x``; none of the iterates breaks an inequality.
 
-    Where ``x`` itself breaks one it is returned unchanged, not converged.
+    If ``x`` itself breaks one it is returned unchanged, not converged.
     """
     return _Solver(program, x, settings or Schedule()).run()
 
@@ -182,7 +182,7 @@ class _Solver:
         return _Step(0.0, self.x, self.g)
 
     def _line_search(self, at: Linearised, factor: Factorised, gradient: Array, step: Array) -> _Step:
-        """The better of a straight and, where that is short, a bent step."""
+        """The better of a straight and, if that is short, a bent step."""
         slope = float(
             np.sum(gradient * step)
         )  # not by @, for which BLAS starts threads from 10 000 elements on

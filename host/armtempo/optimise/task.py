@@ -17,7 +17,7 @@ Function = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Number:
-    """A number from ``least`` to ``most``, a whole one where the default is an int."""
+    """A number from ``least`` to ``most``, a whole one if the default is an int."""
 
     default: float
     least: float

@@ -2,8 +2,8 @@
 
 ::
 
-    operator.py    the board that the panel has: one command at a time, one client in control, states for all
-    live.py        what the board says: state, samples, inputs, sequence
+    operator.py    the panel's board: one command at a time, one client in control, states for all
+    live.py        data from the board: state, samples, inputs, sequence
     held_jog.py    a jog that lasts as long as a browser says that its button is held
     access.py      who may ask the server for anything
     arm_scene.py   the arm in 3-D
@@ -16,5 +16,5 @@
     words.py       every English text
     server.py      all of it served
 
-It owns no logic: what it does, the library does.
+It has no logic of its own: it calls the library.
 """

@@ -1,4 +1,4 @@
-"""Who may ask the server for anything: pages of its own only, and from other machines only those with the token."""
+"""Access control of the server: only its own pages, and from other machines only with the token."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 COOKIE = "armtempo_token"
 MOST_BYTES = 1_000_000
-"""Of the body of a request; a page of via points has a few thousand."""
+"""Largest body of a request; a page of via points has a few thousand bytes."""
 _TOO_MUCH = f"more than {MOST_BYTES} bytes"
 _LOG = logging.getLogger("armtempo")
 
 
 class Access:
-    """An ASGI application around another, which it guards.
+    """ASGI middleware that protects an application.
 
-    ``hosts``: names by which the server may be called, against DNS rebinding; ``token``: what a client must show,
-    once in the address and then in a cookie; "" on the loopback address, where none is needed.
+    ``hosts``: allowed host names, against DNS rebinding; ``token``: required from a client, first in the
+    address and then in a cookie; "" on the loopback address, where none is needed.
     """
 
     def __init__(self, inner: Application, hosts: set[str], token: str) -> None:
         self._inner, self._hosts, self._token = inner, hosts, token
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Hand a request on, or refuse and log it."""
+        """Pass a request on, or refuse and log it."""
         if scope["type"] == "lifespan":
             await self._inner(scope, receive, send)
             return
@@ -79,7 +79,7 @@ class Access:
         return ""
 
     def _with_cookie(self, scope: Scope, send: Send) -> Send:
-        """Keep the token of the address in a cookie, for what the page asks for."""
+        """Store the token of the address in a cookie, for further requests of the page."""
         if not self._token or b"token=" not in scope.get("query_string", b""):
             return send
 
@@ -93,7 +93,7 @@ class Access:
 
 
 async def _body(receive: Receive) -> MutableMapping[str, Any] | None:
-    """The whole body of a request as one message; None for one that is too large, which no header has to say."""
+    """The body of a request as one message; None if it is too large, even without a length header."""
     parts: list[bytes] = []
     while True:
         message = await receive()
@@ -107,7 +107,7 @@ async def _body(receive: Receive) -> MutableMapping[str, Any] | None:
 
 
 def _again(first: MutableMapping[str, Any], receive: Receive) -> Receive:
-    """Receives ``first`` once more, then what else comes."""
+    """A receive function that returns ``first`` again, then further messages."""
     waiting = [first]
 
     async def received() -> MutableMapping[str, Any]:
@@ -122,7 +122,7 @@ def _name(host: str) -> str:
 
 
 def _given(scope: Scope, headers: dict[bytes, bytes]) -> list[str]:
-    """The tokens that a request shows."""
+    """The tokens in a request."""
     query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
     found = query.get("token", [])
     try:

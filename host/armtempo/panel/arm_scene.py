@@ -1,4 +1,4 @@
-"""The arm in 3-D: links as capsules, via points, the tool's path, the ghost of where it will go."""
+"""The arm in 3-D: links as capsules, via points, the tool's path, a ghost at the target."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from armtempo.model.room import FAR_MM
 from armtempo.planning.room_check import Bodies
 
 COLOUR, GHOST, PATH, RUN, VIA, ROOM = "#4477aa", "#999999", "#228833", "#ee6677", "#ccbb44", "#aa3377"
-"""Of Paul Tol's bright scheme, which the colour-blind can tell apart."""
+"""Paul Tol's bright scheme, which is safe for colour-blind users."""
 _THICK = 0.03
-"""Radius of a link as a share of the arm's reach, where the arm file gives none."""
+"""Default radius of a link, as a fraction of the arm's reach."""
 _SHORT_MM = 1e-6
 _OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25
 _ROOM_OPACITY = 0.3
 _SHOWN = 1.2
-"""Walls are shown this far from the arm's base, as a share of its reach."""
+"""Size of the displayed walls, as a fraction of the arm's reach."""
 _VIA_NAME = "via "
 FOLLOW = "follow"
 """The view that keeps the tool in the middle."""
 
 
 class ArmShape:
-    """Where the parts of an arm are at its joint angles; lengths in shares of the reach."""
+    """Poses of an arm's parts at joint angles; lengths as fractions of the reach."""
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
@@ -70,7 +70,7 @@ class ArmShape:
 
     @cached_property
     def pieces(self) -> list[tuple[int, float, float]]:
-        """The point at which each link begins in the outline, its length and its radius; none of no length."""
+        """Index in the outline, length and radius of each link; without links of length 0."""
         radii = [radius / self.reach_mm or _THICK for radius in Bodies(self.arm).radius_mm]
         points = self.outline(np.array(self.arm.home_deg))
         lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -98,7 +98,9 @@ class ArmShape:
         begin, end = points[first], points[np.array(first) + 1]
         along = (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
         zero = np.zeros(len(along))
-        turns = np.column_stack((along[:, 2], zero, -along[:, 0], 1.0 + along[:, 1]))  # from y, the short way
+        turns = np.column_stack(
+            (along[:, 2], zero, -along[:, 0], 1.0 + along[:, 1])
+        )  # the shortest rotation from y
         turns[turns[:, 3] < _OPPOSITE] = (1.0, 0.0, 0.0, 0.0)
         turns /= np.linalg.norm(turns, axis=1, keepdims=True)
         found: list[list[float]] = np.hstack(((begin + end) / 2, turns)).round(5).tolist()
@@ -187,12 +189,12 @@ class ArmScene:
         ui.run_javascript(f"armtempo.follow = {json.dumps(view == FOLLOW)}")
 
     def draw(self, name: str, points_mm: Array, colour: str) -> None:
-        """A line through points (N, 3), in the place of the one of that name."""
+        """Draw a line through points (N, 3), replacing the line of that name."""
         points = (np.asarray(points_mm) / self._shape.reach_mm).round(4).tolist()
         ui.run_javascript(f"armtempo.line({json.dumps(name)}, {json.dumps(points)}, {json.dumps(colour)})")
 
     def dots(self, points_mm: Array) -> None:
-        """A ball at each via point, (N, 3), that can be clicked and dragged."""
+        """Draw a ball at each via point, (N, 3), that can be clicked and dragged."""
         points = (np.asarray(points_mm) / self._shape.reach_mm).tolist()
         while len(self._dots) > len(points):
             self._dots.pop().delete()

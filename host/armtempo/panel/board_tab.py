@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nicegui import ui
+from nicegui import background_tasks, run, ui
 
+from armtempo.basics.errors import LinkError
 from armtempo.deploy import deploy
 from armtempo.deploy.firmware import image, write
 from armtempo.link.board_messages import StoredMotion
 from armtempo.panel import words
 from armtempo.panel.live import Lines
 from armtempo.panel.operator import Needs
+from armtempo.robot.board import Board
 
 if TYPE_CHECKING:
     from armtempo.diagnosis.selftest.result import SelfTest
@@ -44,15 +47,12 @@ class BoardTab:
     def __init__(self, page: PanelPage) -> None:
         self._page = page
         self._operator = operator = page.operator
-        self._stored_of = ""
+        self._stored_of = ("", 0)
         self._tested: SelfTest | None = None
         ui.label(words.STATUS).classes("text-subtitle2")
         columns = [{"name": name, "label": "", "field": name, "align": "left"} for name in ("key", "value")]
         self._state = ui.table(columns=columns, rows=[]).props("dense flat hide-header wrap-cells")
-        with ui.row():
-            ui.label(words.STORED).classes("text-subtitle2")
-            refresh = ui.button(icon="refresh", on_click=self._read).props("flat dense")
-            page.control(refresh.props(f'aria-label="{words.REFRESH}"'), Needs.COMMAND)
+        ui.label(words.STORED).classes("text-subtitle2")
         self._stored = ui.column()
         ui.label(words.PROGRAM).classes("text-subtitle2")
         with ui.row():
@@ -89,9 +89,9 @@ class BoardTab:
             ]
             if rows != self._state.rows:
                 self._state.rows = rows
-            if self._stored_of != state.board_id and not self._operator.busy:
-                self._stored_of = state.board_id
-                self._read()
+            if self._stored_of != (now := (state.board_id, self._operator.ended)) and not self._operator.busy:
+                self._stored_of = now  # what has ended may have stored something
+                background_tasks.create(self._read())
         tested = self._operator.tested
         if tested is not None and tested is not self._tested:
             self._tested = tested
@@ -107,20 +107,20 @@ class BoardTab:
 
     # stored motions
 
-    def _read(self) -> None:
-        def read() -> None:
-            motions = self._operator.board.list()
+    async def _read(self) -> None:
+        with suppress(LinkError):  # its state says so as well
+            motions = await run.io_bound(lambda: self._operator.board.list())
+            if motions is None or self._stored.is_deleted:  # the panel ends, or its page has gone
+                return
             self._stored.clear()
             with self._stored:
                 for motion in motions:
                     self._row(motion)
 
-        self._page.attempt(read)
-
     def _row(self, motion: StoredMotion) -> None:
         operator, page, name = self._operator, self._page, motion.name
 
-        def run() -> None:
+        def run_it() -> None:
             if motion.sequence:
                 operator.board.run_sequence(name, operator.live.take_sequence, out=operator.runs)
             else:
@@ -129,7 +129,9 @@ class BoardTab:
         with ui.row():
             kind = words.A_SEQUENCE if motion.sequence else f"{motion.duration_s:.3f} s"
             ui.label(f"{name} · {kind}{words.BY_BUTTON if motion.default else ''}")
-            button = ui.button(words.RUN, on_click=lambda: page.do(name, run)).props("outline dense no-caps")
+            button = ui.button(words.RUN, on_click=lambda: page.do(name, run_it)).props(
+                "outline dense no-caps"
+            )
             page.control(button)
             for text, call in (
                 (words.RENAME, lambda: self._rename(name)),
@@ -140,9 +142,7 @@ class BoardTab:
 
     async def _remove(self, name: str) -> None:
         sure = words.SURE_REMOVE.format(name=name)
-        await self._if_sure(
-            words.REMOVE, sure, lambda: self._change(lambda: self._operator.board.remove(name))
-        )
+        await self._if_sure(words.REMOVE, sure, lambda: self._change(words.REMOVE, Board.remove, name))
 
     async def _rename(self, name: str) -> None:
         with ui.dialog() as asked, ui.card():
@@ -151,11 +151,10 @@ class BoardTab:
                 ui.button(words.RENAME, on_click=lambda: asked.submit(new.value))
                 ui.button(words.CANCEL, on_click=lambda: asked.submit(None)).props("flat")
         if wanted := await asked:
-            self._change(lambda: self._operator.board.rename(name, wanted))
+            self._change(words.RENAME, Board.rename, name, wanted)
 
-    def _change(self, call: Callable[[], object]) -> None:
-        self._page.at_once(call, Needs.COMMAND)
-        self._read()
+    def _change(self, text: str, call: Callable[..., object], *names: str) -> None:
+        self._page.do(text, lambda: call(self._operator.board, *names), Needs.COMMAND)
 
     # the board's program
 

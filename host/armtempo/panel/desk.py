@@ -1,4 +1,4 @@
-"""What the panel plans: the project's job as a table of via points, and the file in which it is kept."""
+"""The panel's job as a table of via points, and its file."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _NEW = "panel_job"
 
 
 class Desk:
-    """The job that is being made, and the plan of it, if there is one. ``folder``: no other is written to."""
+    """The edited job, and its plan, if any. ``folder``: the only folder that is written to."""
 
     def __init__(self, arm: Arm, folder: Path, job_file: Path | None) -> None:
         self.arm, self.folder = arm, folder
         self.file = job_file
         self.job = Job.load(job_file, arm) if job_file else Job(_NEW, via_deg=[arm.home_deg, arm.home_deg])
         self.plan: Plan | None = None
-        self.rows()  # what is wrong with poses is said at the start rather than in a page
+        self.rows()  # errors of poses are reported at the start instead of in a page
 
     def rows(self) -> list[list[float]]:
         """The job's via points as angles, (n, J); PlanError if no posture reaches a pose among them."""
@@ -37,9 +37,9 @@ class Desk:
         return [list(map(float, row)) for row in found]
 
     def job_with(self, rows: Sequence[Sequence[float]], options: Mapping[str, str]) -> Job:
-        """The job through other via points, with ``options`` as they are typed, "" for none.
+        """The job with other via points and ``options`` (typed texts, "" for none).
 
-        InputError as for the file that ``save`` would write.
+        Raises InputError as for the file that ``save`` would write.
         """
         job = Job.of_table(toml_table.parse(self._text(rows, options), str(self._target)), self.arm)
         last = len(rows) - 1
@@ -47,13 +47,13 @@ class Desk:
         return replace(job, stops=stops, ways=tuple(way for way in self.job.ways if way.via <= last))
 
     def option(self, key: str) -> str:
-        """What the job says under a key, as it is typed."""
+        """The job's value of a key, as text."""
         value = getattr(self.job, key)
         return "" if value is None else str(value)
 
     @property
     def _target(self) -> Path:
-        """The job's file; one in the folder for a job without."""
+        """The job's file; default: a file in the folder."""
         return self.file or self.folder / f"{self.job.name}.toml"
 
     def _text(self, rows: Sequence[Sequence[float]], options: Mapping[str, str]) -> str:
@@ -74,7 +74,8 @@ class Desk:
         return tomlkit.dumps(content)
 
     def save(self, rows: Sequence[Sequence[float]], options: Mapping[str, str]) -> Path:
-        """Write via points and options into the job's file; InputError, and nothing written, if it cannot be."""
+        """Write via points and options into the job's file; raises InputError, without writing, if they are
+        invalid."""
         job, file = self.job_with(rows, options), self._target
         if job.ways or job.stops:
             raise InputError(

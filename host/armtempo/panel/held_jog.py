@@ -1,4 +1,4 @@
-"""A jog that lasts as long as a browser says that its button is held."""
+"""A jog that lasts while a browser reports that its button is held."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from armtempo.panel.operator import Operator
 from armtempo.planning.jog.jog_motion import JogMove
 
 ALIVE_S = 0.35
-"""A button counts as released if the browser has not said for this long that it is held; it says so every 0.1 s."""
+"""A button counts as released after this time without a report of the browser, which comes every 0.1 s."""
 _STEP_S = 0.05
 
 
 class ButtonHold:
-    """The button that a client holds; at most one in the whole panel."""
+    """The held button; at most one in the whole panel."""
 
     def __init__(self, operator: Operator) -> None:
         self._operator = operator
@@ -22,17 +22,17 @@ class ButtonHold:
         self._said_s = 0.0
 
     def press(self, client: str, move: JogMove, speed: float) -> None:
-        """Begin; InputError if it cannot be now. ``speed``: part of the limits, 0.01 to 1."""
+        """Begin a jog; raises InputError if it is not possible now. ``speed``: fraction of the limits, 0.01 to 1."""
         self._client, self._said_s = client, time.monotonic()
         self._operator.do("jog", client, lambda: self._jog(client, move, speed))
 
     def alive(self, client: str) -> None:
-        """The browser says that the button is still held."""
+        """The browser reports that the button is still held."""
         if client == self._client:
             self._said_s = time.monotonic()
 
     def release(self, client: str) -> None:
-        """The button was released, or the client has gone."""
+        """The button was released, or the client has disconnected."""
         if client == self._client:
             self._client = ""
 

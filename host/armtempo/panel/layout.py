@@ -1,10 +1,11 @@
-"""The layout of a page: header with stop, the arm, tabs; and what it is told ten times a second."""
+"""The layout of a page: header with stop, the arm, tabs; and the message sent to it ten times per second."""
 
 from __future__ import annotations
 
 import json
 from contextlib import suppress
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -18,17 +19,18 @@ from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.panel_page import LOOK_S, PanelPage
+from armtempo.robot.board import Board
 
 TELL_S = 0.1
 _POINTS = 200
 _PRIMARY = "#2b5f8f"
-"""White on it has a contrast of 6.6 to 1, of which 4.5 is needed."""
+"""Contrast with white: 6.6 to 1 (4.5 is required)."""
 _SCRIPT = Path(__file__).with_name("panel.js").read_text(encoding="utf-8")
 _STYLE = Path(__file__).with_name("panel.css").read_text(encoding="utf-8")
 
 
 def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
-    """The page of the client that asks for it."""
+    """The page of a client."""
     client = ui.context.client
     page = PanelPage(operator, hold, shape, client.id)
     ui.add_css(_STYLE)
@@ -50,19 +52,18 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
 
 
 def _below_scene(page: PanelPage) -> None:
-    """Views, how fast what moves continues, and where the arm is: in sight from every tab."""
-    operator = page.operator
+    """Views, speed and position of the arm, visible on every tab."""
     with ui.row():
         for view, text in words.VIEWS.items():
             ui.button(text, on_click=lambda view=view: page.scene.look(view)).props("flat dense")
         for text, call in (
-            (words.PAUSE, lambda: operator.board.pause()),
-            (words.RESUME, lambda: operator.board.resume()),
+            (words.PAUSE, Board.pause),
+            (words.RESUME, Board.resume),
         ):
             button = ui.button(text, on_click=lambda call=call: page.at_once(call, Needs.PAUSE))
             page.control(button.props("outline dense no-caps").classes("armtempo-pause"), Needs.PAUSE)
         speed = ui.slider(min=1, max=100, value=100).props(f'label aria-label="{words.SPEED_OF_MOTION}"')
-        speed.on("change", lambda event: page.at_once(lambda: operator.board.speed(float(event.args) / 100)))
+        speed.on("change", lambda event: page.at_once(lambda board: board.speed(float(event.args) / 100)))
         ui.label(words.SPEED_OF_MOTION).classes("text-caption")
         page.control(speed.classes("armtempo-speed"), Needs.BOARD)
     ui.label("").props('id="armtempo-where"')
@@ -70,7 +71,7 @@ def _below_scene(page: PanelPage) -> None:
 
 
 class Paths:
-    """The tool's path of the plan, and of the motion that runs or ran last, in the scene of one page."""
+    """The tool's paths of the plan and of the running or last motion, in the scene of one page."""
 
     def __init__(self, page: PanelPage) -> None:
         self._page = page
@@ -93,7 +94,7 @@ class Paths:
 def _header(page: PanelPage) -> None:
     operator = page.operator
     with ui.header().classes("items-center no-wrap"):
-        stop = ui.button(words.STOP, icon="front_hand", color="negative", on_click=lambda: operator.stop())
+        stop = ui.button(words.STOP, icon="front_hand", color="negative", on_click=lambda: _stop(operator))
         stop.classes("armtempo-stop").tooltip(words.STOP_HINT)
         with ui.column().classes("armtempo-title"):
             ui.label(f"{words.TITLE} · {operator.arm.name}").classes("text-subtitle1 ellipsis")
@@ -127,7 +128,7 @@ def _tabs(page: PanelPage) -> None:
         places = {name: ui.tab_panel(name) for name in parts}
 
     def show(name: str) -> None:
-        """Each tab is built when it is first shown: the first view does not wait for charts and tables."""
+        """Build a tab when it is first shown, so that the first view does not wait for charts and tables."""
         page.shown = name
         if part := parts.pop(name, None):
             with places[name]:
@@ -138,8 +139,13 @@ def _tabs(page: PanelPage) -> None:
     show(words.TAB_MOVE)
 
 
+def _stop(operator: Operator) -> None:
+    """Stop in a separate thread, so that no page waits for a silent board."""
+    Thread(target=operator.stop, name="armtempo panel: stop", daemon=True).start()
+
+
 def _events(page: PanelPage) -> None:
-    """What the page's script says."""
+    """Handle the events of the page's script."""
     operator, hold = page.operator, page.hold
 
     def press(event: Any) -> None:
@@ -147,7 +153,7 @@ def _events(page: PanelPage) -> None:
         if type(number) is int and 0 <= number < len(page.jogs):
             page.attempt(lambda: hold.press(page.client, page.jogs[number], page.jog_percent / 100))
 
-    ui.on("armtempo-stop", lambda: operator.stop())
+    ui.on("armtempo-stop", lambda: _stop(operator))
     ui.on("armtempo-press", press)
     ui.on("armtempo-held", lambda: hold.alive(page.client))
     ui.on("armtempo-release", lambda: hold.release(page.client))
@@ -156,7 +162,7 @@ def _events(page: PanelPage) -> None:
 
 
 def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
-    """What all pages are told: where the arm is, and the numbers that change while it moves."""
+    """The message to all pages: poses of the arm, and numbers that change during a motion."""
     angles = operator.live.angles_deg
     where = "  ".join(f"{angle:.2f}°" for angle in angles)
     with suppress(InputError):

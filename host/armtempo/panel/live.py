@@ -1,4 +1,4 @@
-"""What the board says while the panel has it: its state, where the arm is, the samples of what runs."""
+"""Live data from the board: its state, the arm's position, the samples of the running motion."""
 
 from __future__ import annotations
 
@@ -22,40 +22,36 @@ from armtempo.robot.board_state import BoardState
 from armtempo.robot.sharing import sample_json
 
 _MOST_POINTS = 300
-"""Of the path of a run that is shown."""
+"""Largest number of points of a displayed path."""
 _ROWS = ("path_s", "commanded_deg", "angle_deg", "time_s")
 """The times last: another thread that reads as many rows as there are times finds them all."""
 
 
 class Lines:
-    """The last lines of a text that grows, and how many there have ever been."""
+    """The last lines of a growing text, and the total number of lines."""
 
     def __init__(self) -> None:
         self.last: deque[str] = deque(maxlen=500)
         self.count = 0
 
     def add(self, lines: Sequence[str]) -> None:
-        """Let it grow."""
+        """Append lines."""
         self.last.extend(lines)
         self.count += len(lines)
 
 
 @dataclass
 class LiveCurves:
-    """What the samples of the motion that runs, or ran last, say: a row for each sample."""
+    """The samples of one run, one row per sample."""
 
+    run: int
     time_s: list[float] = field(default_factory=list)
     path_s: list[float] = field(default_factory=list)
     commanded_deg: list[list[float]] = field(default_factory=list)
     angle_deg: list[list[float | None]] = field(default_factory=list)
-    run: int = -1
 
     def take(self, sample: dict[str, Any]) -> None:
-        """Add a sample, as ``sharing.sample_json`` gives it; a new run begins anew."""
-        if sample["run"] != self.run:
-            self.run = sample["run"]
-            for name in reversed(_ROWS):
-                setattr(self, name, [])
+        """Add a sample, as ``sharing.sample_json`` gives it."""
         for name in _ROWS:
             getattr(self, name).append(sample[name])
 
@@ -75,46 +71,47 @@ class LiveCurves:
 
 @dataclass(frozen=True, eq=False)
 class LiveArrays:
-    """The same as arrays."""
+    """Samples as arrays."""
 
     time_s: Array
     path_s: Array
     """The motion's own time, (N,)."""
     commanded_deg: Array
     angle_deg: Array
-    """By the encoders, (N, J); as commanded for a joint without one."""
+    """Encoder angles, (N, J); commanded angles of joints without an encoder."""
 
 
 class LiveArm:
-    """What is known of the arm. Threads that read it see each part whole, as it was or as it is."""
+    """The known state of the arm; each attribute is replaced as a whole, so other threads can read it."""
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self.state: BoardState | None = None
         self.angles_deg: Array = np.array(arm.home_deg)
-        """Where the joints were commanded to be, by the last message, (J,)."""
-        self.curves = LiveCurves()
+        """Commanded angles by the last message, (J,)."""
+        self.curves = LiveCurves(run=-1)
+        """Of the running or last motion; a new object for each run, for threads that read it."""
         self.plan: Plan | None = None
-        """The plan that runs, or ran last."""
+        """The plan of the running or last motion."""
         self.target_deg: Array | None = None
-        """Where the arm goes, (J,), while it goes to a posture."""
+        """Target, (J,), during a motion to a posture."""
         self.run_path_mm: Array = np.empty((0, 3))
         """Of the tool, by ``curves``; another object whenever it has changed."""
         self.inputs: dict[str, bool] = {}
         """Whether each input of the arm is active."""
         self.sequence: SequenceState | None = None
-        """Where the sequence that was started last is."""
+        """State of the sequence that was started last."""
         self._seen = (-1, 0)
         self._jogs: tuple[Array, dict[JogMove, str]] = (np.empty(0), {})
         """Angles, (J,), and the answers of ``why_no_jog`` for them."""
 
     @property
     def fault(self) -> str:
-        """The pending fault and its cure, in words; "" for none."""
+        """The pending fault and its cure; "" for none."""
         return fault_words(self.state.fault) if self.state is not None and self.state.fault else ""
 
     def why_no_jog(self, move: JogMove) -> str:
-        """Why the arm cannot jog that way from where it is, in words; "" if it can."""
+        """Why this jog is not possible now; "" if it is."""
         here = self.angles_deg
         if not np.array_equal(here, self._jogs[0]):
             self._jogs = here, {}
@@ -124,25 +121,28 @@ class LiveArm:
         return known[move]
 
     def take_event(self, event: Event) -> None:
-        """What the board says by itself."""
+        """Handle an event of the board."""
         if isinstance(event, Sample):
             sample = sample_json(event, self.arm)
             if "commanded_deg" in sample:
+                if sample["run"] != self.curves.run:
+                    self.curves = LiveCurves(sample["run"])
                 self.curves.take(sample)
                 self.angles_deg = np.array(sample["commanded_deg"])
 
     def take_sequence(self, state: SequenceState) -> None:
-        """Where the sequence that runs is."""
+        """Note the state of the running sequence."""
         self.sequence = state
 
     def draw(self) -> None:
         """The tool's path by the samples, if there are new ones."""
-        if self._seen != (seen := (self.curves.run, len(self.curves.time_s))) and seen[1] > 1:
-            self.run_path_mm = chains_mm(self.arm, self.curves.thinned(_MOST_POINTS).angle_deg)[:, -1]
+        curves = self.curves
+        if self._seen != (seen := (curves.run, len(curves.time_s))) and seen[1] > 1:
+            self.run_path_mm = chains_mm(self.arm, curves.thinned(_MOST_POINTS).angle_deg)[:, -1]
         self._seen = seen
 
     def ask(self, board: Board) -> None:
-        """The board's state and the levels of its inputs; LinkError if it does not answer."""
+        """Read the board's state and inputs; raises LinkError if it does not answer."""
         state = board.state(self.arm)
         if self.arm.inputs and state.arm:
             levels = board.client.levels()

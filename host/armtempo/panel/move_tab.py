@@ -107,7 +107,7 @@ def _outputs(page: PanelPage) -> None:
                 )
                 button.on_click(
                     lambda name=output.name, state=state: page.at_once(
-                        lambda: operator.board.output(name).set(state)
+                        lambda board: board.output(name).set(state)
                     )
                 )
                 page.control(button, Needs.BOARD)

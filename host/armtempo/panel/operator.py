@@ -1,4 +1,4 @@
-"""The board that the panel has: one command at a time, one client in control, states for all."""
+"""The panel's board: one command at a time, one client in control, states for all."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.stop_request import Stopped
 
 LOOK_S = 0.25
-"""Interval of the board's states while no samples come."""
+"""Interval of status requests while there are no samples."""
 FREEZE_AFTER_S = 5.0
 """A second press of stop within this time freezes the outputs instead of braking."""
 _LOG = logging.getLogger("armtempo")
 
 
 class Needs(Flag):
-    """What a command needs, besides that its client has control."""
+    """Requirements of a command, besides control by its client."""
 
     IDLE = auto()
-    """Nothing else is under way."""
+    """No other command is running."""
     BOARD = auto()
     """The board answers."""
     REST = auto()
@@ -52,9 +52,9 @@ class Needs(Flag):
 
 
 class Operator:
-    """A board in use by the panel. Every method may be called from any thread.
+    """The panel's board. All methods are thread-safe.
 
-    Commands run one after the other in a thread of their own; ``stop`` does not wait for them.
+    Commands run one at a time in separate threads; ``stop`` does not wait for them.
     """
 
     def __init__(self, connect: Callable[[Sink], Board], port: str, desk: Desk, runs: Path) -> None:
@@ -68,7 +68,7 @@ class Operator:
         """Where run folders go."""
         self.live = LiveArm(desk.arm)
         self.ended = 0
-        """How many commands have ended."""
+        """Number of ended commands."""
         self.sequences = SequenceDesk(desk.arm, desk.folder)
         self.tested: SelfTest | None = None
         """The last self-test."""
@@ -77,11 +77,11 @@ class Operator:
         self.monitors: set[str] = set()
         """The clients that watch the traffic."""
         self.trouble = ""
-        """Why the board cannot be reached, in words."""
+        """Text: why the board cannot be reached."""
         self.busy = ""
-        """What is under way, in words."""
+        """Text: the running command."""
         self.progress = 0.0
-        """How far that is, 0 to 1."""
+        """Its progress, 0 to 1."""
         self.log = Lines()
         self.holder = ""
         """The client that has control; "" for none."""
@@ -96,7 +96,7 @@ class Operator:
 
     @property
     def board(self) -> Board:
-        """The board; LinkError while there is none."""
+        """The board; raises LinkError while there is none."""
         if self._board is None:
             raise LinkError(self.trouble or words.NO_BOARD, words.NO_BOARD_HINT)
         return self._board
@@ -116,20 +116,31 @@ class Operator:
             board.close()
             raise
         board.client.session.listeners.append(self.live.take_event)
+        board.client.session.tell = self._tell
         self._board, self.trouble = board, ""
 
+    def _tell(self, text: str) -> None:
+        """Note a message about the connection as ``trouble``, until the board reports its state again."""
+        self.trouble = text
+        self.say(text)
+
     def without_board(self, call: Callable[[], object]) -> None:
-        """Free the port, do ``call``, which needs it, and open the board again."""
-        board, self._board, self.live.state = self._board, None, None
+        """Close the port, run ``call``, which needs it, and open the board again."""
+        board, self._board = self._board, None
         if board is not None:
             board.close()
+        self.live.state = None  # once nobody reads it any more
         try:
             call()
         finally:
-            self._open()
+            try:
+                self._open()
+            except LinkError as error:
+                self.trouble = str(error)
+                raise
 
     def close(self) -> None:
-        """Stop what moves, and let the board go."""
+        """Stop a motion, and close the board."""
         self._closed.set()
         if self.busy:
             self.stop("the panel's end")
@@ -140,7 +151,7 @@ class Operator:
     # who is in control
 
     def take_control(self, client: str) -> None:
-        """Give ``client`` control; a motion of the one before continues, a jog that it holds ends."""
+        """Give ``client`` control; a motion of the previous client continues, its held jog ends."""
         self.holder = client
 
     def release(self, client: str) -> None:
@@ -149,7 +160,7 @@ class Operator:
             self.holder = ""
 
     def why_not(self, client: str, needs: Needs = Needs.MOVE) -> str:
-        """Why ``client`` cannot give a command now, in words; "" if it can."""
+        """Why ``client`` cannot give a command now; "" if it can."""
         if self.trouble and Needs.BOARD in needs:
             return self.trouble
         if self.holder != client:
@@ -174,9 +185,9 @@ class Operator:
     # commands
 
     def do(self, what: str, client: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
-        """Begin ``call`` in a thread of its own; InputError, with the reason, if it cannot be now.
+        """Run ``call`` in a separate thread; raises InputError, with the reason, if that is not possible now.
 
-        What it raises goes to the log and to all watching clients.
+        Its errors go to the log and to all clients.
         """
         with self._lock:
             if reason := self.why_not(client, needs):
@@ -222,11 +233,11 @@ class Operator:
         self.tested = self.board.selftest(self.part)
 
     def part(self, done: float, whole: float) -> None:
-        """The progress of what is under way."""
+        """Note the progress of the running command."""
         self.progress = done / whole if whole else 0.0
 
     def stop(self, by: str = words.PANEL) -> None:
-        """Brake along the path; a second time within FREEZE_AFTER_S: freeze. Any client may, in control or not."""
+        """Brake along the path; a second time within FREEZE_AFTER_S: freeze. Allowed for all clients."""
         now_s = time.monotonic()
         freeze = now_s - self._stopped_s < FREEZE_AFTER_S
         self._stopped_s = now_s
@@ -237,7 +248,7 @@ class Operator:
             self.say(str(error))
 
     def say(self, text: str) -> None:
-        """Put a line into the log."""
+        """Append a line to the log."""
         self.log.add([f"{time.strftime('%H:%M:%S')}  {text}"])
 
     # what the board says
@@ -248,11 +259,11 @@ class Operator:
 
     def _look(self) -> None:
         while not self._closed.wait(LOOK_S):
-            self.live.draw()
             board = self._board
-            if board is None:
-                continue
             try:
+                self.live.draw()
+                if board is None:
+                    continue
                 with board.client.session.in_a_hurry(LOOK_S) as mine:
                     if not mine:
                         continue

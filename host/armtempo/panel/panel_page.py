@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
-from nicegui import ui
+from nicegui import run, ui
 from nicegui.element import Element
 
 from armtempo.basics.arrays import Array
@@ -18,14 +18,16 @@ from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Needs, Operator
 from armtempo.planning.jog.jog_motion import JogMove
+from armtempo.robot.board import Board
 
+T = TypeVar("T")
 LOOK_S = 0.25
-"""Interval at which a page looks at what has changed, but for what moves."""
+"""Interval at which a page updates, except for moving parts."""
 
 
 @dataclass
 class _Control:
-    """Something that can be pressed, and what that needs."""
+    """A control of the page, and its requirements."""
 
     element: Element
     why_not: Callable[[], str]
@@ -35,7 +37,7 @@ class _Control:
     """Why it cannot be pressed."""
 
     def grey(self, reason: str) -> None:
-        """Grey it, with the reason as its hint, unless that is \"\"."""
+        """Disable it, with the reason as its hint, unless that is \"\"."""
         if reason == self.reason:
             return
         self.reason = reason
@@ -59,9 +61,9 @@ class PanelPage:
     shown: str = ""
     """The tab that is shown."""
     listeners: list[tuple[str, Callable[[], None]]] = field(default_factory=list)
-    """Called every LOOK_S while their tab is shown; those of no tab always."""
+    """Called every LOOK_S while their tab is shown; without a tab, always."""
     jogs: list[JogMove] = field(default_factory=list)
-    """What the buttons move that are held, by their numbers."""
+    """Moves of the hold buttons, by number."""
     jog_percent: float = 25.0
     picture: Element = field(init=False)
     """Where the scene is."""
@@ -81,10 +83,9 @@ class PanelPage:
         more: Callable[[], str] = str,
         is_held: bool = False,
     ) -> Any:
-        """An element that is greyed, with the reason as its hint, while it cannot be used.
+        """An element that is disabled, with the reason as its hint, while it cannot be used.
 
-        ``needs``: None if a page that only watches can use it too. ``more``: why it cannot be used although all
-        that it needs is there, in words; "" if it can.
+        ``needs``: None if a page without control can use it too. ``more``: a further reason, "" if there is none.
         """
         with element:
             ui.tooltip("")
@@ -102,33 +103,43 @@ class PanelPage:
         self.listeners.append((self.shown, listener))
 
     def do(self, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
-        """Let the operator begin a command; what is refused is said."""
+        """Start a command of the operator; show a refusal."""
         self.attempt(lambda: self.operator.do(what, self.client, call, needs))
 
-    def attempt(self, call: Callable[[], object]) -> None:
-        """Do something at once; an error is said in the words of the library."""
+    def attempt(self, call: Callable[[], object]) -> bool:
+        """Call something; show the library's error and return False if it fails."""
         try:
             call()
+            return True
         except ArmtempoError as error:
-            ui.notify(str(error), type="negative", multi_line=True, timeout=8000)
+            _say(error)
+            return False
 
-    def at_once(self, call: Callable[[], object], needs: Needs = Needs.BOARD) -> None:
-        """Do what is quick and needs no turn, also while something is under way."""
+    def check(self, needs: Needs) -> None:
+        """Raise InputError, with the reason, if the requirements are not met."""
+        if reason := self.operator.why_not(self.client, needs):
+            raise InputError(reason, words.WAIT)
 
-        def checked() -> None:
-            if reason := self.operator.why_not(self.client, needs):
-                raise InputError(reason, words.WAIT)
-            call()
+    async def at_once(self, call: Callable[[Board], object], needs: Needs = Needs.BOARD) -> None:
+        """Call something on the board at once, also during a command."""
+        if self.attempt(lambda: self.check(needs)):
+            await self.threaded(lambda: call(self.operator.board))
 
-        self.attempt(checked)
+    async def threaded(self, call: Callable[[], T]) -> T | None:
+        """Run ``call`` in a thread, so that no page waits; show an error."""
+        try:
+            return await run.io_bound(call)
+        except ArmtempoError as error:
+            _say(error)
+            return None
 
     def show_ghost(self, angles_deg: Array) -> None:
-        """Show where the arm would be at these angles, (J,), besides where it is; on this page only."""
+        """Show a ghost of the arm at these angles, (J,), on this page only."""
         poses = json.dumps(self.shape.poses(angles_deg))
         ui.run_javascript(f"armtempo.ghost = {poses}")
 
     def refresh(self) -> None:
-        """Grey what cannot be used now, with the reason."""
+        """Disable controls that cannot be used now, with the reason."""
         self.controls = [control for control in self.controls if not control.element.is_deleted]
         for control in self.controls:
             # what is held keeps the keyboard's focus
@@ -137,3 +148,8 @@ class PanelPage:
         for tab, listener in self.listeners:
             if tab in ("", self.shown):
                 listener()
+
+
+def _say(error: ArmtempoError) -> None:
+    """Show an error on this page."""
+    ui.notify(str(error), type="negative", multi_line=True, timeout=8000)

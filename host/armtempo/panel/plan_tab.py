@@ -68,6 +68,9 @@ class PlanTab:
             for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
         ]
         page.on_look(self._look)
+        ui.context.client.on_connect(
+            self._changed
+        )  # what was typed while the connection broke has not arrived
 
     def _option(self, key: str, label: str) -> ui.select | ui.input:
         """The field of a key of the job."""

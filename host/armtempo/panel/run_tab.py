@@ -41,7 +41,7 @@ class RunTab:
             ):
                 button = ui.button(text).on_click(partial(self._do, text, call, needs))
                 page.control(button, needs | Needs.PLAN)
-            self._repeat = ui.number(words.REPEAT, value=1, max=99, precision=0).props("dense outlined")
+            self._repeat = ui.number(words.REPEAT, value=1, precision=0).props("dense outlined")
         ui.label(words.DOTTED).classes("armtempo-note")
         self._angles = CurveChart(self._operator.arm, words.ANGLE, 0)
         self._speeds = CurveChart(self._operator.arm, words.SPEED, 1)
@@ -63,11 +63,12 @@ class RunTab:
         if self._ended != operator.ended:  # perhaps a run, which has its report then
             self._ended = operator.ended
             self._past.refresh()
-        state = (operator.live.curves.run, len(operator.live.curves.time_s))
+        curves = operator.live.curves
+        state = (curves.run, len(curves.time_s))
         if state == self._shown or state[1] < 2:
             return
         self._shown = state
-        live, plan = operator.live.curves.thinned(_MOST_POINTS), operator.live.plan
+        live, plan = curves.thinned(_MOST_POINTS), operator.live.plan
         planned = [plan.trajectory(live.path_s, order) if plan else None for order in (0, 1)]
         self._angles.show(live.time_s, live.angle_deg, planned[0])
         self._speeds.show(live.time_s, np.gradient(live.angle_deg, live.time_s, axis=0), planned[1])
@@ -87,12 +88,9 @@ class RunTab:
         if len(folders) > 1:
             ui.button(words.COMPARE, on_click=lambda: self._compare(chosen)).props("outline no-caps")
 
-    def _compare(self, folders: list[Path]) -> None:
-        def compare() -> None:
-            page = pipeline.compare(folders)
+    async def _compare(self, folders: list[Path]) -> None:
+        if page := await self._page.threaded(lambda: pipeline.compare(folders)):
             ui.navigate.to(_address(page), new_tab=True)
-
-        self._page.attempt(compare)
 
 
 def _choose(chosen: list[Path], folder: Path, wanted: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from nicegui import ui
@@ -42,6 +43,11 @@ class SequenceTab:
         self._where = ui.label("").props('role="status"')
         self._table()
         page.on_look(self._look)
+        ui.context.client.on_connect(self._connected)
+
+    def _connected(self) -> None:
+        """Show the steps again as they are: what was typed while the connection broke has not arrived."""
+        self._shown = -1
 
     def _why_not(self) -> str:
         return words.NO_SEQUENCE_OPEN if self._desk.file is None else ""
@@ -68,7 +74,7 @@ class SequenceTab:
             for key in (kind, *KINDS[kind]):
                 box = ui.input(None if key == kind else words.STEP_KEYS[key], value=step.get(key, ""))
                 box.props(f'dense outlined aria-label="{words.STEP} {index + 1}: {key}"')
-                box.on("change", lambda key=key, box=box: self._set(index, key, str(box.value or "").strip()))
+                box.on("change", lambda event, key=key: self._set(index, key, str(event.args or "").strip()))
                 page.control(box.classes("armtempo-value"), Needs.IDLE)
             for icon, text, call in (
                 ("arrow_upward", words.UP, lambda: desk.move(index, -1)),
@@ -96,12 +102,13 @@ class SequenceTab:
         self._folder_ns, files = now_ns, self._desk.files()
         self._none.set_visibility(not files)
         if files != self._files.options:
-            self._files.set_options(files, value=self._desk.file.name if self._desk.file else None)
+            self._files.set_options(files, value=self._opened)
 
     def _look(self) -> None:
         self._look_for_files()
         if self._desk.version != self._shown:
             self._shown = self._desk.version
+            self._files.set_value(self._opened)  # which another page may have opened
             self._table.refresh()
             self._lit = 0
         state = self._operator.live.sequence
@@ -117,12 +124,22 @@ class SequenceTab:
             self._where.set_text(text if running else f"{text}: {state.ending}")
 
     def _open(self, event: object) -> None:
-        name = str(getattr(event, "value", ""))
-        if self._desk.file is None or name != self._desk.file.name:
-            self._page.at_once(lambda: self._desk.open(name), Needs.IDLE)
+        name = getattr(event, "value", None)
+        if name not in (None, self._opened):
+            self._attempt(lambda: self._desk.open(str(name)))
+            self._files.set_value(self._opened)  # another one, if that was refused
+
+    @property
+    def _opened(self) -> str | None:
+        """The name of the file whose steps are shown."""
+        return self._desk.file.name if self._desk.file else None
 
     def _save(self) -> None:
-        self._page.at_once(lambda: ui.notify(words.SAVED.format(path=self._desk.save().name)), Needs.IDLE)
+        self._attempt(lambda: ui.notify(words.SAVED.format(path=self._desk.save().name)))
+
+    def _attempt(self, call: Callable[[], object]) -> None:
+        if self._page.attempt(lambda: self._page.check(Needs.IDLE)):
+            self._page.attempt(call)
 
     def _planned(self) -> SequencePlan:
         """The plan of the steps as they are now."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import socket
 from contextlib import suppress
 from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import Client, app, ui
+from nicegui import Client, app, background_tasks, ui
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, PlainTextResponse
 
@@ -21,15 +22,18 @@ from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.held_jog import ButtonHold
 from armtempo.panel.operator import Operator
 
-_RECONNECT_S = 20.0
-"""A page whose connection breaks is kept for so long, so that a busy browser need not load it again."""
+_RECONNECT_S = 60.0
+"""Time for which a page is kept after its connection breaks (a busy browser, a sleeping tablet)."""
+_KEPT_MESSAGES = 2000
+"""For such a page; some 15 come each second, and it takes up to 132 s until it is given up."""
 _NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
-"""What a run folder holds, which may come from anybody, does nothing in the panel's name."""
+"""Files of run folders may come from anybody and must not run scripts."""
+_LOG = logging.getLogger("armtempo")
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 
 
 class Panel:
-    """The panel of one board; ``serve`` runs until it is told to end."""
+    """The panel of one board; ``serve`` runs until it is ended."""
 
     def __init__(self, operator: Operator) -> None:
         self._operator = operator
@@ -45,6 +49,7 @@ class Panel:
             title=words.TITLE,
             dark=None,
             reconnect_timeout=_RECONNECT_S,
+            message_history_length=_KEPT_MESSAGES,
             tailwind=False,
             gzip_middleware_factory=lambda inner: GZipMiddleware(inner, compresslevel=1),
         )
@@ -73,12 +78,12 @@ class Panel:
         client.on_delete(lambda: self._gone(client.id))
 
     def _gone(self, client: str) -> None:
-        """A page was closed, or its connection did not come back."""
+        """A page was closed, or did not reconnect."""
         self._operator.release(client)
         self._operator.monitors.discard(client)
 
     async def _tell(self) -> None:
-        asyncio.create_task(self._tell_all())  # noqa: RUF006  it lives as long as the server
+        background_tasks.create(self._tell_all())
 
     async def _tell_all(self) -> None:
         """Compute a message once, and send it to every page."""
@@ -86,8 +91,13 @@ class Panel:
             await asyncio.sleep(layout.TELL_S)
             if not any(client.has_socket_connection for client in Client.instances.values()):
                 continue
-            told = layout.message(self._operator, self._shape)
-            code = f"armtempo.hear({json.dumps(told)})"
+            try:
+                code = f"armtempo.hear({json.dumps(layout.message(self._operator, self._shape))})"
+            except (
+                Exception
+            ):  # a fault of ours: logged, and the next is told; the pages cover themselves meanwhile
+                _LOG.exception("panel: what the pages are told")
+                continue
             for client in list(Client.instances.values()):
                 if client.has_socket_connection:
                     client.run_javascript(code)
@@ -98,7 +108,7 @@ class Panel:
         return FileResponse(file) if file else PlainTextResponse("no such mesh", 404)
 
     async def _run_file(self, name: str, file: str) -> Any:
-        """A file of a run folder, to read; nothing else of the disk."""
+        """Serve a file of a run folder, and no other file."""
         runs = self._operator.runs.resolve()
         path = (runs / name / file).resolve()
         if path.suffix not in _SUFFIXES or not path.is_relative_to(runs) or not path.is_file():
@@ -107,7 +117,7 @@ class Panel:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket bound to an address; ``port`` 0: one that is free. InputError if it cannot be had."""
+    """A socket bound to an address; ``port`` 0: any free port. Raises InputError if that fails."""
     try:
         return socket.create_server((host, port), reuse_port=False)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Every English text of the panel, but for what the library says: errors and their cures."""
+"""All texts of the panel, except errors of the library."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ STATE_KEYS = {
     "frames_bad": "damaged messages",
 }
 STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
-REFRESH, RENAME, REMOVE, NEW_NAME = "Read again", "Rename", "Remove", "New name"
+RENAME, REMOVE, NEW_NAME = "Rename", "Remove", "New name"
 A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
 SELFTEST, SURE_SELFTEST = (

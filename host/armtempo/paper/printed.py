@@ -65,11 +65,11 @@ class Claim:
     verdict: str
     """SAME, BETTER or DIFFERS."""
     because: str = ""
-    """Why it differs, with the misprint where there is one; else a remark."""
+    """Why it differs, with the misprint if there is one; else a remark."""
 
 
 def compared(where: str, what: str, printed: float, found: float, digits: int, because: str = "") -> Claim:
-    """A number printed with ``digits`` decimals: SAME where ours is within one unit of the last."""
+    """A number printed with ``digits`` decimals: SAME if ours is within one unit of the last."""
     verdict = SAME if abs(found - printed) <= 1.01 * 10.0**-digits else DIFFERS
     text = f"{found:.{digits + 1}f}"
     return Claim(where, what, f"{printed:.{digits}f}", text, verdict, "" if verdict == SAME else because)

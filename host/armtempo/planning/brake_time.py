@@ -1,9 +1,9 @@
-"""How long a motion takes to brake to rest, or to change its speed otherwise, by where on its path that begins.
+"""The time for braking to rest, or for another change of speed, as a function of the time at which it begins.
 
-The board lets the motion's own time run at another rate, so the arm stays on its path: in the brake time the rate goes
-from r0 to r1, by the law in ``armtempo_board/stepgen/time_law.py``. Braking and pauses are r1 = 0, and their ramps have
-the shape that makes them shortest over the motion; other changes of speed have times of their own, and one
-shape.
+The board lets the motion's own time run at another rate, so the arm stays on its path: in the brake time the
+rate goes from r0 to r1, by the law in ``armtempo_board/stepgen/time_law.py``. Braking and pauses have r1 = 0,
+and the ramp shape that makes them shortest for the motion; other changes of speed have separate times, and
+one fixed shape.
 """
 
 from __future__ import annotations
@@ -21,9 +21,8 @@ from armtempo.model.parts import Limits
 from armtempo.splines.trajectory import Trajectory
 
 EXCESS = 1.25
-"""Multiple of the acceleration and jerk limits that braking and changes of speed may reach. Within the
-limits themselves a motion that is already at them could only brake very slowly: braking adds to the acceleration and
-jerk of the path."""
+"""Multiple of the acceleration and jerk limits that braking and changes of speed may reach. A motion at its
+limits could brake only very slowly within them, as braking adds to the acceleration and jerk of the path."""
 
 Rates = tuple[tuple[float, float], ...]
 TO_REST: Rates = ((1.0, 0.0), (0.75, 0.0), (0.5, 0.0), (0.25, 0.0), (0.1, 0.0))
@@ -37,8 +36,8 @@ OTHERS: Rates = (
     (0.9, 0.2),
     (0.2, 0.9),
 )
-"""Rates before and after, for which the times are found; between others less is needed. The first one of TO_REST and
-the first two of OTHERS need most."""
+"""Rates before and after for which the times are computed; all others need less. The first of TO_REST and the
+first two of OTHERS need the most."""
 
 UNIT_S = RAMP_UNIT_TICKS / TICK_HZ
 _LONGEST = 65535
@@ -55,10 +54,10 @@ _NEGLIGIBLE = 1e-6  # of RAMP_UNIT_TICKS
 
 @dataclass(frozen=True, eq=False)
 class BrakeTimes:
-    """How long changes take that begin at RAMP_ENTRIES equal steps of a motion's time, in RAMP_UNIT_TICKS.
+    """Durations of changes that begin at RAMP_ENTRIES equidistant times of a motion, in RAMP_UNIT_TICKS.
 
-    Linear in between. ``to_rest``, ``others``: (RAMP_ENTRIES,), whole numbers. ``shape``: of ramps to rest, as in the
-    record of a motion (``armtempo_shared.motion``).
+    Linearly interpolated. ``to_rest``, ``others``: (RAMP_ENTRIES,), integers. ``shape``: of ramps to rest, as
+    in the record of a motion (``armtempo_shared.motion``).
     """
 
     duration_s: float
@@ -67,11 +66,11 @@ class BrakeTimes:
     shape: int = EVEN_RAMP
 
     def rest_s(self, time_s: float | Array) -> Array:
-        """How long braking takes from a time of the motion on."""
+        """Brake time from given times of the motion, seconds, of the same shape."""
         return self._at(self.to_rest, time_s)
 
     def change_s(self, time_s: float | Array) -> Array:
-        """How long another change of speed takes."""
+        """Duration of other changes of speed from given times of the motion, seconds."""
         return self._at(self.others, time_s)
 
     def _at(self, table: Array, time_s: float | Array) -> Array:
@@ -84,10 +83,10 @@ class BrakeTimes:
 
 
 def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
-    """The shortest times that keep EXCESS times the limits, one of ``limits`` for each joint, to 2 %.
+    """The shortest times (within 2 %) that keep EXCESS times the ``limits`` of each joint.
 
-    Speed never rises. Found on a grid of starts and times, and looked at again on a finer one. Raises InputError where
-    the motion itself exceeds EXCESS times the limits.
+    Speed never rises. Computed on a grid of starts and times, and checked on a finer one. Raises InputError
+    if the motion itself exceeds EXCESS times the limits.
     """
     ramps = _Ramps(trajectory, np.array([limit.values for limit in limits]))
     if ramps.worst_of_motion > EXCESS:
@@ -102,7 +101,7 @@ def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
 
 
 def _best_shape(ramps: _Ramps) -> int:
-    """The shape of ramps to rest that are shortest in the mean, each against the best shape from where it begins."""
+    """The ramp shape with the smallest mean ratio of the brake time to that of the best shape at each start."""
     starts = np.tile((np.arange(_SHAPE_STARTS) + 0.5) / _SHAPE_STARTS, len(_SHAPES))
     shapes = np.repeat(_SHAPES, _SHAPE_STARTS)
     lengths = ramps.shortest_s(starts, TO_REST[:1], np.full(len(starts), _SHORTEST_S), shapes)
@@ -111,7 +110,7 @@ def _best_shape(ramps: _Ramps) -> int:
 
 
 def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array, shape: int) -> Array:
-    """Entries from ``least`` on; ``worst``: the rates that need most."""
+    """The table's entries, at least ``least``; ``worst``: the rates that need the most time."""
     parts = RAMP_ENTRIES - 1
     place = np.arange(_STARTS * parts + 1) / _STARTS
     needed = (
@@ -138,7 +137,7 @@ def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array, shape: int) 
 
 
 def _lift(table: Array, place: Array, needed: Array) -> None:
-    """Lengthen the entries where the table between them is less than ``needed``, by as little as will do."""
+    """Increase entries as little as possible so that the interpolated table is at least ``needed``."""
     part = np.minimum(place.astype(int), len(table) - 2)
     weight = place - part
     while True:
@@ -151,19 +150,19 @@ def _lift(table: Array, place: Array, needed: Array) -> None:
 
 
 class _Ramps:
-    """Acceleration and jerk of a motion while its rate changes, over their limits (J, 3)."""
+    """Acceleration and jerk of a motion during changes of its rate, relative to the limits (J, 3)."""
 
     def __init__(self, trajectory: Trajectory, allowed: Array) -> None:
         self._duration_s = trajectory.duration_s
         self._allowed = allowed
         time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
         # speeds, accelerations and jerks over their limits' units; rest after the end
-        # (3, J, T): what is computed for each time is together, which NumPy goes through quickest
+        # (3, J, T): the time axis last, which is fastest in NumPy
         self._motion = np.stack([trajectory(time, order).T for order in (1, 2, 3)])
         self.worst_of_motion = float(np.max(np.abs(self._motion[1:]) / allowed.T[1:, :, None]))
 
     def shortest_s(self, starts: Array, rates: Rates, least_s: Array, shapes: Array | int) -> Array:
-        """From ``least_s`` on, to 1 %, for each of ``starts``, parts of the motion's time; ``shapes``: theirs."""
+        """Shortest durations, at least ``least_s``, within 1 %, for ``starts`` (fractions of the motion's time)."""
         shapes = np.broadcast_to(shapes, starts.shape)
         low, high = least_s.copy(), least_s.copy()
         left = np.arange(len(starts))
@@ -179,7 +178,7 @@ class _Ramps:
         return high
 
     def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Array | int) -> Array:
-        """The largest acceleration or jerk over its limit in changes between ``rates``, for each start."""
+        """The largest ratio of acceleration or jerk to its limit in changes between ``rates``, for each start."""
         worst = np.zeros(len(starts))
         if not len(starts):
             return worst

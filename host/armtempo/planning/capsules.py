@@ -1,4 +1,4 @@
-"""Distances of line segments from boxes and from each other, exactly, for many at once."""
+"""Exact distances of line segments from boxes and from each other, vectorised."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from armtempo.basics.arrays import Array
 
 
 def box_distance(start: Array, end: Array, low: Sequence[float], high: Sequence[float]) -> Array:
-    """Distance of segments (N, 3) to (N, 3) from a box: (N,); negative where it is inside.
+    """Distance of segments (N, 3) to (N, 3) from a box: (N,); negative if it is inside.
 
-    Along a segment the squared distance is convex, and a parabola between the places where it crosses the plane of a
-    face, so its least is at a crossing or an apex. Inside, minus the way out at the deepest of these places counts.
+    Along a segment the squared distance is convex, and a parabola between its crossings of the planes of the
+    faces, so its minimum is at a crossing or an apex. Inside: minus the depth at the deepest of these points.
     """
     way = end - start
     ends = np.array([low, high], dtype=float)

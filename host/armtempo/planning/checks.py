@@ -33,17 +33,17 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 ESTIMATED = "(estimated; 'armtempo selftest' measures your board)"
 
 TOLERANCE = 1e-9
-"""Allowance for rounding: largest excess over a limit, relative, and over a range, in degrees."""
+"""Allowance for rounding: relative excess over a limit, and excess over a range in degrees."""
 
 FITNESS = ("stretched", "penalised")
 """Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its
-limits, ``penalised`` is Eq. (21) as the paper has it."""
+limits, ``penalised`` is Eq. (21) of the paper."""
 
 
 def limits_of(arm: Arm) -> list[Limits]:
     """The limits of the driven joints.
 
-    Raises InputError unless each is positive, and its speed one that the board can step.
+    Raises InputError unless each is positive, and its speed within the board's step rate.
     """
     limits = []
     for joint in arm.driven:
@@ -74,7 +74,7 @@ def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
 
 
 def check_job(arm: Arm, job: Job) -> None:
-    """Raises InputError for settings that do not go together, or make more than the board can hold."""
+    """Raise InputError for settings that contradict, or that the board cannot hold."""
     refine = 1 if isinstance(job.refine, str) else job.refine
     _check_path(job)
     kind = job.parameters.get("fitness", FITNESS[0])
@@ -102,12 +102,12 @@ def check_job(arm: Arm, job: Job) -> None:
 
 
 def leads_tool(job: Job) -> bool:
-    """Whether the job asks for lines or arcs of the tool, or limits its speed."""
+    """Whether the job has lines or arcs of the tool, or limits its speed."""
     return bool(job.ways) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
 
 
 def _check_ways(job: Job, where: str) -> None:
-    """InputError for lines and speeds of the tool that do not go together with the rest of the job."""
+    """Raise InputError for lines and speeds of the tool that contradict the rest of the job."""
     if job.timing != "shared" or job.degree != 5:
         raise InputError(
             f'{where}: lines and speeds of the tool need timing = "shared" and degree 5',
@@ -138,7 +138,7 @@ def _check_ways(job: Job, where: str) -> None:
 
 
 def is_free(job: Job) -> bool:
-    """Whether the path may leave the spline through the via points; a corridor of 0 leaves it no room."""
+    """Whether the path may leave the spline through the via points; not with a corridor of 0."""
     return job.path == "free" and 0.0 not in (job.corridor_deg, job.corridor_mm)
 
 
@@ -167,9 +167,9 @@ def _check_path(job: Job) -> None:
 
 
 def is_wide(via: tuple[float, ...] | Pose) -> bool:
-    """Whether a free path may pass next to it: a pose with more tolerance than counts as reached anyway.
+    """Whether a free path may use the tolerance of a via point: a pose with a larger tolerance than the default.
 
-    Only where nothing or all is asked of the orientation; other poses are passed where the inverse puts them.
+    Only if all or nothing of the orientation is constrained; other poses are passed at the inverse's angles.
     """
     return (
         isinstance(via, Pose)
@@ -193,7 +193,7 @@ def _check_free(job: Job, where: str) -> None:
         if asked and job.timing != "shared":
             raise InputError(
                 f'{where}: {what} needs timing = "shared", where the joints pass via points together',
-                "leave timing out or leave that out",
+                'give timing = "shared" (--timing shared), or leave that out',
             )
     inner = range(1, len(job.via) - 1)
     for stop in job.stops:
@@ -209,7 +209,7 @@ def _check_free(job: Job, where: str) -> None:
 
 
 def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
-    """Raises InputError for via angles (n + 1, J) that are no motion of this arm."""
+    """Raise InputError for via angles (n + 1, J) that are not a motion of this arm."""
     if via_deg.ndim != 2 or len(via_deg) < 2 or via_deg.shape[1] != len(arm.driven):
         raise InputError(
             f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} angles each, "
@@ -227,7 +227,7 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
 
 
 def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
-    """Raises PlanError if the path, also between the via points, leaves a joint's range."""
+    """Raise PlanError if the path leaves a joint's range, also between the via points."""
     low, high = extremes.range_of(np.moveaxis(bspline.polynomials(angle_points_deg, degree), 2, 0))
     for joint, lowest, highest in zip(arm.driven, low, high, strict=True):
         least, most = joint.range_deg
@@ -241,7 +241,7 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
 
 
 def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
-    """The check that every plan passes: PlanError if a limit or the board's step rate is exceeded."""
+    """The check of every plan: raises PlanError if a limit or the board's step rate is exceeded."""
     for joint, extreme in zip(arm.driven, reached, strict=True):
         if not np.all(extreme.values <= np.array(joint.limits.values) * (1 + TOLERANCE)):
             raise PlanError(
@@ -262,14 +262,14 @@ def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
 
 
 def rate_words(rates: float) -> str:
-    """A sum of step rates next to what a board does."""
+    """Text: a sum of step rates compared with the board's."""
     return (
         f"the joints together need up to {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} {ESTIMATED}"
     )
 
 
 def check_time(trajectory: Trajectory) -> None:
-    """Raises PlanError unless time increases everywhere: as all differences of its control points do."""
+    """Raise PlanError unless all differences of time control points are positive, so that time increases."""
     for spline in trajectory.joints:
         if not np.all(np.diff(spline.time_points_s) > 0.0):
             raise PlanError(
@@ -279,7 +279,7 @@ def check_time(trajectory: Trajectory) -> None:
 
 
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
-    """Raises PlanError if a control point exceeds the integers of the board's evaluator."""
+    """Raise PlanError if a control point exceeds the range of the board's integers."""
     for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
         where = f"trajectory {trajectory.name!r}, {joint.name}"
         _check_times(where, joint_spline)

@@ -1,4 +1,4 @@
-"""Points of u at which a program watches the limits: a grid, and the peaks that a solution shows between."""
+"""Collocation points, at which a program checks the limits: a grid, and peaks of the last solution between them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from armtempo.planning.variables import Index
 from armtempo.splines import bspline, extremes, time_axis
 
 _APART = 1e-7
-"""Points of one segment nearer than this are one."""
+"""Points of one segment closer than this are merged."""
 _ZOOMS = 6
-"""Parabolas put through each peak, each on a step a quarter of the one before."""
+"""Number of parabolas through each peak, each on a quarter of the step before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Points:
     u: Array
 
     def __add__(self, other: Points) -> Points:
-        """Both, without those that are nearly there already."""
+        """The union, without nearly equal points."""
         segment = np.concatenate([self.segment, other.segment])
         u = np.concatenate([self.u, other.u])
         order = np.lexsort((u, segment))
@@ -49,11 +49,11 @@ class Curve:
         return self._ratios(self.angle[:, segment], self.limits.T[:, :, None], segment, u)
 
     def own_ratios(self, joint: Index, segment: Index, u: Array) -> Array:
-        """The same of one joint at each point, (P,): (3, P)."""
+        """As ``ratios``, of one joint at each point, (P,): (3, P)."""
         return self._ratios(self.angle[joint, segment], self.limits[joint].T, segment, u)
 
     def _ratios(self, angle: Array, limits: Array, segment: Index, u: Array) -> Array:
-        """For power coefficients of angles (..., P, k + 1) and limits that go with them."""
+        """Ratios for power coefficients of angles (..., P, k + 1) and their limits."""
         q1, q2, q3 = _derivatives(angle, u)
         t1, t2, t3 = _derivatives(self.time[segment], u)
         speed = q1 / t1
@@ -67,13 +67,13 @@ class Curve:
         return np.stack([bspline.evaluate(angle, segment, u) for angle in self.angle], axis=1)
 
     def stretch(self) -> float:
-        """The factor on time with which the motion is just within its limits, proven."""
+        """The factor on time with which the motion just keeps its limits, proven."""
         ratios = extremes.magnitudes(self.angle, self.time) / self.limits
         return float(stretch_of(ratios.T).max())
 
 
 def grid(segments: int, parts: int, ends: bool = True) -> Points:
-    """``parts`` points from the start of every segment on; with ``ends`` also its end, else only the last one."""
+    """``parts`` points in every segment from its start; with ``ends`` also each end, else only the last."""
     u = np.linspace(0.0, 1.0, parts + 1)
     points = Points(np.repeat(np.arange(segments), parts + 1), np.tile(u, segments))
     keep = np.ones(len(points.u), dtype=bool) if ends else points.u < 1.0
@@ -82,7 +82,7 @@ def grid(segments: int, parts: int, ends: bool = True) -> Points:
 
 
 def peaks(curve: Curve, parts: int, least: float) -> Points:
-    """Where a ratio of at least ``least`` has a local maximum, as ``parts`` points a segment show it."""
+    """Local maxima of ratios of at least ``least``, found on ``parts`` points per segment."""
     segments = len(curve.time)
     points = grid(segments, parts)
     ratios = curve.ratios(points.segment, points.u).reshape(3 * len(curve.angle), -1)
@@ -100,7 +100,7 @@ def peaks(curve: Curve, parts: int, least: float) -> Points:
 
 
 def _zoomed(curve: Curve, which: Index, segment: Index, u: Array, step: float) -> Points:
-    """The peaks near these points, by parabolas on ever smaller steps."""
+    """The peaks near these points, by parabolas on decreasing steps."""
     column = np.arange(len(u))
     kind, joint = np.divmod(which, len(curve.angle))
     for _ in range(_ZOOMS):

@@ -6,15 +6,15 @@ With x = (du/dt)^2 as a function of the path's parameter u and ' = d/du, a motio
     acceleration   |q'' x + q' x' / 2|                     <= A
     jerk           |q' x'' / 2 + 3 q'' x' / 2 + qd x|      <= J x^(-1/2),    qd the third derivative
 
-For any multipliers n >= 0, m = m+ - m-, l = l+ - l- of these, all x that keep them take at least
+For any multipliers n >= 0, m = m+ - m-, l = l+ - l- of these constraints, every feasible x takes at least
 
     D = integral of  min over x > 0 of (w x^(-1/2) + c x)  -  n V^2 - (m+ + m-) A
     w = 1 - sum of J (l+ + l-),    c = sum of n q'^2 + (m q'' - m' q') / 2 + (q' l'' - q'' l') / 2
 
-by weak duality and integration by parts (the ends give nothing where the path starts and ends at rest). The minimum is
-3 / 4^(1/3) w^(2/3) c^(1/3): D is concave in the multipliers, and the interior-point method finds about the best of
-those that are splines on cells of u: l quadratic, m linear, n constant. Whatever it finds, ``dual_value.value`` bounds
-D from below.
+by weak duality and integration by parts (the boundary terms vanish for a path from rest to rest). The minimum
+is 3 / 4^(1/3) w^(2/3) c^(1/3): D is concave in the multipliers, and the interior-point method approximately
+maximises it over splines on cells of u: l quadratic, m linear, n constant. For any result,
+``dual_value.value`` bounds D from below.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from armtempo.planning.variables import Index
 from armtempo.splines import bspline
 
 MINIMUM_FACTOR = 3.0 / 4.0 ** (1.0 / 3.0)
-"""The minimum of w x^(-1/2) + c x over x > 0 is this times w^(2/3) c^(1/3)."""
+"""The minimum of w x^(-1/2) + c x over x > 0, divided by w^(2/3) c^(1/3)."""
 _SCHEDULE = Schedule(first_barrier=100.0, last_barrier=1e-4, curvature=False)
 _NODES = 4
 """Gauss points in a cell."""
 _JERK, _ACCELERATION, _SPEED = 0.2, 0.05, 0.5
-"""Coefficients to start from."""
+"""Start values of the coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """A path cut into N cells of length 1, in units of time in which a cell takes about 1.
+    """A path cut into N cells of length 1, with a unit of time in which a cell takes about 1.
 
-    ``pieces``: power coefficients of the angles, (N, k + 1, J); ``limits``: (J, 3) in that unit of time. ``rests``:
-    whether also the second derivative of the angles is 0 at both ends.
+    ``pieces``: power coefficients of the angles, (N, k + 1, J); ``limits``: (J, 3) in that unit of time.
+    ``rests``: whether the second derivative of the angles is also 0 at both ends.
     """
 
     pieces: Array
@@ -65,7 +65,7 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Coefficients of the multipliers, each times its limit, none below 0.
+    """Coefficients of the multipliers, each times its limit, all >= 0.
 
     ``jerk``: (2, N + 2, J), those of l+ and l-, quadratic B-splines; ``acceleration``: (2, N + 1, J), of m+ and m-
     at the ends of cells; ``speed``: (N, J), n in each cell.
@@ -77,7 +77,7 @@ class Multipliers:
 
 
 def best_multipliers(cells: Cells) -> Multipliers:
-    """Those that give about the highest bound."""
+    """The multipliers that approximately maximise the bound."""
     program = _Dual(cells)
     return program.multipliers(interior_point.minimise(program, program.start(), _SCHEDULE).x)
 
@@ -95,7 +95,7 @@ def quadratic(v: Array) -> Array:
 
 
 class _Dual:
-    """Minus D a cell, of coefficients above 0 that keep w and c above 0 at Gauss points of the cells."""
+    """Minus D per cell, for positive coefficients with positive w and c at the Gauss points of the cells."""
 
     equalities = Equalities.none()
 
@@ -119,7 +119,7 @@ class _Dual:
         self.kkt = DualKkt(columns, self._slopes)
 
     def _local(self) -> Index:
-        """Variables that matter in each cell: (N, 11 J)."""
+        """Variables that act on each cell: (N, 11 J)."""
         cell = np.arange(self._cells.count)
         jerk = [self._jerk[sign, cell + offset] for sign in (0, 1) for offset in range(3)]
         acceleration = [self._acceleration[sign, cell + offset] for sign in (0, 1) for offset in range(2)]
@@ -153,7 +153,7 @@ class _Dual:
         return slopes
 
     def start(self) -> Array:
-        """Multipliers that keep w and c above 0: those of speed alone do."""
+        """A feasible start, with positive w and c: multipliers of speed only."""
         x = np.empty(len(self._cost))
         x[self._jerk] = _JERK / self._cells.joints
         x[self._acceleration] = _ACCELERATION
@@ -161,7 +161,7 @@ class _Dual:
         return x
 
     def multipliers(self, x: Array) -> Multipliers:
-        """Those of the variables x."""
+        """The multipliers of the variables x."""
         jerk = x[self._jerk].copy()
         if not self._cells.rests:
             jerk[:, [0, 1, -2, -1]] = 0.0
@@ -169,7 +169,7 @@ class _Dual:
 
     def objective(self, x: Array) -> float:
         w, c = self._forms(x)
-        # Not by @, for which BLAS starts threads from 10 000 elements on.
+        # not @, with which BLAS starts threads for 10 000 elements or more
         least = MINIMUM_FACTOR * np.sum(self._weights * np.cbrt(w) ** 2 * np.cbrt(c))
         return float(np.sum(self._cost * x) - least)
 

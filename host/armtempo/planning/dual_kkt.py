@@ -1,10 +1,10 @@
-"""Newton's equations of the dual bound: a diagonal, and w and c of which there are few in each cell.
+"""Newton's equations of the dual bound: a diagonal plus a low-rank term for w and c of each cell.
 
 The matrix is D + S' B S, D diagonal, B of 2 x 2 blocks, S the slopes of w and c. By Woodbury's formula its inverse is
 
     D^-1 - D^-1 S' (B^-1 + S D^-1 S')^-1 S D^-1
 
-and the matrix in brackets is banded: cells two apart still share a variable, those farther apart none.
+and the matrix in brackets is banded, as only cells at most two apart share variables.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from armtempo.basics.arrays import Array
 from armtempo.planning.variables import Index
 
 _SHARED = 2
-"""Cells that share variables are no farther apart."""
+"""Largest distance of cells that share variables."""
 
 
 class DualKkt:
-    """Solves them for N cells with G points and L variables each.
+    """Solves the equations for N cells with G points and L variables each.
 
-    ``columns``: (N, L), variables of each cell; ``slopes``: (N, G, 2, L) of w and c there.
+    ``columns``: (N, L), variables of each cell; ``slopes``: (N, G, 2, L), of w and c at its points.
     """
 
     def __init__(self, columns: Index, slopes: Array) -> None:
@@ -36,16 +36,16 @@ class DualKkt:
         self._rows = (_SHARED + 1) * self._block
 
     def _both(self, apart: int) -> tuple[Index, Index, Index]:
-        """Variables that a cell and that ``apart`` after share: their numbers there, and their places in both.
+        """Variables shared by a cell and the cell ``apart`` after it: their numbers, and their places in both.
 
-        They have the same places in all cells but perhaps the last.
+        The places are the same in all cells, except perhaps the last.
         """
         _, first, second = np.intersect1d(self._columns[0], self._columns[apart], return_indices=True)
         return self._columns[:-apart, first], first, second
 
     def factor(self, entries: Array) -> DualFactor:
         """The matrix with B (2, 2, N G) and D, one after the other. Raises numpy's LinAlgError if it is singular."""
-        from scipy.linalg import lapack  # here, because loading it takes longer than most commands
+        from scipy.linalg import lapack  # imported here, because that takes longer than most commands
 
         size = len(entries) - self._size
         (b00, b01), (_, b11) = entries[:size].reshape(2, 2, len(self._columns), self._points)

@@ -1,4 +1,4 @@
-"""What a choice of multipliers proves: D of ``dual_bound``, bounded from below by Bernstein coefficients."""
+"""The bound that multipliers prove: D of ``dual_bound``, bounded from below by Bernstein coefficients."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from armtempo.planning.dual_bound import MINIMUM_FACTOR, Cells, Multipliers
 from armtempo.splines import bernstein, bspline
 
 _HALVINGS = 4
-"""Cells are halved so often; what is lost falls with the square of the pieces' length."""
+"""Number of halvings of cells; the loss is proportional to the square of the pieces' length."""
 _ROUNDING = 1e-9
-"""Taken off the bound, relative, for the rounding of its sums."""
+"""Relative reduction of the bound for the rounding of its sums."""
 
 
 def value(cells: Cells, multipliers: Multipliers) -> float:
-    """No motion along the path takes less, in the cells' unit of time; 0 if the multipliers prove nothing.
+    """A lower bound of the motion time along the path, in the cells' unit of time; 0 if the multipliers prove nothing.
 
-    The minimum over x is concave and rises with w and c. On a piece both are at least their chords less what the
-    Bernstein coefficients may lie below them, and the integral over a chord is at least that by its ends.
+    The minimum over x is concave and increases with w and c. On a piece, w and c are at least their chords
+    minus the largest distance of the Bernstein coefficients below them, and by concavity the trapezoidal rule
+    is a lower bound.
     """
     multipliers = _scaled(multipliers)
     w, c = _forms(cells, multipliers)
@@ -40,9 +41,9 @@ def value(cells: Cells, multipliers: Multipliers) -> float:
 
 
 def _scaled(multipliers: Multipliers) -> Multipliers:
-    """All multiplied by what keeps w at 0 or more everywhere: 1 less all of jerk."""
+    """All multipliers scaled so that w, 1 minus the sum of the jerk multipliers, is >= 0 everywhere."""
     jerk = multipliers.jerk.sum(axis=(0, 2))
-    # On a cell the Bernstein coefficients are the middle coefficient and its means with both neighbours.
+    # the Bernstein coefficients of a cell are the middle coefficient and its means with both neighbours
     most = float(max(np.max(jerk[1:-1]), np.max(0.5 * (jerk[1:] + jerk[:-1]))))
     part = min(1.0, (1.0 - _ROUNDING) / most) if most > 0.0 else 1.0
     return Multipliers(multipliers.jerk * part, multipliers.acceleration * part, multipliers.speed * part)
@@ -76,7 +77,7 @@ def _forms(cells: Cells, multipliers: Multipliers) -> tuple[Array, Array]:
 
 
 def _trapezoid(coefficients: Array) -> float:
-    """Integral of functions that are linear on cells of length 1, by their values at the ends (2, N + 1, J)."""
+    """Integral of functions that are linear on cells of length 1, from values at the ends (2, N + 1, J)."""
     return float(coefficients[:, 1:-1].sum() + 0.5 * coefficients[:, [0, -1]].sum())
 
 
@@ -94,10 +95,10 @@ def _least(w: Array, c: Array) -> Array:
 
 
 def _highest_x(cells: Cells) -> Array:
-    """The most that x can be on each cell, (N,), infinite if no simple reason bounds it.
+    """Upper bound of x on each cell, (N,); infinite without a simple bound.
 
-    A joint's speed limit; where a joint turns in the cell, its acceleration limit: v^2 <= 2 A |dq| from there; at an
-    end at rest, its jerk limit: v <= J / 2 (6 dq / J)^(2/3) from there.
+    Bounds: a joint's speed limit; after a turn of a joint in the cell, its acceleration limit, v^2 <= 2 A
+    |dq|; after a rest, its jerk limit, v <= J / 2 (6 dq / J)^(2/3).
     """
     speed, acceleration, jerk = cells.limits.T
     first, second, third = (_extent(cells.pieces, order) for order in (1, 2, 3))
@@ -114,14 +115,14 @@ def _highest_x(cells: Cells) -> Array:
 
 
 class _Extent(NamedTuple):
-    """Bounds on a magnitude on each cell, (N, J); the lower one 0 if the sign is not sure."""
+    """Bounds of a magnitude on each cell, (N, J); the lower bound is 0 if the sign is not known."""
 
     least: Array
     most: Array
 
 
 def _extent(pieces: Array, order: int) -> _Extent:
-    """Of a derivative of each joint."""
+    """Bounds of the derivative of the given order, of each joint."""
     plain = bernstein.unscale(bernstein.from_power(np.moveaxis(bspline.derivative(pieces, order), 1, 2)))
     low, high = plain.min(axis=2), plain.max(axis=2)
     least = np.maximum(np.maximum(low, -high), 0.0)
@@ -129,6 +130,6 @@ def _extent(pieces: Array, order: int) -> _Extent:
 
 
 def _changes(pieces: Array) -> NDArray[np.bool_]:
-    """Where the first derivative has both signs at the ends of a cell: (N, J)."""
+    """Cells with opposite signs of the first derivative at their ends: (N, J)."""
     slopes = bspline.derivative(pieces, 1)
     return np.asarray(slopes[:, 0] * slopes.sum(axis=1) <= 0.0, dtype=bool)

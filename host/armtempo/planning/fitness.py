@@ -1,7 +1,7 @@
-"""The fitness that a search minimises: motion time and excess over the limits, of a whole population at once.
+"""The fitness that a search minimises: motion time and excess over the limits, for a whole population.
 
-Angles are fixed, only the intervals X vary, so everything of the angle and of the basis is computed once,
-on a grid of u; a population then costs one matrix product and a few array operations.
+Only the intervals X vary, so everything that depends on the angles and the basis is computed once, on a grid
+of u; a population then needs one matrix product and a few array operations.
 """
 
 from __future__ import annotations
@@ -15,19 +15,18 @@ from armtempo.splines import bspline, time_axis
 from armtempo.splines.bspline import Array
 
 SAMPLES = 16
-"""Parts of a path segment between the grid points at which the search evaluates the limits; the finished plan is
-checked without a grid."""
+"""Grid intervals per path segment for the search; the finished plan is checked without a grid."""
 _PENALTY = 30.0
-"""Seconds that the penalty of Eq. (21) charges where a limit is exceeded by as much again."""
+"""Penalty of Eq. (21) in seconds for twice the limit."""
 _TINY = 1e-300
 """Avoids 0 / 0 if a joint does not move."""
 
 
 class Fitness:
-    """Fitness of time intervals for one joint, or for several on one time axis.
+    """Fitness of time intervals for one joint, or for several joints on one time axis.
 
-    ``angle_points_deg``: (n + degree, J) control points; ``limits``: one for each joint. A point to
-    evaluate has n intervals in seconds (m = n below).
+    ``angle_points_deg``: (n + degree, J) control points; ``limits``: one per joint. A point to evaluate has n
+    intervals in seconds (m = n below).
     """
 
     def __init__(self, angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> None:
@@ -35,7 +34,7 @@ class Fitness:
         pieces = bspline.polynomials(angle_points_deg, degree)
         self.intervals = len(pieces)
         u = np.linspace(0.0, 1.0, SAMPLES + 1)
-        grid = (len(u), -1, self.intervals, 1)  # (G, J, m, N): a population fills the last axis, the fastest
+        grid = (len(u), -1, self.intervals, 1)  # (G, J, m, N): the population is the last axis, the fastest
         angles = [_on_grid(bspline.derivative(pieces, order), u) for order in (1, 2, 3)]
         self._angles = [np.ascontiguousarray(angle).reshape(grid) for angle in angles]
         self._times = _time_maps(self.intervals, degree, u)
@@ -61,7 +60,7 @@ class Fitness:
     def peaks(self, intervals_s: Array) -> Array:
         """Largest ratios in each segment, (3, J, m, N): of the grid, and of parabolas through its points.
 
-        A parabola through three points whose top lies beyond the outer ones is cut down to less than those.
+        If the top of a parabola through three points is outside of them, a smaller value than theirs is used.
         """
         ratios = self.ratios(intervals_s)
         return np.asarray(np.maximum(_tops(ratios).max(axis=1), np.maximum(ratios[:, 0], ratios[:, -1])))
@@ -75,18 +74,18 @@ class Fitness:
         return np.asarray(intervals_s.sum(axis=1) + _PENALTY * excess)
 
     def stretched(self, intervals_s: Array) -> Array:
-        """Motion time when X is stretched or shrunk until it just keeps the limits, (N,) for X (N, m)."""
+        """Motion time after X is stretched or shrunk to just keep the limits, (N,) for X (N, m)."""
         return np.asarray(intervals_s.sum(axis=1) * self.stretch(intervals_s))
 
     def stretch(self, intervals_s: Array) -> Array:
-        """The factor on X with which it is just within the limits, on the grid: (N,)."""
+        """The factor on X with which it just keeps the limits on the grid: (N,)."""
         ratios = self.ratios(intervals_s)
         everywhere = (1, 2, 3)
         return stretch_of(np.maximum(_tops(ratios).max(axis=everywhere), ratios.max(axis=everywhere)))
 
 
 def _tops(ratios: Array) -> Array:
-    """Tops of parabolas through each three points that follow each other, (3, G - 2, J, m, N); see ``peaks``."""
+    """Tops of parabolas through three successive points, (3, G - 2, J, m, N); see ``peaks``."""
     left, middle, right = ratios[:, :-2], ratios[:, 1:-1], ratios[:, 2:]
     slope = np.abs(left - right)
     bend = middle + middle
@@ -103,7 +102,7 @@ def _tops(ratios: Array) -> Array:
 
 
 def stretch_of(ratios: Array) -> Array:
-    """Least factor on time with which ``ratios`` (3, ...) of speed, acceleration and jerk are 1 at most."""
+    """Least factor on time with which ``ratios`` (3, ...) of speed, acceleration and jerk are at most 1."""
     return np.asarray(np.maximum(np.maximum(ratios[0], np.sqrt(ratios[1])), np.cbrt(ratios[2])))
 
 
@@ -114,7 +113,7 @@ def _on_grid(pieces: Array, u: Array) -> Array:
 
 
 def _time_maps(count: int, degree: int, u: Array) -> Array:
-    """From intervals to t', t'', t''' on the grid, one below the other: (3 * G * m, m)."""
+    """The matrix from intervals to t', t'', t''' on the grid, stacked: (3 * G * m, m)."""
     pieces = bspline.polynomials(np.ascontiguousarray(time_axis.step_map(count, degree).T), degree)
     maps = [_on_grid(bspline.derivative(pieces, order), u).swapaxes(1, 2) for order in (1, 2, 3)]
     return np.concatenate(maps).reshape(-1, count)

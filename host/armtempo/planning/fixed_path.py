@@ -1,4 +1,4 @@
-"""The best time axis of a fixed path, with as many segments for each of the path as wanted."""
+"""The optimal time axis of a fixed path, with a given number of segments per path segment."""
 
 from __future__ import annotations
 
@@ -20,38 +20,37 @@ from armtempo.planning.variables import MotionVariables, time_basis, time_points
 from armtempo.splines import bspline, time_axis
 
 _ROUNDS = 12
-"""Solves, each at the peaks that the one before showed between its points."""
+"""Largest number of solves, each with the peaks of the previous solution as new points."""
 _PARTS, _LEAST_PARTS, _POINTS = 64, 4, 2000
-"""Points of a path segment, shared by its time segments, but at least this many in each of those; fewer where there
-would be more than _POINTS."""
+"""Points per path segment, divided among its time segments; least points per time segment; largest total."""
 _PEAK_THRESHOLD = 0.95
-"""Peaks from this part of a limit on become points."""
+"""Peaks of at least this fraction of a limit become points."""
 _PEAK_GRID_FACTOR = 4
-"""Peaks are looked for on a grid this many times finer."""
+"""Factor by which the grid for the search of peaks is finer."""
 _AWAY = 1.003
-"""Time is stretched by this before each solve, so that it starts within the limits."""
+"""Factor on time before each solve, for a start within the limits."""
 _COARSE = Schedule(first_barrier=1e-2, last_barrier=1e-5)
 _AGAIN = 3e-4
-"""First barrier of the solves after the first."""
+"""Initial barrier parameter of all solves after the first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """A time axis that keeps all limits, and how near it is to the best one nearby."""
+    """A time axis within all limits, and a bound of the local optimum."""
 
     differences_s: Array
-    """Of the time control points, (m + degree - 1,)."""
+    """Differences of the time control points, (m + degree - 1,)."""
     total_s: float
     bound_s: float
-    """No axis nearby with as many variables takes less; 0 if that was not found out."""
+    """Lower bound of the local optimum with the same variables; 0 if not known."""
 
 
 @dataclass(frozen=True, eq=False)
 class Along:
-    """What has limits along a path besides its joints: the way of the tool, and parts of it.
+    """Further quantities with limits along a path: the way of the tool, or components of it.
 
-    ``pieces``: power coefficients on each segment of the time axis, (V, m, degree + 1), of which only derivatives
-    count; ``limits``: of its first three derivatives by time, (V, 3).
+    ``pieces``: power coefficients on each segment of the time axis, (V, m, degree + 1), only used for
+    derivatives; ``limits``: of the first three time derivatives, (V, 3).
     """
 
     pieces: Array
@@ -59,11 +58,11 @@ class Along:
 
 
 class FixedPath:
-    """A path with limits, whose time axis has ``refine`` segments for each of the path.
+    """A path with limits, whose time axis has ``refine`` segments per path segment.
 
-    ``angle_points_deg``: (n + degree, J), one of ``limits`` each. With ``mirrored`` ends the axis is one of
-    intervals (``time_axis.step_map``), else all differences of its control points are free. ``along``: what else has
-    limits along it.
+    ``angle_points_deg``: (n + degree, J); ``limits``: one per joint. With ``mirrored`` ends the axis is given
+    by intervals (``time_axis.step_map``), else all differences of its control points are free. ``along``:
+    further quantities with limits.
     """
 
     def __init__(
@@ -100,13 +99,13 @@ class FixedPath:
         return float(self._weights @ differences_s)
 
     def stretched(self, differences_s: Array) -> Array:
-        """The axis scaled until the motion just keeps every limit, proven."""
+        """The axis scaled so that the motion just keeps every limit, proven."""
         return np.asarray(differences_s * self.curve(differences_s).stretch())
 
     def optimum(self, differences_s: Array, gap: float) -> Optimum:
-        """The best axis near one (m + degree - 1,), which is stretched first; never worse than that.
+        """The local optimum from a start (m + degree - 1,), which is stretched first; never slower than that.
 
-        Ends when it is known to within ``gap`` of it, or further rounds do not help.
+        Ends within a relative ``gap`` of the bound, or if further rounds do not help.
         """
         best = self.stretched(differences_s)
         parts = max(_LEAST_PARTS, min(_PARTS // self.refine, _POINTS // self.variables.segments))
@@ -130,9 +129,9 @@ class FixedPath:
         return Optimum(best, self.duration_s(best), min(bound, self.duration_s(best)))
 
     def _solve(self, seen: list[Array], points: Points, settings: Schedule) -> tuple[Array, float]:
-        """The best axis that keeps the limits at these points, and a bound from below on its motion time.
+        """The optimal axis within the limits at these points, and a lower bound of its motion time.
 
-        From the last of those ``seen``, with what could be reached near any of them.
+        Starts from the last axis in ``seen``; constraints are those that could be reached near any of them.
         """
         differences_s = seen[-1]
         unit_s = self.duration_s(differences_s) / self.variables.segments
@@ -156,7 +155,7 @@ def _at(angle: Array, points: Points, order: int) -> Array:
 
 
 def _mirror(variables: MotionVariables) -> Equalities:
-    """Differences at both ends are equal in pairs, as those of an axis of intervals are."""
+    """Equalities of a mirrored axis: differences at both ends are equal in pairs."""
     edge = (variables.degree - 1) // 2
     mirrored = time_axis.mirrored(variables.segments, edge) + edge
     own = np.flatnonzero(mirrored != np.arange(len(mirrored)))

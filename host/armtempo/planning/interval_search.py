@@ -1,4 +1,4 @@
-"""The search for the intervals of a time axis, within bounds that follow from the job and give way."""
+"""The search for the intervals of a time axis, within bounds that are computed from the job and widened if needed."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from armtempo.planning.fixed_path import FixedPath
 from armtempo.splines import bspline
 
 _REACH = 6.0
-"""Bounds are this factor below and above what an interval would need by itself."""
+"""Factor of the bounds below and above the estimated interval."""
 _WIDER = 6.0
 _WIDENINGS = 3
 _NEAR = 1.01
-"""So near to a bound, as a factor, is at it."""
+"""An interval within this factor of a bound counts as at the bound."""
 _COARSE_GAP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the search found, and what the user must know of it."""
+    """The result of the search, and notes for the user."""
 
     result: Result
     starts_s: Array
-    """Motion time that each start of a gradient search led to; else empty."""
+    """Motion time of each start of a gradient search; else empty."""
     notes: tuple[str, ...] = ()
 
 
 def bounds_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits]) -> Array:
-    """Shortest and longest interval to look at for each path segment: (n, 2).
+    """Shortest and longest interval of the search for each path segment: (n, 2).
 
-    About what each segment would take from rest to rest, as a multiple and as a part of it.
+    The estimated time of each segment from rest to rest, divided and multiplied by _REACH.
     """
     pieces = bspline.polynomials(angle_points_deg, degree)
     via = np.concatenate([pieces[:, 0], pieces[-1:].sum(axis=1)])
@@ -53,8 +53,8 @@ def search(
 ) -> Found:
     """Intervals (n,) by the job's optimiser, for joints on one axis with control points (n + degree, J).
 
-    Where the result ends at bounds that follow from the job, they are widened and it continues from anew; at
-    bounds that the job gives, that is only said. Gradients start within the bounds and may leave them.
+    If the result is at computed bounds, they are widened and the search is repeated; at the job's bounds
+    there is only a note. Gradients start within the bounds and may leave them.
     """
     box = bounds_s(angle_points_deg, job.degree, limits)
     if job.bounds_s is not None:
@@ -105,9 +105,9 @@ def _once(
 def gradient(
     path: FixedPath, box: Array, rng: np.random.Generator, starts: int, progress: Progress | None = None
 ) -> Found:
-    """The best of the local optima that ``starts`` random intervals within ``box`` (n, 2) lead to.
+    """The best local optimum from ``starts`` random intervals within ``box`` (n, 2).
 
-    An evaluation is a start; the history is the best motion time after each.
+    ``evaluations`` is the number of starts; the history is the best motion time after each.
     """
     times: list[float] = []
     intervals = box[:, 0]
@@ -125,9 +125,9 @@ def gradient(
 
 
 def _held(x: Array, box: Array, relative: bool) -> np.ndarray:
-    """Indices of the intervals x (n,) that the bounds hold back.
+    """Indices of the intervals x (n,) at the bounds.
 
-    With ``relative`` only their ratios count: where all of x can be scaled away from the bounds, none is held.
+    With ``relative`` only ratios count: if all of x can be scaled away from the bounds, none.
     """
     low, high = x / box[:, 0], box[:, 1] / x
     if not relative:

@@ -113,7 +113,8 @@ class LimitRows:
         return (self.by_angle @ self._variables.angle_points(x)).reshape(3, time.shape[1], -1), time
 
     def gradient(self, local: Array) -> Array:
-        """Gradient (n,) of what has the derivatives ``local`` (6, P, J) by the six derivatives at each point."""
+        """Gradient (n,) of a function with the derivatives ``local`` (6, P, J) by the six derivatives at each
+        point."""
         by_time = self.by_time.T @ local[3:].sum(axis=2).ravel()
         by_angle = self.by_angle.T @ local[:3].reshape(-1, local.shape[2])
         return self._variables.pack(by_angle, by_time)

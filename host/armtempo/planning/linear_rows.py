@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class LinearRows:
-    """low < weights . x[columns] < high; where a bound is infinite there is no inequality.
+    """low < weights . x[columns] < high; if a bound is infinite there is no inequality.
 
     ``columns`` and ``weights``: (R, w); ``low`` and ``high``: (R,).
     """

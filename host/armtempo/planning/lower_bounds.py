@@ -1,4 +1,4 @@
-"""Motion times that no motion can beat, proven, to hold a plan against."""
+"""Proven lower bounds of the motion time, for comparison with a plan."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import stage
 from armtempo.model.parts import Limits
-from armtempo.planning import dual_bound, dual_value, rest_to_rest
+from armtempo.planning import dual_bound, dual_value, rest_to_rest, via_bound
 from armtempo.planning.dual_bound import Cells
 from armtempo.splines import bspline
 
 _WIGGLE = 1e-9
-"""Turns smaller than this part of the joint's way are rounding."""
+"""Turns smaller than this fraction of the joint's way are rounding."""
 _ROUNDED = 1.0 - 1e-9
-"""Floors are this part of what comes out, for the rounding of angles and sums."""
+"""Factor on the bounds, for the rounding of angles and sums."""
 _MOST_CELLS, _LEAST_CELLS = 16, 4
-"""Cells in a segment of the path."""
+"""Cells per segment of the path, most and least."""
 _WORK = 10_000
-"""Fewer cells where segments times the square of the joints' number would be more than this."""
+"""Bound of segments times the square of the number of joints; above it, fewer cells are used."""
 
 
 @dataclass(frozen=True)
 class Floor:
-    """A proven lower bound of a motion time, and how it was found.
+    """A proven lower bound of a motion time under speed, acceleration and jerk limits.
 
-    ``kind``: ``"rests"``: from turn to turn of one joint; ``"path"``: along the common path; ``"vias"``: through the
-    via points, whatever the path; each under speed, acceleration and jerk limits.
+    ``kind``: ``"rests"``: from turn to turn of one joint; ``"path"``: along the common path; through the via points,
+    for any path, ``"vias"``: of one joint, ``"together"``: of all of them.
     """
 
     time_s: float
@@ -38,15 +38,15 @@ class Floor:
 
 
 def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> Floor:
-    """The highest floor known for joints that move together on a path, ``about_s`` of it.
+    """The highest lower bound for joints that move together on a path; ``about_s``: approximate motion time.
 
-    ``angle_points_deg``: (n + degree, J). Each joint stands still wherever it turns; and with several, no time law
-    along the path keeps the limits of all in less.
+    ``angle_points_deg``: (n + degree, J). Bounds: each joint from turn to turn, where it stands still; for
+    several joints, also the dual bound of all time laws along the path.
     """
     found = []
     angle_points_deg = (
         angle_points_deg - angle_points_deg[0]
-    )  # exact where the way is short: then it counts most
+    )  # exact for a short way, for which it is the larger bound
     for joint, limit in enumerate(limits):
         reached = turns(angle_points_deg[:, joint], degree)
         found.append(Floor(_ROUNDED * rest_to_rest.floor_s(reached, limit, from_rest=degree == 5), "rests"))
@@ -56,7 +56,7 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
 
 
 def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> float:
-    """By duality, on more cells where few prove nothing; 0 if that does not help."""
+    """The dual bound, on more cells if few prove nothing; 0 if that does not help."""
     stage("proving the floor")
     segments = len(angle_points_deg) - degree
     parts = min(max(_WORK // (segments * len(limits) ** 2), _LEAST_CELLS), _MOST_CELLS)
@@ -68,7 +68,7 @@ def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
 
 
 def _by_cells(points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float, parts: int) -> float:
-    """By duality, with that many cells in a segment of the path."""
+    """The dual bound with ``parts`` cells per segment of the path."""
     pieces = bspline.subdivide(bspline.polynomials(points_deg, degree), parts)
     cell_s = about_s / len(pieces)
     values = np.array([limit.values for limit in limits]) * cell_s ** np.arange(1, 4)
@@ -93,7 +93,7 @@ def turns(angle_points_deg: Array, degree: int) -> Array:
 
 
 def _stationary(piece: Array) -> Array:
-    """Angles at the start of a segment and where its slope is zero, in order of u."""
+    """Angles at the start of a segment and at zeros of its slope, in order of u."""
     slope = (piece[1:] * np.arange(1, len(piece)))[::-1]
     roots = np.roots(slope) if np.any(slope) else np.empty(0)
     u = np.sort(roots.real[(np.abs(roots.imag) < 1e-7) & (roots.real > 0) & (roots.real < 1)])
@@ -101,32 +101,48 @@ def _stationary(piece: Array) -> Array:
 
 
 def of_vias(
-    via_deg: Array, limits: Sequence[Limits], stops: Mapping[int, float], loose: Collection[int] = ()
+    via_deg: Array,
+    limits: Sequence[Limits],
+    stops: Mapping[int, float],
+    loose: Collection[int] = (),
+    times_s: Array | None = None,
 ) -> Floor:
-    """No motion through via angles (n + 1, J) takes less, whatever its path.
+    """A lower bound for all motions through via angles (n + 1, J), on any path.
 
-    From stop to stop (dwells in seconds by via point) the largest over joints of the least time through its turning
-    via angles under its three limits: where a joint's via angles turn it stands still there or beyond. ``loose`` via
-    points, which may be passed at other angles, do not count.
+    The sum over stretches between stops (dwells in seconds by via point) of the largest, over joints, of the
+    least time through its turning via angles under its three limits: at a turning via angle the joint stands
+    still there or beyond. With several joints and ``times_s`` (n + 1,), when a plan arrives at the via points, or
+    what ``via_bound`` proves for the joints together, if that is more. ``loose`` via points, which may be passed at
+    other angles, are ignored.
     """
     last = len(via_deg) - 1
     ends = [0, *sorted(set(stops) - set(loose)), last]
-    total = sum(stops.values())
+    total, kind = sum(stops.values()), "vias"
+    values = np.array([limit.values for limit in limits])
     for first, end in pairwise(ends):
         exact = [via for via in range(first, end + 1) if via not in loose]
         rests = end not in loose
-        times = [
+        alone = max(
             rest_to_rest.floor_s(_turning(via_deg[exact, joint], rests), limit, to_rest=rests)
             for joint, limit in enumerate(limits)
-        ]
-        total += _ROUNDED * max(times)
-    return Floor(total, "vias")
+        )
+        together = 0.0
+        if times_s is not None and len(limits) > 1 and len(exact) > 1:
+            stage("proving the floor")
+            lasts_s = np.diff(times_s[exact]) - [
+                sum(dwell for via, dwell in stops.items() if here <= via < there)
+                for here, there in pairwise(exact)
+            ]
+            together = via_bound.floor_s(via_deg[exact], values, lasts_s, rests)
+        kind = "together" if together > alone else kind
+        total += _ROUNDED * max(alone, together)
+    return Floor(total, kind)
 
 
 def _turning(angles: Array, rests: bool) -> Array:
-    """First and last of the angles and those between where their direction changes.
+    """The first and last angle, and those at which the direction changes.
 
-    Where the joint does not rest at the last, that is left out.
+    Without the last if the joint does not rest there.
     """
     kept = [float(angles[0])]
     for angle in angles[1:]:

@@ -1,4 +1,4 @@
-"""The motion time as a smooth program of control points: limits, bounds, and what must be met exactly."""
+"""The motion time as a smooth program of control points: objective, inequalities, equalities."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class Block(Protocol):
 
 
 class MotionProgram:
-    """Motion time a segment plus the squared steps between neighbouring time differences, weighted.
+    """Objective: motion time per segment plus weighted squared steps between neighbouring time differences.
 
-    Angle and time may be traded against each other wherever the arm does not notice; the ``smoothing`` of each
-    step, (S + k - 2,), decides between such motions. ``blocks``: the inequalities besides time differences above
+    Different control points of angle and time can give the same motion; the ``smoothing`` weight of each
+    step, (S + k - 2,), selects one. ``blocks``: the inequalities, in addition to time differences above
     ``least``.
     """
 
@@ -67,7 +67,7 @@ class MotionProgram:
         self.kkt = BandedKkt(variables.places, np.concatenate(rows), np.concatenate(columns), equalities)
 
     def duration(self, x: Array) -> float:
-        """Motion time a segment, in the program's unit."""
+        """Motion time per segment, in the program's unit."""
         return float(self._time @ x)
 
     def objective(self, x: Array) -> float:

@@ -1,4 +1,4 @@
-"""Deviation by per-joint timing: joints pass a via point at different times, so the tool leaves the path."""
+"""Deviations of per-joint timing: joints pass a via point at different times, so the tool leaves the path."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import Trajectory
 
 _PARTS = 200
-"""Chords in a path segment; the path lies within 0.1 mm of them on an arm of 1 m that turns 90 degrees."""
+"""Chords per path segment; the path is within 0.1 mm of them for an arm of 1 m that turns 90 degrees."""
 _TIMES = 2000
 
 
 def via_spread_s(trajectory: Trajectory) -> Array:
-    """How far apart in time the joints that move pass each via point: (n + 1,).
+    """Time between the first and the last moving joint at each via point, seconds: (n + 1,).
 
-    At the first it is zero, at the last it is the difference of the motion times.
+    Zero at the first; at the last, the difference of the motion times.
     """
     moving = [joint for joint in trajectory.joints if np.ptp(joint.angle_points_deg) > 0]
     return np.asarray(np.ptp([joint.via_times_s for joint in moving or trajectory.joints], axis=0))
@@ -29,7 +29,7 @@ def via_spread_s(trajectory: Trajectory) -> Array:
 def tool_stray_mm(arm: Arm, trajectory: Trajectory) -> float:
     """Largest distance of the tool from the path that shared timing would follow exactly, in mm.
 
-    Joints without a motor are at home. From 2000 times against 200 chords in each segment.
+    Joints without a motor are at home. Computed for 2000 times and 200 chords per segment.
     """
     times = np.linspace(0.0, trajectory.duration_s, _TIMES)
     path = _tool(arm, _path_deg(trajectory))
@@ -56,7 +56,7 @@ def _distance(points: Array, starts: Array, ends: Array) -> Array:
     chords = ends - starts
     squares = np.maximum(np.sum(chords**2, axis=1), 1e-300)
     nearest = np.empty(len(points))
-    for first in range(0, len(points), 100):  # to hold 100 x M numbers, not all
+    for first in range(0, len(points), 100):  # in blocks of 100 x M numbers, to save memory
         some = points[first : first + 100]
         along = some @ chords.T - np.sum(starts * chords, axis=1)
         to_start = np.sum(some**2, axis=1)[:, None] - 2.0 * some @ starts.T + np.sum(starts**2, axis=1)

@@ -1,7 +1,7 @@
-"""Inequalities of a time axis along a fixed path that keep speed, acceleration and jerk at points of u within limits.
+"""Inequalities of a time axis on a fixed path: speed, acceleration and jerk at points of u within limits.
 
-Only rows that could be reached are watched: at a point, t' bounds the speed of one joint first, and where one joint's
-acceleration bounds t'', or its jerk t''', it bounds what those of the others can become.
+Only rows that could become active are used: at a point, one joint's speed bounds t' first, and one joint's
+acceleration bounds t'', or its jerk t''', which bounds those of the others.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from armtempo.planning.collocation import Points
 from armtempo.planning.variables import Index, MotionVariables, derivative_matrix, time_basis
 
 _PEAK_THRESHOLD = 0.8
-"""Rows are watched where their ratio could come to this part of the limit."""
+"""Rows whose ratio could reach this fraction of the limit are used."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """M rows: first those of speeds, then of accelerations, then of jerks.
+    """M rows, in the order speeds, accelerations, jerks.
 
     ``point``: (M,); ``slopes``: (3, M), q', q'', q''' of the row's joint over its limit, with the row's sign;
     ``kinds``: the rows of each of the three.
@@ -34,7 +34,8 @@ class Rows:
 
     @classmethod
     def reachable(cls, angle: Array, times: Sequence[Array], limits: Array) -> Rows:
-        """Those that could be reached near some time axes, each (3, P), at points with ``angle`` (3, P, J)."""
+        """The rows that could become active near time axes ``times``, each (3, P), at points with ``angle``
+        (3, P, J)."""
         watched = [_reachable(angle, time, limits) for time in times]
         points, slopes, ends = [], [], [0]
         for kind in range(3):
@@ -108,8 +109,8 @@ def _reachable(angle: Array, time: Array, limits: Array) -> list[Array]:
     found = [np.zeros((2, *angle.shape[1:]), dtype=bool)]
     found[0][(angle[0, points, fastest] < 0.0).astype(np.intp), points, fastest] = True
     for kind in (1, 2):
-        # t'' or t''' changes the ratios of all joints, each in proportion to its effect, and no farther than where the
-        # joint with the largest effect reaches its limit.
+        # t'' or t''' changes the ratios of all joints in proportion to their effect, until the joint with the
+        # largest # effect reaches its limit
         effect = angle[0] / limits[:, kind]
         largest = points, np.abs(effect).argmax(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -144,7 +145,7 @@ class PathRows:
         return LinearisedPath(self, self.times(x))
 
     def spread(self, by_times: Array) -> Array:
-        """Gradient (n,) of what has these derivatives (3, M) by t', t'', t''' of the rows."""
+        """Gradient (n,) of a function with the derivatives (3, M) by t', t'', t''' of the rows."""
         return np.asarray(self._derived.T @ np.concatenate([self._sums(one) for one in by_times]))
 
     def assemble(self, by_times: dict[tuple[int, int], Array]) -> Array:

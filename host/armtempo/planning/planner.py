@@ -24,16 +24,16 @@ from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
 _LINE_REFINE = 4
-"""Time segments for one of the path of a straight line: within 1 % of the fastest, and planned soon."""
+"""Time segments per path segment of a straight line: within 1 % of the fastest, and planned quickly."""
 
 
-@np.errstate(all="ignore")  # what overflows ends as not a number, which no check passes
+@np.errstate(all="ignore")  # an overflow becomes NaN, which every check refuses
 def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
-    """A motion through the job's via points, from rest to rest, as short as the search finds it.
+    """Plan the shortest motion that the search finds through the job's via points, from rest to rest.
 
-    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError where
-    job and arm do not fit each other, PlanError if there is no motion under these limits and ranges; what
-    ``progress`` raises ends the planning.
+    The same arm, job and seed give the same plan on the same machine and versions. Raises InputError if job
+    and arm do not fit each other, PlanError if there is no motion within the limits and ranges; an exception
+    of ``progress`` ends the planning.
     """
     checks.limits_of(arm)
     holding = arm.holding(job.holds)
@@ -56,7 +56,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
 
 @cache
 def versions() -> Mapping[str, str]:
-    """What a plan's numbers depend on besides its input."""
+    """The versions on which a plan's numbers depend."""
     return {
         "armtempo": installed_version(),
         "numpy": np.__version__,
@@ -103,7 +103,7 @@ def straight_line(
 
 
 def slower(trajectory: Trajectory, speed: float) -> Trajectory:
-    """The same motion at ``speed``, up to 1, of its own."""
+    """The motion slowed down to the fraction ``speed``."""
     joints = tuple(
         replace(joint, time_points_s=np.asarray(joint.time_points_s / speed)) for joint in trajectory.joints
     )

@@ -16,16 +16,16 @@ DEGREE = 5
 _PEAKS = (1.875, 10.0 / 3.0**0.5, 60.0)
 """Peak speed, acceleration and jerk of 10 u³ - 15 u⁴ + 6 u⁵ over u in 0..1."""
 SHORTEST_S = 0.05
-"""A move takes at least this long, however small it is."""
+"""Shortest duration of a move."""
 _MARGIN = 1.001
-"""The move is this much slower than the limits allow, so that rounding never exceeds them."""
+"""Factor on the duration, so that rounding does not exceed the limits."""
 
 
 def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, speed: float = 1.0) -> Trajectory:
-    """The quintic from rest at ``start_deg`` (J,) to rest at ``end_deg`` (J,), all joints arriving together.
+    """The quintic from rest at ``start_deg`` (J,) to rest at ``end_deg`` (J,), all joints together.
 
-    As fast as the limits of the slowest joint allow, times ``speed``. Raises InputError if a posture has another
-    number of joints than the arm drives or leaves a joint's range.
+    At the fraction ``speed`` of the fastest such move within the limits. Raises InputError if a posture has
+    another number of joints than the arm drives or leaves a joint's range.
     """
     start, end = posture(start_deg, arm), posture(end_deg, arm)
     duration_s = max(
@@ -40,12 +40,12 @@ def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, spee
 
 
 def backwards(trajectory: Trajectory, name: str) -> Trajectory:
-    """The same motion from its end to its start; every joint starts at time 0."""
+    """The reversed motion; every joint starts at time 0."""
     return Trajectory(name, tuple(_backwards(joint) for joint in trajectory.joints), trajectory.shared)
 
 
 def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
-    """The angles as an array (J,); InputError if their number or a range does not fit the arm."""
+    """The angles as an array (J,); raises InputError if their number or a range does not fit the arm."""
     try:
         found = np.asarray(angles_deg, dtype=float)
     except (TypeError, ValueError):

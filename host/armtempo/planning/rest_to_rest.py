@@ -1,7 +1,6 @@
 """Shortest time of one joint between standstills under speed, acceleration and jerk limits, in closed form.
 
-A lower bound for every time law on a path: between two turning points of a joint its speed is zero at
-both ends, whatever the other joints do.
+A lower bound for every time law on a path: a joint stands still at its turning points, whatever the other joints do.
 """
 
 from __future__ import annotations
@@ -14,16 +13,16 @@ from armtempo.basics.arrays import Array
 from armtempo.model.parts import Limits
 
 _ROUNDING = 8 * float(np.finfo(float).eps)
-"""A way may be shorter by this part of the largest angle: what is at an angle is there as far as its digits go."""
+"""Allowance for rounding: a way may be shorter by this fraction of the largest angle."""
 _LEAST_SHARE = 0.05
-"""A way on which the joints hardly move counts as one that takes this part of the mean."""
+"""Least time of a way on which the joints hardly move, as a fraction of the mean."""
 
 
 def floor_s(angles_deg: Array, limits: Limits, from_rest: bool = True, to_rest: bool | None = None) -> float:
     """Least time to pass ``angles_deg`` (turning points with both ends) in order.
 
-    At the first the acceleration is zero too if ``from_rest``, at the last if ``to_rest`` (None: as at the first);
-    at the others it is free, since a joint may turn under full acceleration.
+    The acceleration is also zero at the first if ``from_rest``, at the last if ``to_rest`` (None: as at the
+    first); at the others it is free, as a joint may turn with full acceleration.
     """
     to_rest = from_rest if to_rest is None else to_rest
     distances = np.maximum(np.abs(np.diff(angles_deg)) - _ROUNDING * float(np.max(np.abs(angles_deg))), 0.0)
@@ -50,9 +49,9 @@ def _stretch_s(distance: float, limits: Limits, from_rest: bool, to_rest: bool) 
 
 
 def _ramp(speed: float, limits: Limits, from_rest: bool) -> tuple[float, float]:
-    """Time and distance from standstill to ``speed``, where the acceleration is zero.
+    """Time and distance from standstill to ``speed``, with zero acceleration at the end.
 
-    It starts at zero too if ``from_rest``, else anywhere within its limit.
+    The initial acceleration is zero if ``from_rest``, else free within its limit.
     """
     top, jerk = limits.acceleration_deg_s2, limits.jerk_deg_s3
     ramps = 2.0 if from_rest else 1.0  # jerk phases; each changes the speed by a² / 2 J
@@ -67,9 +66,9 @@ def _ramp(speed: float, limits: Limits, from_rest: bool) -> tuple[float, float]:
 
 
 def needed_s(via_deg: Array, limits: Array) -> Array:
-    """About what J joints take between neighbouring via points (n + 1, J), from rest to rest: (n,).
+    """Estimated time of J joints between neighbouring via points (n + 1, J), from rest to rest: (n,).
 
-    ``limits``: (J, 3). Where the joints hardly move, at least a part of the mean.
+    ``limits``: (J, 3). At least a fraction of the mean.
     """
     ways = np.abs(np.diff(via_deg, axis=0))
     speed, acceleration, jerk = limits.T

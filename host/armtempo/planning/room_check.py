@@ -1,8 +1,8 @@
-"""Whether an arm keeps to its room over a whole motion, proven: its links are capsules that touch nothing.
+"""Collision check of a whole motion, proven: links are capsules that touch neither obstacles nor each other.
 
-At a time in the middle of a stretch the distances of all links from all obstacles, and from each other, are computed
-exactly. Until either end of the stretch no point of a link moves farther than the speeds of the joints before it times
-their reach to it, times half the stretch. Where that might touch something, the stretch is halved.
+At the middle of a time interval, the distances of all links from all obstacles, and from each other, are
+computed exactly. Within the interval no point of a link moves farther than half the interval times the sum of
+the joints' speeds times their reach to it. If something might touch, the interval is halved.
 """
 
 from __future__ import annotations
@@ -27,11 +27,13 @@ from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
 _STRETCH_S = 0.25
-"""Stretches of time at first."""
+"""Initial length of the intervals."""
 _CLOSE_MM = 0.01
-"""What comes nearer than this counts as touching: nearer, the proof gives up."""
+"""Smaller distances count as touching: the proof ends there."""
+_DEEPER_MM = 0.5
+"""What touches at the start may do so by this much more; less would take many halvings to prove."""
 _MOST = 4000
-"""Stretches looked at at once."""
+"""Largest number of intervals at a time."""
 
 
 @dataclass(frozen=True)
@@ -46,14 +48,14 @@ class Touch:
 
     @property
     def words(self) -> str:
-        """What touches what."""
+        """Describe the touch."""
         depth = f"is {self.depth_mm:.1f} mm inside of" if self.depth_mm > _CLOSE_MM else "touches"
         return f"{self.link} {depth} {self.other}"
 
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """The links of an arm: two segments for each row of the table, along its d and its a; and what its tool holds."""
+    """The links of an arm: two segments per row of the table, along its d and its a; and the load."""
 
     arm: Arm
 
@@ -84,7 +86,7 @@ class Bodies:
         return np.array(load.centre_mm) + np.stack([-way, way])
 
     def ends(self, driven_deg: Array) -> tuple[Array, Array]:
-        """Where the segments begin and end at postures (N, J): both (S, N, 3)."""
+        """Start and end of the segments at postures (N, J): both (S, N, 3)."""
         angles = all_angles_deg(self.arm, driven_deg)
         points = np.moveaxis(outline_mm(self.arm, angles), 1, 0)
         starts, ends = points[:-1], points[1:]
@@ -98,13 +100,13 @@ class Bodies:
 
     @cached_property
     def turned(self) -> Array:
-        """Degrees that each row turns by at most for a degree of each driven joint: (joints, J)."""
+        """Largest turn of each row per degree of each driven joint: (joints, J)."""
         identity = np.eye(len(self.arm.joints))[:, list(self.arm.driven_indices)]
         return np.asarray(np.abs(np.array(Geometry.of(self.arm).turns(list(identity)))))
 
     @cached_property
     def reach_mm(self) -> Array:
-        """How far a segment is from the axis of a row at most, (S, joints); 0 if that does not move it."""
+        """Largest distance of a segment from the axis of a row, (S, joints); 0 if the row does not move it."""
         lengths = np.array([(abs(joint.d_mm), abs(joint.a_mm)) for joint in self.arm.joints]).ravel()
         lengths = np.append(lengths, np.linalg.norm(self.load_ends_mm, axis=1).max(initial=0.0))[
             : len(self.names)
@@ -112,25 +114,25 @@ class Bodies:
         found = np.zeros((len(lengths), len(self.arm.joints)))
         for segment in range(len(lengths)):
             for row in range(len(self.arm.joints)):
-                if segment > 2 * row:  # the d of a row is its own axis
+                if segment > 2 * row:  # the d of a row is on its axis
                     found[segment, row] = lengths[2 * row + 1 : segment + 1].sum()
         return found
 
     @cached_property
     def moves(self) -> NDArray[np.intp]:
-        """Segments that some joint moves."""
+        """Moving segments."""
         return np.flatnonzero((self.reach_mm @ self.turned).any(axis=1))
 
     @cached_property
     def pairs(self) -> list[tuple[int, int]]:
-        """Segments that must not touch each other: at least two rows apart, both thick, and apart at home."""
+        """Pairs of segments to check: at least two rows apart, both with a radius, and not touching at home."""
         if not self.radius_mm.any():
             return []
         found = []
         starts, ends = self.ends(np.array([self.arm.home_deg]))
         row = np.minimum(
             np.arange(len(self.radius_mm)) // 2, len(self.arm.joints) - 1
-        )  # a load is with the last
+        )  # the load belongs to the last row
         for one in range(len(self.radius_mm)):
             for other in range(one + 1, len(self.radius_mm)):
                 between = self.turned[row[one] + 1 : row[other] + 1].any()
@@ -142,7 +144,7 @@ class Bodies:
         return found
 
     def distances(self, driven_deg: Array) -> Array:
-        """Of postures (N, J): moving segments from obstacles, then pairs from each other; less their radii, (N, M)."""
+        """Distances at postures (N, J), minus radii: moving segments from obstacles, then pairs, (N, M)."""
         starts, ends = self.ends(driven_deg)
         count, found = len(driven_deg), []
         if self.obstacles and len(self.moves):
@@ -159,28 +161,28 @@ class Bodies:
 
     @cached_property
     def named(self) -> list[tuple[str, str]]:
-        """What each of the distances is between."""
+        """The names of the two objects of each distance."""
         found = [(self.names[segment], box.name) for segment in self.moves for box in self.obstacles]
         return found + [(self.names[one], self.names[other]) for one, other in self.pairs]
 
     def speeds_mm_s(self, speeds_deg_s: Array) -> Array:
-        """How fast each of the distances can shrink at speeds of the driven joints, (J,): (M,)."""
+        """Largest rate of decrease of each distance at speeds of the driven joints, (J,): (M,)."""
         rows = self.turned @ np.radians(speeds_deg_s)
         found = [float(self.reach_mm[segment] @ rows) for segment in self.moves for _ in self.obstacles]
-        for one, other in self.pairs:  # seen from the first, only the rows after it move the other
+        for one, other in self.pairs:  # relative to the first segment, only rows after it move the other
             after = np.arange(len(rows)) >= one // 2 + one % 2
             found.append(float(self.reach_mm[other, after] @ rows[after]))
         return np.array(found)
 
 
 def has_room(arm: Arm) -> bool:
-    """Whether there is anything that the arm may touch."""
+    """Whether there is anything that the arm could touch."""
     thick = sum(joint.radius_mm > 0.0 for joint in arm.joints) + bool(arm.held and arm.held.radius_mm)
     return bool(arm.room and arm.room.obstacles) or thick > 1
 
 
 def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
-    """All that touches at a posture (J,)."""
+    """All touches at a posture (J,)."""
     bodies = Bodies(arm)
     if not bodies.named:
         return []
@@ -194,14 +196,14 @@ def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
 def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch | None:
     """What touches in a motion, None if it is proven that nothing does.
 
-    ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep: so an
-    arm can be moved out.
+    ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep, or go
+    ``_DEEPER_MM`` deeper: so an arm can be moved out.
     """
     bodies = Bodies(arm)
     if not bodies.named:
         return None
     start = bodies.distances(trajectory(np.zeros(1)))[0]
-    allowed = np.minimum(start - 2.0 * _CLOSE_MM, 0.0)
+    allowed = np.where(start < 2.0 * _CLOSE_MM, start - _DEEPER_MM, 0.0)
     shrink = bodies.speeds_mm_s(speeds_deg_s)
     count = max(1, int(np.ceil(trajectory.duration_s / _STRETCH_S)))
     half = 0.5 * trajectory.duration_s / count
@@ -230,7 +232,7 @@ def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch 
 
 
 def touch_of(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None) -> Touch | None:
-    """The same as ``first_touch``, at once for arms without a room, and for speeds that are not known yet."""
+    """As ``first_touch``; skips arms without a room, and computes unknown speeds."""
     if not has_room(arm):
         return None
     if speeds_deg_s is None:
@@ -239,9 +241,9 @@ def touch_of(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None
 
 
 def check(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, through: bool = False) -> None:
-    """Raises PlanError if a motion leaves the room, naming what touches what, and when.
+    """Raise PlanError if a motion leaves the room, naming both objects and the time.
 
-    ``speeds_deg_s``: as for ``first_touch``, where they are known; ``through``: the message names via points too.
+    ``speeds_deg_s``: as for ``first_touch``, if known; ``through``: the message also names via points.
     """
     touch = touch_of(arm, trajectory, speeds_deg_s)
     if touch is None:

@@ -1,4 +1,4 @@
-"""Planning a sequence: every motion time-optimally, from where the one before it ends."""
+"""Planning a sequence: every motion time-optimally, from the end of the one before."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
 _REFINE = 16
-"""Segments of a straight motion's time axis: within 1 % of its lower bound, and a record that the board checks soon."""
+"""Time segments of a straight motion: within 1 % of its lower bound, and quickly checked by the board."""
 _THEN = {kinds.NEXT: record.NEXT_THEN, kinds.FAULT: record.FAULT_THEN}
 _SAME_STEPS = 1 / 128
-"""Two angles as near as this are one: the board allows 1/64 step between two motions."""
+"""Tolerance for equal angles, steps: the board allows 1/64 step between two motions."""
 
 
 def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
-    """All motions of a sequence, equal ones once, and the rows that the board goes through.
+    """All different motions of a sequence, and the rows that the board executes.
 
-    Raises InputError, naming file and step, where a motion begins elsewhere than the one before it ends or the
+    Raises InputError, naming file and step, if a motion does not begin at the end of the one before, or the
     sequence has no effect; PlanError if a motion cannot be planned.
     """
     compiler = _Compiler(arm, progress)
@@ -56,7 +56,7 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
 
 @dataclass(frozen=True)
 class _Place:
-    """Where the arm is, and what the user calls that."""
+    """A posture of the arm, and its name for messages."""
 
     angles_deg: Angles
     name: str
@@ -64,7 +64,7 @@ class _Place:
 
 @dataclass(frozen=True)
 class _End:
-    """The same of where rows lead; None if nothing has moved yet."""
+    """The posture after some rows; None if nothing has moved yet."""
 
     angles_deg: Angles | None
     name: str
@@ -77,16 +77,16 @@ class _Compiler:
     legs: list[Trajectory] = field(default_factory=list)
     counters: list[str] = field(default_factory=list)
     loads: list[str] = field(default_factory=list)
-    """What the tool holds in each leg."""
+    """The load in each leg."""
     _holds: str = ""
-    """What it holds now."""
+    """The present load."""
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
     _plans: dict[tuple[int, str], Trajectory] = field(default_factory=dict)
     _motions: dict[int, SourceMotion] = field(default_factory=dict)
     _depth: int = 0
 
     def rows(self, steps: tuple[Step, ...], here: Angles | None, name: str) -> tuple[list[SequenceRow], _End]:
-        """The rows of some steps from a posture on, and where they lead."""
+        """The rows of some steps from a posture on, and the posture after them."""
         end = _End(here, name)
         found: list[SequenceRow] = []
         for step in steps:
@@ -104,7 +104,7 @@ class _Compiler:
         return found, end
 
     def _hold(self, step: kinds.Hold) -> list[SequenceRow]:
-        """The motions that follow are those with the load; the board knows nothing of it."""
+        """The following motions are planned with the load, which is not sent to the board."""
         try:
             self.arm.holding(step.load)
         except InputError as error:
@@ -113,7 +113,7 @@ class _Compiler:
         return []
 
     def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
-        """The first pass comes before the others if it begins elsewhere than they do."""
+        """The rows of a repeat; its first pass is separate if it starts at another posture."""
         outermost = not self._depth
         self._depth += 1
         first, end = self.rows(step.steps, before.angles_deg, before.name)
@@ -145,7 +145,7 @@ class _Compiler:
         return [_move(self._known[key], step.step, words)], _End(target.angles_deg, target.name)
 
     def _line(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
-        """A straight line of the tool; to a posture given as a pose in the branch in which the arm is."""
+        """A straight line of the tool; to a pose in the present branch of the arm."""
         posture = self.arm.posture(step.target) if isinstance(step.target, str) else step.target
         pose = posture.where if isinstance(posture, ArmPosture) else None
         target = None if isinstance(pose, Pose) else self._target(step)
@@ -193,7 +193,7 @@ class _Compiler:
         )
 
     def _motion(self, motion: SourceMotion | Job | Plan) -> SourceMotion:
-        """The same object for the same motion."""
+        """One object for equal motions."""
         if isinstance(motion, SourceMotion):
             return motion
         if id(motion) not in self._motions:
@@ -216,14 +216,17 @@ class _Compiler:
         return _Place(_angles(trajectory(0.0)), f"the start of {motion.name}")
 
     def posture(self, posture: ArmPosture, where: str) -> _Place:
-        """Where the arm is then; PlanError if it cannot."""
+        """The arm at that posture; raises PlanError if it cannot be there."""
         try:
             return _Place(_angles(via_points.posture_deg(self.arm, posture)), posture.name)
         except ArmtempoError as error:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
-        for (known, _), found in self._plans.items():  # one with another load will do if it keeps to the room
+        for (
+            known,
+            _,
+        ), found in self._plans.items():  # a plan with another load is accepted if it keeps to the room
             arm = self.arm.holding(_job(motion).holds or self._holds)
             if known == id(motion) and room_check.touch_of(arm, found) is None:
                 return found
@@ -251,7 +254,7 @@ class _Compiler:
             raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
 
     def _still(self, step: kinds.SetOutput | kinds.Wait | kinds.WaitInput | kinds.Count) -> SequenceRow:
-        """The row of a step that moves nothing."""
+        """The row of a step without motion."""
         if isinstance(step, kinds.SetOutput):
             output = self.arm.output(step.output)
             raw = self.arm.outputs[output].raw(step.to)

@@ -1,4 +1,4 @@
-"""A job cut at its stops into jobs that the board can hold one by one."""
+"""A job cut at its stops into jobs that fit the board."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from armtempo.model.job import Job, Stop
 from armtempo.splines.trajectory import Trajectory
 
 LONGEST_S = LONGEST_TICKS / TICK_HZ
-"""The board counts a motion's time to here."""
+"""Longest motion of the board."""
 _ROOM = 0.98
-"""A part is to take no more than this of it: planned by itself it may come out a little longer."""
+"""Used fraction of it: a part planned separately may take a little longer."""
 
 
 def at_all_stops(job: Job, via_deg: Array) -> list[Job]:
@@ -28,9 +28,9 @@ def at_all_stops(job: Job, via_deg: Array) -> list[Job]:
 
 
 def at_few_stops(job: Job, via_deg: Array, whole: Trajectory) -> list[Job]:
-    """As few jobs as keep within what the board counts, by the times at which ``whole`` passes the stops.
+    """The fewest jobs that fit the board, from the times at which ``whole`` passes the stops.
 
-    Raises PlanError if there is no stop, or one stretch by itself is too long.
+    Raises PlanError if there is no stop, or one stretch is too long.
     """
     times = whole.joints[0].via_times_s
     cuts: list[int] = []
@@ -60,7 +60,7 @@ def _stops(job: Job) -> Sequence[Stop]:
 
 
 def _parts(job: Job, via_deg: Array, cuts: Sequence[int]) -> list[Job]:
-    """The jobs between these via points, which each begin and end where their angles are."""
+    """The jobs between these via points, from angles to angles."""
     parts = []
     for number, (first, last) in enumerate(pairwise([0, *cuts, len(via_deg) - 1]), 1):
         ends = [tuple(via_deg[via].tolist()) for via in (first, last)]

@@ -20,7 +20,7 @@ from armtempo.splines.trajectory import JointSpline, Trajectory
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A trajectory, how it was found, and what the user must know of it."""
+    """A trajectory, its searches, and notes for the user."""
 
     trajectory: Trajectory
     searches: tuple[Search, ...]
@@ -28,7 +28,7 @@ class Planned:
 
 
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
-    """The motion through via angles (n + 1, J); PlanError if the spline leaves a joint's range."""
+    """The motion through via angles (n + 1, J); raises PlanError if the spline leaves a joint's range."""
     limits = checks.limits_of(arm)
     points = bspline.fit(via_deg, job.degree)
     checks.check_ranges(arm, points, job.degree)
@@ -41,7 +41,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
 
 
 def _groups(points: Array, via: Array, limits: list[Limits], job: Job) -> list[Group]:
-    """The joints that move, together or one by one."""
+    """The moving joints, as one group or one group each."""
     moving = [int(joint) for joint in np.flatnonzero(np.ptp(via, axis=0) > checks.TOLERANCE)]
     together = [moving] if job.timing == "shared" else [[joint] for joint in moving]
     return [
@@ -50,7 +50,7 @@ def _groups(points: Array, via: Array, limits: list[Limits], job: Job) -> list[G
 
 
 def _trajectory(job: Job, points: Array, groups: list[Group], timed: list[Timed]) -> Trajectory:
-    """All joints on their time axes; one that does not move takes the longest axis."""
+    """All joints on their time axes; a joint that does not move gets the longest axis."""
     longest = max(timed, key=lambda axis: axis.total_s)
     axes = {joint: axis for group, axis in zip(groups, timed, strict=True) for joint in group.joints}
     joints = tuple(

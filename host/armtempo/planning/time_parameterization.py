@@ -21,19 +21,19 @@ from armtempo.planning.variables import time_points
 from armtempo.splines import time_axis
 
 MIN_DURATION_S = 0.01
-"""No motion is planned shorter: a tenth of the time between two samples."""
+"""Shortest motion: a tenth of the sampling interval."""
 
 _POLISHED_GAP = 1e-8
 _REFINED_GAP = 1e-4
-"""How near to its local optimum an axis should come."""
+"""Relative gap of an axis to its local optimum."""
 _REFINE_FACTOR = 8
 _PAYS = 1e-3
-"""With ``refine = "auto"`` each axis gets this many times more segments while that saves this part of its time."""
+"""With ``refine = "auto"``: factor on the segments of an axis, and least relative saving of time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Joints that share a time axis: control points (n + degree, J) and one of ``limits`` each."""
+    """Joints with a common time axis: control points (n + degree, J), and one of ``limits`` per joint."""
 
     joints: tuple[int, ...]
     """Indices among the driven joints."""
@@ -43,25 +43,25 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Timed:
-    """A time axis, (n * refine + degree,) control points, that keeps all limits, and how it was found."""
+    """A time axis within all limits, (n * refine + degree,) control points, and its search."""
 
     time_points_s: Array
     intervals_s: Array
-    """What was varied: the intervals X (n,), or with refinement the differences of all control points."""
+    """The variables: the intervals X (n,), or with refinement the differences of all control points."""
     refine: int
     total_s: float
     searched_s: float
     """Motion time by the search alone."""
     optimum_s: float
-    """No axis nearby with as many variables takes less, where gradients were used; else 0."""
+    """Lower bound of the local optimum with the same variables, if gradients were used; else 0."""
     found: Result
     starts_s: Array
-    """Motion time that each start of a gradient search led to; else empty."""
+    """Motion time of each start of a gradient search; else empty."""
     notes: tuple[str, ...]
 
 
 def most_refine(job: Job, segments: int, joints: int) -> int:
-    """The most segments of the time axis for one of the path that the board's record can hold."""
+    """The most time segments per path segment that the board's record can hold."""
     most = min(REFINE[1], MAX_SEGMENTS // segments)
     shared = job.timing == "shared"
     while most > 1 and motion.size(job.degree, joints, shared, segments, most) > MAX_MOTION_BYTES:
@@ -70,9 +70,9 @@ def most_refine(job: Job, segments: int, joints: int) -> int:
 
 
 def axes(groups: Sequence[Group], job: Job, most: int, progress: Progress | None = None) -> list[Timed]:
-    """The time axis of each group, all with the same refinement, which is at most ``most`` if it is not given.
+    """The time axis of each group, all with the same refinement; an automatic refinement is at most ``most``.
 
-    The random numbers of a group depend on the seed and its first joint only.
+    The random numbers of a group depend only on the seed and its first joint.
     """
     levels = _levels(job, most)
     stages = _Stages(progress, len(groups), levels)
@@ -92,7 +92,7 @@ def axes(groups: Sequence[Group], job: Job, most: int, progress: Progress | None
 
 
 def _levels(job: Job, most: int) -> list[int]:
-    """The refinements to go through."""
+    """The refinements to try."""
     if isinstance(job.refine, int):
         return [job.refine] if job.refine > 1 else []
     levels, refine = [], 1
@@ -108,7 +108,7 @@ def _longest_s(timed: Sequence[Timed]) -> float:
 
 
 def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
-    """The axis that the search finds, polished where no finer one follows."""
+    """The axis of the search, polished if no finer one follows."""
     stage("searching")
     rng = np.random.default_rng([job.seed, group.joints[0]])
     found = interval_search.search(group.angle_points_deg, group.limits, job, rng, stages.within)
@@ -136,7 +136,7 @@ def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
 
 
 def _refined(group: Group, job: Job, axis: Timed, before: int, refine: int) -> Timed:
-    """The same axis cut finer, then improved, so that it is never slower."""
+    """The axis with more segments, optimised; never slower."""
     stage(f"refining to {refine}")
     differences = np.diff(axis.time_points_s)
     start = time_axis.cut(differences, before, refine, job.degree)
@@ -166,7 +166,7 @@ def _long_enough(axis: Timed) -> Timed:
 
 
 class _Stages:
-    """Progress through search, polish and refinement of every group, each weighted by what it takes."""
+    """Progress of search, polish and refinement of every group, weighted by their cost."""
 
     def __init__(self, progress: Progress | None, groups: int, levels: Sequence[int]) -> None:
         self._progress = progress

@@ -1,4 +1,4 @@
-"""The tool of an arm whose moving joints turn while the others stand still: poses, slopes, and how far they reach."""
+"""The tool as a function of the moving joints, with the others fixed: poses, derivatives, and reach."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from armtempo.model.tool_pose import Pose
 
 @dataclass(frozen=True, eq=False)
 class ToolState:
-    """Where the tool is at P postures, and how it moves as each of J joints turns."""
+    """Poses of the tool at P postures, and derivatives by J joints."""
 
     position_mm: Array
     """(P, 3)."""
     rotation: Array
     """(P, 3, 3), its axes in columns."""
     slope_mm_deg: Array
-    """Change of the position for a degree of each joint: (P, 3, J)."""
+    """Derivative of the position by each joint, mm/deg: (P, 3, J)."""
     axes_deg: Array
     """Axis of each joint times the radians of a degree: (P, 3, J)."""
 
 
 class Tool:
-    """The tool for angles of some driven joints, ``moving``, with all others of ``posture_deg`` (driven joints,).
+    """The tool for angles of the joints ``moving``, with the other driven joints at ``posture_deg`` (driven joints,).
 
-    Joints turn rows of the Denavit-Hartenberg table: each its own, before a parallel linkage also the one after.
+    A joint turns its row of the Denavit-Hartenberg table, and, before a parallel linkage, also the next.
     """
 
     def __init__(self, arm: Arm, moving: list[int], posture_deg: Array) -> None:
@@ -42,10 +42,10 @@ class Tool:
         turned = np.array(self._geometry.turns(list(identity)))
         self._rows = np.flatnonzero(np.any(turned != 0.0, axis=1))
         self.turns = turned[self._rows]
-        """Turn of each row that turns for a turn of each joint: (R, J)."""
+        """Turn of each moving row per turn of each joint: (R, J)."""
 
     def at(self, angles_deg: Array) -> ToolState:
-        """For angles (P, J) of the moving joints."""
+        """The state for angles (P, J) of the moving joints."""
         chained = self._frames(angles_deg)
         *rotation, position = (np.stack(part, axis=-1) for part in chained[-1])
         axes, slopes = self._by_row(chained, position)
@@ -58,7 +58,7 @@ class Tool:
         )
 
     def _by_row(self, chained: list[Frame[Array]], position: Array) -> tuple[Array, Array]:
-        """Axis of each row that turns, for a degree, and how the tool moves with it: each (R, P, 3)."""
+        """Axis of each moving row, per degree, and the derivative of the tool's position by it: each (R, P, 3)."""
         axes, slopes = [], []
         for row in self._rows:
             axis = np.radians(1.0) * np.stack(chained[row].z, axis=-1)
@@ -67,9 +67,10 @@ class Tool:
         return np.array(axes), np.array(slopes)
 
     def moved(self, angles_deg: Array, rate: Array, bend: Array) -> tuple[Array, Array]:
-        """First and second derivatives of the position where angles (P, J) have these, each (P, J): each (P, 3).
+        """First and second derivatives of the position, each (P, 3), for angles (P, J) with derivatives
+        ``rate``, ``bend``.
 
-        As a row turns, it carries the axes of those after it along.
+        A turning row also turns the axes of the rows after it.
         """
         chained = self._frames(angles_deg)
         axes, slopes = self._by_row(chained, np.stack(chained[-1].origin, axis=-1))
@@ -84,7 +85,7 @@ class Tool:
         return first, second
 
     def positions_mm(self, angles_deg: Array) -> Array:
-        """Only where it is, (P, 3), for angles (P, J)."""
+        """Positions only, (P, 3), for angles (P, J)."""
         return np.stack(self._frames(angles_deg)[-1].origin, axis=-1)
 
     def _frames(self, angles_deg: Array) -> list[Frame[Array]]:
@@ -93,13 +94,13 @@ class Tool:
         return array_frames(self._geometry, np.radians(chain.all_angles_deg(self._arm, driven)))
 
     def miss(self, angles_deg: Array, target: Pose) -> Miss:
-        """How far the tool is from a pose, for angles (J,)."""
+        """The tool's distance from a pose, for angles (J,)."""
         state = self.at(angles_deg[None])
         x, y, z = state.rotation[0].T.tolist()
         return Constraint.of(target).miss(Frame(x, y, z, state.position_mm[0].tolist()))
 
     @property
     def reach_mm(self) -> Array:
-        """No posture takes the tool farther from the axis of a row that turns: (R,)."""
+        """Largest distance of the tool from the axis of each moving row: (R,)."""
         lengths = np.abs(self._geometry.a) + np.abs(self._geometry.d)
         return np.asarray(np.cumsum(lengths[::-1])[::-1][self._rows])

@@ -1,5 +1,5 @@
-"""Torque that a motion asks of each motor, and what the motor holds at that speed; plans as fast as
-that allows, the arm's acceleration and jerk limits times one factor."""
+"""Torque that a motion needs from each motor, and the motor's available torque at that speed; plans limited
+by torque, with the arm's acceleration and jerk limits times one factor."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from armtempo.planning import planner
 from armtempo.splines.trajectory import Trajectory
 
 ENOUGH = 1.5
-"""Motors are seldom as strong as their data sheet: less than half as much again is told."""
+"""Safety factor: motors are seldom as strong as in their data sheet; a smaller margin gives a warning."""
 _STEP_S, _FEWEST, _MOST = 1e-3, 1000, 20_000
-"""A motion is looked at each millisecond, but at no fewer moments than this and no more than that."""
+"""Sampling interval of a motion, and least and largest number of samples."""
 _TRIES = 10
 _NEAR = 1.03
-"""Factors this near to each other are one: times differ by half as much."""
+"""Ratio of factors at which the search ends: times differ by half as much."""
 _LEAST = 1.0 / 16.0
-"""Of factors: what needs less is held up by gravity or friction, not by acceleration."""
+"""Least factor: below it gravity or friction, not acceleration, is the limit."""
 _PAYS = 1e-3
-"""A larger factor that saves no more than this part of the time is of no use: speed limits the motion."""
+"""The search ends if a larger factor saves less than this fraction of the time: speed limits the motion."""
 
 
 class LeastMargin(NamedTuple):
-    """Where a motor has the least to spare."""
+    """The smallest torque margin of a motion."""
 
     margin: float
-    """Torque that it holds, of what it needs."""
+    """Available torque divided by needed torque."""
     joint: str
     time_s: float
     needed_nm: float
@@ -47,7 +47,7 @@ class LeastMargin(NamedTuple):
 
     @property
     def words(self) -> str:
-        """All of it but the joint."""
+        """Describe it, without the joint."""
         return (
             f"at {self.time_s:.2f} s its motor needs {self.needed_nm:.3g} Nm and holds {self.held_nm:.3g}, "
             f"{self.margin:.2f} times as much"
@@ -56,7 +56,7 @@ class LeastMargin(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MotorTorques:
-    """Of a motion at N moments."""
+    """Torques of a motion at N times."""
 
     joints: tuple[str, ...]
     times_s: Array
@@ -64,11 +64,11 @@ class MotorTorques:
     needed_nm: Array
     """At the motors' shafts, (N, J)."""
     held_nm: Array
-    """(N, J); not a number where the arm file does not say."""
+    """Available torque, (N, J); NaN if it is not in the arm file."""
 
     @property
     def margin(self) -> Array:
-        """Torque held of what is needed: (N, J)."""
+        """Available torque divided by needed torque: (N, J)."""
         needed = np.abs(self.needed_nm)
         return np.divide(self.held_nm, needed, out=np.full_like(needed, np.inf), where=needed > 0.0)
 
@@ -86,9 +86,10 @@ class MotorTorques:
 
 
 def held_nm(joint: DrivenJoint, motor_rad_s: ArrayLike) -> Array:
-    """Torque that a motor holds at speeds of its shaft (N,): of its curve, 0 beyond it; else as in the virtual arm.
+    """Available torque of a motor at shaft speeds (N,): from its curve, 0 beyond it; else from the virtual
+    arm's model.
 
-    There it falls to 0.71 of the holding torque at the corner speed. Not a number where the arm file says neither.
+    In the model it falls to 0.71 of the holding torque at the corner speed. NaN if the arm file has neither.
     """
     speed, model = np.abs(np.asarray(motor_rad_s, dtype=float)), joint.model
     if joint.motor.curve_rpm_nm:
@@ -101,7 +102,8 @@ def held_nm(joint: DrivenJoint, motor_rad_s: ArrayLike) -> Array:
 def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
     """The torques of a motion, None for an arm without ``dynamics``.
 
-    At the motor: what the joint needs by inverse dynamics and friction over the gear ratio, and the rotor's inertia.
+    At the motor: the joint's torque from inverse dynamics and friction, divided by the gear ratio, plus the
+    rotor's inertia.
     """
     if not any(joint.dynamics for joint in arm.joints):
         return None
@@ -122,16 +124,17 @@ def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
 
 
 def least_margin(arm: Arm, trajectory: Trajectory) -> LeastMargin | None:
-    """The smallest margin of a motion; None if the arm file does not say enough."""
+    """The smallest margin of a motion; None if the arm file lacks data."""
     found = of_motion(arm, trajectory)
     return found.least if found else None
 
 
 def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
-    """The fastest plan found in which each motor holds ``ENOUGH`` times what it needs, each millisecond.
+    """The fastest plan in which each motor's available torque is ``ENOUGH`` times the needed one at every sample.
 
-    Speed limits stay; the plan's arm has the limits that it was planned with. Raises InputError for an arm without
-    ``dynamics`` or without the torque of a motor, PlanError where slower motions do not help; else as ``planner.plan``.
+    Speed limits are kept; the plan's arm has the scaled limits. Raises InputError for an arm without
+    ``dynamics`` or without the torque of a motor, PlanError if slower motions do not help; otherwise as
+    ``planner.plan``.
     """
     held = [held_nm(joint, 0.0) for joint in arm.driven]
     if np.any(np.isnan(held)) or not any(joint.dynamics for joint in arm.joints):
@@ -163,7 +166,8 @@ def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan
 
 
 def _between(low: float, high: float) -> float:
-    """The next factor to try: the motors hold ``low`` (0: none yet), but not ``high`` (infinite: none yet)."""
+    """The next factor to try between a feasible ``low`` (0: none yet) and an infeasible ``high`` (infinite:
+    none yet)."""
     if high == math.inf:
         return 2.0 * low
     return math.sqrt(low * high) if low else 0.5 * high

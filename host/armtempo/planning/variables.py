@@ -1,6 +1,6 @@
-"""How a motion's control points are laid out as variables of a program, and what they mean at points of u.
+"""The layout of a motion's control points as variables of a program, and their basis functions at points of u.
 
-A motion of J joints on S segments has S + k angle control points a joint and S + k - 1 differences of time
+A motion of J joints on S segments has S + k angle control points per joint and S + k - 1 differences of time
 control points. With a fixed path only the differences vary.
 """
 
@@ -32,12 +32,12 @@ class MotionVariables:
 
     @property
     def angles(self) -> int:
-        """Angle control points of a joint."""
+        """Number of angle control points per joint."""
         return self.segments + self.degree
 
     @property
     def differences(self) -> int:
-        """Differences of time control points."""
+        """Number of differences of time control points."""
         return self.segments + self.degree - 1
 
     @property
@@ -56,7 +56,7 @@ class MotionVariables:
 
     @property
     def places(self) -> Array:
-        """Where each variable is along the motion: (size,)."""
+        """Position of each variable along the motion: (size,)."""
         angles = np.tile(np.arange(self.angles, dtype=float), self.joints)
         return np.concatenate([angles, np.arange(self.differences) + 0.5])
 
@@ -97,7 +97,7 @@ def time_points(differences: Array, degree: int) -> Array:
 
 def derivative_matrix(bases: Array, segment: Index, count: int) -> csr_array:
     """First, second and third derivatives at all points, (3 P, count), from ``bases`` (P, 3, w) of their segments."""
-    from scipy.sparse import csr_array  # here, because loading it takes longer than most commands
+    from scipy.sparse import csr_array  # imported here, because that takes longer than most commands
 
     points, _, width = bases.shape
     columns = np.tile(segment[:, None] + np.arange(width), (3, 1)).ravel()

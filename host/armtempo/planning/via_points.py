@@ -4,7 +4,7 @@ A pose asks for all joints of the arm, but only joints with a motor move; the ot
 So for each pose
 
 1. the ranges of the driven joints alone decide which solutions can be used;
-2. where the job gives ``posture_deg``, the solution nearest to it is taken; else one that reaches the pose
+2. if the job gives ``posture_deg``, the solution nearest to it is taken; else one that reaches the pose
    with the undriven joints at home comes first, and among equals the one nearest to the posture before;
 3. the driven joints take their angles from it. What the pose would need of the others, and how far the tool
    misses it without, is said in a note.
@@ -183,7 +183,7 @@ def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
 def _solve(
     setup: _Setup, target: Pose, previous: Array, home_first: bool, where: str
 ) -> tuple[Array, Choice | None]:
-    """All that the pose asks for, (joints,) in rad; the choice only where it came of the closed form."""
+    """All that the pose asks for, (joints,) in rad; the choice only if it came of the closed form."""
     if not setup.closed_form or target.fixed != WHOLE:
         return _searched(setup, target, previous, where), None
     choice = choose(setup.solver.geometry, target.matrix, setup.ranges, previous)
@@ -220,7 +220,7 @@ def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Arr
 
 
 def _miss_note(setup: _Setup, target: Pose, needed: Array, number: int) -> list[Note]:
-    """What to say where the tool does not quite reach the pose."""
+    """What to say if the tool does not quite reach the pose."""
     miss = setup.miss(target, needed)
     if not Constraint.of(target).reached(miss):
         text = (
@@ -243,7 +243,7 @@ def _needs(setup: _Setup, needed: Array) -> str:
 
 
 def _branch(setup: _Setup, posture: Array, before: Branch | None) -> Branch:
-    """The branch at a via point; where the arm is between two, it still counts as on the one before."""
+    """The branch at a via point; if the arm is between two, it still counts as on the one before."""
     here = branch_of(setup.solver.geometry, posture)
     return here.after(before) if before else here
 

@@ -7,7 +7,6 @@ import socket
 import time
 from collections.abc import Iterator
 from enum import Enum
-from types import TracebackType
 from typing import Any, Self
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortGivenUpError
@@ -117,9 +116,7 @@ class Caller:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.close()
 
     def _send(self, line: bytes) -> None:

@@ -42,7 +42,7 @@ class Curves:
     theory: Array
     shown: Array
     path_s: Array
-    """(K,), the motion's own time; less than ``times_s`` where the speed was below 100 %."""
+    """(K,), the motion's own time; less than ``times_s`` if the speed was below 100 %."""
     measured: NDArray[np.bool_]
 
 

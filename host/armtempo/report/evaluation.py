@@ -22,7 +22,7 @@ from armtempo.splines.trajectory import Trajectory
 class Evaluation:
     """A run with its motion, its curves and what is wrong with its files.
 
-    ``plan`` is None for a motion that only the board had; ``arm`` too where the folder does not say.
+    ``plan`` is None for a motion that only the board had; ``arm`` too if the folder does not say.
     """
 
     run: run_reader.RunData

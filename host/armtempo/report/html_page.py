@@ -99,7 +99,7 @@ def escape(text: str) -> str:
 
 
 def number(value: float, form: str) -> str:
-    """A value as ``form`` has it; a dash if there is none (NaN), no sign where it rounds to 0."""
+    """A value as ``form`` has it; a dash if there is none (NaN), no sign if it rounds to 0."""
     if math.isnan(value):
         return "–"
     text = f"{value:{form}}"

@@ -36,7 +36,7 @@ class LimitCheck:
 
     @property
     def verdict(self) -> str:
-        """KEPT, WITHIN or EXCEEDED only where 3 sigma more or less change nothing, else UNDECIDED; NOT_MEASURED."""
+        """KEPT, WITHIN or EXCEEDED only if 3 sigma more or less change nothing, else UNDECIDED; NOT_MEASURED."""
         if np.isnan(self.peak):
             return NOT_MEASURED
         lowest, highest = self.peak - 3.0 * self.sigma, self.peak + 3.0 * self.sigma

@@ -66,7 +66,7 @@ def _joint_figure(rows: int, names: Sequence[str], height: float) -> tuple[Figur
 
 
 def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
-    """Angle, speed, acceleration and jerk of every joint, with ``limits`` where there are any (Figs. 5 and 7)."""
+    """Angle, speed, acceleration and jerk of every joint, with ``limits`` if there are any (Figs. 5 and 7)."""
     figure, axes = _joint_figure(4, names, 8.0)
     times = np.linspace(0.0, trajectory.duration_s, _POINTS)
     for order in range(4):
@@ -126,7 +126,7 @@ def errors(found: Curves, names: Sequence[str]) -> Figure:
 
 
 def torque(found: MotorTorques, enough: float) -> Figure:
-    """Torque that each motor holds of what it needs, over time; dashed where it loses steps and where it is prudent."""
+    """Torque that each motor holds of what it needs, over time; dashed if it loses steps and where it is prudent."""
     figure, ((axis,),) = new_figure(1, 1, 6.8, 2.8)
     for joint, name in enumerate(found.joints):
         colour = COLOURS[joint % len(COLOURS)]

@@ -38,7 +38,7 @@ _PEAKS = {
     "kept exactly",
 }
 _MEASURED_PEAKS = ("measured", "verdict")
-"""Columns that a table has only where something was measured."""
+"""Columns that a table has only if something was measured."""
 _COLOURS = {
     peaks.EXCEEDED: html_page.BAD,
     peaks.KEPT: html_page.GOOD,

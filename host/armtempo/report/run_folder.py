@@ -3,7 +3,7 @@
 ::
 
     run.json          what ran, when, on which board; how each repetition ended; the columns' meaning
-    trajectory.json   the plan, where it is known
+    trajectory.json   the plan, if it is known
     arm.json          else the arm
     motion.bin        what the board replayed
     samples-01.csv    one file a repetition, one line a sample (columns: see ``columns``)

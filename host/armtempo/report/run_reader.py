@@ -36,7 +36,7 @@ class RepetitionData:
     time_s: Array
     """(N,)"""
     path_s: Array
-    """(N,), the motion's own time; less than ``time_s`` where the speed was below 100 %."""
+    """(N,), the motion's own time; less than ``time_s`` if the speed was below 100 %."""
     commanded_steps: NDArray[np.int64]
     """(N, J)"""
     commanded_deg: Array
@@ -44,7 +44,7 @@ class RepetitionData:
     angle_deg: Array
     """(N, J), from the encoders; NaN for a joint without one."""
     problem: str = ""
-    """Why there are no samples, where the file cannot be read."""
+    """Why there are no samples, if the file cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class RunData:
 
     @property
     def trajectory_path(self) -> Path | None:
-        """The plan that was run, where it is known."""
+        """The plan that was run, if it is known."""
         path = self.path / TRAJECTORY
         return path if path.is_file() else None
 

@@ -21,7 +21,7 @@ _KINDS = {Level.GOOD: GOOD, Level.ERROR: BAD, Level.NOTE: OPEN}
 
 
 def check_free(folder: Path, force: bool) -> None:
-    """InputError where ``folder`` has a self-test already, unless ``force``, or where it cannot be made."""
+    """InputError if ``folder`` has a self-test already, unless ``force``, or if it cannot be made."""
     there = [name for name in (JSON, HTML) if (folder / name).exists()]
     if there and not force:
         raise InputError(
@@ -41,8 +41,8 @@ def write(found: SelfTest, folder: Path) -> None:
 
 def render(found: SelfTest) -> str:
     """The page."""
-    kind = "virtual board; its figures are simulated" if found.simulated else "board"
-    page = Page("Self-test", f"{kind} {found.board_id}, program {found.program_crc:08x}")
+    kind = "; a virtual board, its figures are simulated" if found.simulated else ""
+    page = Page("Self-test", f"board {found.board_id}, program {found.program_crc:08x}{kind}")
     wrong = [(BAD, f"{line.what}: {line.measured}. {line.cure}") for line in found.failed]
     page.verdict(BAD if wrong else GOOD, "Not OK" if wrong else "OK", wrong)
     for part in dict.fromkeys(line.part for line in found.lines):

@@ -3,7 +3,7 @@
 ::
 
     run.json        what ran, when, on which board; its rows in words; how it ended; the columns' meaning
-    sequence.json   the plan, where it is known
+    sequence.json   the plan, if it is known
     arm.json        else the arm
     leg-01.bin      what the board replayed, a file a motion
     rows.csv        one line a row when it began

@@ -41,7 +41,7 @@ class RowPassed:
     """Of the sequence file, from 1."""
     cycle: int
     value: int
-    """Of the counter, where the row counts."""
+    """Of the counter, if the row counts."""
     words: str
 
 
@@ -90,7 +90,7 @@ class SequenceRun:
 
     @property
     def state(self) -> str:
-        """How it ended, as the board says it; or interrupted, or broken, where the host did not learn that."""
+        """How it ended, as the board says it; or interrupted, or broken, if the host did not learn that."""
         return visible(str(self.meta["state"]))
 
     @property

@@ -27,11 +27,12 @@ _RESULT_WIDTHS = (11, 11, 12, 12)
 _FLOORS = {
     "rests": "from turn to turn of a joint under its speed, acceleration and jerk limits",
     "path": "along the path under the speed, acceleration and jerk limits of all its joints",
+    "together": "through the via points under the speed, acceleration and jerk limits of all joints, whatever the path",
     "vias": "through the via angles of a joint under its speed, acceleration and jerk limits, whatever the path",
 }
 """What ``Search.floor_kind`` means."""
 _WORTH_SAYING = 0.03
-"""A free path is named where it might save more than this part of the motion time."""
+"""A free path is named if it might save more than this part of the motion time."""
 
 
 def lines(plan: Plan) -> list[str]:
@@ -137,7 +138,7 @@ def _polished(search: Search) -> str:
 
 
 def _free_path(plan: Plan) -> list[str]:
-    """What a free path could save at most; nothing where that is little or the job gives the path."""
+    """What a free path could save at most; nothing if that is little or the job gives the path."""
     job, total_s = plan.job, plan.trajectory.duration_s
     if job.path != "through" or checks.leads_tool(job):
         return []

@@ -37,7 +37,7 @@ class Verdict:
 
     @property
     def state(self) -> str:
-        """BAD where one finding is, else OPEN where one is, else GOOD."""
+        """BAD if one finding is, else OPEN if one is, else GOOD."""
         states = {finding.state for finding in self.findings}
         return BAD if BAD in states else OPEN if OPEN in states else GOOD
 
@@ -48,7 +48,7 @@ class Verdict:
 
     @property
     def line(self) -> str:
-        """The verdict on one line: where it is not plainly OK, with the findings that make it so."""
+        """The verdict on one line: if it is not plainly OK, with the findings that make it so."""
         reasons = [finding.text for finding in self.findings if finding.state == self.state != GOOD]
         return ": ".join([self.summary, "; ".join(reasons)]) if reasons else self.summary
 

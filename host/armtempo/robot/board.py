@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -53,6 +53,9 @@ from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.stored_motion import TURN_S
 
+_MOST_REPETITIONS = 99
+"""Their files are numbered with two digits."""
+
 
 @checked
 class Board:
@@ -83,11 +86,16 @@ class Board:
         """Close the port; a virtual board ends. Other methods raise LinkError afterwards."""
         with self._last_turn():
             self._stack.close()
-            self.client.session.check = self._closed
 
-    def _last_turn(self) -> AbstractContextManager[bool]:
-        """While no other thread is within a command: it would open a port again that was closed under it."""
-        return self.client.session.in_a_hurry(TURN_S)
+    @contextmanager
+    def _last_turn(self) -> Iterator[None]:
+        """While no other thread is within a command: it would open a port again that was closed under it.
+
+        One that waits longer, for a cable that is out, finds that the board is closed.
+        """
+        with self.client.session.in_a_hurry(TURN_S):
+            self.client.session.check = self._closed
+            yield
 
     def _closed(self) -> None:
         raise LinkError(f"the board on {self.port} was closed", "open it again with armtempo.connect")
@@ -330,7 +338,7 @@ class Board:
         watcher: Watcher | None = None,
         stop: StopRequest | None = None,
     ) -> Run:
-        """Replay a motion ``repeat`` times and record it in a new run folder in ``out``.
+        """Replay a motion ``repeat`` times, 1 to 99, and record it in a new run folder in ``out``.
 
         ``motion``: a plan, its file (FILE.json), or the name of a motion on the board. The arm must be homed
         and at the start of the motion; the arm of a virtual board is moved there. Between repetitions it
@@ -340,8 +348,8 @@ class Board:
         start, the board has another motion of this name (``upload`` can replace it), or is set up for another
         arm.
         """
-        if repeat < 1:
-            raise InputError(f"repeat = {repeat} is not allowed", "give 1 or more")
+        if not 1 <= repeat <= _MOST_REPETITIONS:
+            raise InputError(f"repeat: {repeat} is not in the range 1<=x<={_MOST_REPETITIONS}", "change it")
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._stoppable(stop) as wanted:

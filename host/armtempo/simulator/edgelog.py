@@ -53,7 +53,7 @@ class PowerCycle:
     pulses: dict[str, list[Pulses]] = field(default_factory=dict)
     """Per pin what pulses a timer made there, in the order of time."""
     ends: list[int] = field(default_factory=list)
-    """Tick at which the motion clock was stopped, where it was."""
+    """Tick at which the motion clock was stopped, if it was."""
 
     def motion(self, number: int = -1) -> dict[str, Edges]:
         """Per pin its edges in the ``number``-th motion, in ticks of the motion clock.

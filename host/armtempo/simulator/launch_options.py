@@ -31,7 +31,7 @@ class InjectedFault:
     ``counts``), ``silence`` (the serial cable is out for ``ms``), ``hang`` (the program stops for ever) or
     ``crash`` (the next look at the time raises).
 
-    From power-up on where ``run`` is 0: ``dead_pin`` (``name`` does not toggle), ``short`` (``name`` "A15-A1": the
+    From power-up on if ``run`` is 0: ``dead_pin`` (``name`` does not toggle), ``short`` (``name`` "A15-A1": the
     second pin toggles with the first), ``half_clock`` (TIM2 counts at half its rate), ``slow_flash`` (each operation
     takes ``ms`` more), ``late_interrupts`` (by ``ms``), ``dead_stream`` (DMA1's stream ``joint`` answers no request).
     """

@@ -10,7 +10,6 @@ import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.simulator.launch_options import LaunchOptions, ProcessOptions, describe, unique_id
@@ -109,9 +108,7 @@ class VirtualBoard:
     def __enter__(self) -> VirtualBoard:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.stop()
         self._folder.remove()
 

@@ -58,7 +58,7 @@ class Spline:
     def __call__(self, u: ArrayLike, order: int = 0) -> Array:
         """Value at ``u``, or its derivative of the given ``order`` with respect to u.
 
-        ``u`` of any shape gives an array of that shape, with J in a last axis where the points have it. Raises
+        ``u`` of any shape gives an array of that shape, with J in a last axis if the points have it. Raises
         InputError for a u outside of 0 to n.
         """
         if not 0 <= order <= self.degree:

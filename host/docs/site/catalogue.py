@@ -18,6 +18,7 @@ class BoardCodes(Directive):
 
     def run(self) -> list[nodes.Node]:
         """One table."""
+        self.state.document.settings.env.note_reread()  # made of the code, which no page's date tells
         rows = [
             (str(code), name, meaning, cure)
             for code, (name, meaning, cure) in sorted(meanings.ERRORS.items())
@@ -30,6 +31,7 @@ class Commands(Directive):
 
     def run(self) -> list[nodes.Node]:
         """The sections, in the order of the help page."""
+        self.state.document.settings.env.note_reread()
         group = click.Context(main, info_name="armtempo")
         return [self._section(group, name) for name in main.list_commands(group)]
 

@@ -45,7 +45,7 @@ def compact(
     module ``core`` of its package. ``entries``: modules that are imported from outside, ``main`` among
     them. ``keep``: names that must stay, as they are used from outside or made at run time. ``together``: modules that
     become part of another one (``join``). ``at_rest``: methods, by module, class and name, that are called only
-    while nothing moves (``set_up``). Raises ValueError where a
+    while nothing moves (``set_up``). Raises ValueError if a
     module asks another for a name that is not there, or a package cannot be made flat.
     """
     trees, flat = _flatten({module: _at_run_time(ast.parse(text)) for module, text in sources.items()})
@@ -91,8 +91,8 @@ def _is_for_checkers(node: ast.stmt) -> bool:
 def _flatten(trees: Mapping[str, ast.Module]) -> tuple[dict[str, ast.Module], dict[str, str]]:
     """The modules by names of two parts at most, and that name by the one before; ``trees`` is used up.
 
-    Packages within packages go; they may hold nothing but a docstring. Raises ValueError where one holds more, or
-    where two modules would have one name.
+    Packages within packages go; they may hold nothing but a docstring. Raises ValueError if one holds more, or
+    if two modules would have one name.
     """
     inner = {
         module for module in trees if "." in module and any(each.startswith(f"{module}.") for each in trees)

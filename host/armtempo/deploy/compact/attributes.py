@@ -55,7 +55,7 @@ def class_variables(node: ast.ClassDef) -> set[str]:
 
 
 def _set(node: ast.AST, on: str = "") -> Iterator[str]:
-    """The attribute that is set here; ``on``: only where it is one of what has this name."""
+    """The attribute that is set here; ``on``: only if it is one of what has this name."""
     if (
         isinstance(node, ast.Attribute)
         and isinstance(node.ctx, ast.Store)

@@ -12,7 +12,7 @@ from armtempo.deploy.compact.scopes import Scoped, Target, imported, top_names, 
 def join(trees: dict[str, ast.Module], together: Mapping[str, Collection[str]]) -> None:
     """Make the modules that are under another one in ``together`` part of that; names stay as they are.
 
-    Raises ValueError where two of them define the same name, or a function hides one that it means.
+    Raises ValueError if two of them define the same name, or a function hides one that it means.
     """
     homes = {module: home for home, modules in together.items() for module in modules}
     for home, modules in together.items():

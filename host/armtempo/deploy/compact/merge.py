@@ -26,7 +26,7 @@ def merge(
     What ``main`` imports at the head of a module, directly or through others, becomes the module ``core`` of
     its package, each name after that of its module. Packages, ``entries``, modules that a function imports and
     modules of which more than names is used stay as they are. ``keep``: names that are used from outside or found at
-    run time. Raises ValueError where a name has no meaning.
+    run time. Raises ValueError if a name has no meaning.
     """
     apart = {*entries, *packages(trees), *_imported_later(trees), *used_whole(trees)}
     inside = {module: top_names(trees[module]) for module in _in_order(trees, main) if module not in apart}
@@ -67,7 +67,7 @@ def _mentioned(tree: ast.AST) -> set[str]:
 
 
 def _makes_only(node: ast.stmt) -> set[str]:
-    """What a statement defines that does nothing else; none where it may do more."""
+    """What a statement defines that does nothing else; none if it may do more."""
     if isinstance(node, ast.FunctionDef | ast.ClassDef):
         return {node.name}
     calls = any(isinstance(inner, ast.Call) for inner in ast.walk(node))

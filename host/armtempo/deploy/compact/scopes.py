@@ -11,7 +11,7 @@ Function = ast.FunctionDef | ast.Lambda
 
 @dataclass(frozen=True)
 class Target:
-    """What an imported name stands for: a module of the program, or a name in one."""
+    """The meaning of an imported name: a module of the program, or a name in one."""
 
     module: str
     name: str | None = None

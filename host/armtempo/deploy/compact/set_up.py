@@ -14,7 +14,7 @@ Method = tuple[ast.ClassDef, ast.FunctionDef]
 def set_up_methods(tree: ast.Module, wanted: Collection[str]) -> list[Method]:
     """The methods of a module's classes that are ``wanted``: class and method, with a dot between.
 
-    Raises ValueError where one is not there.
+    Raises ValueError if one is not there.
     """
     found = {
         f"{node.name}.{method.name}": (node, method)

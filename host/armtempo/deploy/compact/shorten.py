@@ -118,7 +118,7 @@ class _Renamer(Scoped):
     def visit_Name(self, node: ast.Name) -> ast.AST:
         """Names of functions' own cost nothing.
 
-        ValueError where a class reads a name of the module whose short one is that of what it has assigned: it would
+        ValueError if a class reads a name of the module whose short one is that of what it has assigned: it would
         get its own.
         """
         if not self.hides(node.id):

@@ -88,7 +88,7 @@ def _make(found: Checkout, definition: BoardDefinition, progress: Progress) -> P
 
 
 def _run(command: list[str], step: Callable[[str], None]) -> None:
-    """Run make; ToolError with its last lines where it fails."""
+    """Run make; ToolError with its last lines if it fails."""
     if said := toolchain.run(command, step):
         raise ToolError(
             f"MicroPython's build failed:\n  {said}",

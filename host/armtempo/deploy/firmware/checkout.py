@@ -1,4 +1,4 @@
-"""What a checkout of MicroPython has: its version, the boards of its stm32 port, its submodules."""
+"""A checkout of MicroPython: its version, the boards of its stm32 port, its submodules."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armtempo.deploy.firmware import frozen
 RELEASE = "v1.28.0"
 """MicroPython's tag that the firmwares of armtempo's releases are built from."""
 BOARDS = ("STM32F4DISC", "OLIMEX_H407", "VCC_GND_F407ZG")
-"""Boards that releases bring a firmware for; any other of the port with an STM32F405 or F407 can be built."""
+"""Boards with a firmware in releases; any other of the port with an STM32F405 or F407 can be built."""
 _CHIPS = ("STM32F405xx", "STM32F407xx")
 _FLASH_KB = {"E": 512, "G": 1024}
 """By the letter after the number of pins in the chip's name (data sheet, ordering information)."""
@@ -50,11 +50,11 @@ class BoardDefinition:
     name: str
     folder: Path
     machine: str
-    """What the firmware will say that it runs on: ``os.uname().machine``."""
+    """The firmware's ``os.uname().machine``."""
     manifest: str
-    """What is frozen into its firmware anyway."""
+    """The board's own manifest of frozen modules."""
     addresses: tuple[int, ...]
-    """Of the firmware's pieces in the flash, in bytes."""
+    """Addresses of the firmware's pieces in the flash."""
     flash_end: int
 
 
@@ -86,7 +86,7 @@ def look(folder: Path) -> Checkout:
 
 
 def date(checkout: Checkout) -> int:
-    """Of the last commit, in seconds since 1970; 0 without git. In a firmware it stands for the day of the build, so
+    """Date of the last commit, seconds since 1970; 0 without git. Used as the build date of a firmware, so
     that the same sources make the same firmware.
     """
     try:

@@ -22,7 +22,7 @@ _SAID_COLUMNS = 200
 
 
 def run(command: list[str], heard: Callable[[str], None]) -> str:
-    """Run a program, ``heard`` with each line that it prints; the last lines where it fails, else ""."""
+    """Run a program, ``heard`` with each line that it prints; the last lines if it fails, else ""."""
     said: list[str] = []
     with subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True

@@ -1,1 +1,1 @@
-"""The board measures itself: what is measured runs at MicroPython's prompt, is sent from here, and is dropped again."""
+"""The board's self-test: code is sent to MicroPython's prompt, measures, and is removed again."""

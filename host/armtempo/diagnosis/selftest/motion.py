@@ -69,7 +69,7 @@ def back_in_turn(joints: Sequence[dict[str, Any]]) -> TestMotion:
 
 
 def gentle(joints: Sequence[dict[str, Any]]) -> TestMotion:
-    """So slow and small that no harm is done where the drivers are on: towards more steps, in the joints' ranges."""
+    """So slow and small that no harm is done if the drivers are on: towards more steps, in the joints' ranges."""
     counts = [min(_steps_to_see(joint), joint["max_steps"] - joint["min_steps"]) for joint in joints]
     slowest = min(joint["max_rate"] / max(count, 1) for joint, count in zip(joints, counts, strict=True))
     ends = _about_middle(joints, counts)

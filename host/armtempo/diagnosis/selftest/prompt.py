@@ -34,7 +34,7 @@ if _kept: _kept.deinit()
 machine.WDT(timeout=100)
 time.sleep(2)
 {RESET}"""
-"""The same by the watchdog, which nobody feeds; by ``RESET`` where it does not come."""
+"""The same by the watchdog, which nobody feeds; by ``RESET`` if it does not come."""
 _DROP = " [globals().pop(name) for name in [name for name in globals() if name not in before]]\n"
 """What a part defined goes, ``before`` included: a program that continues has its heap back."""
 PARTS = ("drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep")
@@ -146,4 +146,4 @@ def _as_link_error(part: str) -> Iterator[None]:
 
 
 def _cure(part: str) -> str:
-    return f"run the self-test again; where {part!r} fails each time, please report it with the output"
+    return f"run the self-test again; if {part!r} fails each time, please report it with the output"

@@ -44,7 +44,7 @@ def stated(count: int) -> int:
 
 
 def highest(keeps_up: Callable[[int], bool | None], count: int) -> int | None:
-    """By bisection up to what is stated with the margin, to about 3 % of it; None where one could not be tried."""
+    """By bisection up to what is stated with the margin, to about 3 % of it; None if one could not be tried."""
     good, bad = 0, round(stated(count) / KEPT)
     answer = keeps_up(bad)
     if answer:
@@ -68,7 +68,7 @@ def shortest_s(keeps_up: Callable[[float], bool | None], duration_s: float) -> t
 
 
 def to_state(found: Mapping[int, int | None]) -> tuple[int, int] | None:
-    """Steps/s of one joint and of all together, from the rates found by number of joints; None where one is missing."""
+    """Steps/s of one joint and of all together, from the rates found by number of joints; None if one is missing."""
     rates = {count: KEPT * rate for count, rate in found.items() if rate is not None}
     if len(rates) != len(found) or 1 not in rates:
         return None

@@ -1,4 +1,4 @@
-"""What a self-test found: lines of what was measured, what was expected, a verdict, and what to do."""
+"""The result of a self-test: lines with measured and expected value, verdict, and advice."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armtempo.diagnosis.finding import Level
 
 @dataclass(frozen=True)
 class Measurement:
-    """One thing that was measured. ``verdict`` NOTE: there is nothing to compare it with, or it was left out."""
+    """One measurement. ``verdict`` NOTE: nothing to compare with, or left out."""
 
     part: str
     what: str
@@ -22,19 +22,19 @@ class Measurement:
 
 
 def judged(part: str, what: str, measured: str, expected: str, is_good: bool, cure: str) -> Measurement:
-    """A line with a verdict; ``cure`` is for one that is wrong."""
+    """A line with a verdict; ``cure``: advice if it is wrong."""
     verdict = Level.GOOD if is_good else Level.ERROR
     return Measurement(part, what, measured, expected, verdict, "" if is_good else cure)
 
 
 def left_out(part: str, reason: str, cure: str) -> Measurement:
-    """A part that was not done, and why."""
+    """A line about a part that was left out, with the reason."""
     return Measurement(part, "left out", reason, "", Level.NOTE, cure)
 
 
 @dataclass
 class SelfTest:
-    """The lines of one self-test of one board, and the figures that they are from (``data``, by part)."""
+    """The lines of a self-test, and its data by part."""
 
     board_id: str
     simulated: bool
@@ -43,7 +43,7 @@ class SelfTest:
     data: dict[str, Any] = field(default_factory=dict)
 
     def add(self, lines: Iterable[Measurement]) -> None:
-        """More lines."""
+        """Append lines."""
         self.lines.extend(lines)
 
     @property
@@ -56,7 +56,7 @@ class SelfTest:
         return any(line.part in parts for line in self.failed)
 
     def to_json(self) -> dict[str, Any]:
-        """What ``selftest.json`` and ``--json`` have."""
+        """The content of ``selftest.json`` and ``--json``."""
         lines = [{**asdict(line), "verdict": line.verdict.word} for line in self.lines]
         return {
             "selftest": 1,

@@ -1,4 +1,4 @@
-"""The order of a self-test. Drivers stay off: where ENABLE is not at its inactive level, nothing is done."""
+"""The sequence of a self-test. If ENABLE is not at its inactive level, nothing is done."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ SILENT = "silence"
 
 
 def run(client: Client, progress: Progress | None = None) -> SelfTest:
-    """Test the board of ``client``, which runs the program again afterwards; its positions are unknown then.
+    """Test the board of ``client``; afterwards it runs its program again, and positions are unknown.
 
-    Raises LinkError, with nothing done, where something moves, a fault is pending, the drivers are on, or the program
-    is not a part of the firmware; LinkError also where the board falls silent in a part, which it names.
+    Raises LinkError, before anything is done, if a motion runs, a fault is pending, the drivers are on, or
+    the program is not in the firmware; and LinkError, naming the part, if the board stops answering.
     """
     info = client.info
     found = SelfTest(info.board_id[:UNIQUE_ID_DIGITS], info.virtual, info.program_crc)
@@ -82,7 +82,7 @@ def _same_room(before: int, after: int) -> Measurement:
         f"{before}, {after} bytes",
         "the same",
         before == after,
-        "reset the board; where it is so each time, please report it",
+        "reset the board; if it is so each time, please report it",
     )
 
 
@@ -128,7 +128,7 @@ def _check_rest(client: Client) -> None:
 
 
 def _leave(client: Client, found: SelfTest, work: Callable[[Prompt], None]) -> None:
-    """Do ``work`` at the prompt of the board; then its program answers again."""
+    """Do ``work`` at the prompt of the board, then wait for its program."""
     session = client.session
     with session.turns:
         client.leave()
@@ -162,7 +162,7 @@ def _check_drivers(prompt: Prompt, found: SelfTest) -> None:
 def _hung(part: str) -> Measurement:
     return Measurement(
         board_part.BOARD, "the self-test before", f"the board hung in {part!r} and was reset", "", Level.NOTE,
-        f"where it hangs in {part!r} again, please report it with the output",
+        f"if it hangs in {part!r} again, please report it with the output",
     )  # fmt: skip
 
 
@@ -171,7 +171,7 @@ def _drivers(prompt: Prompt) -> dict[str, Any]:
 
 
 def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
-    """All parts, each whether the others passed or failed, until the board falls silent in one."""
+    """Run all parts, even after failures, until the board stops answering."""
     try:
         prompt.enter(soft_reset=True)
         drivers = found.data[DRIVERS] = _drivers(prompt)
@@ -199,7 +199,7 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
 
 
 def _part(prompt: Prompt, found: SelfTest, part: str, *files: str, **arguments: Any) -> Measured | None:
-    """What a part gave; None, with a line about it, where its code raised."""
+    """Run a part; returns its result, None (with a line) after an exception."""
     stage(part)
     try:
         measured = prompt.measure(*files, **arguments)
@@ -215,7 +215,8 @@ def _failed(part: str, error: LinkError) -> Measurement:
 
 
 def _is_still(prompt: Prompt, found: SelfTest) -> bool:
-    """Whether no encoder turns with the first steps: where ENABLE is wired or named wrong, nothing else is made."""
+    """Whether no encoder turns with the first steps; otherwise ENABLE is wired or configured wrong, and the
+    test ends."""
     arguments = _arguments(motion.gentle(found.data[DRIVERS]["joints"]), found)
     measured = _part(prompt, found, "encoders", "engine", "encoders", **arguments)
     if measured is None:
@@ -231,7 +232,7 @@ def _still_off(values: dict[str, Any], found: SelfTest) -> Measurement:
 
 
 def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
-    """The parts that make steps, with the drivers off."""
+    """Run the parts that make steps, with the drivers off."""
     joints = found.data[DRIVERS]["joints"]
     for done, forward in ((0.4, True), (0.5, False)):
         work(done, 1)
@@ -251,7 +252,7 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
 
 
 def _move_long(prompt: Prompt, found: SelfTest) -> None:
-    """A motion of some seconds, whose edges are counted only."""
+    """Run a motion of some seconds, whose edges are only counted."""
     duration_s = _SIMULATED_LONG_S if found.simulated else _LONG_S
     moved = motion.long(found.data[DRIVERS]["joints"], duration_s)
     arguments = {**_arguments(moved, found), "rates": moved.rates, "most": 0}
@@ -261,7 +262,7 @@ def _move_long(prompt: Prompt, found: SelfTest) -> None:
 
 
 def _stop(prompt: Prompt, found: SelfTest, arguments: dict[str, Any], work: Progress) -> None:
-    """E-stops at random moments, in batches that take some seconds each."""
+    """Run stops at random times, in batches of some seconds."""
     count = _SIMULATED_STOPS if found.simulated else _STOPS
     waits_us = np.random.default_rng(_SEED).integers(*_WAITS_US, count).tolist()
     all_of: dict[str, Any] = {}
@@ -316,7 +317,7 @@ def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
 
 
 class _Trials:
-    """Motions of the arm's first joints in the program's own loop."""
+    """Motions of the arm's first joints in the program's main loop."""
 
     def __init__(self, prompt: Prompt, found: SelfTest) -> None:
         self._prompt, self._found = prompt, found
@@ -324,7 +325,7 @@ class _Trials:
         self.longest_cycles = 0
 
     def keeps_up(self, rates: Sequence[int], duration_s: float = 0.0) -> bool | None:
-        """Whether that many joints make these rates; None if it could not be tried."""
+        """Whether the joints reach these rates; None if it could not be tried."""
         values = self._tried(rates, duration_s or self._duration_s, "")
         if values is None or values["fault"]:
             return None if values is None else False
@@ -369,7 +370,7 @@ def _arguments(moved: motion.TestMotion, found: SelfTest) -> dict[str, Any]:
 
 
 def _back(client: Client) -> None:
-    """Greet the program, which starts again after the reset; LinkError if it does not answer in time."""
+    """Wait for the program after the reset; raises LinkError if it does not answer in time."""
     limit_s = time.monotonic() + _BACK_S
     while True:
         time.sleep(_LOOK_S)

@@ -1,4 +1,4 @@
-"""A free path around what is in the way: helping via points, found by growing trees of postures that touch nothing."""
+"""A free path around obstacles: auxiliary via points, found by two rapidly exploring random trees (RRT-connect)."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from armtempo.planning.room_check import Bodies, Touch
 from armtempo.planning.through_plan import Planned
 
 _ROUNDS = 5
-"""Motions that are planned at most, each along the way found more closely."""
+"""Largest number of planned motions, each closer to the collision-free way."""
 _NODES = 400
-"""Postures that the trees of one way have at most."""
+"""Largest number of postures in the trees of one way."""
 _STEP = 0.15
-"""Length of a branch, as a part of the space in which postures are drawn."""
+"""Length of a branch, as a fraction of the sampled space."""
 _SHORTCUTS = 100
 _ASIDE_DEG = 90.0
-"""Postures are drawn up to so far beyond both via points."""
+"""Postures are sampled up to this far outside of the two via points."""
 _CLEAR_MM = 10.0
-"""The way keeps so far from everything, so that the path may cut its corners; less where a via point is nearer."""
+"""Clearance of the way, so that the path may cut its corners; less if a via point is closer."""
 _SAMPLE_MM = 8.0
-"""Between postures that are looked at, no link moves farther."""
+"""Largest motion of a link between checked postures."""
 _MOST_SAMPLES = 300
 
 
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
-    """The motion of ``free_plan.motion``, around what its straightest way would touch, if such a way is found.
+    """The motion of ``free_plan.motion``, around obstacles if a way is found.
 
-    Otherwise it is that motion, which touches something.
+    Otherwise the motion that touches something.
     """
     first = planned = free_plan.motion(arm, job, via_deg, progress)
     holding = arm.holding(job.holds)
@@ -62,7 +62,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
             if found is None:
                 break
             ways[stretch] = found
-        else:  # the path cuts a corner too short: hold it nearer to the way
+        else:  # the path cuts a corner too much: keep it closer to the way
             middle = 0.5 * (ways[stretch][part] + ways[stretch][part + 1])
             ways[stretch] = np.insert(ways[stretch], part + 1, middle, axis=0)
         helped = _helped(job, via_deg, ways)
@@ -75,12 +75,12 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
 
 
 def _places(ways: Sequence[Array]) -> Array:
-    """Numbers of the job's via points among all: (n + 1,)."""
+    """Indices of the job's via points among all: (n + 1,)."""
     return np.cumsum([0, *(len(way) - 1 for way in ways)])
 
 
 def _place(planned: Planned, touch: Touch, ways: Sequence[Array]) -> tuple[int, int]:
-    """In which stretch a motion touches something, and in which part of its way."""
+    """The stretch in which a motion touches something, and the part of its way."""
     times = planned.trajectory.joints[0].via_times_s
     part = int(np.clip(np.searchsorted(times, touch.time_s) - 1, 0, len(times) - 2))
     places = _places(ways)
@@ -89,7 +89,7 @@ def _place(planned: Planned, touch: Touch, ways: Sequence[Array]) -> tuple[int, 
 
 
 def _helped(job: Job, via_deg: Array, ways: Sequence[Array]) -> Job:
-    """The job with the helping via points between its own."""
+    """The job with auxiliary via points between its own."""
     places = _places(ways)
     via = [*job.via[:1]]
     for number, way in enumerate(ways, 1):
@@ -101,11 +101,11 @@ def _helped(job: Job, via_deg: Array, ways: Sequence[Array]) -> Job:
 def _without_help(
     arm: Arm, job: Job, via_deg: Array, planned: Planned, ways: Sequence[Array], names: set[str]
 ) -> Planned:
-    """The motion as one through the job's own via points alone."""
+    """The motion described by the job's own via points only."""
     places = _places(ways)
     joints = []
     for joint in planned.trajectory.joints:
-        assert joint.via_segments is not None  # a free path has them
+        assert joint.via_segments is not None  # a free path has these
         joints.append(replace(joint, via_segments=tuple(joint.via_segments[place] for place in places)))
     searches = []
     for search in planned.searches:
@@ -118,21 +118,21 @@ def _without_help(
 
 @dataclass(frozen=True, eq=False)
 class _Space:
-    """The postures of an arm."""
+    """The space of postures of an arm."""
 
     arm: Arm
 
     @cached_property
     def bodies(self) -> Bodies:
-        """Its links, and what it holds."""
+        """Its links and its load."""
         return Bodies(self.arm)
 
     def is_free(self, driven_deg: Array, clear_mm: Array | float = 0.02) -> bool:
-        """Whether nothing comes nearer than ``clear_mm`` at postures (N, J)."""
+        """Whether all clearances at postures (N, J) are at least ``clear_mm``."""
         return bool(np.all(self.bodies.distances(driven_deg) > clear_mm))
 
     def way(self, start: Array, end: Array, rng: np.random.Generator) -> Array | None:
-        """Postures (K, J) from one to another, straight between each two; None if none is found."""
+        """Collision-free postures (K, J) from one to another, connected by straight lines; None if none is found."""
         clear = np.minimum(_CLEAR_MM, 0.5 * self.bodies.distances(np.stack([start, end])).min(axis=0))
         low, high = np.array([joint.range_deg for joint in self.arm.driven]).T
         inside = 0.01 * (high - low)
@@ -154,13 +154,13 @@ class _Space:
         return None
 
     def leads(self, start: Array, end: Array, clear: Array) -> bool:
-        """Whether the straight way from one posture to another is free, looked at in small steps."""
+        """Whether the straight line between two postures is free, checked in small steps."""
         farthest = float(self.bodies.speeds_mm_s(np.abs(end - start)).max())
         count = min(_MOST_SAMPLES, int(np.ceil(farthest / _SAMPLE_MM)) + 2)
         return self.is_free(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start), clear)
 
     def _shortened(self, way: Array, clear: Array, rng: np.random.Generator) -> Array:
-        """The way with straight shortcuts."""
+        """The way with random straight shortcuts."""
         speeds = np.array([joint.limits.speed_deg_s for joint in self.arm.driven])
         for _ in range(_SHORTCUTS):
             alive()
@@ -180,7 +180,7 @@ class _Space:
         return self._straightened(way, clear)
 
     def _straightened(self, way: Array, clear: Array) -> Array:
-        """Without postures that are not needed."""
+        """The way without unnecessary postures."""
         number = 1
         while number < len(way) - 1:
             if self.leads(way[number - 1], way[number + 1], clear):
@@ -191,14 +191,15 @@ class _Space:
 
 
 class _Tree:
-    """Postures that can be reached from the first in straight pieces."""
+    """A tree of postures connected by straight lines."""
 
     def __init__(self, space: _Space, clear: Array, size: Array, root: Array) -> None:
         self.space, self.clear, self.size = space, clear, size
         self.postures, self.parents, self.tries = [root], [-1], 0
 
     def grown(self, towards: Array) -> int | None:
-        """The number of a new posture, a step from the nearest towards another; None if that is not free."""
+        """Add a posture, one step from the nearest one ``towards`` a posture; returns its number, None if it
+        is not free."""
         away = (np.array(self.postures) - towards) / self.size
         nearest = int(np.argmin(np.sum(away**2, axis=1)))
         length = float(np.linalg.norm(away[nearest]))
@@ -211,7 +212,7 @@ class _Tree:
         return len(self.postures) - 1
 
     def reaches(self, posture: Array) -> bool:
-        """Whether it grows as far as a posture, step by step."""
+        """Grow step by step towards a posture; returns whether it is reached."""
         for _ in range(_NODES):
             new = self.grown(posture)
             if new is None:
@@ -221,7 +222,7 @@ class _Tree:
         return False
 
     def branch(self, number: int) -> Array:
-        """From the root to a posture."""
+        """The postures from the root to one."""
         found = []
         while number >= 0:
             found.append(self.postures[number])

@@ -1,6 +1,6 @@
-"""How far a free path leaves the spline through the via points, as proven bounds.
+"""Proven bounds of the distance between a free path and the spline through the via points.
 
-Both are splines over the same u, so their difference is one too, and its Bernstein coefficients bound it.
+Both are splines over the same u, so their difference is a spline too, and its Bernstein coefficients bound it.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from armtempo.planning.tool import Tool
 from armtempo.splines import bernstein
 
 SHARP = 1e-3
-"""How far, relative, a bound on the tool's deviation may lie above what is reached."""
+"""Relative sharpness of the bound of the tool's deviation."""
 _ROUNDING_MM = 1e-9
 _MOST_PIECES = 50_000
-"""No more pieces are looked at at once: some 100 MB, and a second."""
+"""Largest number of pieces at a time: about 100 MB, and a second."""
 
 
 def joint_deviation_deg(path: Array, through: Array) -> float:
@@ -27,9 +27,9 @@ def joint_deviation_deg(path: Array, through: Array) -> float:
 def tool_deviation_mm(path: Array, through: Array, tool: Tool) -> float:
     """Upper bound of the distance between the tools at the same u, sharp to SHARP unless that needs too many pieces.
 
-    ``path`` and ``through``: Bernstein coefficients (S, 6, J) in degrees. At the ends and in the middle of a piece the
-    distance is computed; between, it grows no faster than ``_growth`` says, and is above the chords between them by no
-    more than ``_bulge``. Pieces that may hold the largest are halved.
+    ``path`` and ``through``: Bernstein coefficients (S, 6, J) in degrees. At the ends and in the middle of a
+    piece the distance is computed; in between, its growth is bounded by ``_growth``, and its excess over the
+    chords by ``_bulge``. Pieces that may have the maximum are halved.
     """
     best = 0.0
     while True:
@@ -59,13 +59,13 @@ def _middle(pieces: Array) -> Array:
 
 
 def _halved(pieces: Array) -> Array:
-    """Both halves of pieces (N, 6, J) by turns: (2 N, 6, J)."""
+    """Both halves of pieces (N, 6, J), alternating: (2 N, 6, J)."""
     halves = bernstein.halves(np.moveaxis(pieces, 1, 2))
     return np.asarray(halves.transpose(0, 2, 3, 1).reshape(-1, *pieces.shape[1:]))
 
 
 def _growth(path: Array, through: Array, reach_mm: Array) -> Array:
-    """Bound on how fast the distance between the tools changes over a piece, mm for the whole of it: (N,).
+    """Bound of the change of the distance between the tools over a piece, mm: (N,).
 
     ``path`` and ``through`` are turns of rows of the Denavit-Hartenberg table, (N, 6, R) in degrees.
     d/du of p(q) - p(r) is J(q) (q' - r') + (J(q) - J(r)) r'. A column of J is no longer than the reach of its
@@ -81,9 +81,9 @@ def _growth(path: Array, through: Array, reach_mm: Array) -> Array:
 
 
 def _bulge(curve: Array, reach_mm: Array) -> Array:
-    """How far the tool is from the chords between ends and middle of a piece at most, in mm: (N,).
+    """Bound of the tool's distance from the chords between ends and middle of a piece, mm: (N,).
 
-    ``curve``: turns of rows, (N, 6, R) in degrees. A second derivative of d over a chord of length h: d h^2 / 8.
+    ``curve``: turns of rows, (N, 6, R) in degrees. Over a chord of length h it is h^2 / 8 times the second derivative.
     """
     degree = curve.shape[1] - 1
     angles = np.radians(curve)

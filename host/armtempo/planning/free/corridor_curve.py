@@ -1,4 +1,4 @@
-"""What a corridor costs: motion time against how far the path may leave the spline through the via points."""
+"""Motion time as a function of the corridor around the spline through the via points."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
 _NARROWER = 8
-"""Corridors below the widest one."""
+"""Number of corridors narrower than the widest."""
 _FACTOR = 2.0
-"""Each is narrower than the one before by this."""
+"""Ratio of successive corridors."""
 _WIDE = {"deg": 1e3, "mm": 1e6}
-"""Corridors that hold no motion back."""
+"""Corridors so wide that they restrict no motion."""
 
 
 @dataclass(frozen=True)
 class CorridorTime:
-    """The motion time in a corridor: None is a path that is free, 0 the spline itself."""
+    """The motion time in a corridor; None: a free path, 0: the spline itself."""
 
     corridor: float | None
     total_s: float
@@ -37,10 +37,9 @@ class CorridorTime:
 def curve(arm: Arm, job: Job, progress: Progress) -> list[CorridorTime]:
     """The job's motion time on the spline, in ever wider corridors, and free.
 
-    In mm of the tool where the job has ``corridor_mm``, else in degrees of any joint. The widest corridor is as wide as
-    a path uses that none holds back. With stops there is no motion on the spline
-    itself, nor in the narrowest corridors. Errors as in
-    ``planner.plan``; InputError if the path is not free.
+    In mm of the tool if the job has ``corridor_mm``, else in degrees of any joint. The widest corridor is the
+    width that an unrestricted path uses. With stops there is no motion on the spline itself, nor in the
+    narrowest corridors. Raises as ``planner.plan``; InputError if the path is not free.
     """
     if job.path != "free":
         raise InputError(
@@ -59,7 +58,7 @@ def curve(arm: Arm, job: Job, progress: Progress) -> list[CorridorTime]:
         except PlanError:
             if width is None or not job.stops:
                 raise
-            continue  # the spline does not rest there: a path that does leaves it by more
+            continue  # the spline does not stop there: a path that stops leaves it by more
         found.append(CorridorTime(width, plan.total_s))
     progress(whole, whole)
     return found
@@ -72,7 +71,7 @@ def _in(job: Job, unit: str, corridor: float | None) -> Job:
 
 
 def _deviation(arm: Arm, plan: Plan, unit: str) -> float:
-    """Bound on how far a plan in a corridor leaves the spline through its via points."""
+    """Bound of the distance of a plan in a corridor from the spline through its via points."""
     points = np.stack([joint.angle_points_deg for joint in plan.trajectory.joints], axis=1)
     spline = bspline.fit(plan.via_deg, DEGREE)
     pieces = (len(points) - DEGREE) // (len(spline) - DEGREE)

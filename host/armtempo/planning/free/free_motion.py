@@ -1,4 +1,4 @@
-"""A motion whose path is free between the via points, and the programs that make it faster."""
+"""A motion with a free path between the via points, and the optimisation of its time."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ from armtempo.planning.variables import MotionVariables, time_points
 from armtempo.splines import bspline
 
 _PARTS = 4
-"""Points in a segment at which limits are watched, besides the peaks found."""
+"""Collocation points per segment, besides peaks."""
 _CORRIDOR_PARTS = 4
-"""Points in a segment at which the tool's corridor is watched."""
+"""Points per segment at which the tool's corridor is enforced."""
 _PEAK_GRID_FACTOR = 4
 _PEAK_THRESHOLD = 0.95
 _AWAY = 1.01
-"""Time is stretched by this before each solve, so that it starts within the limits."""
+"""Factor on time before each solve, for a start within the limits."""
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
-"""Weight of steps between time differences in the first solve, for one segment and via point; part of it later."""
+"""Weight of steps between time differences in the first solve, per segment and via point; fraction of it later."""
 _LEAST_STEP = 1e-3
-"""Least difference of time control points, as a part of their mean: where time nearly stands still, what rounding does
-to the angles is divided by its cube."""
+"""Least difference of time control points, as a fraction of their mean: rounding errors of angles are divided
+by its cube."""
 _FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
 _AGAIN = Schedule(first_barrier=1e-3, last_barrier=1e-4, curvature=False)
 _ROUNDED = 1e-10
-"""A path this little beyond a bound, as a part of the angles, keeps it as far as its digits go."""
+"""Relative excess over a bound that is only rounding."""
 _AT_END = 1e-6
-"""A via point this near to the end of a range, as a part of what its joint turns, is at it."""
+"""A via point this close to the end of a range (fraction of the joint's motion) counts as at the end."""
 _NEAR = 1e-5
-"""Solves end where their points miss no more than this of a limit."""
+"""Solves end if the limits at their points are exceeded by at most this fraction."""
 
 
 class Tolerance(NamedTuple):
-    """How far the tool may be from a pose."""
+    """Largest distance of the tool from a pose."""
 
     position_mm: float
     rotation_deg: float
@@ -58,10 +58,10 @@ class Tolerance(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Demand:
-    """What is asked of a free motion of J joints through n + 1 via points."""
+    """Requirements for a free motion of J joints through n + 1 via points."""
 
     names: tuple[str, ...]
-    """Of the joints."""
+    """Names of the joints."""
     via_deg: Array
     """(n + 1, J)."""
     limits: Array
@@ -72,27 +72,27 @@ class Demand:
     stops: Mapping[int, float]
     """Dwell in seconds by via point where the motion rests, 0 for a rest without one."""
     corridor_deg: float = np.inf
-    """How far any joint may leave the spline through the via points."""
+    """Largest distance of any joint from the spline through the via points."""
     corridor_mm: float = np.inf
-    """How far the tool may leave it."""
+    """Largest distance of the tool from that spline."""
     tool: Tool | None = None
-    """Of these joints; needed for ``corridor_mm`` and ``tolerances``."""
+    """The tool for these joints; needed for ``corridor_mm`` and ``tolerances``."""
     tolerances: Mapping[int, Tolerance] = field(default_factory=dict)
-    """By via point, where the tool need not be exactly where the angles bring it."""
+    """Tolerances of the tool, by via point."""
 
     @property
     def size_deg(self) -> Array:
-        """How far the via points of each joint lie apart: (J,)."""
+        """Span of the via points of each joint: (J,)."""
         return np.asarray(np.ptp(self.via_deg, axis=0))
 
     @property
     def room_deg(self) -> Array:
-        """How far each via point is from the nearer end of its joint's range: (n + 1, J)."""
+        """Distance of each via point from the nearer end of its joint's range: (n + 1, J)."""
         return np.minimum(self.via_deg - self.low_deg, self.high_deg - self.via_deg)
 
     @property
     def turning(self) -> NDArray[np.bool_]:
-        """Via points at the end of a joint's range, where the joint can but turn: (n + 1, J)."""
+        """Via points at the end of a joint's range, where the joint must turn: (n + 1, J)."""
         return np.asarray(self.room_deg <= _AT_END * self.size_deg)
 
 
@@ -117,12 +117,12 @@ class FreeMotion:
 
     @property
     def variables(self) -> MotionVariables:
-        """How its variables are laid out."""
+        """The layout of its variables."""
         return MotionVariables(self.layout.segments, DEGREE, self.angle_points_deg.shape[1])
 
     @property
     def via_times_s(self) -> Array:
-        """When it arrives at each via point: (n + 1,)."""
+        """Arrival times at the via points: (n + 1,)."""
         times = bspline.polynomials(time_points(self.differences_s, DEGREE), DEGREE)
         return np.append(times[self.layout.arrivals[:-1], 0], times[-1].sum())
 
@@ -133,13 +133,13 @@ class FreeMotion:
         return np.asarray(np.diff(self.via_times_s) - np.array(dwells))
 
     def stretched(self, limits: Array) -> FreeMotion:
-        """The same with time scaled until it just keeps every limit, proven."""
+        """The motion with time scaled so that it just keeps every limit, proven."""
         return self.slower(self.curve(limits).stretch())
 
     def slower(self, factor: float) -> FreeMotion:
-        """The same with time scaled, but not in dwells, which the one difference that acts on them alone makes up for.
+        """The motion with time scaled, except in dwells: the difference that acts only on a dwell compensates.
 
-        Where that would have to be below 0, the dwell lasts longer.
+        If it would be negative, the dwell lasts longer.
         """
         differences = self.differences_s * factor
         weights = np.convolve(np.ones(DWELL_SEGMENTS), mean_slopes(DEGREE))
@@ -163,7 +163,7 @@ def bounds(demand: Demand, layout: Layout) -> tuple[Array, Array]:
 
 
 def _held(demand: Demand, layout: Layout) -> NDArray[np.bool_]:
-    """Bernstein coefficients (S, 6, J) that are those of a via point at the end of a range whatever the path."""
+    """Bernstein coefficients (S, 6, J) that are fixed by a via point at the end of a range."""
     held = np.zeros((layout.segments, DEGREE + 1, demand.via_deg.shape[1]), dtype=bool)
     last = len(layout.pieces)
     for via, (arrives, leaves) in enumerate(zip(layout.arrivals, layout.departures(), strict=True)):
@@ -190,7 +190,7 @@ def through(demand: Demand, layout: Layout) -> Array:
 
 
 def _targets(demand: Demand, layout: Layout) -> ToolTargets | None:
-    """Where the tool has to be near: at via points with a tolerance, and along a corridor."""
+    """Targets for the tool: via points with a tolerance, and points along a corridor."""
     if demand.tool is None:
         return None
     parts = []
@@ -228,7 +228,7 @@ def _bernstein(piece: Array, parts: int) -> Array:
 
 
 class Improver:
-    """Solves programs from a motion that keeps what is demanded to faster ones that keep it too."""
+    """Improves a feasible motion by solving programs; the results are feasible too."""
 
     def __init__(self, demand: Demand, layout: Layout) -> None:
         self.demand, self.layout = demand, layout
@@ -238,7 +238,8 @@ class Improver:
         self._targets = _targets(demand, layout)
 
     def improved(self, motion: FreeMotion, rounds: int) -> FreeMotion:
-        """After that many solves, each at the peaks that the one before showed; never slower than ``motion``."""
+        """The motion after ``rounds`` solves, each with the peaks of the previous one; never slower than
+        ``motion``."""
         points = collocation.grid(self.layout.segments, _PARTS, ends=False)
         best = here = motion.stretched(self.demand.limits)
         for number in range(rounds):
@@ -253,7 +254,7 @@ class Improver:
         return best
 
     def _inside(self, motion: FreeMotion, within: FreeMotion) -> FreeMotion:
-        """The motion, drawn towards one within the bounds where meeting via points to the last digit moved it out."""
+        """The motion, moved towards ``within`` if the exact via points have moved it out of the bounds."""
         found, safe = (self._beyond(each) for each in (motion, within))
         out = found > _ROUNDED
         if not out.any():
@@ -265,18 +266,18 @@ class Improver:
         return replace(motion, angle_points_deg=points)
 
     def _beyond(self, motion: FreeMotion) -> Array:
-        """How far each Bernstein coefficient is beyond its bounds, as a part of the largest angle there: (S, 6, J)."""
+        """Excess of each Bernstein coefficient over its bounds, relative to the largest angle: (S, 6, J)."""
         at = angle_bounds.of_path(motion.angle_points_deg, DEGREE)
         largest = np.maximum(1.0, np.maximum(np.abs(self.demand.low_deg), np.abs(self.demand.high_deg)))
         return np.asarray(np.maximum(self._low - at, at - self._high) / largest)
 
     def equalities(self, unit_s: float) -> Equalities:
-        """What must hold exactly, with angles in parts of ``size_deg`` and times in ``unit_s``."""
+        """Equalities, with angles in units of ``size_deg`` and times in ``unit_s``."""
         via = Vias(self.demand.via_deg / self._size, self.demand.turning, frozenset(self.demand.tolerances))
         return self.layout.equalities(self.variables, via, unit_s)
 
     def angle_rows(self) -> Block:
-        """Inequalities of ranges and corridor, with angles in parts of ``size_deg``."""
+        """Inequalities of ranges and corridor, with angles in units of ``size_deg``."""
         return angle_bounds.forms(self.variables, self._low / self._size, self._high / self._size).rows(
             self.variables
         )
@@ -297,7 +298,7 @@ class Improver:
         return replace(
             motion,
             angle_points_deg=self.variables.angle_points(x) * self._size,
-            # A dwell far shorter than the segments next to it may be missed; then it lasts longer.
+            # a dwell much shorter than the segments next to it may be missed; then it lasts longer
             differences_s=np.maximum(self.variables.time_differences(x), least) * unit_s,
         )
 
@@ -311,10 +312,10 @@ class Improver:
 
 
 def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bool = False) -> Array:
-    """``x`` changed so that the equalities hold, with the least third differences of the change.
+    """``x`` changed so that the equalities hold, minimising the third differences of the change.
 
-    With ``smooth`` the least of the angles themselves, whatever they were between the via points. Raises PlanError
-    where the equalities contradict each other.
+    With ``smooth``, minimising the third differences of the angles themselves. Raises PlanError if the
+    equalities contradict each other.
     """
     control = np.concatenate([variables.angle_index(joint) for joint in range(variables.joints)])
     starts = np.concatenate([variables.angle_index(joint)[:-3] for joint in range(variables.joints)])

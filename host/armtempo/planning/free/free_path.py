@@ -1,4 +1,4 @@
-"""The fastest motion through via points whose path is free between them: starts, layouts, and what came of them."""
+"""The fastest motion with a free path through via points: starts, layouts, results."""
 
 from __future__ import annotations
 
@@ -19,49 +19,48 @@ from armtempo.splines import bspline
 
 _COARSE_PIECES = 8
 _PIECES, _LEAST, _MOST = 28, 56, 224
-"""Segments that an automatic layout has for each stretch between via points, and at least and at most in all."""
+"""Segments of an automatic layout: per stretch between via points, least and largest total."""
 _FEW = 5
-"""Segments for each stretch if there are more stretches than _MOST allows."""
+"""Segments per stretch if _MOST is exceeded."""
 _EVEN_PIECES = 24
-"""Segments for each stretch where all have the same number."""
+"""Segments per stretch if all have the same number."""
 _ROUNDS = 3
 _SPREAD = 0.5
-"""Random starts share time out by factors of this standard deviation of their logarithm."""
+"""Standard deviation of the logarithm of the random factors on the stretches' times."""
 _INSIDE = 0.998
-"""A corridor of the tool is kept by so much of it at points, so that it holds between them."""
+"""Fraction of the tool's corridor used at points, so that it holds between them."""
 _DRAWN = 8
-"""A path is drawn towards the spline so often until its corridor is proven."""
+"""Largest number of moves towards the spline until the corridor is proven."""
 
 
 @dataclass(frozen=True, eq=False)
 class Effort:
-    """How much work is put into a free path."""
+    """Settings of the effort for a free path."""
 
     pieces: int | None
-    """Segments between any two via points; None: as many as shorten the motion, more where more time passes."""
+    """Segments between two via points; None: automatic, in proportion to time."""
     most: int
-    """Segments that the record can hold."""
+    """Largest number of segments in the record."""
     starts: int
     rng: np.random.Generator
     along_s: Array | None = None
-    """Differences of a time axis of the spline through the via points, as many for each of its segments: the one start
-    in a corridor that has it."""
+    """Differences of a time axis of the spline through the via points: if given, the only start in a corridor."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shortest:
-    """The fastest motion found, and what the starts led to."""
+    """The fastest motion found, and the results of the starts."""
 
     motion: FreeMotion
     starts_s: Array
-    """Motion time that each start led to on few segments; the best one then went on."""
+    """Motion time of each start on few segments; only the best was refined."""
 
 
 def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     """The fastest motion that meets the demand, from several starts.
 
-    Where via points have tolerances it comes from the one that passes them exactly, so it is never slower. Raises
-    PlanError if no start keeps ranges and corridor.
+    With tolerances, it starts from the motion that passes the via points exactly, so it is never slower.
+    Raises PlanError if no start keeps ranges and corridor.
     """
     if demand.tolerances:
         exact = shortest(replace(demand, tolerances={}), effort, progress)
@@ -93,12 +92,12 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
 
 
 def automatic_pieces(stretches: int, most: int) -> int:
-    """Segments between any two of the via points where all have the same number."""
+    """Segments between two via points if all have the same number."""
     return max(min(_EVEN_PIECES, most // stretches), LEAST_PIECES)
 
 
 def _starts(demand: Demand, effort: Effort, even: bool) -> list[Callable[[], FreeMotion]]:
-    """Ways to make a motion to start from."""
+    """Functions that make start motions."""
     stretches = len(demand.via_deg) - 1
     if effort.along_s is not None:
         return [partial(free_start.on_time_axis, demand, effort.along_s)]
@@ -124,7 +123,7 @@ def _starts(demand: Demand, effort: Effort, even: bool) -> list[Callable[[], Fre
 
 
 def _finished(demand: Demand, motion: FreeMotion, effort: Effort, even: bool) -> FreeMotion:
-    """The best motion on as many segments as it is to have."""
+    """The motion optimised on the final number of segments."""
     tightened = _tightened(demand)
     if not even:
         stretches = len(demand.via_deg) - 1
@@ -149,12 +148,12 @@ def _in_corridor(demand: Demand) -> bool:
 
 
 def _tightened(demand: Demand) -> Demand:
-    """With the tool's corridor as it is kept at points."""
+    """The demand with the tool's corridor reduced by _INSIDE."""
     return replace(demand, corridor_mm=demand.corridor_mm * _INSIDE)
 
 
 def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
-    """The motion drawn towards the spline through the via points, where its deviation is not proven to be allowed."""
+    """The motion moved towards the spline through the via points until its deviation is proven to be allowed."""
     if not np.isfinite(demand.corridor_mm) or demand.tool is None:
         return motion
     middle = bspline.refined(bspline.fit(demand.via_deg, DEGREE), int(motion.layout.pieces[0]), DEGREE)
@@ -164,7 +163,7 @@ def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
         reached = tool_deviation_mm(demand, motion)
         if reached <= demand.corridor_mm:
             return motion
-        if demand.stops:  # nearer to the spline it would not rest there
+        if demand.stops:  # closer to the spline it would not stop there
             break
         part = _INSIDE * demand.corridor_mm / reached
         points = middle + part * (motion.angle_points_deg - middle)
@@ -177,7 +176,7 @@ def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
 
 
 def tool_deviation_mm(demand: Demand, motion: FreeMotion) -> float:
-    """Bound on how far the tool leaves the spline through the via points, on an even layout."""
+    """Bound of the tool's distance from the spline through the via points, on an even layout."""
     assert demand.tool is not None
     path = angle_bounds.of_path(motion.angle_points_deg, DEGREE)
     return corridor.tool_deviation_mm(path, through(demand, motion.layout), demand.tool)

@@ -32,25 +32,25 @@ from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _BEYOND = 2.0
-"""A free path is kept within this many times what its via points span on each side of them."""
+"""A free path stays within this many spans of its via points on each side of them."""
 _WORTH_USING = 1e-3
-"""A tolerance of less than this many mm or degrees is not made use of."""
+"""Smaller tolerances (mm or degrees) are not used."""
 _ROUNDED = 1.001
-"""Time is stretched by no more than this for what rounding does."""
+"""Largest factor on time for rounding errors."""
 _BY_ORDER = 1.0 / np.arange(1, 4)
-"""Speed, acceleration and jerk fall by these powers as time is stretched."""
+"""Speed, acceleration and jerk are divided by these powers of the factor on time."""
 _MARGINS = (0.0, 1e-8, 1e-7, 1e-6, 1e-5)
-"""What time is stretched by on top of that, from one time to the next."""
+"""Further factors on time of successive attempts."""
 _FAIR = 0.3 * checks.TOLERANCE
-"""By so much a limit may be exceeded after the first time."""
+"""Allowed excess over a limit after the first attempt."""
 _START_GAP = 1e-3
-"""How near to the best one the time axis comes that a path in a corridor starts with."""
+"""Relative gap of the time axis with which a path in a corridor starts."""
 _WIDER = 0.5 * checks.TOLERANCE
-"""Ranges are widened by so much of themselves, so that a via point at their end is inside."""
+"""Relative widening of ranges, so that a via point at their end is inside."""
 
 
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
-    """The motion through via angles (n + 1, J), which poses with a tolerance may be left by.
+    """The motion through via angles (n + 1, J), or near them at poses with a tolerance.
 
     Raises InputError for a job that the board cannot hold, PlanError if no path stays within the ranges.
     """
@@ -92,7 +92,7 @@ def _in_corridor(job: Job) -> bool:
 
 
 def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned | None:
-    """The plan on the spline through the via points, inside any corridor; None if it leaves a joint's range."""
+    """The plan on the spline through the via points, which is in any corridor; None if it leaves a joint's range."""
     on_it = replace(job, path="through", corridor_deg=None, corridor_mm=None, refine="auto")
     try:
         planned = through_plan.motion(arm, on_it, via_deg, progress)
@@ -101,14 +101,18 @@ def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planne
     searches = (
         replace(search, floor_s=floor.time_s, floor_kind=floor.kind)
         for search in planned.searches
-        for floor in (floor_of(arm, job, via_deg, list(search.joints)),)
+        for floor in (
+            floor_of(arm, job, via_deg, list(search.joints), planned.trajectory.joints[0].via_times_s),
+        )
     )
     note = "no faster path was found in the corridor than the spline through the via points itself"
+    if job.refine != "auto":
+        note += f', with refine = {job.refine}; try refine = "auto" (--refine auto)'
     return replace(planned, searches=tuple(searches), notes=(*planned.notes, note))
 
 
 def _axis_s(demand: Demand, spline: Planned, pieces: int) -> Array:
-    """Differences of the best time axis that has this many segments for each stretch of the spline."""
+    """Differences of the optimal time axis with ``pieces`` segments per stretch of the spline."""
     joint = spline.trajectory.joints[0]
     start = time_axis.cut(np.diff(joint.time_points_s), joint.refine, pieces, DEGREE)
     limits = [Limits(*values) for values in demand.limits]
@@ -134,7 +138,7 @@ def _most_segments(arm: Arm, job: Job, vias: int) -> int:
 
 
 def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
-    """What the job asks of these joints."""
+    """The job's requirements for these joints."""
     via = via_deg[:, joints]
     driven = [arm.driven[joint] for joint in joints]
     low, high = np.array([joint.range_deg for joint in driven]).T
@@ -157,7 +161,7 @@ def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
 
 
 def _tolerances(job: Job, via_deg: Array, tool: Tool) -> dict[int, Tolerance]:
-    """How far the tool may pass from where via angles (n + 1, J) bring it; what they miss a pose by is taken off."""
+    """Tolerances of the tool around its pose at via angles (n + 1, J), reduced by the miss of the pose there."""
     allowed = {}
     for number, pose in enumerate(job.via):
         if number and isinstance(pose, Pose) and checks.is_wide(pose):
@@ -170,7 +174,7 @@ def _tolerances(job: Job, via_deg: Array, tool: Tool) -> dict[int, Tolerance]:
 
 
 def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[Shortest]) -> Trajectory:
-    """All joints; one that does not move stands still on the longest time axis."""
+    """All joints; a joint that does not move gets the longest time axis."""
     longest = max((one.motion for one in found), key=lambda motion: motion.total_s)
     by_joint = {
         joint: (one.motion, column)
@@ -188,10 +192,9 @@ def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[S
 
 
 def _kept(arm: Arm, trajectory: Trajectory) -> Trajectory:
-    """The same, slower by the little that rounding of its control points may have done to its limits.
+    """The trajectory, stretched slightly if rounding of control points exceeds a limit.
 
-    Where a small move is told by the last digits of its angles, the new times are rounded otherwise than the old: then
-    it is made slower again, by more each time.
+    For a very small move, the stretched times may be rounded differently: then it is stretched again, each time more.
     """
     for margin in _MARGINS:
         factors = [
@@ -223,7 +226,7 @@ def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
 
 
 def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shortest) -> Search:
-    floor = floor_of(arm, job, via_deg, joints)
+    floor = floor_of(arm, job, via_deg, joints, found.motion.via_times_s)
     return Search(
         joints=tuple(joints),
         intervals_s=found.motion.differences_s,
@@ -238,17 +241,20 @@ def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shorte
     )
 
 
-def floor_of(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Floor:
-    """Of some driven joints: no free path through via angles (n + 1, J) takes less."""
+def floor_of(arm: Arm, job: Job, via_deg: Array, joints: list[int], times_s: Array | None = None) -> Floor:
+    """Lower bound of the time of any path of some driven joints through via angles (n + 1, J).
+
+    ``times_s``: see ``lower_bounds.of_vias``.
+    """
     limits = [arm.driven[joint].limits for joint in joints]
     demand = _demand(arm, job, via_deg, joints)
-    return lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances)
+    return lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances, times_s)
 
 
 def _notes(
     arm: Arm, job: Job, via_deg: Array, groups: list[list[int]], found: list[Shortest]
 ) -> tuple[str, ...]:
-    """How far a path in a corridor leaves the spline through the via points, proven."""
+    """Notes: proven distance of a path in a corridor from the spline through the via points."""
     notes = []
     for joints, one in zip(groups, found, strict=True):
         demand = _demand(arm, job, via_deg, joints)

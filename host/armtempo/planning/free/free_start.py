@@ -1,4 +1,4 @@
-"""Motions for a free path to start from: through all via points, at rest where asked, within ranges and corridor."""
+"""Start motions for a free path: through all via points, with the rests, within ranges and corridor."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LEAST_STEP = 1e-3
 
 
 def along_spline(demand: Demand, pieces: int, times_s: Array) -> FreeMotion:
-    """The spline through the via points, with as many segments between any two of them; for times (n,) there."""
+    """The spline through the via points with ``pieces`` segments between two of them, for times (n,) between them."""
     layout = uniform(len(demand.via_deg), pieces, demand.stops)
     points = bspline.refined(bspline.fit(demand.via_deg, DEGREE), pieces, DEGREE)
     if demand.stops:
@@ -29,14 +29,14 @@ def along_spline(demand: Demand, pieces: int, times_s: Array) -> FreeMotion:
 
 
 def on_time_axis(demand: Demand, differences_s: Array) -> FreeMotion:
-    """The same on a time axis (S + 4,) that has as many segments for each stretch."""
+    """The spline through the via points on a time axis (S + 4,) with the same number of segments per stretch."""
     stretches = len(demand.via_deg) - 1
     pieces = (len(differences_s) - DEGREE + 1) // stretches
     return replace(along_spline(demand, pieces, np.ones(stretches)), differences_s=differences_s)
 
 
 def smooth(demand: Demand, layout: Layout, times_s: Array) -> FreeMotion:
-    """The path with the least third differences of its control points, for times (n,) between the via points."""
+    """The path with the least squared third differences of control points, for times (n,) between the via points."""
     rough = np.empty((layout.segments + DEGREE, demand.via_deg.shape[1]))
     place = np.arange(len(rough)) - 0.5 * (DEGREE - 1)
     knots = np.stack([layout.arrivals, layout.departures()], axis=1).ravel()
@@ -46,7 +46,7 @@ def smooth(demand: Demand, layout: Layout, times_s: Array) -> FreeMotion:
 
 
 def resampled(demand: Demand, layout: Layout, motion: FreeMotion) -> FreeMotion:
-    """A motion put onto another layout, with segments that take about the same time between two via points."""
+    """A motion resampled to another layout, with segments of about equal time between two via points."""
     curve = motion.curve(demand.limits)
     times = motion.via_times_s
     leaves = times + np.array([motion.layout.stops.get(via, 0.0) for via in range(len(times))])
@@ -78,7 +78,7 @@ def _passing(times_s: Array) -> Array:
 
 
 def _differences(layout: Layout, steps_s: Array) -> Array:
-    """Differences of time control points for segments that take so long between the via points, (n,)."""
+    """Differences of time control points for given times between the via points, (n,)."""
     arrivals, departures = layout.arrivals, layout.departures()
     segments = np.empty(layout.segments)
     for via, step in enumerate(steps_s):
@@ -90,7 +90,7 @@ def _differences(layout: Layout, steps_s: Array) -> Array:
 
 
 def _met(demand: Demand, layout: Layout, points: Array, differences_s: Array, smooth: bool) -> FreeMotion:
-    """The motion with its control points moved so that via points, rests and dwells are met."""
+    """The motion with control points changed so that via points, rests and dwells are met."""
     improver = Improver(demand, layout)
     x = improver.variables.pack(points / demand.size_deg, differences_s)
     x = met(improver.variables, improver.equalities(1.0), x, smooth)
@@ -100,7 +100,7 @@ def _met(demand: Demand, layout: Layout, points: Array, differences_s: Array, sm
 
 
 def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
-    """The motion, moved where it must be to keep ranges and corridor."""
+    """The motion, changed as needed to keep ranges and corridor."""
     layout, size = motion.layout, demand.size_deg
     low, high = bounds(demand, layout)
     points = motion.angle_points_deg.copy()

@@ -1,4 +1,4 @@
-"""The path of one joint that is most like a given one, but well within bounds."""
+"""The path of one joint nearest to a given one, with a margin to its bounds."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from armtempo.planning.free.angle_bounds import Forms
 from armtempo.planning.linear_rows import LinearRows
 
 _CENTRE = Schedule(first_barrier=1e3, last_barrier=1e3, iterations=30, curvature=False)
-"""Far from all bounds, however little that is like the path wanted."""
+"""Settings that prefer a large margin over similarity."""
 _NEAR = Schedule(first_barrier=10.0, last_barrier=1e-10, curvature=False)
 _OFF = Schedule(first_barrier=10.0, last_barrier=1e-3, curvature=False)
 _TOO_NEAR = 1e-9
-"""A path this near to a bound, in the unit of the angles, is kept farther off, though less like the one wanted: there
-Newton's equations of a motion that starts with it would have no digits."""
+"""A path closer to a bound than this (in the unit of the angles) is moved farther away, even if it becomes
+less similar: otherwise Newton's equations of the following solve lose all digits."""
 _WIDER = 2.0
-"""Bounds are widened by this many times what the path is beyond them."""
+"""Bounds are widened by this factor times the path's excess."""
 _BETTER, _STEPS = 0.99, 60
 _ROOM, _MOST_ROOM = 0.25, 1e-7
-"""Part of the room that the path keeps to its bounds, and the most of it, in the unit of the angles."""
+"""Margin to the bounds: fraction of the room, and largest value in the unit of the angles."""
 
 
 def nearest(forms: Forms, room: float, fixed: Equalities, wanted: Array) -> Array | None:
-    """Control points (C,) that meet ``fixed``, keep each form within its bounds, and are most like ``wanted`` (C,).
+    """Control points (C,) that meet ``fixed``, keep each form within its bounds, and are nearest to ``wanted`` (C,).
 
-    Alike is what has the least squared third differences from it. The bounds are widened until ``wanted``, which
-    meets ``fixed``, keeps them, and then drawn in again around the middle of what they leave, until it keeps them
-    by a part of ``room``, which is what the values that are fixed have left. None if there is no way.
+    The distance is the sum of squared third differences. The bounds are first widened until ``wanted``, which
+    meets ``fixed``, keeps them, and then narrowed again around their middle until the path keeps a margin, a
+    fraction of ``room``, which is the distance of the fixed values from the bounds. None if that is not
+    possible.
     """
     x, room = wanted, min(_ROOM * room, _MOST_ROOM)
     excess = _excess(forms, x) + room
@@ -50,13 +51,13 @@ def nearest(forms: Forms, room: float, fixed: Equalities, wanted: Array) -> Arra
 
 
 def _excess(forms: Forms, x: Array) -> float:
-    """How far the farthest form is beyond its bounds, below 0 if none is."""
+    """Largest excess of a form over its bounds; negative if all are inside."""
     sums = np.sum(forms.weights * x[forms.columns], axis=1)
     return float(np.max(np.maximum(forms.low - sums, sums - forms.high)))
 
 
 class _Alike:
-    """Squared third differences from wanted control points, as a part of theirs, within bounds widened."""
+    """The program: relative squared third differences from ``wanted``, within widened bounds."""
 
     def __init__(self, forms: Forms, wider: float, equalities: Equalities, wanted: Array) -> None:
         self.equalities, self._wanted = equalities, wanted

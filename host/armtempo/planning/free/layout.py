@@ -1,4 +1,4 @@
-"""Where the via points of a free path are among its segments, and what must hold there exactly."""
+"""The positions of the via points among the segments of a free path, and their equalities."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from armtempo.splines import bspline
 
 DEGREE = 5
 DWELL_SEGMENTS = DEGREE
-"""Segments of a dwell: one difference of time control points acts on these alone, and carries its time."""
+"""Segments of a dwell: one difference of time control points acts only on these, and has its time."""
 LEAST_PIECES = 3
-"""Segments between two via points at least; with fewer the via points and rests leave no freedom."""
+"""Least number of segments between two via points; fewer leave no freedom."""
 
 
 @dataclass(frozen=True, eq=False)
 class Vias:
-    """What holds at the via points."""
+    """Conditions at the via points."""
 
     angles: Array
     """(n + 1, J), in the program's unit."""
     turning: NDArray[np.bool_]
-    """Where a joint stands still: (n + 1, J)."""
+    """Whether a joint stands still there: (n + 1, J)."""
     loose: frozenset[int] = frozenset()
     """Via points that have a tolerance instead of their angles."""
 
     def joint(self, number: int) -> Vias:
-        """Those of one joint."""
+        """The conditions of one joint."""
         one = slice(number, number + 1)
         return Vias(self.angles[:, one], self.turning[:, one], self.loose)
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Segments between the via points, (n,), and where the motion rests.
+    """Numbers of segments between the via points, (n,), and the rests.
 
-    ``stops``: dwell in seconds by via point, 0 for a rest without one.
+    ``stops``: dwell in seconds by via point, 0 for a rest without a dwell.
     """
 
     pieces: Index
@@ -57,7 +57,7 @@ class Layout:
 
     @property
     def segments(self) -> int:
-        """All of them."""
+        """Total number of segments."""
         return int(self.arrivals[-1])
 
     @property
@@ -82,7 +82,7 @@ class Layout:
         return rows.equalities()
 
     def angle_equalities(self, variables: MotionVariables, vias: Vias) -> Equalities:
-        """The same without dwells."""
+        """The equalities of the angles."""
         rows = _Rows()
         self._add_angles(rows, variables, vias)
         return rows.equalities()
@@ -106,13 +106,13 @@ class Layout:
 
 
 def uniform(vias: int, pieces: int, stops: Mapping[int, float]) -> Layout:
-    """As many segments between any two of ``vias`` via points, but DEGREE at least between two dwells."""
+    """``pieces`` segments between any two of ``vias`` via points, but at least DEGREE between two dwells."""
     least = least_pieces(vias, stops)
     return Layout(np.where(least == DEGREE, np.maximum(pieces, DEGREE), pieces), stops)
 
 
 def shared_out(shares: Array, segments: int, stops: Mapping[int, float]) -> Layout:
-    """About ``segments`` in all, in proportion to ``shares`` (n,), and at least ``least_pieces``."""
+    """About ``segments`` in total, in proportion to ``shares`` (n,), and at least ``least_pieces``."""
     dwells = DWELL_SEGMENTS * sum(dwell > 0.0 for dwell in stops.values())
     least = least_pieces(len(shares) + 1, stops)
     free = max(segments - dwells - int(least.sum()), 0)
@@ -122,10 +122,10 @@ def shared_out(shares: Array, segments: int, stops: Mapping[int, float]) -> Layo
 
 
 def least_pieces(vias: int, stops: Mapping[int, float]) -> Index:
-    """Segments between each two of ``vias`` via points at least: (n,).
+    """Least numbers of segments between ``vias`` via points: (n,).
 
-    A dwell holds the control points of its first segment and of the one after it. So that none belongs to two
-    dwells, DEGREE segments lie between them.
+    A dwell fixes the control points of its first segment and of the segment after it. DEGREE segments between
+    two dwells keep these separate.
     """
     dwells = np.array([stops.get(via, 0.0) > 0.0 for via in range(vias)])
     return np.where(dwells[:-1] & dwells[1:], DEGREE, LEAST_PIECES).astype(np.intp)
@@ -137,7 +137,7 @@ def _derivative(order: int) -> Array:
 
 
 class _Rows:
-    """Rows of equalities, one by one."""
+    """Collects rows of equalities."""
 
     def __init__(self) -> None:
         self._columns: list[Index] = []

@@ -14,7 +14,7 @@ from armtempo.planning.variables import MotionVariables, angle_basis
 
 @dataclass(frozen=True, eq=False)
 class ToolTargets:
-    """Where the tool has to be near at P points."""
+    """Target poses of the tool at P points, with tolerances."""
 
     points: Points
     position_mm: Array
@@ -23,7 +23,7 @@ class ToolTargets:
     """(P, 3, 3)."""
     tolerance_mm: Array
     tolerance_deg: Array
-    """How far it may be from them: (P,); infinite if that does not matter."""
+    """Largest rotation from the target: (P,); infinite if it is free."""
 
     def __add__(self, other: ToolTargets) -> ToolTargets:
         """Both."""
@@ -39,7 +39,7 @@ class ToolTargets:
 class ToolRows:
     """1 - (distance / tolerance)^2 > 0 for the position, and the like for the cosine of the angle, at each point.
 
-    ``unit_deg``: (J,), degrees in a unit of each joint's variables.
+    ``unit_deg``: (J,), degrees per unit of each joint's variables.
     """
 
     def __init__(self, variables: MotionVariables, tool: Tool, targets: ToolTargets, unit_deg: Array) -> None:

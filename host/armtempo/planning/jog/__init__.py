@@ -1,1 +1,1 @@
-"""Motions by hand: joints and tool, as long as a button is held."""
+"""Jogging of joints and tool."""

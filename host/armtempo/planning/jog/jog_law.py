@@ -1,13 +1,13 @@
-"""The time law of a jog: from rest to a constant speed and to rest, made so that it can be braked quickly anywhere.
+"""The time law of a jog: rest, constant speed, rest; it can be braked quickly at any time.
 
 Way s(u) and time t(u) are uniform quintic B-splines. The differences of their control points are
 
     of t:  h h h h   h h h h  H1 H2 ...  h h h h   h h h h
     of s:  0 0 0 0   v times those of t            0 0 0 0
 
-so each end is at rest, the speed rises over 4 h as a B-spline's sum does, and where all differences that count have the
-ratio v it is v exactly, however long the intervals H are. On a ramp the acceleration is v/h times the cubic basis
-spline, whose largest value is 2/3, the jerk v/h² times its derivative, at most 2/3 too.
+so both ends are at rest, the speed rises over 4 h like the sum of a B-spline, and is exactly v while all its
+differences have the ratio v, for any intervals H. On a ramp the acceleration is v/h times the cubic basis
+spline, whose maximum is 2/3, and the jerk v/h² times its derivative, also at most 2/3.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from armtempo.splines import bspline
 
 DEGREE = 5
 _REST, _RAMP = 4, 4
-"""Differences that are zero at an end, and of those after them the ones that shape its ramp."""
+"""Number of zero differences at an end, and number of differences of its ramp."""
 _PEAK = 2.0 / 3.0
 _SHORTEST_S = 0.01
 _GROWTH = 3.0
-"""An interval is at most so much longer than its neighbour."""
+"""Largest ratio of neighbouring intervals."""
 _HALVINGS = 80
 
 
@@ -45,7 +45,7 @@ class WayLimits:
 
 @dataclass(frozen=True, eq=False)
 class WayLaw:
-    """Control points of the way and of the time, both (n + DEGREE,); the way goes from 0 to its length."""
+    """Control points of the way (from 0 to its length) and of the time, both (n + DEGREE,)."""
 
     way: Array
     time_s: Array
@@ -58,9 +58,9 @@ class WayLaw:
 
 
 def law(length: float, limits: WayLimits, longest: float = math.inf, short_ramps: bool = False) -> WayLaw:
-    """The law for a way of ``length`` > 0; no interval H of it is longer than ``longest`` of the way.
+    """The law for a way of ``length`` > 0; in no interval H the way is longer than ``longest``.
 
-    ``short_ramps``: no interval h either, for which the speed is lower where it has to be.
+    ``short_ramps``: nor in an interval h, by a lower speed if necessary.
     """
     least = 2 * _RAMP
     speed = limits.speed
@@ -81,7 +81,7 @@ def law(length: float, limits: WayLimits, longest: float = math.inf, short_ramps
 
 
 def _fitting_speed(way: float, limits: WayLimits) -> float:
-    """The speed v with v h(v) = ``way``: found by halving, on a scale of logarithms."""
+    """The speed v with v h(v) = ``way``, by bisection of its logarithm."""
     low, high = limits.speed * 1e-9, limits.speed
     for _ in range(_HALVINGS):
         middle = math.sqrt(low * high)
@@ -90,7 +90,7 @@ def _fitting_speed(way: float, limits: WayLimits) -> float:
 
 
 def _intervals(whole_s: float, h: float, longest_s: float) -> list[float]:
-    """Intervals that make up ``whole_s``: longer and longer towards the middle, and alike on both sides."""
+    """Symmetric intervals with the sum ``whole_s``, increasing towards the middle."""
     if whole_s <= 1e-9 * h:
         return []
     side: list[float] = []

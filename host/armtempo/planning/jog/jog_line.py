@@ -1,7 +1,7 @@
-"""The postures along a straight line of the tool, or a turn of it about an axis, each next to the one before.
+"""The postures along a straight line of the tool, or a rotation about an axis, each near the one before.
 
-The line ends where a joint reaches the end of its range, where the tool cannot follow, or near a singular posture,
-where small ways of the tool need large ways of the joints: the arm never changes its branch.
+The line ends where a joint reaches the end of its range, where the tool cannot follow, or near a singular
+posture, where small motions of the tool need large motions of the joints. The arm never changes its branch.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from armtempo.planning.line.tool_path import ToolPath, ToolPiece, rotations
 from armtempo.planning.tool import Tool
 
 TOLERANCE_MM, TOLERANCE_DEG = 0.02, 0.02
-"""A posture this near to the line is on it."""
+"""Tolerances of a posture on the line."""
 STRAY_MM, STRAY_DEG = 0.2, 1.0
-"""How far the tool may leave its line."""
+"""Largest deviation of the tool from its line."""
 STEPS_OF_REACH, STEP_DEG = 250, 1.0
-"""The line is looked at in steps of the arm's reach by this, or of that many degrees."""
+"""Steps along the line: the arm's reach divided by this, or this many degrees."""
 MOST_GAIN = 5.0
-"""Radians of a joint for a radian of the tool, or for a way of the arm's reach; beyond, a posture is singular."""
+"""A posture is singular if a joint moves by more radians per radian of the tool, or per arm's reach of the tool."""
 MARGIN_STEPS = 2.0
-"""This many steps of its motor are left to the end of a joint's range."""
+"""Motor steps kept as a margin to the end of a joint's range."""
 AXES = ("x", "y", "z", "tool-x", "tool-y", "tool-z")
 """Axes of the base, and of the tool as it is at the start."""
 _TRIED = (WHOLE, (APPROACH,), (PITCH,), (YAW,), (ROLL,), ())
@@ -42,6 +42,10 @@ _PARALLEL = 0.99
 _HALVINGS = 8
 _STEPS_TO_JUDGE = 3
 _SMALL_RAD = 1e-5
+_SINGULAR = 1e-3
+"""Singular values of the Jacobian below this, relative to the largest, are 0."""
+_MISSED = 0.01
+"""Part of a motion along the axis that the joints may leave out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,22 +76,22 @@ class ToolLine:
 
     @cached_property
     def reach_mm(self) -> float:
-        """All links in a row."""
+        """Sum of the lengths of all links."""
         return float(self._solver.geometry.reach) or 1.0
 
     @cached_property
     def step(self) -> float:
-        """Of the looks along the line, mm or deg."""
+        """Step along the line, mm or deg."""
         return STEP_DEG if self.about else self.reach_mm / STEPS_OF_REACH
 
     @cached_property
     def direction(self) -> Array:
-        """Of the axis in the frame of the base, (3,)."""
+        """Direction of the axis in the frame of the base, (3,)."""
         unit = np.eye(3)["xyz".index(self.axis[-1])]
         return self.sign * np.asarray(self._pose[:3, :3] @ unit if self.axis.startswith("tool") else unit)
 
     def pose(self, way: float) -> Array:
-        """The tool's pose after that many mm or deg, (4, 4)."""
+        """The tool's pose after a way in mm or deg, (4, 4)."""
         pose = self._pose.copy()
         if self.about:
             pose[:3, :3] = rotations(math.radians(way) * self.direction[None])[0] @ pose[:3, :3]
@@ -97,7 +101,7 @@ class ToolLine:
 
     @cached_property
     def fixed(self) -> tuple[str, ...]:
-        """What the arm can keep of the tool's orientation on this line; InputError if it cannot even begin."""
+        """The part of the orientation that the arm can keep on this line; raises InputError if it cannot begin."""
         for fixed in _TRIED[:2] if self.about else _TRIED:
             if self._turns(fixed) and self._begins(fixed):
                 return fixed
@@ -114,10 +118,10 @@ class ToolLine:
 
     @cached_property
     def _is_singular(self) -> bool:
-        """Whether the tool can move in fewer directions than from postures nearby."""
+        """Whether the joints move the tool along the axis from postures nearby, but not from here."""
         moving = list(self.arm.driven_indices)
 
-        def directions(angles: Array) -> int:
+        def leads(angles: Array) -> bool:
             pose = forward(self._solver.geometry, angles)
             columns = []
             for joint in moving:
@@ -125,14 +129,18 @@ class ToolLine:
                 turned[joint] += _SMALL_RAD
                 change = (forward(self._solver.geometry, turned) - pose) / _SMALL_RAD
                 columns.append(np.append(change[:3, 3] / self.reach_mm, change[:3, :3] if self.about else ()))
-            return int(np.linalg.matrix_rank(np.array(columns), tol=1e-3))
+            turn = np.cross(self.direction, pose[:3, :3], axisb=0, axisc=0)
+            wanted = np.append(np.zeros(3), turn) if self.about else self.direction
+            matrix = np.array(columns).T
+            speeds = np.linalg.lstsq(matrix, wanted, rcond=_SINGULAR)[0]
+            return bool(np.linalg.norm(matrix @ speeds - wanted) < _MISSED)
 
         nearby = self._start.copy()
         nearby[moving] += np.radians(5.0) * np.arange(1, len(moving) + 1)
-        return directions(self._start) < directions(nearby)
+        return leads(nearby) and not leads(self._start)
 
     def _turns(self, fixed: tuple[str, ...]) -> bool:
-        """Whether a turn about the axis is one at all, of what is kept of the orientation."""
+        """Whether a rotation about the axis changes the kept part of the orientation."""
         spins = abs(self.direction @ self._pose[:3, 2]) > _PARALLEL
         return not (self.about and fixed == (APPROACH,) and spins)
 
@@ -148,7 +156,8 @@ class ToolLine:
         return True
 
     def _near(self, way: float, before: Array, fixed: tuple[str, ...], step: float) -> Array | str:
-        """All joints on the line after ``way``, (joints,) in rad, next to the posture before; or why there is none."""
+        """All joint angles on the line after ``way``, rad (joints,), near the posture before; or the reason
+        why not."""
         target = Pose(
             tuple(map(tuple, self.pose(way).tolist())),
             fixed=fixed,
@@ -168,7 +177,7 @@ class ToolLine:
         return angles
 
     def _outside(self, angles: Array) -> str:
-        """The first joint that is nearer to the end of its range than it may come, or stood already."""
+        """The first joint within the margin of its range, and nearer than at the start; "" if none."""
         for index, joint in zip(self.arm.driven_indices, self.arm.driven, strict=True):
             margin = MARGIN_STEPS / joint.steps_per_deg
             angle, start = math.degrees(angles[index]), math.degrees(self._start[index])
@@ -178,7 +187,7 @@ class ToolLine:
         return ""
 
     def followed(self, length: float) -> FollowedLine:
-        """The line as far as the arm can follow it, at most ``length``."""
+        """The part of the line that the arm can follow, at most ``length``."""
         fixed = self.fixed
         ways, postures = [0.0], [self._start]
         ends = ""
@@ -202,23 +211,23 @@ class ToolLine:
 
 @dataclass(frozen=True, eq=False)
 class FollowedLine:
-    """What of a line the arm can follow."""
+    """The part of a line that the arm can follow."""
 
     line: ToolLine
     ways: Array
     """(K,), from 0, mm or deg."""
     angles_rad: Array
-    """All joints there, (K, joints)."""
+    """Angles of all joints there, (K, joints)."""
     ends: str
-    """Why the line ends before it was to, in words; "" if it does not."""
+    """Why the line ends early; "" if it does not."""
 
     @property
     def length(self) -> float:
-        """How far it goes."""
+        """Its length, mm or deg."""
         return float(self.ways[-1])
 
     def at(self, ways: Array) -> Array:
-        """The driven joints at ways along the line, degrees (K, J); InputError if one of them is not on it."""
+        """The driven joints at ways along the line, degrees (K, J); raises InputError if the tool cannot follow."""
         found = []
         line = self.line
         for way in ways:
@@ -230,7 +239,7 @@ class FollowedLine:
         return np.array(found)
 
     def stray(self, angle_points_deg: Array, way_points: Array) -> LineDeviation:
-        """How far splines of the driven joints, (S + 5, J), lead the tool off its place after ways (S + 5,) at most."""
+        """Bound of the tool's deviation for splines of the driven joints, (S + 5, J), and of the way, (S + 5,)."""
         line = self.line
         fixed = line.fixed if line.fixed in (WHOLE, (APPROACH,)) else ()
         turn = math.radians(1.0) * line.direction if line.about else np.zeros(3)
@@ -242,6 +251,6 @@ class FollowedLine:
 
 
 def _short(reason: str) -> str:
-    """Why a posture was not found, without the figures of the one that comes near."""
+    """The reason why a posture was not found, without numbers."""
     first = reason.partition(";")[0]
     return "the arm reaches no further" if first.startswith("the arm does not reach") else first

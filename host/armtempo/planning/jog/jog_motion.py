@@ -1,4 +1,4 @@
-"""A jog: one joint, or the tool along or about an axis, from where the arm is; straight, and quick to stop."""
+"""A jog of one joint, or of the tool along or about an axis, from the present posture."""
 
 from __future__ import annotations
 
@@ -25,39 +25,40 @@ from armtempo.splines import bspline, extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 SPEED = 0.25
-"""Of the arm's speed limits, where nothing else is asked for."""
+"""Default speed, as a fraction of the arm's speed limits."""
 SLOWEST = 0.01
 RAMP = 0.5
-"""Of the acceleration and jerk limits, what a jog uses itself: the rest is for braking at any moment."""
+"""Fraction of the acceleration and jerk limits used by a jog: the rest is for braking at any time."""
 LINE_PARTS = (8, 16, 32, 64)
-"""Into this many parts a line is cut, until the tool stays on it; then its ramps too, which takes longer."""
+"""Numbers of parts of a line, increased until the tool stays on it; finally its ramps are divided too."""
 _SHORTER = 0.98
 _TRIES = 6
 _INSIDE_STEPS = 1e-6
 _SHORTENED, _NEARER = 8, 0.9
-"""A jog that would leave the room is made shorter so often, each time to this part of the way to where it would."""
+"""A jog that would leave the room is shortened up to this often, each time to this fraction of the way to the
+touch."""
 
 
 @dataclass(frozen=True)
 class JogMove:
-    """What is to move, and how far."""
+    """The joint or axis to move, and the distance."""
 
     by: float
-    """deg or mm; infinite: as far as it goes."""
+    """deg or mm; infinite: as far as possible."""
     joint: int | None = None
-    """Place among the driven joints, from 0."""
+    """Index among the driven joints, from 0."""
     axis: str = ""
-    """Of AXES, where it is no joint."""
+    """One of AXES, if it is not a joint."""
     about: bool = False
     """Turn the tool about the axis instead of moving it along."""
 
     @property
     def unit(self) -> str:
-        """Of ``by``."""
+        """Unit of ``by``."""
         return "deg" if self.joint is not None or self.about else "mm"
 
     def words(self, arm: Arm) -> str:
-        """What it moves."""
+        """Describe what moves."""
         if self.joint is not None:
             return arm.driven[self.joint].name
         return f"tool {'about' if self.about else 'along'} {self.axis}"
@@ -65,26 +66,27 @@ class JogMove:
 
 @dataclass(frozen=True, eq=False)
 class JogMotion:
-    """A jog that is planned."""
+    """A planned jog."""
 
     trajectory: Trajectory
     brakes: BrakeTimes
-    """How long it takes to come to rest."""
+    """Its brake times."""
     ends: str
-    """Why it ends before it was to, in words; "" if it does not."""
+    """Why it ends early; "" if it does not."""
 
     @property
     def end_deg(self) -> Array:
-        """Where it ends, (J,)."""
+        """End posture, degrees (J,)."""
         return self.trajectory(self.trajectory.duration_s)
 
 
 def move_of(
     arm: Arm, joint: int | str | None, axis: str | None, by_deg: float | None, by_mm: float | None
 ) -> JogMove:
-    """What is to move: a joint by degrees, or the tool along an axis by mm or about it by degrees.
+    """A move from the arguments of ``Board.jog``: a joint by degrees, or the tool along an axis by mm or
+    about it by degrees.
 
-    Raises InputError if the arguments do not go together, or the arm has no such joint.
+    Raises InputError if the arguments contradict, or the arm has no such joint.
     """
     ways = [by for by in (by_deg, by_mm) if by is not None]
     if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
@@ -98,10 +100,10 @@ def move_of(
 
 
 def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: float = SPEED) -> JogMotion:
-    """The jog from rest at ``here_deg`` (J,), at ``speed`` of the arm's speed limits.
+    """The jog from rest at ``here_deg`` (J,), at the fraction ``speed`` of the arm's speed limits.
 
-    It ends at the end of a range at the latest, before it would leave the arm's room, and a line of the tool where the
-    arm cannot follow it. Raises InputError for a move that is none, or where there is no way to go.
+    It ends early at the end of a range, before it would leave the arm's room, and, for a line of the tool,
+    where the arm cannot follow. Raises InputError for a move that is none, or if there is no way to go.
     """
     start = np.array(here_deg, dtype=float)
     if not SLOWEST <= speed <= 1.0:
@@ -118,7 +120,7 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
 
 
 def problem(arm: Arm, here_deg: Sequence[float], move: JogMove) -> str:
-    """Why a jog cannot begin at ``here_deg`` (J,), in words; "" if it can, as far as the room is not looked at."""
+    """Why a jog cannot begin at ``here_deg`` (J,), without a check of the room; "" if it can."""
     start = np.array(here_deg, dtype=float)
     try:
         if move.joint is not None:
@@ -131,7 +133,7 @@ def problem(arm: Arm, here_deg: Sequence[float], move: JogMove) -> str:
 
 
 def _in_room(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
-    """The jog as far as the arm stays in its room, and why it ends before it was to."""
+    """The jog, shortened to stay in the room, and why it ends early."""
     why = ""
     for _ in range(_SHORTENED):
         way = _joint if move.joint is not None else _tool
@@ -148,7 +150,7 @@ def _in_room(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> 
 
 
 def _passed(arm: Arm, trajectory: Trajectory, time_s: float, move: JogMove) -> float:
-    """How far a jog has come at a time, in its unit."""
+    """The distance of a jog at a time, in its unit."""
     first, there = trajectory(np.array([0.0, time_s]))
     if move.joint is not None:
         return float(abs(there[move.joint] - first[move.joint]))
@@ -160,7 +162,7 @@ def _passed(arm: Arm, trajectory: Trajectory, time_s: float, move: JogMove) -> f
 
 
 def number_of_joint(arm: Arm, joint: int | str) -> int:
-    """The place of a joint, from 0, by its number (from 1) or its name; InputError if there is none."""
+    """The index of a joint, from 0, by its number (from 1) or its name; raises InputError if there is none."""
     names = [driven.name for driven in arm.driven]
     if joint in names:
         return names.index(str(joint))
@@ -186,9 +188,9 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
 
 
 def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
-    """Where a joint is to end, on a whole step within its range if that is what ends it, and why there.
+    """The end of a joint's jog, degrees (a whole step, if the range ends it), and why it ends there.
 
-    InputError where it cannot move that way.
+    InputError if it cannot move that way.
     """
     low, high = joint.range_deg
     wanted = here + by
@@ -226,7 +228,7 @@ def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tup
 
 
 def _line(arm: Arm, start: Array, move: JogMove) -> ToolLine:
-    """The line of the tool; InputError where there is no such axis, or the arm cannot be at ``start``."""
+    """The line of the tool; InputError if there is no such axis, or the arm cannot be at ``start``."""
     if move.axis not in AXES:
         raise InputError(f"there is no axis {move.axis!r}", f"give one of {', '.join(AXES)}")
     point_to_point.posture(start, arm)
@@ -251,7 +253,7 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
 
 
 def _line_limits(followed: FollowedLine, length: float, speed: float) -> WayLimits:
-    """Of the way along the line, by the joint that turns most for it."""
+    """Limits of the way along the line, from those of the joints."""
     arm = followed.line.arm
     upto = followed.ways <= length * (1 + 1e-9)
     angles = np.degrees(followed.angles_rad[upto][:, list(arm.driven_indices)])
@@ -276,7 +278,7 @@ def _within(trajectory: Trajectory, arm: Arm) -> bool:
 
 
 def _slowed(trajectory: Trajectory, arm: Arm, speed: float) -> Trajectory:
-    """The same motion in such a time that every joint keeps its part of the limits."""
+    """The motion stretched so that every joint keeps its fraction of the limits."""
     factor = 0.0
     for reached, joint in zip(extremes.of_joints(trajectory.joints), arm.driven, strict=True):
         limits = _limits(joint, speed)

@@ -1,1 +1,1 @@
-"""Straight lines and arcs of the tool, and speeds that it keeps."""
+"""Straight lines and arcs of the tool, and limits of its speed."""

@@ -1,4 +1,4 @@
-"""The path of a stretch in which the tool is not led: the spline through its via points, or a free one."""
+"""The path of a stretch without a line or arc of the tool: the spline through its via points, or a free path."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import checks
-from armtempo.planning.free import free_plan
+from armtempo.planning.free import around
 from armtempo.planning.line.stretches import Stretch
 from armtempo.planning.lower_bounds import Floor
 from armtempo.splines import bspline
@@ -30,7 +30,7 @@ class Between:
     arrivals: tuple[int, ...]
     """Segments before each of its via points."""
     floor: Floor | None = None
-    """Of any motion through them; None where the path is fixed."""
+    """Lower bound for any motion through them; None for a fixed path."""
 
     @property
     def segments(self) -> int:
@@ -54,7 +54,8 @@ def between(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Prog
 
 
 def _free(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progress) -> Between:
-    """As by a job of its own from rest to rest, on few segments, as all stretches share the board's memory."""
+    """The free path of a separate job from rest to rest, on few segments, as all stretches share the board's
+    memory."""
     ends = [tuple(angles.tolist()) for angles in via_deg[[0, -1]]]
     alone = replace(
         job,
@@ -65,7 +66,7 @@ def _free(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progre
         speed_mm_s=None,
         acceleration_mm_s2=None,
     )
-    planned = free_plan.motion(arm, alone, via_deg, progress)
+    planned = around.motion(arm, alone, via_deg, progress)
     joints = planned.trajectory.joints
     points = np.stack([joint.angle_points_deg for joint in joints], axis=1)
     search = planned.searches[0]

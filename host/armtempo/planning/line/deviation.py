@@ -1,8 +1,8 @@
-"""How far the tool leaves its way, proven for all of it.
+"""Proven bounds of the tool's deviation from its way.
 
-At equal u, the tool of the joints' spline and the place that the way has there differ by e(u). Over a piece of length h
-it is above the chord between e at both ends by no more than h^2 / 8 of the largest second derivative; both second
-derivatives are bounded by Bernstein coefficients. Pieces that may hold the largest are halved.
+Let e(u) be the difference between the tool for the joints' spline and the way at the same u. Over a piece of
+length h, |e| exceeds the chord between its ends by at most h^2 / 8 times the largest second derivative, which
+is bounded by Bernstein coefficients. Pieces that may have the maximum are halved.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from armtempo.planning.tool import Tool
 from armtempo.splines import bernstein
 
 _SHARP = 0.02
-"""How far, relative, a bound may lie above what is reached."""
+"""Relative sharpness of a bound."""
 _MOST_PIECES = 20_000
 
 
 class LineDeviation(NamedTuple):
-    """No place of the way is left by more."""
+    """Bounds of the deviation over a way."""
 
     position_mm: float
     rotation_deg: float
@@ -65,7 +65,7 @@ def proven(
 
 
 def _at_ends(angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...]) -> Array:
-    """Larger deviation at both ends of pieces, (N, 2): position in mm, and the chord of the turn."""
+    """The larger deviation of the two ends of pieces, (N, 2): position in mm, and chord of the rotation."""
     found = []
     for end in (0, -1):
         state = tool.at(angles_deg[:, end])
@@ -78,7 +78,8 @@ def _at_ends(angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: 
 
 
 def _per_axis(fixed: tuple[str, ...]) -> float:
-    """Factor from the norm of a difference of rotations to that of one axis square to the turn: 2 sin(angle / 2)."""
+    """Factor from the norm of a difference of rotations to 2 sin(angle / 2), that of an axis perpendicular to
+    the rotation."""
     return float(np.sqrt(0.5)) if fixed == WHOLE else 1.0
 
 
@@ -91,10 +92,10 @@ def _degrees(chord: float) -> float:
 
 
 def _bends(angles_deg: Array, ways: Array, tool: Tool, bounds: Bounds) -> _Bends:
-    """Largest second derivative over each piece of arm and way together.
+    """Bounds of the second derivatives over each piece, of arm and way together.
 
-    Columns of the Jacobian are no longer than the reach of their joint; as another joint turns, they change by no more
-    than the reach of the outer one of both. Axes turn no faster than all joints together.
+    Columns of the Jacobian are at most as long as the reach of their joint; their derivative by another joint
+    is at most the reach of the outer of the two. Axes turn at most as fast as all joints together.
     """
     turns = np.radians(angles_deg @ tool.turns.T)
     speed, bend = derivatives(turns, 2)
@@ -120,6 +121,6 @@ def derivatives(pieces: Array, orders: int) -> list[Array]:
 
 
 def halved(pieces: Array) -> Array:
-    """Both halves of pieces (N, 6, J) by turns: (2 N, 6, J)."""
+    """Both halves of pieces (N, 6, J), alternating: (2 N, 6, J)."""
     halves = bernstein.halves(np.moveaxis(pieces, 1, 2))
     return np.asarray(halves.transpose(0, 2, 3, 1).reshape(-1, *pieces.shape[1:]))

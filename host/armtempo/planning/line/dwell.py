@@ -1,4 +1,4 @@
-"""Waiting at a rest between two stretches: segments put between them in which only time passes."""
+"""Dwells between two stretches: inserted segments in which only time passes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from armtempo.planning.motion_program import mean_slopes
 
 DEGREE = 5
 DWELL_SEGMENTS = DEGREE
-"""A dwell adds no more segments than these to the path."""
+"""Segments that a dwell adds to the path."""
 _LEAST_STEP = 1e-3
-"""What a dwell that is too short adds to the time axis, as a part of the step before it."""
+"""Addition to the time axis for a dwell that is too short, as a fraction of the step before it."""
 
 
 @dataclass(frozen=True, eq=False)
 class TimedPath:
-    """A path of S segments on a time axis with ``refine`` segments for each of them."""
+    """A path of S segments on a time axis with ``refine`` segments per path segment."""
 
     angle_points_deg: Array
     """(S + 5, J)."""
@@ -30,10 +30,10 @@ class TimedPath:
     refine: int
 
     def with_dwells(self, dwells_s: Mapping[int, float]) -> TimedPath:
-        """The same with waits, in seconds by via point; each is at a rest, where five control points are the same.
+        """The path with dwells, in seconds by via point; each is at a rest, where five control points are equal.
 
-        The time axis before and after stays the same. The four of its differences that both sides of the rest have in
-        common are needed twice, so a dwell lasts at least as long as these: hundredths to tenths of a second.
+        The time axis before and after is unchanged. The four differences common to both sides of the rest are
+        duplicated, so a dwell lasts at least their sum: hundredths to tenths of a second.
         """
         timed = self
         for via in sorted(dwells_s, reverse=True):

@@ -1,6 +1,6 @@
 """The joints' angles along a way of the tool, each posture next to the one before.
 
-The arm stays in its branch, or passes a singular posture where the tool's way leads through it; where the joints cannot
+The arm stays in its branch, or passes a singular posture where the tool's way leads through it; if the joints cannot
 follow, the error says at which place and why.
 """
 
@@ -22,34 +22,34 @@ from armtempo.planning.line.tool_path import ToolPath, rotation_vectors
 from armtempo.planning.tool import Tool
 
 STEPS = 32
-"""Places at which a way is looked at, at least."""
+"""Least number of places along a way."""
 _MOST_STEP_DEG = 4.0
-"""No joint turns farther from one posture to the next."""
+"""Largest turn of a joint between two postures."""
 _FINEST = 2.0**-14
-"""Steps of the way are no smaller part of it."""
+"""Smallest step, as a fraction of the way."""
 _NEWTON_STEPS = 12
 _ON_IT = 1e-9
-"""A posture this near to the way, as a part of the reach or in rad, is on it."""
+"""Tolerance of a posture on the way, as a fraction of the reach, or rad."""
 _DROPPED = 1e-9
-"""Smaller singular values, as a part of the largest, count as none."""
+"""Smaller singular values, relative to the largest, count as 0."""
 _SINGULAR = 0.02
-"""Least singular value of the Jacobian, lengths as parts of the reach: below, a posture is called singular."""
+"""Least singular value of the Jacobian, lengths as parts of the reach: smaller ones are called singular."""
 _STRAIGHT = 0.05
-"""rad; where a joint's turn by so much changes the branch, that part of the arm is straight."""
+"""rad; a part of the arm is straight if a turn of its joint by this changes the branch."""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A way of the tool for an arm, with what of the orientation counts: WHOLE, (APPROACH,) or ()."""
+    """A way of the tool for an arm, with the constrained part of the orientation: WHOLE, (APPROACH,) or ()."""
 
     arm: Arm
     path: ToolPath
     fixed: tuple[str, ...]
     name: str
-    """What messages call it: "P1 to P2"."""
+    """Name in messages: "P1 to P2"."""
 
     def place(self, way: float) -> str:
-        """A place on it in words."""
+        """Describe a place on it."""
         return f"{self.name}, at {max(way, 0.0):.1f} of {self.path.length:.1f} mm"
 
 
@@ -66,14 +66,14 @@ class Followed:
 
     @property
     def end_deg(self) -> Array:
-        """At its end, (J,)."""
+        """End posture, (J,)."""
         return np.asarray(self.angles_deg[-1])
 
     def at(self, ways: Array) -> Array:
-        """The postures at any ways (N,) within it, exactly on it: (N, J)."""
+        """The postures at ways (N,), exactly on the course: (N, J)."""
         near = np.stack([np.interp(ways, self.ways, column) for column in self.angles_deg.T], axis=1)
         if _is_loose(self.course, self.tool):
-            from scipy.interpolate import CubicSpline  # loading it takes longer than most commands
+            from scipy.interpolate import CubicSpline  # its import takes longer than most commands
 
             near = CubicSpline(self.ways, self.angles_deg)(ways)
         angles, missed = _corrected(self.course, self.tool, ways, near)
@@ -84,10 +84,10 @@ class Followed:
 
 
 def follow(course: Course, start_deg: Array, end_deg: Array | None = None) -> Followed:
-    """The postures from ``start_deg`` (J,) on, which is at its start.
+    """The postures along the course from ``start_deg`` (J,), at its start.
 
-    An arm that can take many postures at a place goes over evenly to ``end_deg``, where that is given. Raises
-    PlanError, naming the place, where a joint leaves its range or cannot follow.
+    A redundant arm moves evenly to ``end_deg``, if given. Raises PlanError, naming the place, if a joint
+    leaves its range or cannot follow.
     """
     tool = Tool(course.arm, list(range(len(course.arm.driven))), start_deg)
     length, step = course.path.length, 1.0 / STEPS
@@ -114,7 +114,7 @@ def follow(course: Course, start_deg: Array, end_deg: Array | None = None) -> Fo
 
 
 def _extrapolated(places: list[float], postures: list[Array], place: float) -> Array:
-    """A first guess, from the last two postures."""
+    """Extrapolation from the last two postures."""
     if len(places) < 2:
         return postures[-1]
     part = (place - places[-1]) / (places[-1] - places[-2])
@@ -122,7 +122,7 @@ def _extrapolated(places: list[float], postures: list[Array], place: float) -> A
 
 
 def _corrected(course: Course, tool: Tool, ways: Array, near_deg: Array) -> tuple[Array, Array]:
-    """Postures on the course near some (N, J), and what they still miss, (N,)."""
+    """Postures on the course near given ones (N, J), and their residuals, (N,)."""
     position, rotation = course.path.poses(ways)
     angles = near_deg.copy()
     missed = np.full(len(ways), np.inf)
@@ -139,7 +139,7 @@ def _corrected(course: Course, tool: Tool, ways: Array, near_deg: Array) -> tupl
 def _gap(
     course: Course, tool: Tool, position: Array, rotation: Array, angles_deg: Array
 ) -> tuple[Array, Array]:
-    """How far poses are from postures (N, J), and how that falls with the angles: (N, M) and (N, M, J)."""
+    """Residuals of postures (N, J) against poses, and their Jacobian: (N, M) and (N, M, J)."""
     state = tool.at(angles_deg)
     reach = float(tool.reach_mm.max()) or 1.0
     gaps = [(position - state.position_mm) / reach]
@@ -159,12 +159,12 @@ def _rank(fixed: tuple[str, ...]) -> int:
 
 
 def _is_loose(course: Course, tool: Tool) -> bool:
-    """Whether the arm can take many postures at a place."""
+    """Whether the arm is redundant on the course."""
     return bool(tool.turns.shape[1] > _rank(course.fixed))
 
 
 def singular_value(course: Course, tool: Tool, ways: Array, angles_deg: Array) -> Array:
-    """How far postures (N, J) are from a singular one: the least singular value of the Jacobian that counts, (N,)."""
+    """Distance of postures (N, J) from singular ones: the least relevant singular value of the Jacobian, (N,)."""
     position, rotation = course.path.poses(ways)
     slope = np.degrees(_gap(course, tool, position, rotation, angles_deg)[1])
     values = np.linalg.svd(slope, compute_uv=False)
@@ -184,7 +184,7 @@ def _check_range(course: Course, way: float, angles_deg: Array) -> None:
 
 
 def _stuck(course: Course, tool: Tool, way: float, angles_deg: Array) -> PlanError:
-    """Why the joints cannot follow from here on."""
+    """The error: why the joints cannot follow from here on."""
     place = course.place(way)
     if tool.turns.shape[1] < _rank(course.fixed):
         count = tool.turns.shape[1]
@@ -203,7 +203,7 @@ def _stuck(course: Course, tool: Tool, way: float, angles_deg: Array) -> PlanErr
 
 
 def passed(found: Followed) -> list[str]:
-    """Where the arm changes its branch on the way, or comes near to a singular posture, in words."""
+    """Notes: where the arm changes its branch on the way, or comes near to a singular posture."""
     course, words = found.course, []
     geometry = Geometry.of(course.arm)
     if not refusals(geometry):
@@ -230,13 +230,13 @@ def passed(found: Followed) -> list[str]:
 
 
 def _which(arm: Arm, angles_deg: Array) -> str:
-    """What of the arm is singular, in words, for arms of the closed form."""
+    """Describe the singular part of the arm, for arms with a closed form."""
     straight = straight_parts(arm, angles_deg)
     return f" ({', '.join(straight)})" if straight else ""
 
 
 def straight_parts(arm: Arm, angles_deg: Array) -> list[str]:
-    """Which of base, elbow and wrist are about to change their branch, in words; none for arms without closed form."""
+    """Those of base, elbow and wrist that are about to change their branch; empty without a closed form."""
     geometry = Geometry.of(arm)
     if refusals(geometry):
         return []

@@ -1,6 +1,6 @@
-"""The joints' spline of a job that leads the tool, of as many segments as prove that the tool stays near its way.
+"""The joints' spline of a job with lines of the tool, with enough segments to prove that the tool stays near its way.
 
-Each stretch from rest to rest is a spline of its own: at a rest between two, five control points are the same.
+Each stretch from rest to rest is a separate spline: at a rest between two, five control points are equal.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from armtempo.splines import bspline
 
 DEGREE = 5
 _LINE_PIECES = 8
-"""Segments of a line at first."""
+"""Initial number of segments of a line."""
 _SAME_DEG = 1e-4
-"""Two postures as near as this are one."""
+"""Tolerance for equal postures."""
 _FLOOR, _CORNER = 0.2, 2.5
-"""Least slowness of the way, and where a corner is cut, as a part of its mean."""
+"""Slowness of the way relative to its mean: the least, and at a cut corner."""
 _SMOOTH = 0.05
-"""The slowness of the way is smoothed over this part of it."""
+"""The slowness is smoothed over this fraction of the way."""
 _TABLE = 512
 
 
 @dataclass(frozen=True, eq=False)
 class Led:
-    """A stretch with the postures along its way."""
+    """A stretch with a line or arc of the tool, and the postures along its way."""
 
     stretch: Stretch
     followed: Followed
     places: Array
-    """Where its knots are: parts of the way at equal steps of u, (_TABLE + 1,)."""
+    """Fractions of the way at equal steps of u, (_TABLE + 1,), for its knots."""
 
     def ways(self, count: int) -> Array:
         """Ways at the knots of ``count`` segments: (count + 1,)."""
@@ -54,7 +54,7 @@ class Led:
         return np.asarray(parts * self.followed.course.path.length)
 
     def keeps(self, away: LineDeviation) -> bool:
-        """Whether the tool is as near to its way as the job asks."""
+        """Whether a deviation is within the job's tolerance."""
         enough = self.stretch.enough
         return away.position_mm <= enough.position_mm and away.rotation_deg <= enough.rotation_deg
 
@@ -66,14 +66,14 @@ class LinePath:
     angle_points_deg: Array
     """(S + 5, J)."""
     way_points: Array
-    """Of the ways of all stretches one after the other, as a spline with the same knots: (S + 5,)."""
+    """Control points of the ways of all stretches, with the same knots: (S + 5,)."""
     knots: tuple[int, ...]
-    """Segments before each stretch, and all."""
+    """Segments before each stretch, and in total."""
     arrivals: tuple[int, ...]
-    """Segments before each via point; where a corner is cut, nearly."""
+    """Segments before each via point; approximate for a cut corner."""
 
     def deviation(self, number: int, led: Led) -> LineDeviation:
-        """How far the tool leaves its way in a stretch at most."""
+        """Bound of the tool's deviation in a stretch."""
         first, last = self.knots[number], self.knots[number + 1]
         angles = of_path(self.angle_points_deg, DEGREE)[first:last]
         ways = of_path(self.way_points[:, None], DEGREE)[first:last, :, 0]
@@ -82,7 +82,7 @@ class LinePath:
 
 
 def led_stretches(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
-    """The stretches of a job in which the tool is led, by their number; PlanError if the arm cannot follow."""
+    """The stretches of a job with lines or arcs of the tool, by number; raises PlanError if the arm cannot follow."""
     speeds = np.array([limit.speed_deg_s for limit in checks.limits_of(arm)])
     found = {}
     for number, stretch in enumerate(cut.of_job(job)):
@@ -107,7 +107,7 @@ def _followed(arm: Arm, job: Job, stretch: Stretch, via_deg: Array) -> Followed:
 
 
 def _places(found: Followed, speeds: Array) -> Array:
-    """Places on the way at equal steps of u: slow at both ends, and where the joints have far to turn."""
+    """Places on the way at equal steps of u: dense at both ends, and where the joints turn far."""
     u = np.linspace(0.0, 1.0, _TABLE + 1)
     places = found.ways / found.ways[-1]
     taken = np.abs(np.diff(found.angles_deg, axis=0) / speeds).max(axis=1) / np.diff(places)
@@ -115,7 +115,7 @@ def _places(found: Followed, speeds: Array) -> Array:
     slow = np.maximum(slow, _FLOOR * slow.mean())
     path = found.course.path
     for place, cut_mm in zip(path.starts[1:-1], path.cuts, strict=True):
-        if cut_mm > 0.0:  # as many segments there as on a line so much longer
+        if cut_mm > 0.0:  # a cut corner gets as many segments as a longer line
             near = np.abs(u * path.length - place) < cut_mm
             slow[near] = np.maximum(slow[near], _CORNER * slow.mean())
     reach = int(3 * _SMOOTH * _TABLE)
@@ -129,9 +129,9 @@ def _places(found: Followed, speeds: Array) -> Array:
 def proven_path(
     arm: Arm, job: Job, via_deg: Array, led: Mapping[int, Led], others: Mapping[int, Between]
 ) -> tuple[LinePath, dict[int, LineDeviation]]:
-    """The spline with as few segments as prove that the tool stays near its way, and how near in each stretch.
+    """The spline with the fewest segments that prove the tolerance, and the proven deviation of each stretch.
 
-    Raises PlanError if the board could not hold that many.
+    Raises PlanError if the board cannot hold them.
     """
     stretches = cut.of_job(job)
     most = _most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
@@ -163,7 +163,7 @@ def proven_path(
 
 
 def _most_segments(arm: Arm) -> int:
-    """The most that the board's record holds."""
+    """The most segments that the board's record can hold."""
     most = MAX_SEGMENTS
     while record.size(DEGREE, len(arm.driven), True, most, 1) > MAX_MOTION_BYTES:
         most -= 1
@@ -173,7 +173,7 @@ def _most_segments(arm: Arm) -> int:
 def _path(
     stretches: Sequence[Stretch], pieces: Sequence[int], via_deg: Array, parts: Mapping[int, Led | Between]
 ) -> LinePath:
-    """The spline through postures of all stretches, with a rest between each two."""
+    """The spline through the postures of all stretches, with rests between them."""
     knots, arrivals = [0], [0]
     rows = []
     before = 0.0
@@ -197,7 +197,7 @@ def _path(
 
 
 def _passed(one: Led, ways: Array) -> list[int]:
-    """The knots of a stretch nearest to each of its via points but the first, increasing."""
+    """The knots of a stretch nearest to each of its via points except the first, increasing."""
     found: list[int] = []
     for place in one.followed.course.path.starts[1:]:
         nearest = int(np.argmin(np.abs(ways - place)))

@@ -1,4 +1,4 @@
-"""The trajectory of a job that leads the tool along lines and arcs, or limits its speed."""
+"""The trajectory of a job with lines and arcs of the tool, or limits of its speed."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ from armtempo.splines import bspline, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _GAP, _PAYS = 1e-3, 1e-3
-"""How near to its local optimum a time axis comes, and what a finer one has to save."""
+"""Relative gap of a time axis to its local optimum, and least relative saving of a finer axis."""
 _REFINE_FACTOR = 8
 
 
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
-    """The motion through via angles (n + 1, J), the tool led as the job asks.
+    """The motion through via angles (n + 1, J) with the job's lines and arcs.
 
-    Raises PlanError, naming via points and place, where the arm cannot follow, or the tool is not proven to stay near
-    its way.
+    Raises PlanError, naming via points and place, if the arm cannot follow, or the tolerance of the tool
+    cannot be proven.
     """
     stage("following the tool's way")
     led = led_stretches(arm, job, via_deg)
@@ -71,7 +71,7 @@ def _timed(
     notes: list[str],
     progress: Progress,
 ) -> Planned:
-    """The shortest time axis on the path, within the limits of joints and tool; with the waits of its dwells."""
+    """The shortest time axis on the path within the limits of joints and tool, with its dwells."""
     limits = checks.limits_of(arm)
     moving = np.flatnonzero(np.ptp(path.angle_points_deg, axis=0) > checks.TOLERANCE)
     points, own = path.angle_points_deg[:, moving], [limits[joint] for joint in moving]
@@ -114,19 +114,19 @@ def _timed(
 
 
 class _Axis(NamedTuple):
-    """The best time axis of those tried."""
+    """The best of the tried time axes."""
 
     refine: int
     found: Optimum
     history_s: list[float]
-    """Motion time of each one tried."""
+    """Motion time of each tried axis."""
 
 
 def _best_axis(
     points: Array, limits: Sequence[Limits], levels: Sequence[int], watched: Callable[[int], Along | None],
     progress: Progress,
 ) -> _Axis:  # fmt: skip
-    """The shortest axis of ever more segments, as long as they pay; ``watched``: what else has limits."""
+    """The shortest axis, refined as long as that saves time; ``watched``: further quantities with limits."""
     differences, before = np.ones(len(points) - 1), 1
     tried: list[tuple[int, Optimum]] = []
     for refine in levels:
@@ -143,7 +143,7 @@ def _best_axis(
 
 
 def _watched(path: LinePath, tool: Tool, limits: ToolLimits, refine: int) -> Along | None:
-    """The way of the tool, where it has limits."""
+    """The tool's way as a quantity with limits; None without limits."""
     if not limits.any:
         return None
     pieces = bspline.subdivide(bspline.polynomials(path.angle_points_deg, DEGREE), refine)
@@ -151,7 +151,7 @@ def _watched(path: LinePath, tool: Tool, limits: ToolLimits, refine: int) -> Alo
 
 
 def _levels(most: int) -> list[int]:
-    """Refinements to go through, each only where the one before saved enough."""
+    """Refinements to try, each only if the one before saved enough."""
     return [1, min(_REFINE_FACTOR, most)][: min(most, 2)]
 
 
@@ -162,7 +162,8 @@ def _floor(
     about_s: float,
     floors: Mapping[int, Floor | None],
 ) -> Floor:
-    """No time law along the path that rests between its stretches takes less; ``floors``: known of some stretches."""
+    """Lower bound for all time laws on the path with rests between stretches; ``floors``: known bounds of
+    stretches."""
     parts = []
     for number, (first, last) in enumerate(pairwise(knots)):
         stretch = points[first : last + DEGREE]
@@ -174,7 +175,7 @@ def _floor(
 
 
 def _asked(job: Job, via: int) -> tuple[float, float]:
-    """Limits of the tool's speed and acceleration on the way to a via point; infinite if there is none."""
+    """Limits of the tool's speed and acceleration on the way to a via point; infinite without a limit."""
     way = tool_way.at(job.ways, via)
     both = []
     for key in ("speed_mm_s", "acceleration_mm_s2"):
@@ -185,7 +186,7 @@ def _asked(job: Job, via: int) -> tuple[float, float]:
 
 
 def _tool_limits(job: Job, path: LinePath) -> ToolLimits:
-    """The tool's limits on each segment; where a corner is cut, its segments keep those of both ways."""
+    """The tool's limits on each segment; segments of a cut corner have those of both ways."""
     segments = path.knots[-1]
     limits = np.full((2, segments), np.inf)
     for via, (first, last) in enumerate(pairwise(path.arrivals), 1):
@@ -196,9 +197,9 @@ def _tool_limits(job: Job, path: LinePath) -> ToolLimits:
 
 
 def _limit_notes(job: Job, path: LinePath, angles: Array, axis_s: Array, tool: Tool) -> list[str]:
-    """What the tool reaches on each way whose speed or acceleration the job limits, proven.
+    """Notes: proven maxima of the tool on each way with a limit.
 
-    Of the Bernstein coefficients of angles (S, 6, J) and time (S, 6).
+    From Bernstein coefficients of angles (S, 6, J) and time (S, 6).
     """
     refine = len(angles) // path.knots[-1]
     notes = []

@@ -1,4 +1,4 @@
-"""A job's via points cut into stretches from rest to rest: on the spline through them, or the tool led along a way."""
+"""A job's via points divided into stretches from rest to rest: on a spline, or along lines and arcs of the tool."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from armtempo.planning.line.tool_path import ToolPath, ToolPiece
 from armtempo.planning.tool import Tool
 
 _CUT = 0.5
-"""A corner is cut over no more than this part of the shorter line."""
+"""Largest cut of a corner, as a fraction of the shorter line."""
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Via points ``first`` to ``last``, at both of which the motion rests; ``ways`` where the tool is led."""
+    """Via points ``first`` to ``last``, with rests at both; ``ways``: the lines and arcs of the tool, if any."""
 
     first: int
     last: int
@@ -33,12 +33,12 @@ class Stretch:
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Name in messages."""
         return f"P{self.first} to P{self.last}"
 
     @property
     def enough(self) -> LineDeviation:
-        """How far the tool may leave its way."""
+        """Allowed deviation of the tool."""
         return LineDeviation(
             min(way.tolerance_mm for way in self.ways), min(way.tolerance_deg for way in self.ways)
         )
@@ -63,9 +63,9 @@ def of_job(job: Job) -> list[Stretch]:
 
 
 def kept(arm: Arm, end: tuple[float, ...] | Pose) -> tuple[str, ...]:
-    """What of the orientation a line to this via point keeps: WHOLE, (APPROACH,) or ().
+    """The part of the orientation kept on a line to this via point: WHOLE, (APPROACH,) or ().
 
-    A pose says it itself; to via angles, as much as the joints with a motor can keep.
+    For a pose, its constrained part; for angles, as much as the driven joints can keep.
     """
     if isinstance(end, Pose):
         return end.fixed if end.fixed in (WHOLE, (APPROACH,)) else ()
@@ -76,7 +76,7 @@ def kept(arm: Arm, end: tuple[float, ...] | Pose) -> tuple[str, ...]:
 def course(arm: Arm, job: Job, stretch: Stretch, first_deg: Array) -> Course:
     """The way of the tool in a stretch that begins at angles ``first_deg``, (J,).
 
-    Raises PlanError for a way that is none.
+    Raises PlanError for an invalid way.
     """
     tool = Tool(arm, list(range(len(arm.driven))), first_deg)
     fixed = kept(arm, job.via[stretch.last])
@@ -124,7 +124,7 @@ def _piece(way: ToolWay, start: Array, end: Array, fixed: tuple[str, ...]) -> To
 
 
 def _check_cuts(stretch: Stretch, path: ToolPath) -> None:
-    """PlanError if corners are cut over more of a line than there is."""
+    """Raise PlanError if corners are cut over more than half of a line."""
     ways = [0.0, *path.cuts, 0.0]
     for number, piece in enumerate(path.pieces):
         name = f"P{stretch.first + number} to P{stretch.first + number + 1}"
@@ -142,7 +142,7 @@ def _check_cuts(stretch: Stretch, path: ToolPath) -> None:
 
 
 def end_deg(arm: Arm, job: Job, via: int, before_deg: Array) -> Array:
-    """Where the line to a via point leads to from the posture before, (J,): angles (J,)."""
+    """Angles (J,) at the end of the line to a via point, starting at the posture ``before_deg`` (J,)."""
     way = tool_way.at(job.ways, via)
     assert way is not None
     return follow(course(arm, job, Stretch(via - 1, via, (way,)), before_deg), before_deg).end_deg

@@ -1,4 +1,4 @@
-"""Limits of the tool's speed and acceleration along a path: what a time axis watches, and what is proven of it."""
+"""Limits of the tool's speed and acceleration along a path: for the optimisation of a time axis, and proven bounds."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
 _DIRECTIONS = 8
-"""The acceleration is checked in this many directions of the plane of the motion; between two of them it may be
-2 % larger, so each has as much less."""
+"""Number of directions in the plane of motion in which the acceleration is limited; between two of them it
+may be 2 % larger, so the limit is reduced."""
 _SHARP = 2e-3
-"""How far, relative, a bound may lie above what is reached."""
+"""Relative sharpness of a bound."""
 _MOST_PIECES = 100_000
 
 
 @dataclass(frozen=True, eq=False)
 class ToolLimits:
-    """Limits on each segment of a path, (S,); infinite if there is none."""
+    """Limits on each segment of a path, (S,); infinite without a limit."""
 
     speed_mm_s: Array
     acceleration_mm_s2: Array
 
     @property
     def any(self) -> bool:
-        """Whether there is one."""
+        """Whether there is a limit."""
         return bool(np.any(np.isfinite(self.speed_mm_s)) or np.any(np.isfinite(self.acceleration_mm_s2)))
 
     def refined(self, parts: int) -> ToolLimits:
-        """The same with each segment cut into ``parts``."""
+        """The limits with each segment cut into ``parts``."""
         return ToolLimits(np.repeat(self.speed_mm_s, parts), np.repeat(self.acceleration_mm_s2, parts))
 
 
 def along(pieces_deg: Array, tool: Tool, limits: ToolLimits) -> Along:
-    """The way of the tool on each segment, for a time axis to watch; ``pieces_deg``: power coefficients (S, 6, J).
+    """The tool's way on each segment, for the time axis; ``pieces_deg``: power coefficients (S, 6, J).
 
-    Speeds and positions at six places of a segment make polynomials: near enough for the search, what comes of it is
+    Polynomials are interpolated at six places of a segment: accurate enough for the search; the result is
     proven by ``excess``.
     """
     degree = pieces_deg.shape[1] - 1
@@ -85,7 +85,7 @@ def reached(angles_deg: Array, times_s: Array, tool: Tool) -> tuple[float, float
 
 
 def excess(angles_deg: Array, times_s: Array, tool: Tool, limits: ToolLimits) -> float:
-    """The factor on time with which the tool is within its limits, proven; 1 at least. Arguments as in ``reached``."""
+    """The factor (>= 1) on time with which the tool keeps its limits, proven. Arguments as in ``reached``."""
     kinds, group = np.unique(
         np.stack([limits.speed_mm_s, limits.acceleration_mm_s2], axis=1), axis=0, return_inverse=True
     )
@@ -112,7 +112,7 @@ def _largest(
 
 
 def _bounds(angles_deg: Array, times_s: Array, tool: Tool) -> tuple[Array, Array]:
-    """Speed and acceleration over pieces at most, and in their middle: each (N, 2)."""
+    """Bounds of speed and acceleration over pieces, and their values in the middle: each (N, 2)."""
     q, t = (_middle(pieces, order) for pieces, order in ((angles_deg, 2), (times_s[:, :, None], 2)))
     first, second = tool.moved(*q)
     t1, t2 = t[1], t[2]
@@ -136,7 +136,7 @@ def _bounds(angles_deg: Array, times_s: Array, tool: Tool) -> tuple[Array, Array
 
 
 def _middle(pieces: Array, orders: int) -> list[Array]:
-    """Value and derivatives in the middle of Bernstein pieces (N, 6, J): each (N, J)."""
+    """Value and derivatives at the middle of Bernstein pieces (N, 6, J): each (N, J)."""
     found, scale = [], 1.0
     for _ in range(orders + 1):
         degree = pieces.shape[1] - 1

@@ -1,6 +1,6 @@
-"""The way that a job asks of the tool between two rests: straight lines, arcs, and corners that are cut.
+"""The way of the tool between two rests: straight lines, arcs, and cut corners.
 
-A place on it is the way to it in mm, ``way``; where the tool only turns, in degrees.
+``way``: arc length in mm; in degrees if the tool only turns.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 
 _STILL_MM, _STILL_DEG = 1e-6, 1e-6
-"""Shorter ways and smaller turns are none."""
+"""Shorter ways and smaller turns count as 0."""
 _HALF_TURN_DEG = 179.9
-"""Of a turn by more it is not known which way it goes."""
+"""The direction of a larger turn is not defined."""
 _FLAT = 1e-9
 _CORNER_BEND = 15.0 / 16.0
 """Largest f'' of ``_corner``."""
@@ -29,13 +29,13 @@ class ToolPiece:
     start: Array
     """Pose at its start, (4, 4)."""
     length: float
-    """mm, or of a turn on the spot degrees."""
+    """mm; degrees for a rotation without translation."""
     direction: Array
-    """Of the way at the start, (3,); 0 for a turn on the spot."""
+    """Direction at the start, (3,); 0 for a rotation without translation."""
     inward: Array
     """To the centre of the arc times its curvature, (3,) in 1/mm; 0 for a line."""
     turn: Array
-    """Rotation vector for a mm of way, (3,) in rad."""
+    """Rotation vector per mm of way, (3,) in rad."""
 
     def moved(self, way: Array) -> Array:
         """Position relative to the start at ways (N,): (N, 3)."""
@@ -62,14 +62,14 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class ToolPath:
-    """Pieces one after the other; ``cuts``: the way before and after each corner that is cut there, in mm."""
+    """Consecutive pieces; ``cuts``: the way before and after each corner over which it is cut, mm."""
 
     pieces: tuple[ToolPiece, ...]
     cuts: tuple[float, ...] = ()
 
     @property
     def starts(self) -> Array:
-        """Way at the start of each piece, and at the end: (n + 1,)."""
+        """Way at the start of each piece, and at the end of the last: (n + 1,)."""
         return np.concatenate([[0.0], np.cumsum([piece.length for piece in self.pieces])])
 
     @property
@@ -95,7 +95,7 @@ class ToolPath:
         return positions, rotated
 
     def _cut(self, index: int, part: Array, cut: float) -> tuple[Array, Array]:
-        """Poses in a cut corner, ``part`` from -1 to 1: both pieces' ways, each of them slowing down to it."""
+        """Poses in a cut corner, ``part`` from -1 to 1: a blend of both pieces."""
         before, after = self.pieces[index], self.pieces[index + 1]
         left, right = cut * _corner(-part), cut * _corner(part)
         end = np.array([before.length])
@@ -105,25 +105,25 @@ class ToolPath:
 
     @property
     def bounds(self) -> Bounds:
-        """Of the whole."""
+        """Bounds over the whole way."""
         bends = [float(np.linalg.norm(piece.inward)) for piece in self.pieces]
         turns = [float(np.linalg.norm(piece.turn)) for piece in self.pieces]
         corner = max((2.0 * _CORNER_BEND / cut for cut in self.cuts if cut > 0.0), default=0.0)
         bend, turn = max(bends) + corner, max(turns)
-        # In a corner the ways of both pieces sum up to one at most, each with its own turn
+        # in a corner the ways of both pieces sum to at most one, each with its own turn
         slope = max(float(np.linalg.norm(piece.direction)) for piece in self.pieces)
         return Bounds(slope, bend, turn, turn * corner + turn * turn)
 
 
 def _corner(part: Array) -> Array:
-    """0 up to -1, its argument from 1 on, between with a second derivative 15/16 (1 - x^2)^2: twice smooth."""
+    """0 below -1, its argument above 1, in between the second derivative is 15/16 (1 - x^2)^2: a C3 function."""
     x = np.clip(part, -1.0, 1.0)
     inner = (5.0 + 16.0 * x + 15.0 * x**2 - 5.0 * x**4 + x**6) / 32.0
     return np.asarray(np.where(part > 1.0, part, inner))
 
 
 def line(start: Array, end: Array, turn: Array, where: str) -> ToolPiece:
-    """The straight line between two poses (4, 4), turning by a rotation vector, (3,) in rad."""
+    """The straight line between two poses (4, 4), with the rotation vector ``turn``, (3,) in rad."""
     way = end[:3, 3] - start[:3, 3]
     length = float(np.linalg.norm(way))
     if length > _STILL_MM:
@@ -165,7 +165,7 @@ def turn_between(start: Array, end: Array, where: str) -> Array:
 
 
 def turn_of_axis(start: Array, end: Array, where: str) -> Array:
-    """The same that turns one direction (3,) into another, and no more."""
+    """The smallest rotation vector that turns one direction (3,) into another."""
     normal = np.cross(start, end)
     size = float(np.linalg.norm(normal))
     angle = float(np.arctan2(size, start @ end))

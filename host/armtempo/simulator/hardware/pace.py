@@ -1,7 +1,7 @@
 """How virtual time passes relative to real time, and the calls that wait.
 
 While a timer has something to do soon, virtual time runs as fast as this process can, or, with ``speed``, at
-that multiple of real time. It keeps to real time while nothing moves (asleep until input comes), where the
+that multiple of real time. It keeps to real time while nothing moves (asleep until input comes), if the
 arm is to stop when the host falls silent (the host's silence is real), for a while after the host has spoken twice in
 quick succession, as one does that holds a motion (the same), and while the host does not read, so that a host which is
 busy for a moment loses no more than with a real board.
@@ -40,7 +40,7 @@ class Pace:
         board.millisecond = self._first_millisecond
 
     def idle(self):
-        """Until the next interrupt or the next millisecond; in real time where nothing moves."""
+        """Until the next interrupt or the next millisecond; in real time if nothing moves."""
         board = self._board
         board.run_until(board.next_ms, wake=True)
 

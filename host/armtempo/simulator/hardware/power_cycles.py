@@ -55,7 +55,7 @@ def _live(options, before, mode, path):
 
 
 def _start(options, repl):
-    """boot.py, and where that went well main.py, unless the host talks to the raw REPL."""
+    """boot.py, and if that went well main.py, unless the host talks to the raw REPL."""
     if not _execute(options, repl, "boot.py"):
         boot.flash_error(boot.BOOT_ERROR)
     elif not repl.raw and not _execute(options, repl, "main.py"):

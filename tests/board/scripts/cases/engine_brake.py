@@ -75,7 +75,7 @@ def case_too_late():  # not emulated
 
 
 def case_never_longer_than_the_motion():  # not emulated
-    """Where braking would take longer than the rest of the motion, it ends as planned; earlier, it is braked."""
+    """If braking would take longer than the rest of the motion, it ends as planned; earlier, it is braked."""
     for asked in (TICK_HZ // 2, TICK_HZ - TICK_HZ // 5):
         rig = Rig(joints(), planned=False)
         begin(rig)

@@ -29,7 +29,7 @@ def workspace(words, address):
 
 
 def begin_of(part):
-    """Its place in the backup SRAM, in words; -1 where it is not there."""
+    """Its place in the backup SRAM, in words; -1 if it is not there."""
     word = (uctypes.addressof(part) - stm.BKPSRAM) // 4
     return word if 0 <= word < engine_memory.PROCESSOR_WORDS else -1
 

@@ -1,4 +1,4 @@
-"""The main loop and the interrupt with the heap locked: MemoryError where anything allocates.
+"""The main loop and the interrupt with the heap locked: MemoryError if anything allocates.
 
 Registers are plain memory here; the counter, the streams and the interrupt are moved by this script.
 """
@@ -79,7 +79,7 @@ def show(counter, streams):
 
 
 def locked(function, argument=None):
-    """Call with the heap locked; without an argument where it is None."""
+    """Call with the heap locked; without an argument if it is None."""
     micropython.heap_lock()
     try:
         if argument is None:

@@ -66,7 +66,7 @@ def ready(entries, made, matched, last, now):
 
 
 def case_when_to_write():
-    """Where three eighths are free and the last rising edge is 390 us to 37 ms ahead; a dry ring is fed no more."""
+    """If three eighths are free and the last rising edge is 390 us to 37 ms ahead; a dry ring is fed no more."""
     guard, plenty = 32768 + 100, 3145728 + 100
     for entries, made, matched, last, now, hungry, fed in (
         (64, 20, 8, guard, 0, 1, 1),
@@ -136,7 +136,7 @@ def case_sizes():
 
 
 def case_how_often_rings_are_written():
-    """Every millisecond where each ring lasts 3.15 ms when it is full, else twice as often; TIM6 has 16 bits."""
+    """Every millisecond if each ring lasts 3.15 ms when it is full, else twice as often; TIM6 has 16 bits."""
     for rates, ticks in (
         ([20_000] * 3, 84_000),
         ([162_000], 84_000),
@@ -320,7 +320,7 @@ def frozen(line, levels, high_a=0, high_b=0, runs=1, before=0):
 
 
 def case_towards_a_switch():
-    """A limit switch freezes where a joint moves towards it, at one of its levels of DIR; E-stop and program always."""
+    """A limit switch freezes if a joint moves towards it, at one of its levels of DIR; E-stop and program always."""
     for line, levels, freezes in (
         (8, 1 << 7 | 1 << 10, 1),
         (8, 1 << 10, 0),

@@ -1,4 +1,4 @@
-"""Turns of the loop while moving with the heap locked: MicroPython raises MemoryError where anything allocates.
+"""Turns of the loop while moving with the heap locked: MicroPython raises MemoryError if anything allocates.
 
 Samples come and go, the host asks for status and samples, sets outputs and reads inputs; prints what was done that way.
 """
@@ -45,7 +45,7 @@ class Still:
     def snapshot(self, raw):
         raw[0] = self.turns
 
-    def brake(self):  # where the last hold is more than 300 ms ago
+    def brake(self):  # if the last hold is more than 300 ms ago
         pass
 
     freeze = brake

@@ -311,7 +311,7 @@ class Rig:
         self.engine.start()
 
     def refusal(self, motion):
-        """(code, joint, value) where it cannot be loaded, else None."""
+        """(code, joint, value) if it cannot be loaded, else None."""
         try:
             self.engine.load(motion)
         except Refused as refused:

@@ -32,7 +32,7 @@ class Flash:
         self._lasting = {}
 
     def change(self):
-        """Count a change; fail where the test wants it."""
+        """Count a change; fail if the test wants it."""
         self.changes += 1
         if self.changes == self.fail_at:
             if self.error is None:

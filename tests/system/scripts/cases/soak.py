@@ -305,7 +305,7 @@ class Soak:
         what = ("stop", "stop", "freeze", "estop", "lost")[self.numbers.randrange(0, 5)]
         self.count(what)
         if what in ("stop", "freeze"):
-            yield from world.answer("stop", (int(what == "freeze"),))  # refused where it has just ended
+            yield from world.answer("stop", (int(what == "freeze"),))  # refused if it has just ended
             return ""
         if what == "estop":
             set_level(ESTOP, PRESSED)

@@ -136,7 +136,7 @@ def case_slips_when_driven_too_hard():
 
 
 def case_torque_falls_with_speed():
-    """What the motor follows with all its torque, it loses where the torque falls with speed."""
+    """What the motor follows with all its torque, it loses if the torque falls with speed."""
     lags = []
     for corner in (0.0, 3.0):
         motor, _, _ = stepper(corner_speed_rad_s=corner, inertia_kg_m2=0.02)

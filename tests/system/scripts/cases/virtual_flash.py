@@ -1,4 +1,4 @@
-"""The simulated flash, case by case: its size, and what is left of it where the power fails.
+"""The simulated flash, case by case: its size, and what is left of it if the power fails.
 
 Argument: a scratch folder.
 """

@@ -630,7 +630,7 @@ def case_peripherals_of_a_bus_are_1_kb_apart():
 
 
 def case_kinds_of_memory_have_micropythons_numbers():
-    """extmod/moductypes.c, of version 1.28: also where CPython has a stand-in."""
+    """extmod/moductypes.c, of version 1.28: also if CPython has a stand-in."""
     assert (uctypes.ARRAY, uctypes.INT32) == (-1 << 30, 5 << 27)
 
 

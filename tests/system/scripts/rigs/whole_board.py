@@ -163,7 +163,7 @@ class World(SilentPort):
             yield
 
     def type(self, data):
-        """Send bytes; Ctrl-C interrupts where the prompt has the port."""
+        """Send bytes; Ctrl-C interrupts if the prompt has the port."""
         Serial._take_in(self, data, 1 << 30)
 
     def press(self, level=1):

@@ -1,4 +1,4 @@
-"""Whether the encoders stand still while the arm's pins step: where one turns, its driver is on in spite of ENABLE."""
+"""Whether the encoders stand still while the arm's pins step: if one turns, its driver is on in spite of ENABLE."""
 
 _STILL = 2  # counts by which an encoder between two marks may jump
 

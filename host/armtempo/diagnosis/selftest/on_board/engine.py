@@ -67,7 +67,7 @@ def pulls(pin, level):
 def pull_inactive(engine):
     """An E-stop that is not wired would be tripped: draw it to the other level. A switch is stronger.
 
-    ValueError where one is pressed.
+    ValueError if one is pressed.
     """
     from armtempo_board.hardware import pins
 
@@ -88,7 +88,7 @@ def serve(engine, idle_us):
 
 
 def load(engine, motion, start_steps):
-    """Put the joints at its start and load it; the motion. ValueError where the drivers are not off."""
+    """Put the joints at its start and load it; the motion. ValueError if the drivers are not off."""
     from armtempo_shared.motion import Motion
 
     output, driven, level = enable()

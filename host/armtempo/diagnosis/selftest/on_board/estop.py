@@ -23,7 +23,7 @@ def stopped(engine, at, value):
 
 
 def cost_of_looking(engine, at, value):
-    """The same where nothing has to be waited for, and nothing is triggered."""
+    """The same if nothing has to be waited for, and nothing is triggered."""
     from armtempo_board.hardware.isr import FROZEN
 
     engine.block[FROZEN] = 1
@@ -42,7 +42,7 @@ def serve_for(engine, wait_us, idle_us):
 def ways(engine):
     """By name, what stops the outputs: (register, value that trips, value afterwards, fault that is due).
 
-    An edge only where the pull resistor moves the input, as nothing is wired to it; a limit switch that is pressed is
+    An edge only if the pull resistor moves the input, as nothing is wired to it; a limit switch that is pressed is
     left out.
     """
     from armtempo_board.hardware import pins
@@ -71,7 +71,7 @@ def ways(engine):
 
 
 def starve(engine, joints, motion, start_steps, idle_us):
-    """What becomes of a motion that lasts longer where the interrupt that fills the rings is held off (TIM6 stops)."""
+    """What becomes of a motion that lasts longer if the interrupt that fills the rings is held off (TIM6 stops)."""
     from armtempo_board.hardware import pins
 
     load(engine, motion, start_steps)

@@ -82,7 +82,7 @@ def flash():
 
 
 def write_file():
-    """Milliseconds to write and read a file of 4 KB, None where there is no room; nothing is left of it."""
+    """Milliseconds to write and read a file of 4 KB, None if there is no room; nothing is left of it."""
     import os
 
     space = os.statvfs("/flash")

@@ -9,7 +9,7 @@ with x the rotor's angle and c the command, both in microsteps, m microsteps a s
 as the winding's inductance holds the current back. Lag, ringing and lost steps come out of it. The joint
 follows the rotor through gear and backlash.
 
-It is integrated in steps of 1 ms from the start of each motion, drift-kick-drift, more finely where the rotor
+It is integrated in steps of 1 ms from the start of each motion, drift-kick-drift, more finely if the rotor
 swings fast; each step sees the mean of what was commanded in it, so a pulse counts from its own moment on.
 """
 
@@ -167,7 +167,7 @@ class Stepper(IdealMotor):
         return aim - asin(load) / self._electrical
 
     def _settle(self):
-        """Stop computing where the rotor has come to rest."""
+        """Stop computing if the rotor has come to rest."""
         rest = self._rest(self._x)
         if self.blocked or abs(rest - self._x) < 20 * _REST_STEPS:
             if not self.blocked:

@@ -186,7 +186,7 @@ class Written:
         self.path = path
 
     def write(self, data):
-        """Write; OSError(ENOSPC) where the flash is full."""
+        """Write; OSError(ENOSPC) if the flash is full."""
         if self._flash.operation():
             self._file.write(data[: len(data) // 2])
             self._flash.power_fails()

@@ -82,7 +82,7 @@ class Line:
             sink.edges(self, before, count, times, origin)
 
     def pulse(self, pulses, now):
-        """From now on a timer makes pulses here: ticks high, ticks of the period; (0, 0) where it ended."""
+        """From now on a timer makes pulses here: ticks high, ticks of the period; (0, 0) if it ended."""
         self.pulses = pulses
         for sink in self.pulse_sinks:
             sink.pulses(self, pulses, now)

@@ -91,7 +91,7 @@ def _is_new():
 
 
 def _make_file_system():
-    """Start files are left out where the program has its own elsewhere."""
+    """Start files are left out if the program has its own elsewhere."""
     machine_state.flash.format()
     for name, size in _FACTORY_FILES.items():
         if name.endswith(".py") and machine_state.options["program"]:

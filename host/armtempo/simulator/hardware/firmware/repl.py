@@ -85,7 +85,7 @@ class Repl:
             send("MPY: sync filesystems\r\nMPY: soft reboot\r\n")
 
     def execute(self, text, name="<stdin>", log=False):
-        """Run code; False if it raises, which is shown to the host. SoftReset where it asks to leave."""
+        """Run code; False if it raises, which is shown to the host. SoftReset if it asks to leave."""
         return self._run(lambda: exec(compile(text, name, "exec"), self.names), log)
 
     def _run(self, action, log=False):
@@ -200,7 +200,7 @@ class Repl:
                 self._run(lambda text=line: self._one(text))
 
     def _one(self, text):
-        """Run what was typed; show the value where it is an expression."""
+        """Run what was typed; show the value if it is an expression."""
         try:
             code = compile(text, "<stdin>", "eval")
         except SyntaxError:

@@ -43,7 +43,7 @@ class Timer:
             self.init(*args, **kwargs)
 
     def init(self, freq=None, prescaler=None, period=None, mode=0, div=1, callback=None):
-        """Clock the timer, set prescaler and period (from ``freq`` where given) and start it."""
+        """Clock the timer, set prescaler and period (from ``freq`` if given) and start it."""
         if mode != self.UP or div != 1:
             raise ValueError("the virtual board's timers count up, undivided")
         if freq is not None:

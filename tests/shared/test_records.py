@@ -1,0 +1,259 @@
+"""Records of arms, motions and sequences: what is packed is found again, what is damaged is refused."""
+
+from __future__ import annotations
+
+import random
+import struct
+from binascii import crc32
+from dataclasses import dataclass
+
+import pytest
+from armtempo_shared import armrecord, limits, motion, sequence, sequence_check
+from armtempo_shared.sequence import SequenceData, SequenceError
+
+BITS = {"B": 8, "H": 16, "I": 32, "i": 31}
+ARM_CRC = 0x12345678
+RAMPS = tuple(range(1, 33)), tuple(range(1000, 65000, 2000)), 3 + 16 * 7
+Row = tuple[int, int, int, int, int]
+LARGEST = {
+    sequence.MOVE: (0, 0),
+    sequence.OUTPUT: (65_535, 0),
+    sequence.WAIT: (0, 3_600_000),
+    sequence.WAIT_INPUT: (1 + 4, 3_600_000),
+    sequence.REPEAT: (1, 1_000_000),
+    sequence.END: (1, 0),
+    sequence.COUNT: (0, 0),
+}
+"""The most that a row's value and amount may be."""
+
+
+def made(joints: int, seed: int = 3) -> tuple[dict[str, int], list[dict[str, int]]]:
+    rng = random.Random(seed)
+    head = {name: rng.getrandbits(BITS[kind]) for name, kind in armrecord.HEAD}
+    rows = [{name: rng.getrandbits(BITS[kind]) for name, kind in armrecord.JOINT} for _ in range(joints)]
+    rows[0]["min_steps"] = -(2**31)
+    return head, rows
+
+
+@pytest.mark.parametrize("joints", range(1, limits.MAX_JOINTS + 1))
+def test_round_trip(joints: int) -> None:
+    head, rows = made(joints)
+    data = armrecord.pack(head, rows)
+    found_head, found_rows, crc = armrecord.unpack(data)
+    assert found_head == head
+    assert found_rows == rows
+    assert crc == int.from_bytes(data[-4:], "little") == armrecord.crc32(data[:-4])
+
+
+def wired(outputs: int, inputs: int, seed: int = 5) -> tuple[list[dict[str, int]], list[dict[str, int]]]:
+    rng = random.Random(seed)
+    fields = ((armrecord.OUTPUT, outputs), (armrecord.INPUT, inputs))
+    first, second = (
+        [{name: rng.getrandbits(BITS[kind]) for name, kind in table} for _ in range(count)]
+        for table, count in fields
+    )
+    return first, second
+
+
+@pytest.mark.parametrize(
+    ("outputs", "inputs"), [(1, 0), (0, 1), (3, 2), (limits.MAX_OUTPUTS, limits.MAX_INPUTS)]
+)
+def test_round_trip_with_outputs_and_inputs(outputs: int, inputs: int) -> None:
+    head, rows = made(3)
+    data = armrecord.pack(head, rows, *wired(outputs, inputs))
+    assert armrecord.unpack(data)[:2] == (head, rows)
+    assert armrecord.unpack_outputs(data) == wired(outputs, inputs)
+
+
+def test_an_arm_without_has_the_bytes_that_it_always_had() -> None:
+    """Layout of version 2, written out here: a board of that version takes it."""
+    head, rows = made(2)
+    wanted = struct.pack("<4sBBHHHHHHI", b"ATA1", 2, 2, *head.values())
+    wanted += b"".join(struct.pack("<BBBBiiiiIIBBBB", *row.values()) for row in rows)
+    assert armrecord.pack(head, rows) == wanted + struct.pack("<I", armrecord.crc32(wanted))
+    assert armrecord.unpack_outputs(armrecord.pack(head, rows)) == ([], [])
+
+
+def test_a_program_from_before_refuses_what_it_does_not_know() -> None:
+    """It takes version 2 only, and the record with outputs is of version 3."""
+    assert armrecord.pack(*made(1))[4] == 2
+    assert armrecord.pack(*made(1), *wired(1, 0))[4] == 3
+
+
+@pytest.mark.parametrize(("place", "count"), [(0, 9), (0, 2), (1, 9), (1, 0), (0, 0)])
+def test_wrong_counts_are_refused_even_with_a_right_checksum(place: int, count: int) -> None:
+    plain = armrecord.pack(*made(1))
+    data = bytearray(armrecord.pack(*made(1), *wired(1, 1))[:-4])
+    data[len(plain) - 4 + place] = count
+    with pytest.raises(armrecord.ArmRecordError, match="length"):
+        armrecord.unpack(bytes(data) + struct.pack("<I", armrecord.crc32(data)))
+
+
+@pytest.mark.parametrize("outputs", [0, 2])
+def test_any_changed_bit_or_length_is_refused(outputs: int) -> None:
+    data = armrecord.pack(*made(2), *wired(outputs, outputs))
+    for bit in range(8 * len(data)):
+        broken = bytearray(data)
+        broken[bit // 8] ^= 1 << bit % 8
+        with pytest.raises(armrecord.ArmRecordError):
+            armrecord.unpack(bytes(broken))
+    for size in range(len(data)):
+        with pytest.raises(armrecord.ArmRecordError):
+            armrecord.unpack(data[:size])
+
+
+@pytest.mark.parametrize(
+    ("offset", "value"), [(4, armrecord.VERSION + 2), (4, armrecord.VERSION - 1), (5, 0), (5, 7), (0, 0)]
+)
+def test_other_versions_are_refused_even_with_a_right_checksum(offset: int, value: int) -> None:
+    data = bytearray(armrecord.pack(*made(2))[:-4])
+    data[offset] = value
+    with pytest.raises(armrecord.ArmRecordError):
+        armrecord.unpack(bytes(data) + struct.pack("<I", armrecord.crc32(data)))
+
+
+def test_each_flag_is_a_bit_of_its_own() -> None:
+    flags = [value for name, value in vars(armrecord).items() if name.startswith("FLAG_")]
+    assert len(flags) == 5
+    assert sorted(flags) == [1 << bit for bit in range(len(flags))]
+
+
+def packed(
+    degree: int = 5, joints: int = 3, axes: int = 3, segments: int = 6, refine: int = 2, seed: int = 1
+) -> bytes:
+    rng = random.Random(seed)
+    angles = [[rng.getrandbits(63) - 2**62 for _ in range(segments + degree)] for _ in range(joints)]
+    times = [[rng.getrandbits(60) for _ in range(segments * refine + degree)] for _ in range(axes)]
+    return motion.pack(degree, angles, times, refine, RAMPS, ARM_CRC)
+
+
+@pytest.mark.parametrize(("joints", "axes"), [(1, 1), (2, 1), (2, 2), (3, 3), (6, 6), (3, 1), (6, 1)])
+@pytest.mark.parametrize("degree", [3, 5])
+def test_every_point_is_found_at_its_offset(degree: int, joints: int, axes: int) -> None:
+    data = packed(degree, joints, axes)
+    view = motion.Motion(data)
+    assert (view.degree, view.joints, view.segments, view.refine) == (degree, joints, 6, 2)
+    assert (view.can_brake, view.arm_crc, view.shared) == (True, ARM_CRC, axes == 1 and joints > 1)
+    assert len(data) == motion.size(degree, joints, view.shared, 6, 2)
+    rng = random.Random(1)
+    for joint in range(joints):
+        expected = [rng.getrandbits(63) - 2**62 for _ in range(6 + degree)]
+        assert list(struct.unpack_from(f"<{6 + degree}q", data, view.angle_offset(joint))) == expected
+    for axis in range(axes):
+        expected = [rng.getrandbits(60) for _ in range(12 + degree)]
+        assert list(struct.unpack_from(f"<{12 + degree}q", data, view.time_offset(axis))) == expected
+    assert {view.time_offset(joint) for joint in range(joints)} == {
+        view.time_offset(axis) for axis in range(axes)
+    }
+
+
+def test_any_changed_bit_is_refused() -> None:
+    data = packed(joints=1, axes=1, segments=1, refine=1)
+    for bit in range(8 * len(data)):
+        broken = bytearray(data)
+        broken[bit // 8] ^= 1 << bit % 8
+        with pytest.raises(motion.MotionError):
+            motion.Motion(bytes(broken))
+
+
+def test_any_other_length_is_refused() -> None:
+    data = packed()
+    for size in [*range(40), *range(len(data) - 40, len(data))]:
+        with pytest.raises(motion.MotionError):
+            motion.Motion(data[:size])
+    with pytest.raises(motion.MotionError):
+        motion.Motion(data + b"\0")
+
+
+@pytest.mark.parametrize(
+    ("offset", "value", "complaint"),
+    [
+        (4, 4, "degree"),
+        (5, 0, "degree"),
+        (5, limits.MAX_JOINTS + 1, "degree"),
+        (6, 2, "version"),
+        (6, 4, "version"),
+        (7, 1, "version"),
+        (7, 0x70, "version"),
+        (7, 0x77, "version"),
+        (0, ord("B"), "version"),
+        (8, 0, "segments"),
+        (10, 0, "segments"),
+        (9, 2, "segments"),
+    ],
+)
+def test_unknown_kinds_are_refused_even_with_a_right_checksum(
+    offset: int, value: int, complaint: str
+) -> None:
+    data = bytearray(packed()[:-4])
+    data[offset] = value
+    whole = bytes(data) + struct.pack("<I", motion.crc32(data))
+    with pytest.raises(motion.MotionError, match=complaint):
+        motion.Motion(whole)
+
+
+@dataclass(frozen=True)
+class Record:
+    """What the check asks of a record: its rows, one motion and one counter."""
+
+    all_rows: tuple[Row, ...]
+    motions: int = 1
+    counters: int = 1
+
+    @property
+    def rows(self) -> int:
+        return len(self.all_rows)
+
+    def row(self, index: int) -> Row:
+        return self.all_rows[index]
+
+    def motion(self, index: int) -> tuple[str, int]:
+        return "a", index
+
+    def counter(self, index: int) -> str:
+        return "parts"
+
+
+def with_row(op: int, value: int, amount: int) -> Record:
+    """A record around one row: what is repeated begins and ends."""
+    before = ((sequence.REPEAT, 0, 0, 2, 1),) if op == sequence.END else ()
+    after = ((sequence.END, 0, 0, 0, 1),) if op == sequence.REPEAT else ()
+    return Record((*before, (op, 0, value, amount, 1), *after))
+
+
+@pytest.mark.parametrize("op", LARGEST)
+def test_values_and_amounts_have_their_bounds(op: int) -> None:
+    value, amount = LARGEST[op]
+    sequence_check.check(with_row(op, value, amount))  # type: ignore[arg-type]
+    for beyond in ((value + 1, amount), (value, amount + 1)):
+        with pytest.raises(SequenceError, match="row"):
+            sequence_check.check(with_row(op, *beyond))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("op", [0, max(LARGEST) + 1])
+def test_other_ops_are_refused(op: int) -> None:
+    with pytest.raises(SequenceError):
+        sequence_check.check(with_row(op, 0, 0))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("magic", "said"), [(b"XXXX", "no sequence record"), (b"ATS1", "another version")])
+def test_other_files_are_no_sequence(magic: bytes, said: str) -> None:
+    with pytest.raises(SequenceError, match=said):
+        SequenceData(magic + bytes(60))
+
+
+def test_a_record_ends_where_its_header_says() -> None:
+    """Also one whose checksum holds for what is too much."""
+    data = sequence.pack(0, [(sequence.WAIT, 0, 0, 100, 1)], [])
+    SequenceData(data)
+    longer = data[:-4] + bytes(9)
+    with pytest.raises(SequenceError, match="length does not fit the header"):
+        SequenceData(longer + struct.pack("<I", crc32(longer)))
+
+
+def test_a_motions_name_is_text() -> None:
+    head = struct.pack("<4sIHBB", sequence.MAGIC, 0, 1, 1, 0)
+    rows = struct.pack("<BBHIH", sequence.MOVE, 0, 0, 0, 1)
+    data = head + rows + struct.pack("<24sI", b"\xff" * 24, 0)
+    with pytest.raises(SequenceError, match="a motion's name"):
+        SequenceData(data + struct.pack("<I", crc32(data))).motion(0)
