@@ -11,8 +11,12 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 from armtempo.basics.progress import Progress, alive, stage
+from armtempo.kinematics.chain import all_angles_deg
+from armtempo.kinematics.forward import forward
+from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.tool_pose import Pose
 from armtempo.planning import room_check
 from armtempo.planning.free import free_plan
 from armtempo.planning.room_check import Bodies, Touch
@@ -32,12 +36,15 @@ _CLEAR_MM = 10.0
 _SAMPLE_MM = 8.0
 """Largest motion of a link between checked postures."""
 _MOST_SAMPLES = 300
+_NEARBY_MM = (30.0, 10.0)
+"""The tool may pass helping via points by the first of these with which nothing touches."""
 
 
-def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
+def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool = True) -> Planned:
     """The motion of ``free_plan.motion``, around obstacles if a way is found.
 
-    Otherwise the motion that touches something.
+    Otherwise the motion that touches something. ``nearest``: as near to what is in the way as is fastest; else
+    with room for the changes of a path that becomes part of another.
     """
     first = planned = free_plan.motion(arm, job, via_deg, progress)
     holding = arm.holding(job.holds)
@@ -52,8 +59,6 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     names = set()
     rng = np.random.default_rng([job.seed, len(via_deg)])
     for _ in range(_ROUNDS):
-        if touch is None:
-            return _without_help(arm, job, via_deg, planned, ways, names)
         names.add(touch.other)
         stage(f"looking for a way around {touch.other}")
         stretch, part = _place(planned, touch, ways)
@@ -65,13 +70,41 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
         else:  # the path cuts a corner too much: keep it closer to the way
             middle = 0.5 * (ways[stretch][part] + ways[stretch][part + 1])
             ways[stretch] = np.insert(ways[stretch], part + 1, middle, axis=0)
-        helped = _helped(job, via_deg, ways)
+        helped = _helped(job, ways)
+        angles = np.concatenate([ways[0], *(way[1:] for way in ways[1:])])
         try:
-            planned = free_plan.motion(arm, helped, np.array(helped.via), progress)
+            planned = free_plan.motion(arm, helped, angles, progress)
         except PlanError:
             break
-        touch = room_check.touch_of(holding, planned.trajectory)
-    return first if touch else _without_help(arm, job, via_deg, planned, ways, names)
+        if not (touch := room_check.touch_of(holding, planned.trajectory)):
+            own = set(_places(ways).tolist())
+            if nearest:
+                planned = _loosened(arm, helped, angles, own, planned, progress)
+            return _without_help(arm, job, via_deg, planned, ways, names)
+    return first
+
+
+def _loosened(
+    arm: Arm, helped: Job, angles: Array, own: set[int], planned: Planned, progress: Progress
+) -> Planned:
+    """The motion, faster where the tool may pass its helping via points nearby; those of the job are ``own``."""
+    stage("passing nearby")
+    poses = forward(Geometry.of(arm), np.radians(all_angles_deg(arm, angles)))
+    for tolerance_mm in _NEARBY_MM:
+        via = [
+            each
+            if number in own
+            else Pose(tuple(map(tuple, pose.tolist())), fixed=(), tolerance_mm=tolerance_mm)
+            for number, (each, pose) in enumerate(zip(helped.via, poses, strict=True))
+        ]
+        try:
+            found = free_plan.motion(arm, replace(helped, via=tuple(via)), angles, progress)
+        except PlanError:
+            continue
+        faster = found.trajectory.duration_s < planned.trajectory.duration_s
+        if faster and room_check.touch_of(arm.holding(helped.holds), found.trajectory) is None:
+            return found
+    return planned
 
 
 def _places(ways: Sequence[Array]) -> Array:
@@ -88,7 +121,7 @@ def _place(planned: Planned, touch: Touch, ways: Sequence[Array]) -> tuple[int, 
     return stretch, part - int(places[stretch])
 
 
-def _helped(job: Job, via_deg: Array, ways: Sequence[Array]) -> Job:
+def _helped(job: Job, ways: Sequence[Array]) -> Job:
     """The job with auxiliary via points between its own."""
     places = _places(ways)
     via = [*job.via[:1]]

@@ -66,7 +66,7 @@ def _free(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progre
         speed_mm_s=None,
         acceleration_mm_s2=None,
     )
-    planned = around.motion(arm, alone, via_deg, progress)
+    planned = around.motion(arm, alone, via_deg, progress, nearest=False)
     joints = planned.trajectory.joints
     points = np.stack([joint.angle_points_deg for joint in joints], axis=1)
     search = planned.searches[0]
