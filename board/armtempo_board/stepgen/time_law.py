@@ -77,7 +77,7 @@ _HALF_MASK = const((1 << 15) - 1)
 _LONGEST = const(1 << 28)
 _MOST = const((1 << 30) - 1)
 _LEAST_RATE = const(1 << 10)
-_FAR = const(1 << 17)  # in 4096 ticks: longer than any ramp and subinterval
+_LARGEST = const(1 << 17)  # in 4096 ticks: longer than any ramp and subinterval
 _AHEAD = const(4096)  # this many thousand units are added, if a time may lie before the ramp
 _MOST_ROUNDS = const(60)
 
@@ -259,11 +259,11 @@ def to_real_time(given: object, node: ptr32, place: int, scale: int) -> int:
     in_ramp = 0
     rate = law[AFTER]
     place = motion - law[END_HIGH]
-    if place < 0 - _FAR or (place < _FAR and (place << 12) + whole < law[END_LOW]):
+    if place < 0 - _LARGEST or (place < _LARGEST and (place << 12) + whole < law[END_LOW]):
         anchor = START_HIGH
         rate = law[BEFORE]
         place = motion - law[START_HIGH]
-        if place >= 0 - _FAR:
+        if place >= 0 - _LARGEST:
             place = (place << 12) + whole - law[START_LOW]
             if place > 0 or (place == 0 and fraction):
                 in_ramp = 1
