@@ -105,3 +105,16 @@ def test_a_motion_beyond_its_limits_has_no_brake_times() -> None:
     tight = [replace(joint.limits, jerk_deg_s3=joint.limits.jerk_deg_s3 / 2) for joint in arm.driven]
     with pytest.raises(InputError, match="beyond the arm's acceleration or jerk limits"):
         brake_time.of_motion(motion, tight)
+
+
+def test_a_brake_beyond_the_longest_ramp_has_the_longest() -> None:
+    """Entries cannot be longer than the record's; those next to them still end up within the limits."""
+    arm = Arm.paper()
+    limits = Limits(speed_deg_s=90.0, acceleration_deg_s2=0.5, jerk_deg_s3=0.05)
+    slow = replace(
+        arm, joints=[replace(joint, limits=limits) if joint.limits else joint for joint in arm.joints]
+    )
+    motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [60.0, -50.0, 50.0], slow)
+    brakes = brake_time.of_motion(motion, [limits] * 3)
+    assert brakes.longest_rest_s == pytest.approx(brake_time.LONGEST_S)
+    assert brakes.rest_s(0.0) < 1.0

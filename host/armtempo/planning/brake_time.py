@@ -180,7 +180,7 @@ class _Kind:
             new = length != before
             excess = self._ramps.excess(at[new], unit_s * length[new], self._rates, shape[new])
             found[new] = excess > EXCESS
-            found &= length < RAMP_LENGTH
+            found &= length < RAMP_LENGTH - _NEGLIGIBLE
             if not np.any(found):
                 return table
             _lift(table, np.where(found, _LONGER * length, 0.0))
