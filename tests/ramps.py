@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from armtempo_shared.motion import EVEN_RAMP
+from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPES
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 
 def rise(shape: int = EVEN_RAMP) -> BSpline:
-    """S of a shape p + 16 q with p < q: its slope is linear between 0, p/16, q/16 and 1."""
-    places = np.array([0, shape & 15, shape >> 4, 16]) / 16
+    """S of one of RAMP_SHAPES: its slope is linear between 0, p/16, q/16 and 1, its integral from 0 to 1 is given."""
+    ends, way = RAMP_SHAPES[2 * shape : 2 * shape + 2]
+    places = np.array([0, ends & 15, ends >> 4, 16]) / 16
     hats = np.array([places[2], 1 - places[1]]) / 2  # S(1) and e(1) by the slopes at p and q
     ways = hats * (1 - np.array([sum(places[:3]), sum(places[1:])]) / 3)
-    way = np.floor(64 * sum(ways) / sum(hats) + 0.5) / 64
-    return make_interp_spline(places, [0, *np.linalg.solve([hats, ways], [1, way]), 0], k=1).antiderivative()
+    return make_interp_spline(
+        places, [0, *np.linalg.solve([hats, ways], [1, way / 64]), 0], k=1
+    ).antiderivative()
 
 
 def rate(x: ArrayLike, before: float, after: float, shape: int = EVEN_RAMP) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
-"""Becomes ``/flash/lib/armtempo_archive.mpy``: finds the program's modules in one file, most of them deflated.
+"""Becomes ``/flash/lib/armtempo_archive.mpy``: finds the program's modules in one file, each deflated.
 
 For MicroPython's own firmware, in whose flash they have no room otherwise; ``boot.py`` imports it. The file begins with
 the length of its index in two bytes, then the index, a line "PACKAGE/MODULE OFFSET" for each, the package without
-"armtempo_", the offset below 0 if the module is not deflated. It is written by ``deploy/archive.py`` on the host.
+"armtempo_". It is written by ``deploy/archive.py`` on the host.
 """
 
 import sys
@@ -26,14 +26,7 @@ _ENDING = ".mpy"
 
 
 class Archive:
-    """As MicroPython wants a file system, as far as imports need it.
-
-    The names of the rest are such as MicroPython has anyway: others would take heap.
-    """
-
-    def __init__(self) -> None:
-        with open(_FILE, "rb") as file:
-            self.index = file.read(int.from_bytes(file.read(_LENGTH_BYTES), "little"))
+    """As MicroPython wants a file system, as far as imports need it."""
 
     def mount(self, readonly: bool, mkfs: bool) -> None:
         """Nothing to do."""
@@ -42,37 +35,27 @@ class Archive:
         """The same."""
 
     def stat(self, path: str) -> "tuple[int, ...]":
-        """Status of a module or folder; raises OSError if it does not exist."""
-        if self.seek(path):
-            return (_REGULAR,) + (0,) * 9
-        if self.find(path[_BEFORE:] + "/") < 0:
-            raise OSError(_ENOENT)
-        return (_FOLDER,) + (0,) * 9
+        """Whether a module or a folder is there; OSError."""
+        return (_REGULAR if self.find(path) else _FOLDER,) + (0,) * 9
 
     def open(self, path: str, mode: str) -> "Any":
         """A module's bytes."""
-        offset = self.seek(path)
-        if not offset:
-            raise OSError(_ENOENT)
+        offset = self.find(path)
         file = open(_FILE, "rb")  # noqa: SIM115  the import closes it
-        file.seek(abs(offset))
-        if offset < 0:
-            return file
+        file.seek(offset)
         return deflate.DeflateIO(file, deflate.ZLIB, 0, True)
 
-    def seek(self, path: str) -> int:
-        """Offset of a module; 0: it does not exist."""
-        name = path[_BEFORE : -len(_ENDING)] + " "
-        at = self.find(name)
-        if at < 0 or not path.endswith(_ENDING):
-            return 0
-        begin = at + len(name)
-        return int(self.index[begin : self.index.find(b"\n", begin)])
-
-    def find(self, text: str) -> int:
-        """Place of a line of the index with this beginning, or -1."""
-        at = self.index.find(b"\n" + text.encode())
-        return at + 1 if at >= 0 else -1
+    def find(self, path: str) -> int:
+        """Where a module begins, 0: a folder; OSError. The index is read each time, as it would take heap."""
+        with open(_FILE, "rb") as file:
+            index = file.read(int.from_bytes(file.read(_LENGTH_BYTES), "little"))
+        is_module = path.endswith(_ENDING)
+        name = "\n" + (path[_BEFORE : -len(_ENDING)] + " " if is_module else path[_BEFORE:] + "/")
+        begin = index.find(name.encode())
+        if begin < 0:
+            raise OSError(_ENOENT)
+        begin += len(name)
+        return int(index[begin : index.find(b"\n", begin)]) if is_module else 0
 
 
 try:

@@ -6,18 +6,19 @@ angles in steps / 2**28, times in ticks / 2**16.
 ::
 
     offset  type   field
-    0       4s     magic  b"ATM3"
+    0       4s     magic  b"ATM4"
     4       B      degree k, 3 or 5
     5       B      joints
     6       B      flags: bit 0, all joints share one time axis
-    7       B      the shape p + 16 q of the ramp to rest, 1 <= p < q <= 15 (EVEN_RAMP)
+    7       B      lengths of ramps count in 2 ** this ticks, 6 to 19
     8       H      segments n of the angle splines
     10      H      refine R: the time axes have n * R segments
     12      I      crc32 of the arm record it was made for
-    16      H[32]  how long it takes to come to rest, by where that begins: at 32 equal steps of the motion's time from
-                   its start to its end, in 16384 ticks, linear in between; all 0: it cannot
-    80      H[32]  the same for any other change of the speed
-    144     q[]    per joint: n + k angle control points; its n * R + k time control points,
+    16      H[64]  the ramp to rest, by where it begins: at 64 equal steps of the motion's time from its start to its
+                   end. Low 11 bits: its length, linear in between. The rest: its shape (RAMP_SHAPES), up to the
+                   next step. All 0: it cannot
+    144     H[32]  the same at 32 steps for any other change of the speed
+    208     q[]    per joint: n + k angle control points; its n * R + k time control points,
                    or, with a shared axis, those once after the last joint
     end     I      crc32 over all before it
 """
@@ -35,20 +36,30 @@ if TYPE_CHECKING:
 
     Ramps = tuple[Sequence[int], Sequence[int], int]
 
-MAGIC = b"ATM3"
+MAGIC = b"ATM4"
 SHARED_AXIS = 1
-RAMP_ENTRIES = 32
-RAMP_UNIT_TICKS = 16384
-"""195 us; the longest ramp is 65535 of it, 12.8 s."""
+REST_ENTRIES = 64
+OTHER_ENTRIES = 32
+RAMP_LENGTH = 2047
+"""Mask of an entry's length, and the longest; its shape is in the bits above these 11."""
+LEAST_RAMP_BITS = 6
+MOST_RAMP_BITS = 19
+"""Of the unit of lengths; the longest ramp takes 12.8 s then."""
 _HEAD = "<4sBBBBHHI"
-_RAMPS = "<%dH" % RAMP_ENTRIES
-_RAMPS_SIZE = struct.calcsize(_RAMPS)
+_RAMPS = "<%dH" % (REST_ENTRIES + OTHER_ENTRIES)
 _RAMPS_AT = struct.calcsize(_HEAD)
-HEAD_SIZE = _RAMPS_AT + 2 * _RAMPS_SIZE
-EVEN_RAMP = 5 + 16 * 11
-"""The shape of all other ramps. From the end of a ramp at which the rate is least, its slope rises over p/16 of its
-length, falls over the last 1 - q/16, and is constant in between, but for what lets its way be a multiple of 1/64."""
-NO_RAMPS = (0,) * RAMP_ENTRIES, (0,) * RAMP_ENTRIES, EVEN_RAMP
+HEAD_SIZE = _RAMPS_AT + struct.calcsize(_RAMPS)
+RAMP_SHAPES = (
+    b"\xb5\x20\xc2\x2a\x95\x26\x43\x36\x64\x24\x82\x20\xe5\x20\xf1\x20\xf1\x1c\x21\x37\xf1\x24\x71\x2c"
+    b"\x43\x26\xc2\x20\xf4\x1e\x76\x22\xf6\x1e\xa6\x20\xf1\x28\xf5\x22\x84\x21\x93\x29\xf3\x28\xf1\x1e"
+    b"\xa4\x2a\x82\x26\xf3\x24\xf1\x22\xf3\x1e\xf6\x22\xc8\x1e\x82\x24"
+)
+"""Shapes of ramps: p + 16 q and 64 w of each. From the end of a ramp at which the rate is least, its slope rises to s1
+over p/16 of its length, goes to s2 until q/16, and falls to 0; w of the length is the way of a rate from 0 to 1, which
+with p and q says what s1 and s2 are. Each of 30 random motions has one here that is close to its best."""
+EVEN_RAMP = 0
+"""The shape for changes that are none to rest."""
+NO_RAMPS = (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS
 """Of a motion that can neither brake nor change its speed."""
 
 
@@ -74,15 +85,14 @@ def pack(
     """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
-    all, its n * R + k control points (int, ticks * 2**16). ``ramps``: RAMP_ENTRIES lengths of ramps to rest and as many
-    of others, in RAMP_UNIT_TICKS, and the shape of those to rest.
+    all, its n * R + k control points (int, ticks * 2**16). ``ramps``: REST_ENTRIES entries of ramps to rest,
+    OTHER_ENTRIES of others, and the bits of their unit.
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
     flags = SHARED_AXIS if shared else 0
     head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, ramps[2], segments, refine, arm_crc)
-    for lengths in ramps[:2]:
-        head += struct.pack(_RAMPS, *lengths)
+    head += struct.pack(_RAMPS, *ramps[0], *ramps[1])
     body: "list[int]" = []
     for joint, points in enumerate(angles):
         body.extend(points)
@@ -104,9 +114,9 @@ class MotionHead:
     def __init__(self, head: bytes, length: int) -> None:
         if length < HEAD_SIZE + 4 or len(head) < HEAD_SIZE:
             raise MotionError("too short")
-        (magic, self.degree, self.joints, flags, self.brake_shape, self.segments, self.refine,
+        (magic, self.degree, self.joints, flags, self.ramp_bits, self.segments, self.refine,
          self.arm_crc) = struct.unpack_from(_HEAD, head, 0)  # fmt: skip
-        if magic != MAGIC or not 1 <= self.brake_shape & 15 < self.brake_shape >> 4 or flags & ~SHARED_AXIS:
+        if magic != MAGIC or not LEAST_RAMP_BITS <= self.ramp_bits <= MOST_RAMP_BITS or flags & ~SHARED_AXIS:
             raise MotionError("not a motion record of this version")
         if self.degree not in (3, 5) or not 1 <= self.joints <= MAX_JOINTS:
             raise MotionError("unknown degree or number of joints")
@@ -118,23 +128,24 @@ class MotionHead:
         if length != size(self.degree, self.joints, self.shared, self.segments, self.refine):
             raise MotionError("length does not fit the header")
 
-    def ramp_units(self, at: int, duration: int, to_rest: bool) -> int:
-        """How long a change of speed takes, in RAMP_UNIT_TICKS, that begins at a time of the motion.
+    def ramp(self, at: int, duration: int, to_rest: bool) -> int:
+        """The entry for a change of speed that begins at a time of the motion; its length is linear between two.
 
         ``at``, and how long the motion lasts, in a unit of which that is less than 8192, so all are small integers of
         the board: ``at`` rounded down, ``duration`` up. What is between two entries is taken up to 2 units later if
         the next one is longer.
         """
-        parts = RAMP_ENTRIES - 1
+        parts = (REST_ENTRIES if to_rest else OTHER_ENTRIES) - 1
         at = parts * min(max(at, 0), duration)
         first = min(at // duration, parts - 1)
         at -= first * duration
-        place = 2 * first + (0 if to_rest else _RAMPS_SIZE)
+        place = 2 * first + (0 if to_rest else 2 * REST_ENTRIES)
         ramps = self.ramps
-        before, after = ramps[place] + (ramps[place + 1] << 8), ramps[place + 2] + (ramps[place + 3] << 8)
-        if after > before:
+        entry = ramps[place] + (ramps[place + 1] << 8)
+        less = (entry & RAMP_LENGTH) - (ramps[place + 2] + (ramps[place + 3] << 8) & RAMP_LENGTH)
+        if less < 0:
             at = min(at + 2 * parts, duration)
-        return before - (before - after) * at // duration
+        return entry - less * at // duration
 
     def angle_offset(self, joint: int) -> int:
         """Byte offset of the joint's first angle control point."""

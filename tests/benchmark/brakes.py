@@ -25,9 +25,9 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Limits
 from armtempo.planning import brake_time, planner
-from armtempo.planning.brake_time import EXCESS, TO_REST, UNIT_S
+from armtempo.planning.brake_time import EXCESS, LONGEST_S, TO_REST
 from armtempo.splines.trajectory import Trajectory
-from armtempo_shared.motion import EVEN_RAMP, RAMP_ENTRIES
+from armtempo_shared.motion import EVEN_RAMP, REST_ENTRIES
 from scipy.optimize import linprog
 
 from tests.host import problems
@@ -35,7 +35,6 @@ from tests.host import problems
 PARTS = 24
 MOMENTS = 20
 SHORTER = 0.97
-LONGEST_S = 65535 * UNIT_S
 ROUNDS = 12
 SAMPLES = 4000
 SHORTEST_S = 1e-3
@@ -81,7 +80,12 @@ def ratios(trajectory: Trajectory, limits: Sequence[Limits]) -> Array:
     record = brake_time.of_motion(trajectory, limits)
     record_s = record.rest_s(moments * trajectory.duration_s)
     ramps = brake_time._Ramps(trajectory, allowed)
-    lawful_s = ramps.shortest_s(moments, TO_REST[:1], np.full(MOMENTS, SHORTEST_S), record.shape)
+    lawful_s = ramps.shortest_s(
+        moments,
+        TO_REST[:1],
+        np.full(MOMENTS, SHORTEST_S),
+        record.rest_shapes(moments * trajectory.duration_s),
+    )
     any_s = [
         Shortest(trajectory, allowed, [moment])(time) for moment, time in zip(moments, lawful_s, strict=True)
     ]
@@ -92,8 +96,8 @@ def ratios(trajectory: Trajectory, limits: Sequence[Limits]) -> Array:
 def table_ratios(trajectory: Trajectory, limits: Sequence[Limits], parts: int) -> Array:
     """(1, SPACES): the time of the best shape of so many parts, in some spaces of the table, over that of any law."""
     allowed = np.array([limit.values for limit in limits])
-    spaces = np.linspace(1, RAMP_ENTRIES - 3, SPACES).astype(int)[:, None]
-    starts = (spaces + np.array([0.0, 0.5, 1.0])) / (RAMP_ENTRIES - 1)
+    spaces = np.linspace(1, REST_ENTRIES - 3, SPACES).astype(int)[:, None]
+    starts = (spaces + np.array([0.0, 0.5, 1.0])) / (REST_ENTRIES - 1)
     lawful_s = brake_time._Ramps(trajectory, allowed).shortest_s(
         starts[:, 1], TO_REST[:1], np.full(SPACES, SHORTEST_S), EVEN_RAMP
     )

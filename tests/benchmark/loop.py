@@ -30,7 +30,7 @@ from armtempo.model.arm import Arm
 from armtempo.records import encode
 from armtempo_shared import armrecord, wire
 from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
-from armtempo_shared.motion import RAMP_UNIT_TICKS
+from armtempo_shared.motion import MOST_RAMP_BITS, OTHER_ENTRIES, REST_ENTRIES
 
 from tests.benchmark import firmware
 from tests.board import motions
@@ -52,7 +52,8 @@ SIX = (
 WORST_CYCLES = 3.0
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
-BRAKE_ENTRY = TICK_HZ // 2 // RAMP_UNIT_TICKS
+RAMPS = (TICK_HZ // 2 >> MOST_RAMP_BITS,) * (REST_ENTRIES + OTHER_ENTRIES)
+"""Of motions that came with NO_RAMPS."""
 PROBE = "firmware_loop.py"
 PROBE_MANIFEST = """
 include("$(PORT_DIR)/boards/manifest.py")
@@ -239,7 +240,7 @@ def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> Non
     rows = [{**joint, "counts_num": 0, "counts_den": 1, "limit_active_high": 1} for joint in case.rows]
     record = armrecord.pack(case.head, rows)
     motion = bytearray(case.motion)
-    struct.pack_into("<I64H", motion, 12, wire.record_crc(record), *[BRAKE_ENTRY] * 64)
+    struct.pack_into(f"<I{len(RAMPS)}H", motion, 12, wire.record_crc(record), *RAMPS)
     struct.pack_into("<I", motion, len(motion) - 4, crc32(motion[:-4]))
     (tree / "armtempo" / "arm.ata").write_bytes(record)
     (tree / "armtempo" / "go.atm").write_bytes(motion)

@@ -12,8 +12,8 @@ from armtempo_shared import engine_memory, limits
 from tests import interpreters
 from tests.board import heap_use
 
-PEAK = 85_500
-MOTION = 68_000
+PEAK = 70_000
+MOTION = 64_700
 MACHINE_CODE = 31_000
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "arm_changes.py"
 CHANGES = 25

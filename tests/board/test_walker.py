@@ -12,7 +12,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from armtempo_shared.motion import RAMP_UNIT_TICKS, Motion
+from armtempo_shared.motion import Motion
 from numpy.polynomial import Polynomial
 
 from tests import inprocess, interpreters
@@ -107,8 +107,8 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
 
 
 def _brake(start_s: float, length_s: float) -> tuple[int, int]:
-    """In ticks; the length whole in the record's units and on the grid of ramps, 2^14 and 64000 ticks: as it is run."""
-    whole = 125 * RAMP_UNIT_TICKS
+    """In ticks; the length whole in a record's unit for it and on the grid of ramps, 64000 ticks: as it is run."""
+    whole = 125 << max(14, (int(length_s * walking.TICK_HZ) // 1900).bit_length())
     return round(start_s * walking.TICK_HZ), round(length_s * walking.TICK_HZ / whole) * whole
 
 

@@ -16,8 +16,8 @@ from tests.board import oracle
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "walk.py"
 PULSE_TICKS = 168
 GAP_TICKS = 20_000
-BRAKE_SHAPE = 3 + 16 * 7
-"""Slowly at first: 9/16 of the time until it brakes most."""
+BRAKE_SHAPE = 31
+"""Half of the time until it brakes most."""
 
 
 @dataclass(frozen=True)

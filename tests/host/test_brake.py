@@ -26,7 +26,7 @@ def changed_excess(
     starts_s: Array,
     lengths_s: Array,
     rate: tuple[float, float],
-    shape: int,
+    shapes: Array,
 ) -> Array:
     """Largest speed, and acceleration or jerk, over their limits as the rate goes from one to the other: (starts, 2).
 
@@ -34,7 +34,7 @@ def changed_excess(
     """
     before, after = rate
     x = np.linspace(0.0, 1.0, 151)
-    passed = ramps.passed(x, before, after, shape)
+    passed = np.array([ramps.passed(x, before, after, shape) for shape in shapes])
     times = starts_s[:, None] + lengths_s[:, None] * passed
     values = trajectory(times.ravel()).reshape(*times.shape, -1)
     allowed = np.array([limit.values for limit in limits])
@@ -63,12 +63,12 @@ def test_every_change_keeps_its_limits_from_anywhere_and_quicker_ones_do_not(nam
         (brakes.change_s(starts), ((0.0, 1.0), (0.95, 0.6), (0.1, 0.7))),
     ):
         for rate in rates:
-            shape = EVEN_RAMP if rate[1] else brakes.shape
-            found = changed_excess(plan.trajectory, limits, starts, lengths, rate, shape)
+            shapes = np.full(len(starts), EVEN_RAMP) if rate[1] else brakes.rest_shapes(starts)
+            found = changed_excess(plan.trajectory, limits, starts, lengths, rate, shapes)
             assert found[:, 0].max() <= 1 + 1e-6
             assert found[:, 1].max() <= brake_time.EXCESS * 1.02, rate
     quicker = changed_excess(
-        plan.trajectory, limits, starts, 0.85 * brakes.rest_s(starts), (1.0, 0.0), brakes.shape
+        plan.trajectory, limits, starts, 0.85 * brakes.rest_s(starts), (1.0, 0.0), brakes.rest_shapes(starts)
     )
     assert np.mean(quicker[:, 1] > brake_time.EXCESS) > 0.6
 
@@ -90,8 +90,11 @@ def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
     brakes = brake_time.of_motion(motion, limits)
     starts = every_start(motion, 121)
     worst = max(
-        changed_excess(motion, limits, starts, brakes.rest_s(starts), (1.0, 0.0), brakes.shape)[:, 1].max(),
-        changed_excess(motion, limits, starts, brakes.change_s(starts), (0.0, 1.0), EVEN_RAMP)[:, 1].max(),
+        changed_excess(motion, limits, starts, lengths, rate, shapes)[:, 1].max()
+        for lengths, rate, shapes in (
+            (brakes.rest_s(starts), (1.0, 0.0), brakes.rest_shapes(starts)),
+            (brakes.change_s(starts), (0.0, 1.0), np.full(len(starts), EVEN_RAMP)),
+        )
     )
     assert 0.97 * brake_time.EXCESS <= worst <= 1.01 * brake_time.EXCESS
 

@@ -22,7 +22,7 @@ from armtempo_shared import armrecord, engine_memory, limits, motion
 from armtempo_shared.engine_memory import SHORT_MS, room_words
 
 ARM = Arm.paper()
-BRAKES = BrakeTimes(1.0, np.arange(5.0, 37.0), np.arange(100.0, 420.0, 10.0), 3 + 16 * 7)
+BRAKES = BrakeTimes(1.0, np.arange(5.0, 69.0), np.arange(100.0, 420.0, 10.0), np.arange(63) % 32, 14)
 START, END = np.array([0.0, -60.0, 40.0]), np.array([180.0, -38.0, -52.0])
 PAPER = Arm.paper()
 
@@ -41,10 +41,12 @@ def test_control_points_arrive_as_steps_and_ticks(shared: bool) -> None:
     record = motion.Motion(encode.motion_record(trajectory(shared), ARM, BRAKES))
     assert (record.degree, record.joints, record.segments, record.refine) == (5, 3, 2, 2)
     assert record.shared == shared
-    assert record.brake_shape == 3 + 16 * 7
-    end = 31 * 200
-    assert [record.ramp_units(200 * place, end, True) for place in range(32)] == [*range(6, 37), 36]
-    assert [record.ramp_units(at, end, False) for at in (-5, 0, end, end + 1)] == [101, 101, 410, 410]
+    assert record.ramp_bits == 14
+    end = 63 * 100
+    expected = [6 + place + 2048 * (place % 32) for place in range(63)]
+    assert [record.ramp(100 * place, end, True) for place in range(63)] == expected
+    assert record.ramp(end, end, True) == 68 + 2048 * (62 % 32)
+    assert [record.ramp(at, end, False) for at in (-5, 0, end, end + 1)] == [101, 101, 410, 410]
     for joint, per_deg in enumerate((6400 / 180, 32000 / 360, 6400 / 180)):
         angles = np.frombuffer(record.data, "<i8", 7, record.angle_offset(joint)) / 2.0**28
         np.testing.assert_allclose(angles, (np.arange(7) + 10 * joint) * per_deg, atol=2.0**-28)

@@ -135,7 +135,7 @@ def test_flushed_buttons_are_forgotten() -> None:
 def test_it_is_followed_until_it_is_unplugged(monkeypatch: pytest.MonkeyPatch) -> None:
     pygame = Pygame()
     monkeypatch.setitem(sys.modules, "pygame", pygame)
-    with gamepad.beside(NoKeys(), joints=3) as keys:
+    with gamepad.added_to(NoKeys(), joints=3) as keys:
         assert keys.read(0.0) == ""
         pygame.pad.axes = [0.0, -1.0]  # pushed away from the body
         assert keys.read(LIMIT_S) == "+"
@@ -157,7 +157,7 @@ def test_it_is_followed_until_it_is_unplugged(monkeypatch: pytest.MonkeyPatch) -
 def test_none_is_connected(monkeypatch: pytest.MonkeyPatch) -> None:
     pygame = Pygame(pads=0)
     monkeypatch.setitem(sys.modules, "pygame", pygame)
-    with pytest.raises(InputError, match="no gamepad is connected"), gamepad.beside(NoKeys(), 3):
+    with pytest.raises(InputError, match="no gamepad is connected"), gamepad.added_to(NoKeys(), 3):
         pass
     assert pygame.ended
 
@@ -167,7 +167,7 @@ def test_pygame_opens_no_window_and_reads_beside_other_programs(monkeypatch: pyt
     with patch.dict(os.environ):
         for name in [name for name in os.environ if name.startswith(("SDL_", "PYGAME_"))]:
             del os.environ[name]
-        with pytest.raises(InputError), gamepad.beside(NoKeys(), 3):
+        with pytest.raises(InputError), gamepad.added_to(NoKeys(), 3):
             pass
         assert os.environ["SDL_VIDEODRIVER"] == "dummy"
         assert os.environ["SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS"] == "1"
@@ -176,6 +176,6 @@ def test_pygame_opens_no_window_and_reads_beside_other_programs(monkeypatch: pyt
 
 def test_without_pygame_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(MissingPackageError, match=r"gamepad") as caught, gamepad.beside(NoKeys(), 3):
+    with pytest.raises(MissingPackageError, match=r"gamepad") as caught, gamepad.added_to(NoKeys(), 3):
         pass
     assert "armtempo[gamepad]" in (caught.value.hint or "")

@@ -18,7 +18,7 @@ from armtempo.link.board_messages import Positions, Sample
 from armtempo.report import run_folder
 from armtempo_shared import armrecord, motion, sequence, wire
 
-RAMPS = tuple(range(1, 33)), tuple(range(1000, 65000, 2000)), motion.EVEN_RAMP
+RAMPS = tuple(range(1000, 65000, 1000)), tuple(range(1, 33)), 14
 KEPT = Path(__file__).with_name("stored_bytes.json")
 
 

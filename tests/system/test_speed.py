@@ -144,7 +144,7 @@ def test_changes_keep_the_brake_times_limits() -> None:
             start = rng.uniform(0, trajectory.duration_s)
             step = float(brakes.change_s(start) if after else brakes.rest_s(start)) / 1500
             x = np.arange(1501) / 1500
-            shape = EVEN_RAMP if after else brakes.shape
+            shape = EVEN_RAMP if after else int(brakes.rest_shapes(start))
             passed = 1500 * step * ramps.passed(x, before, after, shape)
             values = trajectory(np.minimum(start + passed, trajectory.duration_s))
             for order in range(3):

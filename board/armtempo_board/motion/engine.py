@@ -167,7 +167,11 @@ class Engine:
         duration_ticks = start_check.check_start(motion, self.drives, limits, self.known)
         del start_check
         heap.tidy()
-        from armtempo_board.stepgen.override import Override
+        try:
+            from armtempo_board.stepgen.override import Override
+        except MemoryError:  # what the first attempt left free lies otherwise
+            gc.collect()
+            from armtempo_board.stepgen.override import Override
 
         override = Override()
         override.begin(rate, motion, duration_ticks)

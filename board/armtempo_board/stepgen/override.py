@@ -8,7 +8,7 @@ for. Imported before a motion, and forgotten after it.
 from array import array
 
 from armtempo_shared.limits import LONGEST_RUN_TICKS
-from armtempo_shared.motion import EVEN_RAMP
+from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPES
 from micropython import const
 
 from armtempo_board import features
@@ -30,7 +30,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-_UNIT_BITS = const(14)  # RAMP_UNIT_TICKS of the record
+# as in motion.py of armtempo_shared: an entry for a ramp
+_RAMP_LENGTH = const(2047)
+_SHAPE_BIT = const(11)
 _MOST_PARTS = const(8190)  # of a motion's time, to look up its ramps
 
 
@@ -61,42 +63,42 @@ class Override:
     def ramp_end_ticks(self, from_ticks: int, rate: int) -> int:
         """Real time at which a ramp to another rate would end that begins at a real time, after the last ramp."""
         thousands = self._thousands(from_ticks)
-        return (
-            self._real_ticks
-            + PERMILLE * thousands
-            + self._ramp_ticks(self._motion_ticks + self.rate * thousands, rate)
-        )
+        length, _ = self._ramp(self._motion_ticks + self.rate * thousands, rate)
+        return self._real_ticks + PERMILLE * thousands + length
 
     def rest_kiticks(self, from_kiticks: int) -> int:
         """Real time, in Ki ticks, at which a ramp to rest would end that begins at a real time; allocates nothing."""
         since = max(from_kiticks - self._real_kiticks, 0)
         at = self._motion_kiticks + since // PERMILLE * self.rate + since % PERMILLE * self.rate // PERMILLE
-        units: int = self._motion.ramp_units(at >> (self._shift - 10), self._parts, True)
-        grid = ((units << 8) + PERMILLE - 1) // PERMILLE  # RAMP_GRID_TICKS are 1000 << 6
+        motion = self._motion
+        units: int = motion.ramp(at >> (self._shift - 10), self._parts, True) & _RAMP_LENGTH
+        grid: int = (
+            (units << motion.ramp_bits - 6) + PERMILLE - 1
+        ) // PERMILLE  # RAMP_GRID_TICKS are 1000 << 6
         return self._real_kiticks + since + (125 * grid >> 1)
 
     def _thousands(self, from_ticks: int) -> int:
         """Thousands of ticks from the last ramp's end, rounded up."""
         return max(-(-(from_ticks - self._real_ticks) // PERMILLE), 0)
 
-    def _ramp_ticks(self, at_ticks: int, rate: int) -> int:
-        """Length of a ramp that begins at a time of the motion, rounded up to the grid."""
+    def _ramp(self, at_ticks: int, rate: int) -> "tuple[int, int]":
+        """Length, rounded up to the grid, and shape of a ramp that begins at a time of the motion."""
         grid = time_law.RAMP_GRID_TICKS
-        units: int = self._motion.ramp_units(at_ticks >> self._shift, self._parts, rate == 0)
-        return min(-(-(units << _UNIT_BITS) // grid), time_law.LONGEST_RAMP_TICKS // grid) * grid
+        motion = self._motion
+        entry: int = motion.ramp(at_ticks >> self._shift, self._parts, rate == 0)
+        return -(-((entry & _RAMP_LENGTH) << motion.ramp_bits) // grid) * grid, entry >> _SHAPE_BIT
 
     def ramp(self, from_ticks: int, rate: int) -> None:
         """Go to another rate, from a real time on that is after the last ramp."""
         thousands = self._thousands(from_ticks)
         self._real_ticks += PERMILLE * thousands
         self._motion_ticks += self.rate * thousands
-        length = self._ramp_ticks(self._motion_ticks, rate)
-        shape = EVEN_RAMP if rate else self._motion.brake_shape
+        length, shape = self._ramp(self._motion_ticks, rate)
         time_law.set_length(self.law, length)
         time_law.set_ramp(self.law, shape, self.rate, rate)
         self._set(time_law.START_HIGH)
         self._real_ticks += length
-        way = 64 * min(self.rate, rate) + abs(rate - self.rate) * time_law.way_64ths(shape)
+        way = 64 * min(self.rate, rate) + abs(rate - self.rate) * RAMP_SHAPES[2 * shape + 1]
         self._motion_ticks += way * (length // time_law.RAMP_GRID_TICKS)
         self._set(time_law.END_HIGH)
         self._motion_kiticks = self._motion_ticks >> 10

@@ -90,7 +90,7 @@ _CLEARED = (_STEPS, _REACHED, _LAST_STEP, _MODE, _HELD_BACK, _HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
 _LAW_WORDS = const(26)  # as in time_law.py
 _BEFORE = const(-1)  # in Ki ticks: before a motion
-_FAR = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
+_LARGEST = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
 
 
 class StepGenerator:
@@ -117,7 +117,7 @@ class StepGenerator:
         self._pending = _NOTHING
         self._first_direction = 1  # of FIRST,
         self._first_ticks = 0  # its time in the motion's own,
-        self._first_comes = False  # and whether by the law it comes
+        self._first_due = False  # and whether it occurs by the law
         self._last_high = self._last_ticks = 0  # the time of LAST in the motion's own
         self._last_is_queued = False  # nothing was queued since LAST was
         self._interval_in = 0  # IN of the queue as the subinterval began
@@ -343,7 +343,7 @@ class StepGenerator:
             self._solve(0)
         else:
             self._first_ticks = self._node_ticks()
-            self._first_comes = True
+            self._first_due = True
 
     def _solve(self, index: int) -> None:
         """Set the first node to the subinterval's step ``index``."""
@@ -351,12 +351,12 @@ class StepGenerator:
         queue = self.queue
         solve(solver, index, 0)
         self._first_ticks = self._node_ticks()
-        self._first_comes = True
+        self._first_due = True
         if queue[_MODE] & _BY_LAW:
             comes = self._law.to_real_time(self._law_words, solver, _FIRST_NODE, queue[_TIME_SCALE])
             if comes and queue[_MODE] < _AT_START:
                 self._law.scale_slope(solver, _FIRST_NODE)
-            self._first_comes = comes
+            self._first_due = comes
 
     def _queue_first(self) -> None:
         """FIRST, if LAST is pending too against that."""
@@ -366,7 +366,7 @@ class StepGenerator:
                 self._pending = _NOTHING  # neither comes
             else:
                 self._queue_last()
-        elif not self._first_comes:
+        elif not self._first_due:
             self._halt()
         elif is_opposite:
             self.at_turn = True
@@ -433,8 +433,8 @@ class StepGenerator:
     def _since_last(self, high: int, ticks: int) -> int:
         """Ticks of the motion's time from LAST to another step; any large number if it is far."""
         high -= self._last_high
-        if high > _FAR:
-            high = _FAR
+        if high > _LARGEST:
+            high = _LARGEST
         return (high << 12) + ticks - self._last_ticks
 
     def _high(self) -> int:

@@ -4,13 +4,13 @@ The rate is constant but for ramps: over a length L of real time it goes from on
 0. Counted by r, in parts of L, from that end of the ramp at which the rate is least, the rate is b + h S(r), and the
 motion's time from there on is b r + h e(r) of L, e the integral of S. S goes from 0 to 1; its slope is 0 at r = 0, s1
 at r = p/16, s2 at r = q/16, 0 at r = 1, and linear in between, so e is convex, and of third order in each of the three
-pieces. p and q are the shape of the ramp, which the record gives for braking; s1 and s2 differ by as little as makes
-e(1) a multiple of 1/64. This law moves the nodes, time and slope; all steps between them follow. Rates are in
-thousandths and times at the ends of a ramp in whole ticks, so outside the ramps real time is exact, however long the
-motion is. Fractions here have 30 bits.
+pieces. p, q and e(1), a multiple of 1/64, are the shape of the ramp, which the record gives. This law moves the nodes,
+time and slope; all steps between them follow. Rates are in thousandths and times at the ends of a ramp in whole ticks,
+so outside the ramps real time is exact, however long the motion is. Fractions here have 30 bits.
 """
 
 import micropython
+from armtempo_shared.motion import RAMP_SHAPES
 from micropython import const
 
 TYPE_CHECKING = False
@@ -77,7 +77,7 @@ _HALF_MASK = const((1 << 15) - 1)
 _LONGEST = const(1 << 28)
 _MOST = const((1 << 30) - 1)
 _LEAST_RATE = const(1 << 10)
-_FAR = const(1 << 17)  # in 4096 ticks: longer than any ramp and subinterval
+_LARGEST = const(1 << 17)  # in 4096 ticks: longer than any ramp and subinterval
 _AHEAD = const(4096)  # this many thousand units are added, if a time may lie before the ramp
 _MOST_ROUNDS = const(60)
 
@@ -97,19 +97,12 @@ def set_length(law: "array[int]", ticks: int) -> None:
     law[UNIT] = unit
 
 
-def way_64ths(shape: int) -> int:
-    """64 e(1) of a shape."""
-    first, second = shape & 15, shape >> 4
-    equal = 16 + second - first
-    return ((192 - 4 * (first + second)) * equal - 64 * (16 - first) + 3 * equal // 2) // (3 * equal)
-
-
 def set_ramp(law: "array[int]", shape: int, before: int, after: int) -> None:
-    """The shape of the ramp, 1 <= p < q <= 15, and the rates before and after, in thousandths."""
-    first, second = shape & 15, shape >> 4
-    way = way_64ths(shape)
+    """The shape of the ramp (``armtempo_shared.motion``), and the rates before and after, in thousandths."""
+    law[_SHAPE] = RAMP_SHAPES[2 * shape]
+    first, second = law[_SHAPE] & 15, law[_SHAPE] >> 4
+    way = RAMP_SHAPES[2 * shape + 1]
     late = 192 - 4 * (first + second) - 3 * way  # 64ths of the rise that s2 is the cause of
-    law[_SHAPE] = shape
     law[_RATE_1] = ((64 - late) * first << 24) // second
     law[_WAY_1] = first * law[_RATE_1] // 48
     law[_GAIN_1] = ((64 - late) * (second - first) << 25) // second
@@ -266,11 +259,11 @@ def to_real_time(given: object, node: ptr32, place: int, scale: int) -> int:
     in_ramp = 0
     rate = law[AFTER]
     place = motion - law[END_HIGH]
-    if place < 0 - _FAR or (place < _FAR and (place << 12) + whole < law[END_LOW]):
+    if place < 0 - _LARGEST or (place < _LARGEST and (place << 12) + whole < law[END_LOW]):
         anchor = START_HIGH
         rate = law[BEFORE]
         place = motion - law[START_HIGH]
-        if place >= 0 - _FAR:
+        if place >= 0 - _LARGEST:
             place = (place << 12) + whole - law[START_LOW]
             if place > 0 or (place == 0 and fraction):
                 in_ramp = 1

@@ -54,12 +54,12 @@ def _wrapped(function: Callable[..., Any], owner: str = "") -> Callable[..., Any
 
     @wraps(function)
     def call(*arguments: Any, **named: Any) -> Any:
-        places, rest, kinds = _annotated(function)
+        places, rest, kinds, checks = _annotated(function)
         for argument, value in zip(chain(places, repeat(rest)) if rest else places, arguments, strict=False):
-            if not _check(kinds[argument])(value):
+            if not checks[argument](value):
                 raise _wrong(name, argument, value, kinds[argument])
         for argument, value in named.items():
-            if argument in kinds and not _check(kinds[argument])(value):
+            if argument in checks and not checks[argument](value):
                 raise _wrong(name, argument, value, kinds[argument])
         return function(*arguments, **named)
 
@@ -71,8 +71,10 @@ def _wrong(name: str, argument: str, value: object, kind: Any) -> InputError:
 
 
 @cache
-def _annotated(function: Callable[..., Any]) -> tuple[list[str], str, dict[str, Any]]:
-    """Names of the positional arguments, name of the variable one ("" if none), and types of all.
+def _annotated(
+    function: Callable[..., Any],
+) -> tuple[list[str], str, dict[str, Any], dict[str, Callable[[object], bool]]]:
+    """Names of the positional arguments, name of the variable one ("" if none), and types and checks of all.
 
     Arrays have the type ``Numbers``.
     """
@@ -80,7 +82,9 @@ def _annotated(function: Callable[..., Any]) -> tuple[list[str], str, dict[str, 
     code = function.__code__
     rest = code.co_varnames[code.co_argcount + code.co_kwonlyargcount] if code.co_flags & _TAKES_MORE else ""
     kinds = dict.fromkeys((*code.co_varnames[: code.co_argcount], rest), Any)
-    return [*code.co_varnames[: code.co_argcount]], rest, kinds | get_type_hints(function, localns=arrays)
+    kinds |= get_type_hints(function, localns=arrays)
+    checks = {argument: _check(kind) for argument, kind in kinds.items()}
+    return [*code.co_varnames[: code.co_argcount]], rest, kinds, checks
 
 
 _TAKES_MORE = inspect.CO_VARARGS

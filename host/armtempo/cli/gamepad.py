@@ -102,7 +102,7 @@ class KeysAndGamepad:
 
 
 @contextmanager
-def beside(keys: Keys, joints: int) -> Iterator[Keys]:
+def added_to(keys: Keys, joints: int) -> Iterator[Keys]:
     """``keys`` together with the first connected gamepad, for an arm of ``joints`` joints.
 
     Raises MissingPackageError without pygame, InputError if there is no gamepad.

@@ -109,7 +109,7 @@ def pressed_keys(board: Board, with_gamepad: bool) -> Iterator[Keys]:
         if not with_gamepad:
             yield pressed
             return
-        with gamepad.beside(pressed, len(board.arm.driven)) as both:
+        with gamepad.added_to(pressed, len(board.arm.driven)) as both:
             click.echo(gamepad.HELP)
             yield both
 

@@ -1,30 +1,28 @@
-"""The archive of compiled modules of the board program, most deflated, for the board's ``archive.py``."""
+"""The archive of compiled modules of the board program, each deflated, for the board's ``archive.py``."""
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Collection, Mapping
 
-_WINDOW_BITS = 10
-"""Window (1 KB) for modules imported with little memory; the decoder needs another 1.4 KB."""
+_WINDOW_BITS = 9
+"""Window (0.5 KB) for modules imported with little memory; the decoder needs another 1.3 KB."""
 _WIDE_BITS = 13
 """Window (8 KB) for modules imported with enough memory."""
 
 
-def pack(files: Mapping[str, bytes], wide: Collection[str], plain: Collection[str]) -> bytes:
+def pack(files: Mapping[str, bytes], wide: Collection[str]) -> bytes:
     """The archive of files by their path from the library's folder on.
 
-    ``wide``: imported while the heap is empty; ``plain``: not deflated.
+    ``wide``: imported while the heap is empty.
     """
-    packed = {path: data if path in plain else _deflated(data, path in wide) for path, data in files.items()}
+    packed = {path: _deflated(data, path in wide) for path, data in files.items()}
     index = ""
     while True:  # as offsets grow in length with the index
         at = 2 + len(index)
         lines = []
         for path, data in packed.items():
-            lines.append(
-                f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {-at if path in plain else at}"
-            )
+            lines.append(f"\n{path.removeprefix('armtempo_').removesuffix('.mpy')} {at}")
             at += len(data)
         made = "".join(lines) + "\n"
         if len(made) == len(index):

@@ -32,8 +32,6 @@ _READER = "archive.py"
 """File of the board package that finds modules in the archive."""
 _READER_NAME = "armtempo_archive"
 _WIDE = [f"{PACKAGES[0]}/{CORE}.mpy"]
-_PLAIN = [f"{PACKAGES[0]}/override.mpy"]
-"""What is imported last when a motion starts; not deflated, as inflating takes 2.4 KB and memory is shortest."""
 _HASH = f"{PACKAGES[1]}/program_hash.py"
 _MAIN = f"{PACKAGES[0]}.app.program"
 _STEPGEN, _MOTION = f"{PACKAGES[0]}.stepgen", f"{PACKAGES[0]}.motion"
@@ -54,6 +52,7 @@ _TOGETHER = {
 }
 """Modules that are imported later, with those that come and go with them: each costs memory for names and a table."""
 _FEATURES = f"{PACKAGES[0]}.features"
+_HEAP = f"{PACKAGES[0]}.heap"
 _NO_FEATURES = "".join(f"{name} = 0\n" for name in ("SEQUENCES", "OUTPUTS", "JOG", "SPEED", "ALL", "BITS"))
 _IN_FIRMWARE = (
     f"{_MOTION}.next_motion",
@@ -132,7 +131,7 @@ def library(mpy: int | None) -> dict[str, bytes]:
         return {f"{LIBRARY}/{name}": data for name, data in sources.items()}
     packed = dict(compiled(mpy))
     reader = f"{_READER_NAME}.mpy"
-    files = {reader: packed.pop(reader), ARCHIVE: archive.pack(packed, _WIDE, _PLAIN)}
+    files = {reader: packed.pop(reader), ARCHIVE: archive.pack(packed, _WIDE)}
     return {f"{LIBRARY}/{name}": data for name, data in files.items()}
 
 
@@ -188,6 +187,7 @@ def compact_program() -> Compact:
         if module not in _IN_FIRMWARE
     }
     sources[_FEATURES] = _NO_FEATURES
+    sources[_HEAP] = _short_list(sources[_HEAP])
     sources[table.__name__] = _short_table(sources[table.__name__])
     sources[f"{PACKAGES[1]}.program_hash"] = _hash()
     board = package_folder(PACKAGES[0])
@@ -204,6 +204,15 @@ def compact_program() -> Compact:
         _TOGETHER,
         [f"{PACKAGES[0]}.{name}" for name in _AT_REST],
     )
+
+
+def _short_list(text: str) -> str:
+    """The modules that are given up (heap.py), without those that are not among the files: a text in the heap too."""
+    gone = [*_IN_FIRMWARE, *(module for modules in _TOGETHER.values() for module in modules)]
+    names = {name for module in gone for name in (module, module.rsplit(".", 1)[-1])}
+    begin = text.index('_NOT_ALWAYS = """') + len('_NOT_ALWAYS = """')
+    end = text.index('"""', begin)
+    return text[:begin] + " ".join(name for name in text[begin:end].split() if name not in names) + text[end:]
 
 
 def _short_table(text: str) -> str:

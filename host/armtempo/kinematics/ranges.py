@@ -86,7 +86,9 @@ class Ranges:
         for angle, (low, high, near), before in zip(angles, self._whole, previous, strict=True):
             if not (low <= angle <= high and -near < angle - before < near):
                 angle = placed(angle, low, high, before)
-                most = max(most, low - angle, angle - high)
+                outside = low - angle if angle < low else angle - high
+                if outside > most:
+                    most = outside
             found.append(angle)
         return found, most
 

@@ -2,18 +2,28 @@
 
 The board lets the motion's own time run at another rate, so the arm stays on its path: in the brake time the
 rate goes from r0 to r1, by the law in ``armtempo_board/stepgen/time_law.py``. Braking and pauses have r1 = 0,
-and the ramp shape that makes them shortest for the motion; other changes of speed have separate times, and
-one fixed shape.
+and those of RAMP_SHAPES that make them shortest from where they begin; other changes of speed have separate
+times, and one fixed shape.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 from armtempo_shared.limits import TICK_HZ
-from armtempo_shared.motion import EVEN_RAMP, RAMP_ENTRIES, RAMP_UNIT_TICKS
+from armtempo_shared.motion import (
+    EVEN_RAMP,
+    LEAST_RAMP_BITS,
+    MOST_RAMP_BITS,
+    OTHER_ENTRIES,
+    RAMP_LENGTH,
+    RAMP_SHAPES,
+    REST_ENTRIES,
+)
+from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
@@ -25,6 +35,8 @@ EXCESS = 1.25
 limits could brake only very slowly within them, as braking adds to the acceleration and jerk of the path."""
 
 Rates = tuple[tuple[float, float], ...]
+Shapes = NDArray[np.int64]
+"""Numbers of RAMP_SHAPES."""
 TO_REST: Rates = ((1.0, 0.0), (0.75, 0.0), (0.5, 0.0), (0.25, 0.0), (0.1, 0.0))
 OTHERS: Rates = (
     (0.0, 1.0),
@@ -37,33 +49,36 @@ OTHERS: Rates = (
     (0.2, 0.9),
 )
 """Rates before and after for which the times are computed; all others need less. The first of TO_REST and the
-first two of OTHERS need the most."""
+first two of OTHERS need the most; from 0.5 to rest does where the motion ends within a ramp from 1."""
+_WORST_TO_REST = TO_REST[:3:2]
+_WORST_OTHERS = OTHERS[:2]
 
-UNIT_S = RAMP_UNIT_TICKS / TICK_HZ
-_LONGEST = 65535
-_LONGER = 1.02
-_STARTS = 6  # in each part of the table
-_PHASES = 15  # of each piece of a ramp
-_SHAPES = [p + 16 * q for p in (1, 2, 3, 4, 5, 6, 7) for q in (5, 6, 7, 8, 9, 10, 12, 14) if p < q]
-_SHAPE_STARTS = 12
+LONGEST_S = (RAMP_LENGTH << MOST_RAMP_BITS) / TICK_HZ
+_LONGER = 1.01
+_REST_STARTS, _OTHER_STARTS = 3, 6  # in each part of a table
+_PHASES = 15  # of each piece of a ramp,
+_FEW_PHASES = 8  # and where shapes are compared
 _SAMPLES = 4000
 _SHORTEST_S = 0.01
-_HALVINGS = 6
-_NEGLIGIBLE = 1e-6  # of RAMP_UNIT_TICKS
+_ROOM = 1.1  # for entries to be lengthened
+_HALVINGS = 7
+_NEGLIGIBLE = 1e-6  # of the unit of lengths
+_SHAPES = np.frombuffer(RAMP_SHAPES, np.uint8).reshape(-1, 2)
 
 
 @dataclass(frozen=True, eq=False)
 class BrakeTimes:
-    """Durations of changes that begin at RAMP_ENTRIES equidistant times of a motion, in RAMP_UNIT_TICKS.
+    """How long changes take that begin at equal steps of a motion's time, in 2**``unit_bits`` ticks; linear in between.
 
-    Linearly interpolated. ``to_rest``, ``others``: (RAMP_ENTRIES,), integers. ``shape``: of ramps to rest, as
-    in the record of a motion (``armtempo_shared.motion``).
+    ``to_rest``: (REST_ENTRIES,), ``others``: (OTHER_ENTRIES,), whole numbers. ``shapes``: (REST_ENTRIES - 1,), of ramps
+    to rest from each entry to the next (``armtempo_shared.motion``).
     """
 
     duration_s: float
     to_rest: Array
     others: Array
-    shape: int = EVEN_RAMP
+    shapes: Shapes
+    unit_bits: int
 
     def rest_s(self, time_s: float | Array) -> Array:
         """Brake time from given times of the motion, seconds, of the same shape."""
@@ -74,12 +89,23 @@ class BrakeTimes:
         return self._at(self.others, time_s)
 
     def _at(self, table: Array, time_s: float | Array) -> Array:
-        return np.asarray(UNIT_S * np.interp(time_s, np.linspace(0.0, self.duration_s, RAMP_ENTRIES), table))
+        return np.asarray(
+            self._unit_s * np.interp(time_s, np.linspace(0.0, self.duration_s, len(table)), table)
+        )
+
+    def rest_shapes(self, time_s: Array) -> Shapes:
+        """The shapes of ramps to rest from times of the motion on."""
+        place = (np.asarray(time_s) * (len(self.shapes) / self.duration_s)).astype(int)
+        return np.asarray(self.shapes[np.clip(place, 0, len(self.shapes) - 1)])
+
+    @property
+    def _unit_s(self) -> float:
+        return float((1 << self.unit_bits) / TICK_HZ)
 
     @property
     def longest_rest_s(self) -> float:
         """The longest brake time."""
-        return UNIT_S * float(self.to_rest.max())
+        return self._unit_s * float(self.to_rest.max())
 
 
 def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
@@ -94,65 +120,97 @@ def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
             f"the motion {trajectory.name!r} goes beyond the arm's acceleration or jerk limits",
             "plan it again",
         )
-    shape = _best_shape(ramps)
-    to_rest = _table(ramps, TO_REST, TO_REST[:1], np.full(RAMP_ENTRIES, _SHORTEST_S / UNIT_S), shape)
-    others = _table(ramps, OTHERS, OTHERS[:2], to_rest, EVEN_RAMP)
-    return BrakeTimes(trajectory.duration_s, to_rest, others, shape)
-
-
-def _best_shape(ramps: _Ramps) -> int:
-    """The ramp shape with the smallest mean ratio of the brake time to that of the best shape at each start."""
-    starts = np.tile((np.arange(_SHAPE_STARTS) + 0.5) / _SHAPE_STARTS, len(_SHAPES))
-    shapes = np.repeat(_SHAPES, _SHAPE_STARTS)
-    lengths = ramps.shortest_s(starts, TO_REST[:1], np.full(len(starts), _SHORTEST_S), shapes)
-    lengths = lengths.reshape(len(_SHAPES), -1)
-    return _SHAPES[int(np.argmin(np.mean(lengths / lengths.min(axis=0), axis=1)))]
-
-
-def _table(ramps: _Ramps, rates: Rates, worst: Rates, least: Array, shape: int) -> Array:
-    """The table's entries, at least ``least``; ``worst``: the rates that need the most time."""
-    parts = RAMP_ENTRIES - 1
-    place = np.arange(_STARTS * parts + 1) / _STARTS
-    needed = (
-        ramps.shortest_s(
-            place / parts, worst, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), least), shape
-        )
-        / UNIT_S
+    shapes = _best_shapes(ramps.with_few_phases())
+    kinds = (
+        _Kind(ramps, TO_REST, _WORST_TO_REST, shapes, _REST_STARTS),
+        _Kind(ramps, OTHERS, _WORST_OTHERS, np.full(OTHER_ENTRIES - 1, EVEN_RAMP), _OTHER_STARTS),
     )
-    table = np.maximum(needed[::_STARTS], least)
-    _lift(table, place, needed)
-    table = np.minimum(np.ceil(table), _LONGEST)
-    place = np.arange(2 * _STARTS * parts + 1) / (2 * _STARTS)
-    length_s = np.zeros(len(place))
-    found = np.zeros(len(place), bool)
+    longest = _ROOM * TICK_HZ * max(float(kind.needed_s.max()) for kind in kinds)
+    bits = LEAST_RAMP_BITS
     while True:
-        before_s, length_s = length_s, UNIT_S * np.interp(place, np.arange(RAMP_ENTRIES), table)
-        new = np.flatnonzero(length_s != before_s)
-        found[new] = ramps.excess(place[new] / parts, length_s[new], rates, shape) > EXCESS
-        found &= length_s < UNIT_S * _LONGEST
-        if not np.any(found):
-            return table
-        _lift(table, place, np.where(found, _LONGER * length_s / UNIT_S, 0.0))
-        table = np.minimum(np.ceil(table), _LONGEST)
+        while bits < MOST_RAMP_BITS and longest > RAMP_LENGTH << bits:
+            bits += 1
+        to_rest, others = (kind.table((1 << bits) / TICK_HZ) for kind in kinds)
+        if bits == MOST_RAMP_BITS or max(to_rest.max(), others.max()) < RAMP_LENGTH:
+            return BrakeTimes(trajectory.duration_s, to_rest, others, shapes, bits)
+        bits += 1
 
 
-def _lift(table: Array, place: Array, needed: Array) -> None:
-    """Increase entries as little as possible so that the interpolated table is at least ``needed``."""
-    part = np.minimum(place.astype(int), len(table) - 2)
-    weight = place - part
+def _best_shapes(ramps: _Ramps) -> Shapes:
+    """(REST_ENTRIES - 1,): those whose ramps to rest from ends and middle of a part are shortest in the mean."""
+    starts = np.linspace(0.0, 1.0, 2 * REST_ENTRIES - 1)
+    even_s = ramps.shortest_s(starts, _WORST_TO_REST, np.full(len(starts), _SHORTEST_S), EVEN_RAMP)
+    lengths = np.array(
+        [ramps.shorter_s(starts, _WORST_TO_REST, even_s, shape) for shape in range(len(_SHAPES))]
+    )
+    return np.asarray(np.argmin(lengths[:, :-2:2] + lengths[:, 1::2] + lengths[:, 2::2], axis=0))
+
+
+class _Kind:
+    """Changes between ``rates``, of which ``worst`` need most, with a shape in each part of their table.
+
+    ``needed_s``: (parts, starts + 1), how long those take that begin at equal steps from one end of a part to another.
+    """
+
+    def __init__(self, ramps: _Ramps, rates: Rates, worst: Rates, shapes: Shapes, starts: int) -> None:
+        self._ramps, self._rates, self._shapes = ramps, rates, shapes
+        self._starts = starts
+        at, shape = self._places(starts)
+        least_s = np.full(at.size, _SHORTEST_S)
+        self.needed_s = ramps.shortest_s(at.ravel(), worst, least_s, shape.ravel()).reshape(at.shape)
+
+    def _places(self, starts: int) -> tuple[Array, Shapes]:
+        """Parts of the motion's time, and the shapes from there on."""
+        parts = len(self._shapes)
+        at = (np.arange(parts)[:, None] + np.linspace(0.0, 1.0, starts + 1)) / parts
+        return at, np.repeat(self._shapes, starts + 1).reshape(at.shape)
+
+    def table(self, unit_s: float) -> Array:
+        """The entries, in units; RAMP_LENGTH: perhaps too short."""
+        needed = self.needed_s / unit_s
+        table: Array = np.append(needed[:, 0], 0.0)
+        table[1:] = np.maximum(table[1:], needed[:, -1])
+        _lift(table, needed)
+        table = np.minimum(np.ceil(table), RAMP_LENGTH)
+        at, shape = self._places(2 * self._starts)
+        length = np.zeros(at.shape)
+        found = np.zeros(at.shape, bool)
+        while True:
+            before, length = length, _between(table, 2 * self._starts)
+            new = length != before
+            excess = self._ramps.excess(at[new], unit_s * length[new], self._rates, shape[new])
+            found[new] = excess > EXCESS
+            found &= length < RAMP_LENGTH
+            if not np.any(found):
+                return table
+            _lift(table, np.where(found, _LONGER * length, 0.0))
+            table = np.minimum(np.ceil(table), RAMP_LENGTH)
+
+
+def _between(table: Array, starts: int) -> Array:
+    """(parts, starts + 1): a table at equal steps from each entry to the next."""
+    weight = np.linspace(0.0, 1.0, starts + 1)
+    return np.asarray((1.0 - weight) * table[:-1, None] + weight * table[1:, None])
+
+
+def _lift(table: Array, needed: Array) -> None:
+    """Lengthen the entries where the table between them is less than ``needed``, by as little as will do."""
+    starts = needed.shape[1] - 1
     while True:
-        missing = needed - (1.0 - weight) * table[part] - weight * table[part + 1]
-        worst = int(np.argmax(missing))
-        if missing[worst] <= _NEGLIGIBLE:
+        missing = needed - _between(table, starts)
+        part, start = divmod(int(np.argmax(missing)), starts + 1)
+        most = missing[part, start]
+        if most <= _NEGLIGIBLE:
             return
-        share = np.array([1.0 - weight[worst], weight[worst]])
-        table[part[worst] : part[worst] + 2] += missing[worst] * share / np.sum(share**2)
+        share = np.array([1.0 - start / starts, start / starts])
+        table[part : part + 2] += most * share / np.sum(share**2)
 
 
 class _Ramps:
     """Acceleration and jerk of a motion during changes of its rate, relative to the limits (J, 3)."""
 
     def __init__(self, trajectory: Trajectory, allowed: Array) -> None:
+        self._phases = _PHASES
         self._duration_s = trajectory.duration_s
         self._allowed = allowed
         time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
@@ -161,14 +219,32 @@ class _Ramps:
         self._motion = np.stack([trajectory(time, order).T for order in (1, 2, 3)])
         self.worst_of_motion = float(np.max(np.abs(self._motion[1:]) / allowed.T[1:, :, None]))
 
-    def shortest_s(self, starts: Array, rates: Rates, least_s: Array, shapes: Array | int) -> Array:
-        """Shortest durations, at least ``least_s``, within 1 %, for ``starts`` (fractions of the motion's time)."""
+    def with_few_phases(self) -> _Ramps:
+        """The same, looked at in fewer places of each ramp."""
+        found = copy(self)
+        found._phases = _FEW_PHASES
+        return found
+
+    def shortest_s(self, starts: Array, rates: Rates, least_s: Array, shapes: Shapes | int) -> Array:
+        """From ``least_s`` on, to 1 %, for each of ``starts``, parts of the motion's time; ``shapes``: theirs."""
         shapes = np.broadcast_to(shapes, starts.shape)
         low, high = least_s.copy(), least_s.copy()
         left = np.arange(len(starts))
         while len(left := left[self.excess(starts[left], high[left], rates, shapes[left]) > EXCESS]):
             low[left], high[left] = high[left], 2.0 * high[left]
-            left = left[high[left] < 2.0 * UNIT_S * _LONGEST]
+            left = left[high[left] < 2.0 * LONGEST_S]
+        return self._halved(starts, rates, low, high, shapes)
+
+    def shorter_s(self, starts: Array, rates: Rates, most_s: Array, shape: int) -> Array:
+        """As ``shortest_s``, but from half of ``most_s`` on, and twice that where it is not enough."""
+        shapes = np.full(len(starts), shape)
+        enough = self.excess(starts, most_s, rates, shapes) <= EXCESS
+        low = np.where(enough, 0.5 * most_s, most_s)
+        return np.where(enough, self._halved(starts, rates, low, most_s, shapes), 2.0 * most_s)
+
+    def _halved(self, starts: Array, rates: Rates, low: Array, high: Array, shapes: Shapes) -> Array:
+        """Of times between ``low``, which is not enough, and ``high``, which is."""
+        low, high = low.copy(), high.copy()
         left = np.flatnonzero(high > low)
         for _ in range(_HALVINGS):
             middle = 0.5 * (low[left] + high[left])
@@ -177,13 +253,13 @@ class _Ramps:
             high[left] = np.where(fails, high[left], middle)
         return high
 
-    def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Array | int) -> Array:
-        """The largest ratio of acceleration or jerk to its limit in changes between ``rates``, for each start."""
+    def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Shapes | int) -> Array:
+        """The largest acceleration or jerk over its limit in changes between ``rates``, for each start."""
         worst = np.zeros(len(starts))
         if not len(starts):
             return worst
         length = length_s[:, None]
-        place, rise, slope, bend, way, whole = _ramp(np.atleast_1d(shapes))
+        place, rise, slope, bend, way, whole = _ramp(np.atleast_1d(shapes), self._phases)
         for before, after in rates:
             least, change = min(before, after), after - before
             rate = least + abs(change) * rise
@@ -210,17 +286,16 @@ class _Ramps:
         return values[0], values[1], values[2]
 
 
-def _ramp(shapes: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """r, S, S', S'' and e (N, 3 * _PHASES) at the ends of each piece and in between, and e(1) (N, 1), of shapes (N,).
+def _ramp(shapes: Shapes, phases: int) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """r, S, S', S'' and e (N, 3 * phases) at the ends of each piece and in between, and e(1) (N, 1), of shapes (N,).
 
     As in ``armtempo_board/stepgen/time_law.py``.
     """
-    second, first = np.divmod(shapes[:, None], 16.0)
-    first, second = first / 16.0, second / 16.0
-    whole = np.rint(64 * (3 - first - second - (1 - first) / (1 + second - first)) / 3) / 64
+    second, first = np.divmod(_SHAPES[shapes, :1], 16)
+    first, second, whole = first / 16.0, second / 16.0, _SHAPES[shapes, 1:] / 64.0
     late = 3 * (1 - whole) - first - second
     slopes = (0.0 * first, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0 * first)
-    at = np.linspace(0.0, 1.0, _PHASES)
+    at = np.linspace(0.0, 1.0, phases)
     rise = way = start = 0.0 * first
     pieces = []
     for width, before, after in zip(

@@ -70,10 +70,12 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
-    """The lengths and the shape of ramps as whole numbers."""
+    """Entries for ramps to rest and others, and the bits of their unit, as whole numbers."""
     if brakes is None:
         return motion.NO_RAMPS
-    return [int(entry) for entry in brakes.to_rest], [int(entry) for entry in brakes.others], brakes.shape
+    shapes = (motion.RAMP_LENGTH + 1) * np.append(brakes.shapes, motion.EVEN_RAMP)
+    to_rest = [int(entry) for entry in brakes.to_rest + shapes]
+    return to_rest, [int(entry) for entry in brakes.others], brakes.unit_bits
 
 
 def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:

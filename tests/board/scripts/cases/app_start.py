@@ -133,7 +133,7 @@ def case_an_engine_that_cannot_be_made_is_named():
 def case_a_damaged_motion_is_listed_and_refused():
     arm = stand_in.arm()
     root = folder_with(arm)
-    for name, data in (("cut", b"ATM3"), ("empty", b""), ("noise", bytes(20000))):
+    for name, data in (("cut", b"ATM4"), ("empty", b""), ("noise", bytes(20000))):
         with open(root + "/" + name + ".atm", "wb") as file:
             file.write(data)
     _, host, hello = started(root)

@@ -6,11 +6,11 @@ import random
 
 import cases
 from armtempo_shared import motion
-from brake_motion import BRAKE_TICKS, RAMPS, path, record
+from brake_motion import BRAKE_TICKS, RAMP_BITS, RAMPS, path, record
 from engine_rig import FEWER, TICK_HZ, Rig, arm
 
 SEED = 20262
-LENGTH_TICKS = -(-(RAMPS[0][0] * motion.RAMP_UNIT_TICKS) // 64000) * 64000
+LENGTH_TICKS = -(-(RAMPS[0][0] << RAMP_BITS) // 64000) * 64000
 """Of a ramp, as it is run."""
 
 

@@ -16,8 +16,8 @@ from armtempo_board.errors import Refused
 from armtempo_shared import codes
 from armtempo_shared.limits import LONGEST_RUN_TICKS
 from armtempo_shared.messages import NO_JOINT, RESUME
-from armtempo_shared.motion import EVEN_RAMP, NO_RAMPS, RAMP_ENTRIES, RAMP_UNIT_TICKS
-from brake_motion import BRAKE_TICKS, RAMPS, ramp_way, record, some_shape
+from armtempo_shared.motion import EVEN_RAMP, NO_RAMPS, RAMP_SHAPES
+from brake_motion import BRAKE_TICKS, RAMP_BITS, RAMPS, ramp_way, record
 from engine_rig import FEWER, TICK_HZ, Rig, arm
 
 SEED = 20263
@@ -56,17 +56,25 @@ def joints():
 
 
 def some_ramps():
-    """Lengths up to BRAKE_TICKS that are all different, and a shape."""
-    to_rest, others = [[random.randrange(300, longest) for longest in lengths] for lengths in RAMPS[:2]]
-    return to_rest, others, some_shape()
+    """Lengths up to BRAKE_TICKS that are all different, and shapes."""
+    ramps = [
+        [
+            random.randrange(300, longest) + 2048 * random.randrange(len(RAMP_SHAPES) // 2)
+            for longest in lengths
+        ]
+        for lengths in RAMPS[:2]
+    ]
+    return ramps[0], ramps[1], RAMP_BITS
 
 
-def length_by_table(motion, to_rest, duration, at):
-    """How long a change takes that begins at a time of the motion, in ticks."""
-    ramps = struct.unpack_from("<32H", motion.data, 16 if to_rest else 80)
-    place = (RAMP_ENTRIES - 1) * min(at / duration, 1.0)
-    first = min(int(place), RAMP_ENTRIES - 2)
-    return RAMP_UNIT_TICKS * (ramps[first] + (ramps[first + 1] - ramps[first]) * (place - first))
+def by_table(motion, to_rest, duration, at):
+    """How long a change takes that begins at a time of the motion, in ticks, and the shape just before and after it."""
+    ramps = struct.unpack_from("<64H" if to_rest else "<32H", motion.data, 16 if to_rest else 144)
+    place = (len(ramps) - 1) * min(at / duration, 1.0)
+    first = min(int(place), len(ramps) - 2)
+    length, after = [ramp % 2048 for ramp in ramps[first : first + 2]]
+    shapes = [ramps[max(int(place - 0.02), 0)] // 2048, ramps[first] // 2048]
+    return (length + (after - length) * (place - first)) * 2**RAMP_BITS, shapes
 
 
 def some_motion():
@@ -103,10 +111,12 @@ def begin(motion, rate=1000):
         end = override.ramp_end_ticks(from_ticks, to)
         ramp(from_ticks, to)
         assert override.steady_ticks() == end
-        longer = end - start - length_by_table(motion, to == 0, override._duration_ticks, passed)
-        near = RAMP_UNIT_TICKS * (1 + 725 * 31 * 2 / 4096)  # two places of 4096
-        assert -near < longer <= 64000 + near, longer
-        rig.laws.append((start, passed, end - start, before, to, EVEN_RAMP if to else motion.brake_shape))
+        length, shapes = by_table(motion, to == 0, override._duration_ticks, passed)
+        near = 2**RAMP_BITS * (1 + 725 * 63 * 2 / 4096)  # two places of 4096
+        assert -near < end - start - length <= 64000 + near, (start, end, length)
+        shape = motion.ramp(int(passed) >> override._shift, override._parts, to == 0) >> 11
+        assert shape in shapes, (shape, shapes)
+        rig.laws.append((start, passed, end - start, before, to, shape))
 
     rig.engine.rates.override.ramp = watched
     rig.engine.start()
@@ -280,13 +290,14 @@ def case_stops():  # not emulated
                 change(rig)
         rig.engine.brake()
         asked = rig.board.now - rig.zero()
+        stood = not rig.engine.moving  # in a pause
         rig.run_to(asked + 5 * TICK_HZ)
         assert not rig.engine.moving and rig.engine.fault == 0, number
-        stop_ticks = rig.engine.rates.duration_ticks - asked
-        assert stop_ticks < LONGEST_STOP_TICKS, (number, stop_ticks)
+        end = asked if stood else rig.engine.rates.duration_ticks
+        assert end - asked < LONGEST_STOP_TICKS, (number, end - asked)
         rig.turn()
         counts = check_steps(rig, recorders, expected)
-        rest = motion_ticks(rig.laws, rig.engine.rates.duration_ticks)
+        rest = motion_ticks(rig.laws, end)
         for count, steps in zip(counts, expected):
             due = len([None for ticks, _ in steps if ticks < rest])
             assert abs(count - due) <= 1, (number, count, due)

@@ -1,7 +1,7 @@
 """Check motion records and walk every joint of them; runs on all interpreters.
 
-Arguments: pulse ticks, gap ticks, room, start and length of braking in ticks (0 0: none; the length whole
-in RAMP_UNIT_TICKS), then records. Prints what the check says of each, and writes its steps next to it (.steps), little
+Arguments: pulse ticks, gap ticks, room, start and length of braking in ticks (0 0: none; the length whole in a unit for
+it) and its shape, then records. Prints what the check says of each, and writes its steps next to it (.steps), little
 endian int32 each: joint, direction, time of it or of the one before in 1024 ticks, rising edge, falling edge.
 """
 
@@ -18,7 +18,7 @@ from armtempo_board.motion import motion_check as checking
 from armtempo_board.stepgen.override import Override
 from armtempo_board.stepgen.step_generator import StepGenerator
 from armtempo_shared import engine_memory
-from armtempo_shared.motion import RAMP_UNIT_TICKS, Motion
+from armtempo_shared.motion import Motion
 
 MASK = 1023
 OVERRIDE = Override()
@@ -28,14 +28,16 @@ step_rates.together = 1_000_000
 
 
 class SameRamps:
-    """A motion, as far as ``Override`` asks one, whose ramps all last as long."""
+    """A motion, as far as ``Override`` asks one, whose ramps are all the same."""
 
     def __init__(self, ticks, shape):
-        self._units = ticks // RAMP_UNIT_TICKS
-        self.brake_shape = shape
+        self.ramp_bits = 14
+        while ticks >> self.ramp_bits > 2047:
+            self.ramp_bits += 1
+        self._entry = (ticks >> self.ramp_bits) + 2048 * shape
 
-    def ramp_units(self, _at, _parts, _to_rest):
-        return self._units
+    def ramp(self, _at, _parts, _to_rest):
+        return self._entry
 
 
 FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}

@@ -1,15 +1,14 @@
 """A small motion of three joints that turn and rest, as a record and as a function of time."""
 
-import random
-
 from armtempo_shared import motion
 from armtempo_shared.basis import BASIS, FACTORIAL
 from armtempo_shared.limits import TICK_HZ
 
 SEGMENTS = 9
 BRAKE_TICKS = TICK_HZ // 5
-_LENGTHS = (BRAKE_TICKS // motion.RAMP_UNIT_TICKS,) * motion.RAMP_ENTRIES
-RAMPS = _LENGTHS, _LENGTHS, motion.EVEN_RAMP
+RAMP_BITS = 14
+_LENGTH = (BRAKE_TICKS >> RAMP_BITS,)
+RAMPS = _LENGTH * motion.REST_ENTRIES, _LENGTH * motion.OTHER_ENTRIES, RAMP_BITS
 # steps at the control points, seconds at those of the time axis
 ANGLES = (
     (0, 0, 0, 0, 0, 400, 1800, 2500, 3000, 3000, 3000, 3000, 3000, 3000),
@@ -29,18 +28,10 @@ def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES):
     return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0))
 
 
-def some_shape():
-    """That of a ramp to rest."""
-    first = random.randrange(1, 15)
-    return first + 16 * random.randrange(first + 1, 16)
-
-
 def ramp_way(shape, r):
     """e at r of a shape: the integral of a rate from 0 to 1 whose slope is linear between 0, p/16, q/16 and 1."""
-    first, second = (shape & 15) / 16, (shape >> 4) / 16
-    equal = (1 - first) / (1 + second - first)  # of the rise that the slope at q/16 is the cause of
-    whole = int(64 * (3 - first - second - equal) / 3 + 0.5) / 64
-    late = 3 - first - second - 3 * whole
+    first, second = (motion.RAMP_SHAPES[2 * shape] & 15) / 16, (motion.RAMP_SHAPES[2 * shape] >> 4) / 16
+    late = 3 - first - second - 3 * motion.RAMP_SHAPES[2 * shape + 1] / 64
     way = rate = start = 0.0
     slopes = (0.0, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0)
     for width, before, after in zip((first, second - first, 1 - second), slopes, slopes[1:]):
