@@ -106,7 +106,14 @@ def _check(kind: Any) -> Callable[[object], bool]:
         return _PLAIN[kind]
     if origin in (Union, UnionType):
         checks = [_check(one) for one in inner]
-        return lambda value: any(check(value) for check in checks)
+
+        def fits_one(value: object) -> bool:
+            for check in checks:  # noqa: SIM110: half the time of any()
+                if check(value):
+                    return True
+            return False
+
+        return fits_one
     if isinstance(kind, dataclasses.InitVar):
         return _check(cast(Any, kind.type))
     if origin is Callable:
@@ -138,7 +145,7 @@ def _is_text(value: object) -> bool:
 def _are_numbers(value: object) -> bool:
     try:
         array = np.asarray(value)
-        return array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
+        return array.dtype.kind in "iuf" and np.count_nonzero(np.isfinite(array)) == array.size
     except (ValueError, TypeError, OverflowError):
         return False
 

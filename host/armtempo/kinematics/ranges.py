@@ -21,10 +21,19 @@ def placed(angle: float, low: float, high: float, previous: float) -> float:
 
     All in rad; NaN stays NaN.
     """
+    if high - low < _ONE_TURN and low - math.tau < angle < high + math.tau:
+        # one turn at most to add: several times as fast
+        below, above = angle, angle
+        if angle < low - TOLERANCE_RAD:
+            above = angle + math.tau
+        elif angle > high + TOLERANCE_RAD:
+            below = angle - math.tau
+        at = above if above <= high + TOLERANCE_RAD else below
+        if low - TOLERANCE_RAD <= at <= high + TOLERANCE_RAD:
+            return min(max(at, low), high)
+        return below if low - below < above - high else above
     if math.isnan(angle):
         return angle
-    if high - low < _ONE_TURN and low - math.tau < angle < high + math.tau:
-        return _placed_once(angle, low, high)
     least = math.ceil((low - TOLERANCE_RAD - angle) / math.tau)
     most = math.floor((high + TOLERANCE_RAD - angle) / math.tau)
     if least <= most:
@@ -36,19 +45,6 @@ def placed(angle: float, low: float, high: float, previous: float) -> float:
 
 _ONE_TURN = math.tau - 3.0 * TOLERANCE_RAD
 """In a range narrower than this only one number of whole turns fits."""
-
-
-def _placed_once(angle: float, low: float, high: float) -> float:
-    """``placed`` for such a range and an angle less than a turn outside of it, several times as fast."""
-    below, above = angle, angle
-    if angle < low - TOLERANCE_RAD:
-        above = angle + math.tau
-    elif angle > high + TOLERANCE_RAD:
-        below = angle - math.tau
-    at = above if above <= high + TOLERANCE_RAD else below
-    if low - TOLERANCE_RAD <= at <= high + TOLERANCE_RAD:
-        return min(max(at, low), high)
-    return below if low - below < above - high else above
 
 
 @dataclass(frozen=True)
