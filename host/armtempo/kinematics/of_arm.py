@@ -37,18 +37,19 @@ _COST = 2.0
 class Solution:
     """Joint angles for a pose of the tool."""
 
-    __slots__ = ("_found", "usable")
-
-    usable: bool
-    """Whether the arm can take these angles."""
+    __slots__ = ("_found",)
 
     def __init__(self, found: Candidate | NumericalSolution) -> None:
         self._found = found
-        self.usable = found.usable
 
     def __repr__(self) -> str:
         where = f"angles_deg={self.angles_deg.round(4).tolist()}, branch={self.branch!r}"
         return f"Solution({where}, rejections={self.rejections!r}, distance_deg={self.distance_deg:.4g})"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the arm can take these angles."""
+        return self._found.usable
 
     @property
     def angles_deg(self) -> Array:
