@@ -166,7 +166,7 @@ def _within_tolerance(
         swing = _SWINGS * most_swing(problem, angles, _COST)
         if np.all(np.abs(solver.ranges.excess(angles)) <= swing):
             starts.append(angles)
-    return descents(solver.moving.with_all, target, near, starts)
+    return descents(solver.moving.with_all, target, near, starts) if starts else []
 
 
 def _whole(rows: Sequence[float]) -> Pose:
