@@ -112,7 +112,7 @@ def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) 
 
         commandline.wait_for(slow, "the run")
         assert "through" in on_board("pause")
-        assert "in a pause" in on_board("status")
+        assert "paused" in on_board("status")
         on_board("resume")
         assert "at 5 %" in on_board("status")
         on_board("speed", "100")
