@@ -12,6 +12,7 @@ import re
 from pathlib import Path
 
 BOARD = Path(__file__).parent / "armtempo_board"
+SHARED = Path(__file__).parents[1] / "shared" / "armtempo_shared"
 _LINE = re.compile(r"(_?(\w+) = const\().*?(\)(?:\s+#(?: = ([A-Z0-9_ +-]+))?.*)?)$")
 _HOME = re.compile(r"# .*\bas in (\w+)\.py")
 _ARITHMETIC = (ast.BinOp, ast.UnaryOp, ast.Constant, ast.operator, ast.unaryop)
@@ -40,7 +41,7 @@ def written(path: Path) -> str:
             block = named[1] if named else block if line.startswith("# of ") else ""
         elif home := named[1] if named else block:
             if home not in homes:
-                (source,) = BOARD.rglob(f"{home}.py")
+                (source,) = (*BOARD.rglob(f"{home}.py"), *SHARED.glob(f"{home}.py"))
                 homes[home] = constants(source)
             known = homes[home]
             if found[4]:

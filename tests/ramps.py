@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPES
+from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPES, RAMP_WAYS
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 
 def rise(shape: int = EVEN_RAMP) -> BSpline:
     """S of one of RAMP_SHAPES: its slope is linear between 0, p/16, q/16 and 1, its integral from 0 to 1 is given."""
-    ends, way = RAMP_SHAPES[2 * shape : 2 * shape + 2]
+    ends, way = RAMP_SHAPES[shape], RAMP_WAYS[shape]
     places = np.array([0, ends & 15, ends >> 4, 16]) / 16
     hats = np.array([places[2], 1 - places[1]]) / 2  # S(1) and e(1) by the slopes at p and q
     ways = hats * (1 - np.array([sum(places[:3]), sum(places[1:])]) / 3)

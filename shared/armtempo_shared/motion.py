@@ -41,7 +41,9 @@ SHARED_AXIS = 1
 REST_ENTRIES = 64
 OTHER_ENTRIES = 32
 RAMP_LENGTH = 2047
-"""Mask of an entry's length, and the longest; its shape is in the bits above these 11."""
+"""Mask of an entry's length, and the longest."""
+RAMP_SHAPE_BIT = 11
+"""Its shape is in the bits from this one on."""
 LEAST_RAMP_BITS = 6
 MOST_RAMP_BITS = 19
 """Of the unit of lengths; the longest ramp takes 12.8 s then."""
@@ -50,13 +52,17 @@ _RAMPS = "<%dH" % (REST_ENTRIES + OTHER_ENTRIES)
 _RAMPS_AT = struct.calcsize(_HEAD)
 HEAD_SIZE = _RAMPS_AT + struct.calcsize(_RAMPS)
 RAMP_SHAPES = (
-    b"\xb5\x20\xc2\x2a\x95\x26\x43\x36\x64\x24\x82\x20\xe5\x20\xf1\x20\xf1\x1c\x21\x37\xf1\x24\x71\x2c"
-    b"\x43\x26\xc2\x20\xf4\x1e\x76\x22\xf6\x1e\xa6\x20\xf1\x28\xf5\x22\x84\x21\x93\x29\xf3\x28\xf1\x1e"
-    b"\xa4\x2a\x82\x26\xf3\x24\xf1\x22\xf3\x1e\xf6\x22\xc8\x1e\x82\x24"
+    b"\xb5\xc2\x95\x43\x64\x82\xe5\xf1\xf1\x21\xf1\x71\x43\xc2\xf4\x76\xf6\xa6\xf1\xf5\x84\x93\xf3\xf1"
+    b"\xa4\x82\xf3\xf1\xf3\xf6\xc8\x82"
 )
-"""Shapes of ramps: p + 16 q and 64 w of each. From the end of a ramp at which the rate is least, its slope rises to s1
-over p/16 of its length, goes to s2 until q/16, and falls to 0; w of the length is the way of a rate from 0 to 1, which
-with p and q says what s1 and s2 are. Each of 30 random motions has one here that is close to its best."""
+"""Of each shape of ramps p + 16 q: from the end of a ramp at which the rate is least, its slope rises to s1 over p/16
+of its length, goes to s2 until q/16, and falls to 0. For each of 30 random motions one is close to its best."""
+RAMP_WAYS = (
+    b"\x20\x2a\x26\x36\x24\x20\x20\x20\x1c\x37\x24\x2c\x26\x20\x1e\x22\x1e\x20\x28\x22\x21\x29\x28\x1e"
+    b"\x2a\x26\x24\x22\x1e\x22\x1e\x24"
+)
+"""Of each shape 64 w: w of the ramp's length is the way of a rate from 0 to 1, which with p and q says what s1 and s2
+are."""
 EVEN_RAMP = 0
 """The shape for changes that are none to rest."""
 NO_RAMPS = (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS

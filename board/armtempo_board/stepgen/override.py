@@ -8,7 +8,7 @@ for. Imported before a motion, and forgotten after it.
 from array import array
 
 from armtempo_shared.limits import LONGEST_RUN_TICKS
-from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPES
+from armtempo_shared.motion import EVEN_RAMP, RAMP_WAYS
 from micropython import const
 
 from armtempo_board import features
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 # as in motion.py of armtempo_shared: an entry for a ramp
 _RAMP_LENGTH = const(2047)
-_SHAPE_BIT = const(11)
+_RAMP_SHAPE_BIT = const(11)
+
 _MOST_PARTS = const(8190)  # of a motion's time, to look up its ramps
 
 
@@ -86,7 +87,7 @@ class Override:
         grid = time_law.RAMP_GRID_TICKS
         motion = self._motion
         entry: int = motion.ramp(at_ticks >> self._shift, self._parts, rate == 0)
-        return -(-((entry & _RAMP_LENGTH) << motion.ramp_bits) // grid) * grid, entry >> _SHAPE_BIT
+        return -(-((entry & _RAMP_LENGTH) << motion.ramp_bits) // grid) * grid, entry >> _RAMP_SHAPE_BIT
 
     def ramp(self, from_ticks: int, rate: int) -> None:
         """Go to another rate, from a real time on that is after the last ramp."""
@@ -98,7 +99,7 @@ class Override:
         time_law.set_ramp(self.law, shape, self.rate, rate)
         self._set(time_law.START_HIGH)
         self._real_ticks += length
-        way = 64 * min(self.rate, rate) + abs(rate - self.rate) * RAMP_SHAPES[2 * shape + 1]
+        way = 64 * min(self.rate, rate) + abs(rate - self.rate) * RAMP_WAYS[shape]
         self._motion_ticks += way * (length // time_law.RAMP_GRID_TICKS)
         self._set(time_law.END_HIGH)
         self._motion_kiticks = self._motion_ticks >> 10

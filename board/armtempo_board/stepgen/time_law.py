@@ -10,7 +10,7 @@ so outside the ramps real time is exact, however long the motion is. Fractions h
 """
 
 import micropython
-from armtempo_shared.motion import RAMP_SHAPES
+from armtempo_shared.motion import RAMP_SHAPES, RAMP_WAYS
 from micropython import const
 
 TYPE_CHECKING = False
@@ -99,9 +99,9 @@ def set_length(law: "array[int]", ticks: int) -> None:
 
 def set_ramp(law: "array[int]", shape: int, before: int, after: int) -> None:
     """The shape of the ramp (``armtempo_shared.motion``), and the rates before and after, in thousandths."""
-    law[_SHAPE] = RAMP_SHAPES[2 * shape]
+    law[_SHAPE] = RAMP_SHAPES[shape]
     first, second = law[_SHAPE] & 15, law[_SHAPE] >> 4
-    way = RAMP_SHAPES[2 * shape + 1]
+    way = RAMP_WAYS[shape]
     late = 192 - 4 * (first + second) - 3 * way  # 64ths of the rise that s2 is the cause of
     law[_RATE_1] = ((64 - late) * first << 24) // second
     law[_WAY_1] = first * law[_RATE_1] // 48

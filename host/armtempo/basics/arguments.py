@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache, wraps
 from itertools import chain, repeat
 from numbers import Integral, Real
+from operator import call
 from types import UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
@@ -106,7 +107,7 @@ def _check(kind: Any) -> Callable[[object], bool]:
         return _PLAIN[kind]
     if origin in (Union, UnionType):
         checks = [_check(one) for one in inner]
-        return lambda value: any(check(value) for check in checks)
+        return lambda value: any(map(call, checks, repeat(value)))
     if isinstance(kind, dataclasses.InitVar):
         return _check(cast(Any, kind.type))
     if origin is Callable:
@@ -138,7 +139,7 @@ def _is_text(value: object) -> bool:
 def _are_numbers(value: object) -> bool:
     try:
         array = np.asarray(value)
-        return array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
+        return array.dtype.kind in "iuf" and np.count_nonzero(np.isfinite(array)) == array.size
     except (ValueError, TypeError, OverflowError):
         return False
 

@@ -46,7 +46,7 @@ class MovingArm:
         """An arm whose driven joints move."""
         return cls(Geometry.of(arm), Ranges.of(arm), arm.driven_indices)
 
-    @property
+    @cached_property
     def with_all(self) -> MovingArm:
         """The same arm with every joint moving."""
         return replace(self, moving=tuple(range(self.geometry.joints)))

@@ -37,18 +37,19 @@ _COST = 2.0
 class Solution:
     """Joint angles for a pose of the tool."""
 
-    __slots__ = ("_found", "usable")
-
-    usable: bool
-    """Whether the arm can take these angles."""
+    __slots__ = ("_found",)
 
     def __init__(self, found: Candidate | NumericalSolution) -> None:
         self._found = found
-        self.usable = found.usable
 
     def __repr__(self) -> str:
         where = f"angles_deg={self.angles_deg.round(4).tolist()}, branch={self.branch!r}"
         return f"Solution({where}, rejections={self.rejections!r}, distance_deg={self.distance_deg:.4g})"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the arm can take these angles."""
+        return self._found.usable
 
     @property
     def angles_deg(self) -> Array:
@@ -165,7 +166,7 @@ def _within_tolerance(
         swing = _SWINGS * most_swing(problem, angles, _COST)
         if np.all(np.abs(solver.ranges.excess(angles)) <= swing):
             starts.append(angles)
-    return descents(solver.moving.with_all, target, near, starts)
+    return descents(solver.moving.with_all, target, near, starts) if starts else []
 
 
 def _whole(rows: Sequence[float]) -> Pose:

@@ -21,10 +21,19 @@ def placed(angle: float, low: float, high: float, previous: float) -> float:
 
     All in rad; NaN stays NaN.
     """
+    if high - low < _ONE_TURN and low - math.tau < angle < high + math.tau:
+        # one turn at most to add: several times as fast
+        below, above = angle, angle
+        if angle < low - TOLERANCE_RAD:
+            above = angle + math.tau
+        elif angle > high + TOLERANCE_RAD:
+            below = angle - math.tau
+        at = above if above <= high + TOLERANCE_RAD else below
+        if low - TOLERANCE_RAD <= at <= high + TOLERANCE_RAD:
+            return min(max(at, low), high)
+        return below if low - below < above - high else above
     if math.isnan(angle):
         return angle
-    if high - low < _ONE_TURN and low - math.tau < angle < high + math.tau:
-        return _placed_once(angle, low, high)
     least = math.ceil((low - TOLERANCE_RAD - angle) / math.tau)
     most = math.floor((high + TOLERANCE_RAD - angle) / math.tau)
     if least <= most:
@@ -37,18 +46,8 @@ def placed(angle: float, low: float, high: float, previous: float) -> float:
 _ONE_TURN = math.tau - 3.0 * TOLERANCE_RAD
 """In a range narrower than this only one number of whole turns fits."""
 
-
-def _placed_once(angle: float, low: float, high: float) -> float:
-    """``placed`` for such a range and an angle less than a turn outside of it, several times as fast."""
-    below, above = angle, angle
-    if angle < low - TOLERANCE_RAD:
-        above = angle + math.tau
-    elif angle > high + TOLERANCE_RAD:
-        below = angle - math.tau
-    at = above if above <= high + TOLERANCE_RAD else below
-    if low - TOLERANCE_RAD <= at <= high + TOLERANCE_RAD:
-        return min(max(at, low), high)
-    return below if low - below < above - high else above
+_STAYS = 0.99 * math.pi
+"""An angle in its range and nearer than this to the previous one needs no whole turn added."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +69,9 @@ class Ranges:
         return tuple(zip(self.low.tolist(), self.high.tolist(), strict=True))
 
     @cached_property
-    def _whole(self) -> tuple[tuple[float, float, float], ...]:
-        """(low, high) of each joint, and how near to the previous angle one in there needs no whole turn added."""
-        return tuple(
-            (low, high, math.inf if high - low < _ONE_TURN else 0.99 * math.pi) for low, high in self.ends
-        )
+    def _whole(self) -> tuple[tuple[int, float, float, bool], ...]:
+        """Index, low and high of each joint, and whether only one number of whole turns fits."""
+        return tuple((joint, *ends, ends[1] - ends[0] < _ONE_TURN) for joint, ends in enumerate(self.ends))
 
     def placed(self, angles: Sequence[float], previous: Sequence[float]) -> list[float]:
         """``placed`` for each joint of one posture."""
@@ -82,14 +79,15 @@ class Ranges:
 
     def fitted(self, angles: Sequence[float], previous: Sequence[float]) -> tuple[list[float], float]:
         """As ``placed``, and the largest excess over a range; 0 if all are inside."""
-        found, most = [], 0.0
-        for angle, (low, high, near), before in zip(angles, self._whole, previous, strict=True):
-            if not (low <= angle <= high and -near < angle - before < near):
-                angle = placed(angle, low, high, before)
-                outside = low - angle if angle < low else angle - high
-                if outside > most:
-                    most = outside
-            found.append(angle)
+        found, most = [*angles], 0.0
+        for joint, low, high, narrow in self._whole:
+            angle = found[joint]
+            if low <= angle <= high and (narrow or -_STAYS < angle - previous[joint] < _STAYS):
+                continue
+            found[joint] = angle = placed(angle, low, high, previous[joint])
+            outside = low - angle if angle < low else angle - high
+            if outside > most:
+                most = outside
         return found, most
 
     def excess(self, angles: Sequence[float]) -> list[float]:

@@ -27,15 +27,16 @@ from armtempo.kinematics.solutions import (
 
 Pair = tuple[float, float]
 Three = tuple[float, float, float]
+Six = tuple[float, float, float, float, float, float]
 NOWHERE = (math.nan,) * 6
 
 
 class _Plane(NamedTuple):
-    """The tool's axes relative to the arm's plane, for one direction of the base."""
+    """The tool's axes relative to the arm's plane, for one direction of the base; ``y3``: across it."""
 
     theta1: float
     along: Three
-    across: Three
+    y3: Three
     height: Three
 
 
@@ -70,7 +71,8 @@ def solve_pose(shape: Shape, pose: Sequence[float], previous: Sequence[float]) -
         o = formulas.in_arm_plane(cos, sin, o_x, o_y)
         a = formulas.in_arm_plane(cos, sin, a_x, a_y)
         theta1 = _joint(shape, 0, math.atan2(sin, cos))
-        plane = _Plane(theta1, (n[0], o[0], a[0]), (n[1], o[1], a[1]), (n_z, o_z, a_z))
+        y3 = formulas.along_y3(shape, n[1]), formulas.along_y3(shape, o[1]), formulas.along_y3(shape, a[1])
+        plane = _Plane(theta1, (n[0], o[0], a[0]), y3, (n_z, o_z, a_z))
         wrist = formulas.to_shoulder(shape, forward, z)
         _both_elbows(found, shape, plane, wrist, -sign * shape.sign1, previous)
     if axis:
@@ -118,10 +120,10 @@ def _both_wrists(
 ) -> None:
     """Add two solutions for the joint angles ``arm`` of joints 1 to 3: theta5 >= 0 and flipped."""
     cos, sin = fore
-    along, across, height = plane.along, plane.across, plane.height
-    n = formulas.along_x3(cos, sin, along[0], height[0]), formulas.along_y3(shape, across[0])
-    o = formulas.along_x3(cos, sin, along[1], height[1]), formulas.along_y3(shape, across[1])
-    a = formulas.along_x3(cos, sin, along[2], height[2]), formulas.along_y3(shape, across[2])
+    _, along, y3, height = plane
+    n = formulas.along_x3(cos, sin, along[0], height[0]), y3[0]
+    o = formulas.along_x3(cos, sin, along[1], height[1]), y3[1]
+    a = formulas.along_x3(cos, sin, along[2], height[2]), y3[2]
     a_z = formulas.along_z3(shape, cos, sin, along[2], height[2])
     sin5 = math.sqrt(a[0] * a[0] + a[1] * a[1])
     singular = sin5 <= STRAIGHT_WRIST
@@ -131,16 +133,22 @@ def _both_wrists(
     theta5 = formulas.theta5(FLOATS, shape, sin5, a_z)
     theta6 = formulas.theta6(FLOATS, shape, a, n, o)
     flipped4, flipped6 = theta4 - math.copysign(math.pi, theta4), theta6 - math.copysign(math.pi, theta6)
-    plain, flipped = (theta4, theta5, theta6), (flipped4, -theta5, flipped6)
+    plain, flipped = (*arm, theta4, theta5, theta6), (*arm, flipped4, -theta5, flipped6)
     if shape.wrist_offset:
         plain, flipped = _wrist_joints(shape, plain), _wrist_joints(shape, flipped)
-    found.angles_rad.extend(((*arm, *plain), (*arm, *flipped)))
+    found.angles_rad.extend((plain, flipped))
     found.outcome.extend((OK, OK))
     found.singular.extend((WRIST_STRAIGHT * singular,) * 2)
 
 
-def _wrist_joints(shape: Shape, theta: Three) -> Three:
-    return _joint(shape, 3, theta[0]), _joint(shape, 4, theta[1]), _joint(shape, 5, theta[2])
+def _wrist_joints(shape: Shape, posture: Six) -> Six:
+    """The posture with offsets taken off its joints 4 to 6."""
+    joint1, joint2, joint3, theta4, theta5, theta6 = posture
+    _, _, _, offset4, offset5, offset6 = shape.joint_offset
+    joint4 = math.remainder(theta4 - offset4, math.tau) if offset4 else theta4
+    joint5 = math.remainder(theta5 - offset5, math.tau) if offset5 else theta5
+    joint6 = math.remainder(theta6 - offset6, math.tau) if offset6 else theta6
+    return joint1, joint2, joint3, joint4, joint5, joint6
 
 
 def _joint(shape: Shape, index: int, theta: float) -> float:

@@ -21,6 +21,7 @@ from armtempo_shared.motion import (
     OTHER_ENTRIES,
     RAMP_LENGTH,
     RAMP_SHAPES,
+    RAMP_WAYS,
     REST_ENTRIES,
 )
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ _SHORTEST_S = 0.01
 _ROOM = 1.1  # for entries to be lengthened
 _HALVINGS = 7
 _NEGLIGIBLE = 1e-6  # of the unit of lengths
-_SHAPES = np.frombuffer(RAMP_SHAPES, np.uint8).reshape(-1, 2)
+_SHAPES, _WAYS = np.frombuffer(RAMP_SHAPES, np.uint8), np.frombuffer(RAMP_WAYS, np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,8 +292,8 @@ def _ramp(shapes: Shapes, phases: int) -> tuple[Array, Array, Array, Array, Arra
 
     As in ``armtempo_board/stepgen/time_law.py``.
     """
-    second, first = np.divmod(_SHAPES[shapes, :1], 16)
-    first, second, whole = first / 16.0, second / 16.0, _SHAPES[shapes, 1:] / 64.0
+    second, first = np.divmod(_SHAPES[shapes][:, None], 16)
+    first, second, whole = first / 16.0, second / 16.0, _WAYS[shapes][:, None] / 64.0
     late = 3 * (1 - whole) - first - second
     slopes = (0.0 * first, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0 * first)
     at = np.linspace(0.0, 1.0, phases)

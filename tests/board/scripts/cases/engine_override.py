@@ -58,10 +58,7 @@ def joints():
 def some_ramps():
     """Lengths up to BRAKE_TICKS that are all different, and shapes."""
     ramps = [
-        [
-            random.randrange(300, longest) + 2048 * random.randrange(len(RAMP_SHAPES) // 2)
-            for longest in lengths
-        ]
+        [random.randrange(300, longest) + 2048 * random.randrange(len(RAMP_SHAPES)) for longest in lengths]
         for lengths in RAMPS[:2]
     ]
     return ramps[0], ramps[1], RAMP_BITS

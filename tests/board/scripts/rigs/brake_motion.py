@@ -30,8 +30,8 @@ def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES):
 
 def ramp_way(shape, r):
     """e at r of a shape: the integral of a rate from 0 to 1 whose slope is linear between 0, p/16, q/16 and 1."""
-    first, second = (motion.RAMP_SHAPES[2 * shape] & 15) / 16, (motion.RAMP_SHAPES[2 * shape] >> 4) / 16
-    late = 3 - first - second - 3 * motion.RAMP_SHAPES[2 * shape + 1] / 64
+    first, second = (motion.RAMP_SHAPES[shape] & 15) / 16, (motion.RAMP_SHAPES[shape] >> 4) / 16
+    late = 3 - first - second - 3 * motion.RAMP_WAYS[shape] / 64
     way = rate = start = 0.0
     slopes = (0.0, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0)
     for width, before, after in zip((first, second - first, 1 - second), slopes, slopes[1:]):
