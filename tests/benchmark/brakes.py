@@ -126,9 +126,8 @@ class Shortest:
     ) -> None:
         self._allowed = allowed[:, 1:]
         self._starts_s = [moment * trajectory.duration_s for moment in moments]
-        self._shape = np.kron(
-            np.eye(parts), np.ones((PARTS // parts, 1))
-        )  # second derivatives (PARTS, parts)
+        # Second derivatives (PARTS, parts)
+        self._shape = np.kron(np.eye(parts), np.ones((PARTS // parts, 1)))
         self._grid_s = np.linspace(0.0, trajectory.duration_s, SAMPLES)
         motion = [trajectory(self._grid_s, order) for order in (1, 2, 3)]
         self._motion = [*motion, np.gradient(motion[2], self._grid_s, axis=0)]

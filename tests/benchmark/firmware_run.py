@@ -122,9 +122,8 @@ def flash(folder: Path, elf: Path, with_library: bool) -> Path:
         local.write_bytes(data)
     boot = (tree / "boot.py").read_text()
     assert USB in boot
-    (tree / "boot.py").write_text(
-        boot.replace(USB, "pyb.usb_mode(None)")
-    )  # the emulator has none, and waits long
+    # The emulator has none, and waits long
+    (tree / "boot.py").write_text(boot.replace(USB, "pyb.usb_mode(None)"))
     before, found, _ = (tree / "main.py").read_text().partition(firmware.START)
     assert found
     (tree / "main.py").write_text(before + START % settings)

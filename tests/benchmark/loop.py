@@ -43,12 +43,13 @@ RATES = (5_000, 10_000, 20_000, 33_000, 50_000, 70_000, 100_000, 130_000, 160_00
 JOINTS = (1, 3)
 AT_LIMITS = ((240_000, 1), (120_000, 2), (80_000, 3), (25_000, 3), (2_000, 6), (8_000, 6), (20_000, 6))
 """Rates of each joint, and joints: at the limits that hello states, and where many start together."""
+# As ``cruise`` takes them
 SIX = (
     (40_000, 6, 0.5, 1.2),
     (20_000, 6, 1.0, 2.2),
     (40_000, 6, 1.0, 2.2),
     (40_000, 6, 2.0, 4.2),
-)  # as ``cruise`` takes them
+)
 WORST_CYCLES = 3.0
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them

@@ -429,9 +429,8 @@ def test_the_longest_lever_is_that_of_the_stretched_arm() -> None:
     scara = [found.lever_mm for found in resolution.resolutions(Arm.load("scara"))]
     np.testing.assert_allclose(scara, [228 + 136.5, 136.5, 0], rtol=1e-4, atol=1e-6)
     lower = resolution.resolutions(Arm.load("community"))[1]
-    assert lower.lever_mm == pytest.approx(
-        120, rel=1e-4
-    )  # the rods keep forearm and hand from turning with it
+    # The rods keep forearm and hand from turning with it
+    assert lower.lever_mm == pytest.approx(120, rel=1e-4)
 
 
 def test_the_torque_margin_is_that_of_the_model() -> None:

@@ -386,9 +386,8 @@ def test_in_a_browser(folder: Path, tmp_path: Path, dark: bool, widths: tuple[in
         assert found["cut"] == []
         assert len(found["figures"]) == PARTS
         assert min(found["figures"]) > 80
-        assert (
-            min(found["scales"]) > 0.9
-        )  # of CSS pixels to points: text of 10 points is 9 pixels high or more
+        # Of CSS pixels to points: text of 10 points is 9 pixels high or more
+        assert min(found["scales"]) > 0.9
         assert found["tables"] == 6
         assert "How to repeat it" in found["text"]
         assert "Per-joint timing" in found["text"]

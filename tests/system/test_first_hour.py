@@ -61,9 +61,8 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     subprocess.run([sys.executable, *install], check=True, capture_output=True)
     (site,) = (folder / "venv").glob("lib/python*/site-packages")
     mine = sysconfig.get_paths()["purelib"]
-    (site / "dependencies.pth").write_text(
-        f"import sys; sys.path.append({mine!r})\n"
-    )  # without its .pth files
+    # Without its .pth files
+    (site / "dependencies.pth").write_text(f"import sys; sys.path.append({mine!r})\n")
     return programs
 
 

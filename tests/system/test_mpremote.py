@@ -101,9 +101,8 @@ def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
             arm_state.home(board, boards.ARM)
             started = _start(board)
             begun_s = time.monotonic()
-        port = SerialTransport(
-            process.port, timeout=0.05
-        )  # a pseudo terminal: without one its read waits for ever
+        # A pseudo terminal: without one its read waits for ever
+        port = SerialTransport(process.port, timeout=0.05)
         with pytest.raises(TransportError, match="could not enter raw repl"):
             port.enter_raw_repl(timeout_overall=started.duration_s / 2)
         port.close()

@@ -130,9 +130,8 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     page.get_by_label("⟳ x +").hover(force=True)
     page.wait_for_selector("text=the arm cannot turn the tool about x from here")
     assert page.get_by_label("⟳ x +").is_disabled()
-    page.evaluate(
-        "[1e9, -1, true, 'x', null, [1], {}].forEach(one => emitEvent('armtempo-press', one))"
-    )  # no buttons
+    # No buttons
+    page.evaluate("[1e9, -1, true, 'x', null, [1], {}].forEach(one => emitEvent('armtempo-press', one))")
     page.evaluate("window.socket.emit('event', {id: 'x', client_id: 'x', listener_id: 5, args: []})")
     show(page, "Plan")
     page.get_by_role("button", name="Plan", exact=True).click()
@@ -144,18 +143,18 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
         said = commandline.run("run", "--repeat", number, "feed", folder=panel.folder).errors
         wait_for(page, said.rpartition(": ")[2].rstrip(".\n"), place="armtempo-said")
     page.get_by_label("Repetitions").fill("1")
-    page.get_by_label("Speed, %").click(
-        position={"x": 12, "y": 10}
-    )  # of 128: a minute, so that the stop is in time
+    # Of 128: a minute, so that the stop is in time
+    page.get_by_label("Speed, %").click(position={"x": 12, "y": 10})
     page.get_by_role("button", name="Run", exact=True).click()
     wait_for(page, "moving", "at ", "Run")
     page.get_by_role("button", name="Pause").click()
     wait_for(page, "in a pause", "Run")
     page.get_by_role("button", name="Resume").click()  # on along the path
     page.wait_for_function("!document.getElementById('armtempo-state').textContent.includes('in a pause')")
+    # joint 1
     page.wait_for_function(
         "parseFloat(document.getElementById('armtempo-where').textContent.split('·')[1]) > 0"
-    )  # joint 1
+    )
     page.keyboard.press(" ")  # the button just pressed has the focus, and does not take it
     wait_for(page, "idle")
     joints = panels.rest(panel.state).joints

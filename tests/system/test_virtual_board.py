@@ -147,9 +147,8 @@ def test_command_prints_the_port_and_ends_with_ctrl_c(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=commandline.SLOW_S)
     assert process.returncode == 130
-    assert (
-        "Traceback" not in error
-    )  # that its port is gone cannot be told: another program may have the number now
+    # That its port is gone cannot be told: another program may have the number now
+    assert "Traceback" not in error
 
 
 # the simulated hardware behaves like the chip's, on every interpreter

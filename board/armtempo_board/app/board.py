@@ -45,9 +45,8 @@ class Board:
         self.rows: "dict[int, Any]" = {}  # and their commands
         self.program_crc = program_crc
         self.board_id = board_id()
-        self.boot = int.from_bytes(
-            os.urandom(_BOOT_BYTES), "little"
-        )  # a different number after each power-up
+        # A different number after each power-up
+        self.boot = int.from_bytes(os.urandom(_BOOT_BYTES), "little")
         self.joints = 0
         self.arm_crc = 0
         self.all_but_limits = 0  # of the arm record: identity of the arm

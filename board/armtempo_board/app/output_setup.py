@@ -32,9 +32,8 @@ def attach(board: "Board", outputs: "Rows", inputs: "Rows") -> None:
     handlers = output_commands.output, output_commands.inputs_and_outputs
     for (_, number, fields, _, tail), (_, _, values, _, _), handler in zip(rows("O"), rows("P"), handlers):
         board.rows[number] = (handler, fields, values, tail)
-    heap.forget(
-        "output_commands", "outputs", "digital_inputs"
-    )  # they stay, and are not known by name any more
+    # They stay, and are not known by name any more
+    heap.forget("output_commands", "outputs", "digital_inputs")
 
 
 def outputs_of(table: "Rows") -> "Outputs":

@@ -16,11 +16,12 @@ from armtempo_board.motion.workspace import Workspace
 
 _PULSE_SPARE_US = const(5)
 _TICKS_PER_US = const(84)
+# fields of a joint's row in the arm record that are needed later
 _LIMITS = (
     "min_steps",
     "max_steps",
     "max_rate",
-)  # fields of a joint's row in the arm record that are needed later
+)
 
 
 class EngineParts:

@@ -69,9 +69,8 @@ class Readings:
     def _convert(self, at: int, to: int) -> None:
         raw, words = self._sampler.raw, self._words
         epoch = self._clock.epoch
-        ahead = (
-            isr.word_kiticks(raw, at) - self._clock.counter_kiticks
-        )  # it may have come since that was read
+        # It may have come since that was read
+        ahead = isr.word_kiticks(raw, at) - self._clock.counter_kiticks
         if ahead > _HALF_ROUND_KITICKS:
             epoch -= 1
         elif ahead < -_HALF_ROUND_KITICKS:

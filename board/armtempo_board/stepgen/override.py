@@ -73,9 +73,8 @@ class Override:
         at = self._motion_kiticks + since // PERMILLE * self.rate + since % PERMILLE * self.rate // PERMILLE
         motion = self._motion
         units: int = motion.ramp(at >> (self._shift - 10), self._parts, True) & _RAMP_LENGTH
-        grid: int = (
-            (units << motion.ramp_bits - 6) + PERMILLE - 1
-        ) // PERMILLE  # RAMP_GRID_TICKS are 1000 << 6
+        # RAMP_GRID_TICKS are 1000 << 6
+        grid: int = ((units << motion.ramp_bits - 6) + PERMILLE - 1) // PERMILLE
         return self._real_kiticks + since + (125 * grid >> 1)
 
     def _thousands(self, from_ticks: int) -> int:

@@ -167,9 +167,8 @@ class StepGenerator:
             return False
         if self.at_turn:
             self.turn()
-        self.prepare(
-            _BEFORE
-        )  # a step that comes at 0 is the last one, too: a law that begins there takes it back
+        # A step that comes at 0 is the last one, too: a law that begins there takes it back
+        self.prepare(_BEFORE)
         return True
 
     def close(self) -> None:

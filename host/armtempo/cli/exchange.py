@@ -177,9 +177,8 @@ def import_urdf(
     fit = fitting.fit(chain)
     corners_mm = urdf_meshes.of_rows(chain, fit, urdf) if meshes else {}
     text = arm_text.arm_text(chain, fit, urdf)
-    arm = Arm.of_table(
-        toml_table.parse(text, str(out))
-    )  # an arm file that could not be read again is not written
+    # An arm file that could not be read again is not written
+    arm = Arm.of_table(toml_table.parse(text, str(out)))
     replace_text(out, text)
     written = mesh_files.write(out, corners_mm) if meshes else []
     values = {

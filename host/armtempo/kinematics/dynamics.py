@@ -73,9 +73,8 @@ def _row_torques(
     chained = array_frames(geometry, angles)
     turning, bending = (np.stack(geometry.turns(list(each.T))) for each in (rates, rate_changes))
     spin, spin_change = np.zeros((len(angles), 3)), np.zeros((len(angles), 3))
-    fall = np.tile(
-        [0.0, 0.0, GRAVITY_M_S2], (len(angles), 1)
-    )  # gravity as an upward acceleration of the base
+    # Gravity as an upward acceleration of the base
+    fall = np.tile([0.0, 0.0, GRAVITY_M_S2], (len(angles), 1))
     forces, moments = [], []
     for row, body in enumerate(bodies):
         before, after = chained[row], chained[row + 1]

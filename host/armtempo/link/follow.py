@@ -72,10 +72,11 @@ class Follower:
         self._last: Done | Fault | None = None
         self._notices: list[str] = []
         self._asked_s = client.session.clock()
+        # Last value that should increase (motion clock, sample index), and how often it did not
         self._progress = (
             -1,
             0,
-        )  # last value that should increase (motion clock, sample index), and how often it did not
+        )
 
     @property
     def ended(self) -> bool:

@@ -47,7 +47,7 @@ Answer = tuple[tuple[Any, ...], Any]
 class Session:
     """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests.
 
-    If the port breaks, ``open_transport`` is called until it returns a transport on which ``greet`` finds the
+    If the port breaks, ``reopen`` (if set) is called until it returns a transport on which ``greet`` finds the
     same board. Then the command in progress is sent again; ``follow`` requests lost samples. The greeting
     makes the board forget its last answer: if that answer was lost, the board executes the command twice and
     may refuse it the second time.
@@ -116,9 +116,8 @@ class Session:
             if reply is not None:
                 return _answer(name, reply)
             now_s = self.clock()
-            silent = (
-                now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
-            )  # on a disturbed line every frame may be lost
+            # On a disturbed line every frame may be lost
+            silent = now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
             if silent or now_s - begin_s >= answer_timeout_s:
                 raise self._no_answer(name, now_s - begin_s)
             self.repeats += 1

@@ -15,11 +15,12 @@ from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseEr
 BAUD_RATE = 115_200
 """Only used by a UART between host and board; no effect over USB."""
 _ADVICE = "'armtempo ports' lists the ports"
+# TypeError: pyserial's, if another thread has closed it
 _BROKEN = (
     serial.SerialException,
     OSError,
     TypeError,
-)  # TypeError: pyserial's, if another thread has closed it
+)
 
 
 class Transport(Protocol):

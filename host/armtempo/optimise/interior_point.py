@@ -183,9 +183,8 @@ class _Solver:
 
     def _line_search(self, at: Linearised, factor: Factorised, gradient: Array, step: Array) -> _Step:
         """The better of a straight and, if that is short, a bent step."""
-        slope = float(
-            np.sum(gradient * step)
-        )  # not by @, for which BLAS starts threads from 10 000 elements on
+        # Not by @, for which BLAS starts threads from 10 000 elements on
+        slope = float(np.sum(gradient * step))
         if not np.all(np.isfinite(step)) or slope >= 0.0:
             return _Step(0.0, self.x, self.g)
         change = at.forward(step)

@@ -98,9 +98,8 @@ class ArmShape:
         begin, end = points[first], points[np.array(first) + 1]
         along = (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
         zero = np.zeros(len(along))
-        turns = np.column_stack(
-            (along[:, 2], zero, -along[:, 0], 1.0 + along[:, 1])
-        )  # the shortest rotation from y
+        # The shortest rotation from y
+        turns = np.column_stack((along[:, 2], zero, -along[:, 0], 1.0 + along[:, 1]))
         turns[turns[:, 3] < _OPPOSITE] = (1.0, 0.0, 0.0, 0.0)
         turns /= np.linalg.norm(turns, axis=1, keepdims=True)
         found: list[list[float]] = np.hstack(((begin + end) / 2, turns)).round(5).tolist()

@@ -68,9 +68,8 @@ class PlanTab:
             for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
         ]
         page.on_look(self._look)
-        ui.context.client.on_connect(
-            self._changed
-        )  # what was typed while the connection broke has not arrived
+        # What was typed while the connection broke has not arrived
+        ui.context.client.on_connect(self._changed)
 
     def _option(self, key: str, label: str) -> ui.select | ui.input:
         """The field of a key of the job."""

@@ -44,9 +44,8 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
     several joints, also the dual bound of all time laws along the path.
     """
     found = []
-    angle_points_deg = (
-        angle_points_deg - angle_points_deg[0]
-    )  # exact for a short way, for which it is the larger bound
+    # Exact for a short way, for which it is the larger bound
+    angle_points_deg = angle_points_deg - angle_points_deg[0]
     for joint, limit in enumerate(limits):
         reached = turns(angle_points_deg[:, joint], degree)
         found.append(Floor(_ROUNDED * rest_to_rest.floor_s(reached, limit, from_rest=degree == 5), "rests"))

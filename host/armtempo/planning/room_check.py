@@ -130,9 +130,8 @@ class Bodies:
             return []
         found = []
         starts, ends = self.ends(np.array([self.arm.home_deg]))
-        row = np.minimum(
-            np.arange(len(self.radius_mm)) // 2, len(self.arm.joints) - 1
-        )  # the load belongs to the last row
+        # The load belongs to the last row
+        row = np.minimum(np.arange(len(self.radius_mm)) // 2, len(self.arm.joints) - 1)
         for one in range(len(self.radius_mm)):
             for other in range(one + 1, len(self.radius_mm)):
                 between = self.turned[row[one] + 1 : row[other] + 1].any()

@@ -88,10 +88,11 @@ class HeldJog:
         client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
         client.upload(encoded.name, encoded.data)
+        # Nothing holds the jog while a broken port is waited for
         self._reopen, client.session.reopen = (
             client.session.reopen,
             None,
-        )  # nothing holds the jog while a broken port is waited for
+        )
         try:
             self._run = client.start(encoded.name, encoded.key.crc, START_HELD).run
         except BaseException:

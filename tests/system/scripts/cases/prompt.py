@@ -182,9 +182,8 @@ def case_ctrl_c_stops_a_replay_wherever_it_comes(world):  # not compiled
         yield from world.until(lambda: machine_state.board.timers[2].running)
         yield from world.wait(numbers.randrange(0, 2300))
         running = machine_state.board.timers[2].running
-        assert (
-            machine_state.serial.interrupt_char == -1 or not running
-        )  # KeyboardInterrupt could come anywhere
+        # KeyboardInterrupt could come anywhere
+        assert machine_state.serial.interrupt_char == -1 or not running
         world.type(b"\x03")
         if number & 1:
             yield from world.wait(numbers.randrange(1, 300))

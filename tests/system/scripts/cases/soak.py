@@ -231,9 +231,8 @@ class Soak:
         yield from world.ask("speed", (self.rate() if self.legs else 900,))
         yield from world.ask("start", (0, store(rows)), "seq")
         fault = ""
-        calm = (
-            0 if self.legs else 9
-        )  # motions at the beginning to which nothing is done: a cycle, and what follows it
+        # Motions at the beginning to which nothing is done: a cycle, and what follows it
+        calm = 0 if self.legs else 9
         left = numbers.randrange(3, 40)  # things that are done before it is stopped
         while (yield from self.ending()) == "running":
             if self.watch.motions < calm or left < 0:

@@ -9,9 +9,8 @@ _SAMPLES = 4096  # 4 ms; the loop comes round in less
 _PERIOD = 167  # of TIM1 at 168 MHz: 1 us
 _DMA2EN, _TIM1EN = 1 << 22, 1
 _TIM1 = stm.TIM1
-_HALF_WORDS = (
-    3 << 16 | 1 << 13 | 1 << 11 | 1 << 10 | 1 << 8
-)  # very high priority, memory incremented, circular
+# Very high priority, memory incremented, circular
+_HALF_WORDS = 3 << 16 | 1 << 13 | 1 << 11 | 1 << 10 | 1 << 8
 _CHANNEL = 6 << 25
 _STREAMS = (("A", 5), ("B", 1))  # TIM1's update asks stream 5, its compare channel 1 stream 1
 _REQUESTS = 1 << 8 | 1 << 9
