@@ -17,9 +17,8 @@ def _end(*signalled: object) -> None:
 
 def main() -> None:
     """Run the command; ``armtempo.cli`` handles Ctrl-C once a subcommand begins."""
-    if (
-        _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler
-    ):  # it may be ignored, in the background
+    # It may be ignored, in the background
+    if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
         _signal.signal(_signal.SIGINT, _end)
     if sys.argv[1:2] == ["stop"]:
         from armtempo.ports import quick_stop

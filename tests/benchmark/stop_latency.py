@@ -76,9 +76,8 @@ def measure(watch: Watch, times: int, press: Callable[[], object]) -> list[float
         while (stopped_s := watch.stopped_s.get(timeout=_PATIENCE_S)) < begin_s:
             pass
         found.append(stopped_s - begin_s)
-        if isinstance(
-            ended, subprocess.Popen
-        ):  # it waits for the arm's rest, and the next motion begins at once
+        # It waits for the arm's rest, and the next motion begins at once
+        if isinstance(ended, subprocess.Popen):
             ended.kill()
             ended.wait()
     return found

@@ -79,9 +79,8 @@ class Readings:
         words[to + TICKS_HIGH] = max(epoch, 0)
         if epoch >= 0:
             isr.copy_word(raw, at, words, to)
-        if (
-            self._override
-        ):  # else something failed while the motion was ended, and this belongs to what comes of that
+        # Else something failed while the motion was ended, and this belongs to what comes of that
+        if self._override:
             self._override.put_path(words, to)
         commanded, counts = to + COMMANDED, to + COMMANDED + len(self._joints)
         for number in range(len(self._joints)):

@@ -223,10 +223,8 @@ class _Compiler:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
-        for (
-            known,
-            _,
-        ), found in self._plans.items():  # a plan with another load is accepted if it keeps to the room
+        # A plan with another load is accepted if it keeps to the room
+        for (known, _), found in self._plans.items():
             arm = self.arm.holding(_job(motion).holds or self._holds)
             if known == id(motion) and room_check.touch_of(arm, found) is None:
                 return found

@@ -118,11 +118,12 @@ def _check_rest(client: Client) -> None:
     status = client.status()
     if status.moving:
         raise LinkError("the board is moving", "wait for the end of the motion, or 'armtempo stop'")
+    # An E-stop that is not wired; a self-test that hung
     if status.fault not in (
         0,
         codes.ESTOP,
         codes.WATCHDOG,
-    ):  # an E-stop that is not wired; a self-test that hung
+    ):
         name, _, _ = ERRORS.get(status.fault, (str(status.fault), "", ""))
         raise LinkError(f"the board has fault {name} pending", "remove its cause, then 'armtempo clear'")
 
@@ -188,9 +189,8 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         found.add(link_part.judge(found.data[link_part.PART], found.simulated))
         if drivers_part.is_off(drivers) and _is_still(prompt, found):
             _move(prompt, found, work)
-            if not any(
-                line.part == pulse_part.PULSES for line in found.failed
-            ):  # else no rate tells anything
+            # Else no rate tells anything
+            if not any(line.part == pulse_part.PULSES for line in found.failed):
                 _rates(prompt, found, work)
         prompt.at_end = WATCHDOG_RESET
     except SilentError as error:

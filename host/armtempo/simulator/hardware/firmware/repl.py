@@ -49,9 +49,8 @@ def traceback(error):
     text = io.StringIO()
     sys.print_exception(error, text)
     lines = text.getvalue().split("\n")
-    if (
-        isinstance(error, OSError) and error.errno in errno.errorcode
-    ):  # as MicroPython says it on every system
+    # As MicroPython says it on every system
+    if isinstance(error, OSError) and error.errno in errno.errorcode:
         lines[-2] = "OSError: [Errno %d] %s" % (error.errno, errno.errorcode[error.errno])
     return "\n".join([line for line in lines if "/hardware/" not in line])
 
