@@ -169,11 +169,9 @@ class LinearisedPath:
         self._gradient = block.limits.gradient(times)
 
     def forward(self, step: Array) -> Array:
-        """See there."""
         return np.asarray(-np.sum(self._gradient * self._block.times(step), axis=0))
 
     def backward(self, weights: Array) -> Array:
-        """See there."""
         return self._block.spread(-self._gradient * weights)
 
     def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:

@@ -34,7 +34,6 @@ class Evaluation:
 
     @property
     def names(self) -> list[str]:
-        """Names of the driven joints."""
         return [joint.name for joint in self.run.joints]
 
     @property

@@ -82,7 +82,6 @@ class Page:
         self._parts.append(f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>")
 
     def render(self) -> str:
-        """The whole document."""
         body = "\n".join(self._parts)
         style = _STYLE.read_text(encoding="utf-8")
         return (

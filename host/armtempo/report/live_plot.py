@@ -57,5 +57,4 @@ class LivePlot:
         self._figure.canvas.flush_events()
 
     def close(self) -> None:
-        """Close the window."""
         self._plt.close(self._figure)
