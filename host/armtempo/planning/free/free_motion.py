@@ -49,7 +49,7 @@ _ROUNDED = 1e-10
 """Relative excess over a bound that is only rounding."""
 _AT_END = 1e-6
 """A via point this close to the end of a range (fraction of the joint's motion) counts as at the end."""
-_NEAR = 1e-5
+_NEAR = 1e-4
 """Solves end if the limits at their points are exceeded by at most this fraction."""
 
 

@@ -18,7 +18,7 @@ from armtempo.planning.free.layout import DEGREE, LEAST_PIECES, Layout
 from armtempo.splines import bspline
 
 _COARSE_PIECES = 8
-_PIECES, _LEAST = 32, 120
+_PIECES, _LEAST = 32, 96
 """Segments of an automatic layout: per stretch between via points, and least total."""
 _EVEN_PIECES = 24
 """Segments per stretch if all have the same number."""
