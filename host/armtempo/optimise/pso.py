@@ -1,6 +1,6 @@
 """Particle swarm: J. Kennedy and R. Eberhart, "Particle swarm optimization", ICNN 1995, pp. 1942-1948,
-with the inertia weight that falls over the run of Y. Shi and R. Eberhart, "Empirical study of particle
-swarm optimization", CEC 1999, pp. 1945-1950.
+with the linearly decreasing inertia weight of Y. Shi and R. Eberhart, "Empirical study of particle swarm
+optimization", CEC 1999, pp. 1945-1950.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ PARAMETERS = swarm.PARAMETERS
 def search(
     task: Task, *, inertia_start: float, inertia_end: float, own: float, common: float, top_speed: float
 ) -> Result:
-    """Minimises; the swarm moves twice an iteration: 2 N evaluations, as in the paper."""
+    """Minimise; the swarm moves twice per iteration: 2 N evaluations, as in the paper."""
     particles = swarm.Swarm(task, top_speed)
     for inertia in np.linspace(inertia_start, inertia_end, task.iterations):
         particles.move(inertia, own, common)

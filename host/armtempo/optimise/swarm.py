@@ -1,4 +1,4 @@
-"""A swarm of particles: positions, velocities, and the best position of each so far."""
+"""A swarm of particles: positions, velocities, and each one's best position so far."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from armtempo.optimise.task import Number, Parameter, Task, Tracker
 
 PARAMETERS: dict[str, Parameter] = {
     "inertia_start": Number(0.9, 0.0, 2.0, "inertia in the first iteration"),
-    "inertia_end": Number(0.4, 0.0, 2.0, "and in the last"),
-    "own": Number(2.0, 0.0, 10.0, "pull towards a particle's own best point"),
-    "common": Number(2.0, 0.0, 10.0, "pull towards the best point of all"),
-    "top_speed": Number(0.2, 0.001, 1.0, "longest move as a part of the bounds' width"),
+    "inertia_end": Number(0.4, 0.0, 2.0, "inertia in the last iteration"),
+    "own": Number(2.0, 0.0, 10.0, "acceleration towards a particle's own best point"),
+    "common": Number(2.0, 0.0, 10.0, "acceleration towards the best point of all"),
+    "top_speed": Number(0.2, 0.001, 1.0, "longest move as a fraction of the bounds' width"),
 }
-"""Of every swarm."""
+"""Parameters of every swarm."""
 
 
 class Swarm:
-    """Positions, velocities, values and memories of the particles, started at random in the task's bounds."""
+    """Positions, velocities, values and best positions of the particles, initially random within the bounds."""
 
     def __init__(self, task: Task, top_speed: float) -> None:
         self.tracker = Tracker(task)
@@ -31,7 +31,7 @@ class Swarm:
         self.tracker.iteration_done()
 
     def move(self, inertia: float, own: float, common: float) -> None:
-        """Move every particle once (N evaluations); one that reaches a bound stops there."""
+        """Move every particle once (N evaluations); at a bound it stops."""
         own_pull = own * self._rng.random(self.positions.shape) * (self._seen - self.positions)
         common_pull = common * self._rng.random(self.positions.shape) * (self.tracker.x - self.positions)
         velocities = inertia * self.velocities + own_pull + common_pull
@@ -44,9 +44,9 @@ class Swarm:
         self._seen[better], self._seen_values[better] = self.positions[better], self.values[better]
 
     def select(self, rivals: int) -> None:
-        """Copy positions and velocities of the better half over the worse one; best positions so far are kept.
+        """Copy positions and velocities of the better half over the worse one, which keeps its best positions.
 
-        A particle is better that beats more of ``rivals`` others drawn at random.
+        Particles are ranked by how many of ``rivals`` random others they beat.
         """
         population = len(self.values)
         drawn = self._rng.integers(0, population, (population, rivals))
