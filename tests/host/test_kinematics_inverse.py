@@ -8,8 +8,8 @@ import pytest
 from armtempo.basics.errors import InputError
 from armtempo.kinematics import BRANCHES, Geometry, branch_of, forward, inverse, refusals
 from armtempo.kinematics.inverse import CHUNK
-from armtempo.kinematics.moved_tool import moved_tool_deg
 from armtempo.kinematics.solutions import OK, WRIST_STRAIGHT
+from armtempo.kinematics.solver import moved_tool_deg
 
 from tests.host.published_arms import (
     EQ_16,

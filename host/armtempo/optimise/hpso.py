@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from armtempo.optimise import swarm
+from armtempo.optimise import pso
 from armtempo.optimise.task import Number, Result, Task
 
-PARAMETERS = {**swarm.PARAMETERS, "rivals": Number(5, 1, 1000, "others that a particle is scored against")}
+PARAMETERS = {**pso.PARAMETERS, "rivals": Number(5, 1, 1000, "others that a particle is scored against")}
 
 
 def search(
@@ -28,7 +28,7 @@ def search(
 
     Each particle is compared with ``rivals`` random others; the rest as in ``pso``.
     """
-    particles = swarm.Swarm(task, top_speed)
+    particles = pso.Swarm(task, top_speed)
     for inertia in np.linspace(inertia_start, inertia_end, task.iterations):
         for _ in range(2):
             particles.select(rivals)

@@ -152,7 +152,7 @@ def without_encoder(names: Sequence[str]) -> str:
     """Text on joints without an encoder."""
     have = "has" if len(names) == 1 else "have"
     return (
-        f"{_listed(names)} {have} no encoder: the steps were sent, but not measured at the joint; "
+        f"{_listed(names)} {have} no encoder, so whether the arm made the steps is not known; "
         "an encoder would show lost steps, lag and overshoot, and stop a motion that goes wrong"
     )
 
