@@ -191,15 +191,15 @@ ABOUT_S = np.array([1.123, 1.597, 1.296, 0.8, 0.609, 1.397])
 
 
 @pytest.mark.parametrize("factors", [1.0, 0.8, 2.0, np.array([1, 3, 1, 1, 0.2, 1])])
-def test_free_floor_holds_whatever_times_it_is_told(factors: float | np.ndarray) -> None:
+def test_free_floor_holds_for_any_expected_times(factors: float | np.ndarray) -> None:
     limits = np.array([limit.values for limit in LIMITS])
     found = via_bound.floor_s(FEEDING, limits, ABOUT_S * factors)
     assert (0.98 if np.all(factors == 1.0) else 0.0) * 6.8222 <= found <= 6.8222
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_free_floor_holds_whatever_the_multipliers(seed: int) -> None:
-    """And between two times E is at least what is said, for random columns too."""
+def test_free_floor_holds_for_any_multipliers(seed: int) -> None:
+    """The bound of E between two durations holds, too."""
     rng = np.random.default_rng(seed)
     size = np.ptp(FEEDING, axis=0)
     ways, limits = (
@@ -208,14 +208,14 @@ def test_free_floor_holds_whatever_the_multipliers(seed: int) -> None:
     )
     chosen = rng.normal(0, 0.3, (6, 3, 3, via_bound._COLUMNS))
     ends = rng.normal(0, 0.3, (7, 3, 2))
-    chosen[..., via_bound._LOCAL :] = np.concatenate([ends[:-1], ends[1:]], axis=-1)[:, None]
-    scan = via_bound._Scan(ways, limits, ABOUT_S[:, None] * via_bound._ABOUT, chosen)
+    chosen[..., via_bound._INNER :] = np.concatenate([ends[:-1], ends[1:]], axis=-1)[:, None]
+    scan = via_bound._Scan(ways, limits, ABOUT_S[:, None] * via_bound._TRIAL_TIMES, chosen)
     low = scan._between()
     for s in rng.uniform(0, 1, 20):
         times, x = (each[:-1] + s * np.diff(each, axis=0) for each in (scan.times, scan.x))
         cost = via_bound._Cost.of(ways[scan.stretch[:-1]], limits, times)
         together = np.isfinite(low)
-        assert np.all((cost.exact(x, cost.inside(x)) + 1e-7 * (1 + np.abs(low)) >= low)[together])
+        assert np.all((cost.exact(x, cost.arguments(x)) + 1e-7 * (1 + np.abs(low)) >= low)[together])
     assert scan.floor().sum() <= 6.8222
 
 

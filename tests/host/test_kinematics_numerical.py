@@ -16,11 +16,11 @@ from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import WHOLE, Pose
 
-from tests.host.published_arms import NAMED, turned
-from tests.host.small_arms import (
+from tests.host.arms import (
     FITTING,
     FIVE,
     FOUR,
+    NAMED,
     OFFSET_WRIST,
     ONE,
     PAPER_ARM,
@@ -30,6 +30,7 @@ from tests.host.small_arms import (
     SIX,
     asked,
     drawn_posture,
+    turned,
 )
 
 WIDE = 2 * np.pi
