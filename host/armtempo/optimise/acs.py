@@ -1,6 +1,6 @@
 """Adaptive cuckoo search, section 3.2 of the paper, Eqs. (22) to (25), and a variant that adapts more.
 
-The two variants (measured in host/docs/acs.md):
+The two variants (reasons: host/docs/optimisers.md):
 
 ===================  ==================================  ===================================================
 choice               ``variant = "paper"``               ``variant = "differences"`` (default)
@@ -96,7 +96,7 @@ PARAMETERS: dict[str, Parameter] = {
     "b": Number(0.5, -5.0, 5.0, "of Eq. (25)"),
     "pa": Number(0.25, 0.001, 1.0, "fraction of the nests, or probability of a variable, to be abandoned"),
     "beta": BETA,
-    "variant": OneOf("differences", tuple(VARIANTS), "see [adaptive cuckoo search](acs.md)"),
+    "variant": OneOf("differences", tuple(VARIANTS), "see [below](#choices-in-the-adaptive-cuckoo-search)"),
 }
 
 
