@@ -62,7 +62,7 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
         "index": "number of the sample in its repetition, from 0",
         "ticks": f"motion clock of the board, ticks of 1/{limits.TICK_HZ} s",
         "time_s": "the same in seconds",
-        "path_s": "the motion's own time in seconds: less than the clock's if the speed was below 100 %",
+        "path_s": "the motion's own time in seconds: behind the clock where the speed was below 100 %",
     }
     for number, joint in enumerate(joints, start=1):
         found |= {
