@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.cli import main, state
+from armtempo.cli import doctor, main, state
 from armtempo.diagnosis import drives, figures, machine, resolution, torque
 from armtempo.diagnosis.arm_check import check, check_arm
 from armtempo.diagnosis.finding import Level
@@ -20,7 +20,6 @@ from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.parts import JointModel
 from armtempo.ports.board_port import Port
-from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
 from click.testing import CliRunner
 
@@ -345,7 +344,7 @@ STATE = BoardState(
 
 
 def test_a_sound_board_has_nothing_wrong() -> None:
-    assert {item.level for item in board_check.examine_board(STATE)} == {Level.GOOD}
+    assert {item.level for item in doctor.examine_board(STATE)} == {Level.GOOD}
 
 
 @pytest.mark.parametrize(
@@ -364,9 +363,7 @@ def test_a_sound_board_has_nothing_wrong() -> None:
     ],
 )
 def test_what_is_wrong_with_a_board(change: dict[str, object], level: Level, words: str, cure: str) -> None:
-    found = [
-        item for item in board_check.examine_board(replace(STATE, **change)) if item.level is not Level.GOOD
-    ]  # type: ignore[arg-type]
+    found = [item for item in doctor.examine_board(replace(STATE, **change)) if item.level is not Level.GOOD]  # type: ignore[arg-type]
     assert [item.level for item in found] == [level]
     assert words in found[0].what
     assert cure in found[0].next_step
@@ -380,7 +377,7 @@ def test_another_version_of_the_program_is_told_with_both_and_what_to_do() -> No
 
 
 def test_a_board_that_does_not_answer() -> None:
-    (item,) = board_check.examine_board(LinkError("no answer within 2 s; check power and cable"))
+    (item,) = doctor.examine_board(LinkError("no answer within 2 s; check power and cable"))
     assert item.level is Level.ERROR
     assert "no answer" in item.what
 

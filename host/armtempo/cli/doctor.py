@@ -13,10 +13,13 @@ from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.diagnosis import arm_check, machine
 from armtempo.diagnosis.finding import Finding, Level, error, good, note
+from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.model import shipped
 from armtempo.ports import board_port
-from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
+
+_LEAST_HEAP = 8_000
+"""Bytes of free heap below which a long motion may not fit."""
 
 
 @click.command("doctor")
@@ -70,9 +73,9 @@ def _board(port: str | None, arm_path: Path | None) -> list[Finding]:
     except ArmtempoError:  # no port is set and no board is plugged in: not an error
         return [note("board", "not checked", "give --port PORT, or --port sim")]
     try:
-        return board_check.examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
+        return examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
     except ArmtempoError as refused:
-        return board_check.examine_board(refused)
+        return examine_board(refused)
 
 
 def _named(state: BoardState, arm_path: Path | None) -> BoardState:
@@ -102,3 +105,40 @@ def _print(parts: dict[str, list[Finding]]) -> None:
             click.echo(f"  {item.level.word:<6}{item.where:<{width}}  {item.what}")
             if item.next_step:
                 click.echo(f"  {'':<6}{'':<{width}}  -> {item.next_step}")
+
+
+def examine_board(state: BoardState | ArmtempoError) -> list[Finding]:
+    """Findings about a board's state, or about the error with which it could not be read."""
+    if isinstance(state, ArmtempoError):
+        return [error("board", str(state), "see 'armtempo help recovery' for each of its states")]
+    found = [
+        good("board", f"{state.board_id}{' (virtual)' if state.virtual else ''}, port {state.port}"),
+        _program(state),
+        _room(state),
+        good(
+            "arm on the board", state.arm or (f"record {state.arm_crc:08x}" if state.arm_crc else "none yet")
+        ),
+        good("state", state.state),
+    ]
+    if state.arm_problem:
+        found.append(error("stored arm", state.arm_problem, "armtempo configure"))
+    if state.fault:
+        found.append(error("fault", state.fault, "remove its cause, then 'armtempo clear'"))
+    if state.frames_bad or state.samples_lost:
+        text = f"{state.frames_bad} damaged messages, {state.samples_lost} samples lost"
+        found.append(note("link", text, "if it continues, try another cable or USB socket"))
+    return found
+
+
+def _program(state: BoardState) -> Finding:
+    text = f"{state.program_crc:08x}, protocol {state.protocol}"
+    if state.program_current:
+        return good("program", f"{text}, as installed here")
+    return error("program", f"{text}, which differs from the one installed here, {own_crc():08x}", UPDATE)
+
+
+def _room(state: BoardState) -> Finding:
+    text = f"{state.free_heap} bytes of heap, {state.free_flash} of flash"
+    if state.free_heap >= _LEAST_HEAP:
+        return good("free", text)
+    return note("free", text, "flash a firmware with the program built in: 'armtempo flash'")

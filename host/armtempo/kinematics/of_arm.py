@@ -154,17 +154,22 @@ def _within_tolerance(
         (given.tolerance_mm, given.tolerance_deg) if given else (TOLERANCE_MM, TOLERANCE_DEG)
     )
     slack = math.radians(max(_MARGIN_DEG, _MARGIN_TOLERANCES * tolerance_deg))
-    beside = [each.placed_rad for each in choice.candidates if each.outside_rad <= slack]
-    lever = math.hypot(*choice.shape.flange)
-    reach = tolerance_mm + 2.0 * math.sin(0.5 * math.radians(tolerance_deg)) * lever
-    starts = choice.of_nearer_poses(near, reach) if choice.beyond < reach else []
+    close = [each for each in choice.candidates if each.outside_rad <= slack]
+    beyond = choice.beyond
+    if not close and beyond == math.inf:
+        return []
+    turned = math.radians(tolerance_deg)
+    reach = tolerance_mm + 2.0 * math.sin(0.5 * turned) * math.hypot(*choice.shape.flange)
+    most = _SWINGS * math.sqrt(_COST)
+    beside = [each.placed_rad for each in close if choice.may_fit(each, most * reach, most * turned)]
+    starts = choice.of_nearer_poses(near, reach, slack) if beyond < reach else []
     if not beside and not starts:
         return []
-    target = given or _whole(choice.pose)
+    target, core = given or _whole(choice.pose), solver.geometry.core
     problem = solver.moving.with_all.problem(Constraint.of(target), within=False)
     for angles in beside:
         swing = _SWINGS * most_swing(problem, angles, _COST)
-        if np.all(np.abs(solver.ranges.excess(angles)) <= swing):
+        if np.all(np.abs(solver.ranges.excess(angles)[core]) <= swing):
             starts.append(angles)
     return descents(solver.moving.with_all, target, near, starts) if starts else []
 

@@ -14,7 +14,7 @@ from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.chain import chains_mm
-from armtempo.kinematics.moved_tool import moved_tool_deg
+from armtempo.kinematics.solver import moved_tool_deg
 from armtempo.model import via_table
 from armtempo.model.job import DEGREES, PATHS, TIMINGS
 from armtempo.panel import words

@@ -195,7 +195,7 @@ def _between(table: Array, starts: int) -> Array:
 
 
 def _lift(table: Array, needed: Array) -> None:
-    """Lengthen the entries where the table between them is less than ``needed``, by as little as will do."""
+    """Lengthen the entries around values of the table that are less than ``needed``, by as little as possible."""
     starts = needed.shape[1] - 1
     while True:
         missing = needed - _between(table, starts)
