@@ -23,7 +23,7 @@ from armtempo.robot.run import Run
 )
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=options.FILE,
     help="Page to write when comparing; default: comparison.html next to the first run. An existing file is only "
     "replaced if it is such a page.",
 )

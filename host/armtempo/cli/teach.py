@@ -20,9 +20,7 @@ from armtempo.robot.board import Board
 
 
 @click.command("teach")
-@click.argument(
-    "job_file", required=False, metavar="[JOB.toml]", type=click.Path(dir_okay=False, path_type=Path)
-)
+@click.argument("job_file", required=False, metavar="[JOB.toml]", type=options.FILE)
 @click.option(
     "--posture", "name", metavar="NAME", help="Write the position as [posture.NAME] into the arm file."
 )
