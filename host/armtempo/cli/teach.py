@@ -108,7 +108,7 @@ def _write_job(board: Board, file: Path, by_hand: bool, gamepad: bool) -> None:
             if by_hand:
                 _guide(board, pressed, points)
             else:
-                jog.screen(board, pressed, more=points.keys, told=_MORE).loop()
+                jog.screen(board, pressed, more=points.keys, more_help=_MORE).loop()
         points.save(file)
     except BaseException:
         points.tell()
