@@ -26,7 +26,7 @@ from armtempo.simulator.launch_options import InjectedFault
 from armtempo_shared import codes
 
 from tests import interpreters
-from tests.system import boards, commandline
+from tests.system import commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
 ON_BOARD = Path(prompt.__file__).with_name("on_board")
@@ -34,7 +34,7 @@ ENABLE, STEPS = "E12", ("A15", "A1", "B10")
 
 
 @contextmanager
-def board(folder: Path, record: Arm = boards.ARM, **options: Any) -> Iterator[str]:
+def board(folder: Path, record: Arm = commandline.ARM, **options: Any) -> Iterator[str]:
     """The port of a virtual board that is set up for an arm, the paper's; its edges go to ``folder/edges``."""
     flash = folder / "flash" / "armtempo"
     flash.mkdir(parents=True)
@@ -277,8 +277,8 @@ def test_motors_that_turn_in_spite_of_enable_stop_it(tmp_path: Path) -> None:
 
     No joint goes further than its encoder needs to show it.
     """
-    wrong = replace(boards.ARM, driver=Driver(enable_active="high"), safety=Safety(estop_fitted=True))
-    with board(tmp_path, wrong, arm=boards.ARM) as port:
+    wrong = replace(commandline.ARM, driver=Driver(enable_active="high"), safety=Safety(estop_fitted=True))
+    with board(tmp_path, wrong, arm=commandline.ARM) as port:
         code, found = selftest(port, tmp_path)
     assert (code, words(found, "wrong")) == (1, ["drivers: encoders while STEP toggles"])
     assert all(rises(tmp_path, pin) < 40 for pin in STEPS)
@@ -316,9 +316,9 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     the arm is held and homed as before; so without the firmware."""
     for name, value in (("_TRIES", 1), ("_SPEED", 0.5), ("SLOWEST", 0.2)):
         monkeypatch.setattr(motor_test, name, value)
-    (joint,) = boards.ARM.joints[:1]
+    (joint,) = commandline.ARM.joints[:1]
     joint = replace(joint, model=JointModel(), switches=LimitSwitches(low=1, high=2))
-    real = replace(boards.ARM, joints=(joint,), safety=Safety(estop_fitted=True))
+    real = replace(commandline.ARM, joints=(joint,), safety=Safety(estop_fitted=True))
     named = replace(real, joints=(_encoder(joint, direction=-1),))
     said: list[str] = []
     with board(tmp_path, named, arm=real, faults=PRESSED) as port, connect(port) as used:
@@ -363,7 +363,7 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 )
 def test_what_an_encoder_shows(part: float, lines: list[str]) -> None:
     """It counts so much of what is due."""
-    joint = boards.ARM.driven[0]
+    joint = commandline.ARM.driven[0]
     steps = 640
     line, found = motor_test.judge_encoder(joint, steps, round(part * float(steps * joint.counts_per_step)))
     assert [one.removesuffix(" times as far") for one in found] == lines
