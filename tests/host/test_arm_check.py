@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
 from armtempo.cli import doctor, main, state
-from armtempo.diagnosis import drives, figures, machine, resolution, torque
+from armtempo.diagnosis import drives, figures, resolution, torque
 from armtempo.diagnosis.arm_check import check, check_arm
 from armtempo.diagnosis.finding import Level
 from armtempo.kinematics.chain import chains_mm, outline_mm
@@ -383,20 +383,20 @@ def test_a_board_that_does_not_answer() -> None:
 
 
 def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(machine, "find_ports", lambda: [Port("/dev/ttyACM0", "board", True)])
-    monkeypatch.setattr(machine.os, "access", lambda *_: False)
-    monkeypatch.setattr(machine.sys, "platform", "linux")
-    (item,) = machine.ports()
+    monkeypatch.setattr(doctor.board_port, "find_ports", lambda: [Port("/dev/ttyACM0", "board", True)])
+    monkeypatch.setattr(doctor.os, "access", lambda *_: False)
+    monkeypatch.setattr(doctor.sys, "platform", "linux")
+    (item,) = doctor.ports()
     assert item.level is Level.ERROR
     assert "dialout" in item.next_step
 
 
 def test_packages_that_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(name: str) -> str:
-        raise machine.PackageNotFoundError(name)
+        raise doctor.PackageNotFoundError(name)
 
-    monkeypatch.setattr(machine, "version", nothing)
-    levels = {item.where: item.level for item in machine.packages()}
+    monkeypatch.setattr(doctor, "version", nothing)
+    levels = {item.where: item.level for item in doctor.packages()}
     assert levels["numpy"] is Level.ERROR
     assert levels["matplotlib"] is Level.NOTE
     assert "sphinx" not in levels

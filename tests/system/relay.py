@@ -235,7 +235,7 @@ class HeldJogs:
             if let_go.moving:
                 self._let_go(case.kind, held)
         self._cut(False)
-        stated_s = jog.rest_s(held.motion, told=told)
+        stated_s = jog.rest_s(held.motion, stopped=told)
         while (end := board.status()).moving and _seconds(let_go, end) <= stated_s:
             time.sleep(0.01)  # a busy machine's board may be late, by its own clock it is not
         self._look(end.positions.commanded_steps)

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+import os
+import platform
+import re
+import shutil
+import sys
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 import click
 
-from armtempo.basics import settings
+from armtempo.basics import installation, settings
 from armtempo.basics.errors import ArmtempoError
 from armtempo.basics.settings import ProjectSettings
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.diagnosis import arm_check, machine
+from armtempo.diagnosis import arm_check
 from armtempo.diagnosis.finding import Finding, Level, error, good, note
 from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.model import shipped
 from armtempo.ports import board_port
+from armtempo.ports.board_port import Port
 from armtempo.robot.board_state import BoardState
 
 _LEAST_HEAP = 8_000
 """Bytes of free heap below which a long motion may not fit."""
+_LEAST_PYTHON = (3, 11)
+_NO_PORT = "connect a board by its USB socket, or use --port sim; a board without MicroPython: armtempo flash"
+_GROUP = "sudo usermod -a -G dialout $USER, then log in again"
 
 
 @click.command("doctor")
@@ -33,9 +43,9 @@ def doctor(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     Exit code 1 if something is wrong.
     """
     parts = {
-        "machine": machine.examine_machine(),
-        "packages": machine.packages(),
-        "ports": machine.ports(),
+        "machine": machine(),
+        "packages": packages(),
+        "ports": ports(),
         "project": _project(arm_path, port),
         "arm": _arm(arm_path),
         "board": _board(port, arm_path),
@@ -142,3 +152,58 @@ def _room(state: BoardState) -> Finding:
     if state.free_heap >= _LEAST_HEAP:
         return good("free", text)
     return note("free", text, "flash a firmware with the program built in: 'armtempo flash'")
+
+
+def machine() -> list[Finding]:
+    """Versions of armtempo, Python and the operating system."""
+    python = f"{platform.python_version()} ({platform.python_implementation()})"
+    fits = sys.version_info[:2] >= _LEAST_PYTHON
+    least = ".".join(map(str, _LEAST_PYTHON))
+    found = good("Python", python) if fits else error("Python", python, f"install Python {least} or newer")
+    system = good("system", f"{platform.system()} {platform.release()}, {platform.machine()}")
+    return [good("armtempo", installation.installed_version()), found, _flash_tool(), system]
+
+
+def _flash_tool() -> Finding:
+    found = shutil.which("dfu-util") or shutil.which("st-flash")
+    if found:
+        return good("flash tool", found)
+    return note("flash tool", "not installed", "for 'armtempo flash': install dfu-util")
+
+
+def packages() -> list[Finding]:
+    """Each required or optional package, with its version, or how to install it."""
+    found: dict[str, Finding] = {}
+    for requirement in requires("armtempo") or []:
+        name = re.split(r"[^A-Za-z0-9._-]", requirement)[0]
+        extra = re.search(r"extra == ['\"](\w+)['\"]", requirement)
+        if extra is not None and extra[1] == "docs":  # for developers
+            continue
+        if not (name in found or "platform_machine" in requirement):  # which also has an extra
+            found[name] = _package(name, extra[1] if extra else "")
+    return [*found.values()]
+
+
+def _package(name: str, extra: str) -> Finding:
+    """A package of the core (``extra`` = "") or of an extra."""
+    try:
+        return good(name, version(name))
+    except PackageNotFoundError:
+        if extra:
+            advice = f"{installation.command(name, extra)} if you want it"
+            return note(name, "not installed", advice)
+        return error(name, "missing", "pip install --force-reinstall armtempo")
+
+
+def ports() -> list[Finding]:
+    """The serial ports, and whether this user can open them."""
+    found = [_port(port) for port in board_port.find_ports()]
+    return found or [note("ports", "none", _NO_PORT)]
+
+
+def _port(port: Port) -> Finding:
+    what = f"{port.description or 'serial port'}{', a MicroPython board' if port.board else ''}"
+    if sys.platform == "linux" and not os.access(port.device, os.R_OK | os.W_OK):
+        level = Level.ERROR if port.board else Level.NOTE
+        return Finding(level, port.device, f"{what}; no permission to open it", _GROUP)
+    return good(port.device, what)

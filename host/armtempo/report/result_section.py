@@ -49,8 +49,10 @@ _COLOURS = {
 
 def write(sheet: html_page.Page, found: Evaluation) -> None:
     """The verdict and its tables."""
-    told = verdict.of(found)
-    sheet.verdict(told.state, told.summary, [(finding.state, finding.text) for finding in told.findings])
+    result = verdict.of(found)
+    sheet.verdict(
+        result.state, result.summary, [(finding.state, finding.text) for finding in result.findings]
+    )
     for text in found.complaints:
         if "cut short" in text:
             sheet.note(text, html_page.BAD)

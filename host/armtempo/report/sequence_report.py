@@ -122,12 +122,12 @@ def verdict(found: SequenceRun, legs: tuple[LegResult, ...]) -> Verdict:
 def render(found: SequenceRun) -> str:
     """The page as HTML."""
     legs = results(found)
-    told = verdict(found, legs)
+    result = verdict(found, legs)
     meta = found.meta
     sheet = html_page.Page(
         f"Run of sequence {found.name!r}", f"{meta['started']}, arm {meta.get('arm', 'not known')}"
     )
-    sheet.verdict(told.state, told.summary, [(item.state, item.text) for item in told.findings])
+    sheet.verdict(result.state, result.summary, [(item.state, item.text) for item in result.findings])
     sheet.heading("Its motions")
     if legs:
         sheet.table(tuple(_LEGS), [row for leg in legs for row in _rows(found, leg)], explained=_LEGS)
