@@ -193,40 +193,35 @@ CABLE_OUT = 5
 """The motion, counted from power-up, at which the cable is out: the first E-stop."""
 HANGS = 2
 """The same of the first one whose pulses are captured."""
-BROKEN = (
-    (
-        (
-            InjectedFault("short", 0, 0, name="A15-A1"),
-            InjectedFault("dead_pin", 0, 0, name="B10"),
-            InjectedFault("slow_flash", 0, 0, ms=1500),
-            InjectedFault("late_interrupts", 0, 0, ms=0.05),
-        ),
-        (
-            "PA1, forward together: 383 steps, those of PA15 among them",
-            "PB10, forward together: 0 steps",
-            "flash: erase and write",
-            "E-stop by software to frozen outputs",
-            "E-stop by an edge to frozen outputs",
-            "limit switch by an edge to frozen outputs",
-        ),
+BAD_PINS = [InjectedFault("short", 0, 0, name="A15-A1"), InjectedFault("dead_pin", 0, 0, name="B10")]
+BAD_PINS += [InjectedFault("slow_flash", 0, 0, ms=1500), InjectedFault("late_interrupts", 0, 0, ms=0.05)]
+BAD_CABLE = [
+    InjectedFault("dead_stream", 0, 0, joint=1),
+    InjectedFault("silence", 0.01, CABLE_OUT, ms=60_000),
+]
+BROKEN: dict[str, tuple[Any, ...]] = {
+    "pins": (
+        BAD_PINS,
+        "PA1, forward together: 383 steps, those of PA15 among them",
+        "PB10, forward together: 0 steps",
+        "flash: erase and write",
+        "E-stop by software to frozen outputs",
+        "E-stop by an edge to frozen outputs",
+        "limit switch by an edge to frozen outputs",
     ),
-    (
-        (
-            InjectedFault("dead_stream", 0, 0, joint=1),
-            InjectedFault("silence", 0.01, CABLE_OUT, ms=60_000),
-        ),
-        (
-            "fault internal",
-            "PB10, forward together: 1 steps",
-            "steps of a longer motion, 0.3 s:",
-            "the whole part: the board fell silent in 'estop'",
-        ),
+    "stream and cable": (
+        BAD_CABLE,
+        "fault internal",
+        "PB10, forward together: 1 steps",
+        "steps of a longer motion, 0.3 s:",
+        "the whole part: the board fell silent in 'estop'",
     ),
-    (
-        (InjectedFault("half_clock", 0, 0),),
-        ("a tick of TIM2: 4.000", "motion forward together: fault start_failed"),
+    "clock": (
+        [InjectedFault("half_clock", 0, 0)],
+        "a tick of TIM2: 4.000",
+        "motion forward together: fault start_failed",
     ),
-)
+}
 
 
 @pytest.mark.parametrize("interpreter", [one for one in interpreters.AVAILABLE if one != "micropython-arm"])
@@ -248,10 +243,9 @@ def test_a_part_leaves_nothing_at_the_prompt(
     assert interpreters.run(interpreter, script).split() == ["1", "0", "True"]
 
 
-@pytest.mark.parametrize(("faults", "wrong"), BROKEN, ids=("pins", "stream and cable", "clock"))
-def test_what_is_wrong_is_named(
-    tmp_path: Path, faults: tuple[InjectedFault, ...], wrong: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("broken", BROKEN)
+def test_what_is_wrong_is_named(tmp_path: Path, broken: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    faults, *wrong = BROKEN[broken]
     if any(fault.run for fault in faults):
         impatient(monkeypatch, "estop")
     with board(tmp_path, faults=faults) as port:
