@@ -211,6 +211,10 @@ def case_damaged_uploads_are_refused():
     wrong = bytearray(host.record)
     wrong[30] ^= 1
     assert host.upload("feed", bytes(wrong))[-1] == ("error", "bad_checksum", 255, 0)
+    assert host.ask("put_begin", (len(host.record), 0), "feed")[0] == "ok"
+    for at in range(0, len(host.record), 100):
+        assert host.ask("put_data", (at,), host.record[at : at + 100])[0] == "ok"
+    assert host.ask("put_commit", (1,)) == ("error", "bad_checksum", 255, 0)  # whole, and not what was meant
     assert host.upload("feed", wire.frame(0, 0, b"no record")[1:])[-1] == ("error", "bad_record", 255, 0)
     assert host.upload("/arm", host.record)[-1] == ("error", "bad_record", 255, 0)
     assert host.ask("list", (0,))[1][2] == wire.record_crc(host.record)

@@ -255,14 +255,6 @@ def case_behind_a_stop_nothing_is_prepared():
     assert stands(host)[0] == "stopped" and runs(app) == 1
 
 
-def case_a_motion_that_is_unfit_is_refused_before_anything_moves():
-    app, host = ready([(OUTPUT, 0, 7, 0), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
-    app.controller.board.engine.unfit = (codes.TOO_FAST, 1, 5)
-    begin(host)
-    assert stands(host) == ("refused", codes.TOO_FAST, 3, 2, 0), stands(host)
-    assert runs(app) == 0 and app.controller.board.outputs.log == [] and state(host) == "idle"
-
-
 def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
@@ -373,11 +365,6 @@ def case_nothing_else_is_taken_meanwhile():
     assert stands(host)[0] == "running"
 
 
-def case_before_any_the_command_is_unknown():
-    _, host = connected()
-    assert host.ask("sequence")[:2] == ("error", "unknown_command")
-
-
 def case_while_a_motion_runs_the_last_one_is_told():
     _, host = ready([(WAIT, 0, 0, 10)])
     begin(host)
@@ -435,16 +422,6 @@ def case_speed_between_motions_is_that_of_the_next():
     stand_in.Clock.now_ms += 5000
     host.turn(5)
     assert app.controller.board.engine.rates.wanted == 200
-
-
-def case_the_button_starts_it_as_the_default():
-    app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
-    assert host.ask("set_default", (), "seq")[0] == "ok"
-    app.controller.begin(app.controller.board.store().default(), 0)
-    host.turn(6)
-    arrive(app, host, 10)
-    arrive(app, host, 0)
-    assert stands(host)[0] == "finished"
 
 
 def case_code_stays_from_the_first_motion_to_the_end_where_memory_is_not_short():  # emulated
