@@ -163,8 +163,8 @@ def walk(board: Modules, record: bytes) -> Tried:
     tried = Tried()
     fit, put = intervals.cubics_fit, intervals.put_cubics
 
-    def fitting(steps: int, solver: array[int], queue: array[int]) -> int:
-        verdict: int = fit(steps, solver, queue)
+    def fitting(steps: int, *others: object) -> int:
+        verdict: int = fit(steps, *others)
         tried.rejected += not verdict
         return verdict
 

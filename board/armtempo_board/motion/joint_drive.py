@@ -180,10 +180,8 @@ class JointDrive:
 
     def follow(self, law: "array[int]", is_last: bool) -> None:
         """Follow another time law (see ``StepGenerator.follow``)."""
-        fed = self.ring.feed(0)
-        self.generator.follow(law, is_last)
+        self.generator.follow(law, is_last, self.ring)
         self._next_refill_kiticks = -LOOKAHEAD_KITICKS
-        self.ring.feed(fed)
 
     def finish(self) -> None:
         """End the motion where its time stops."""

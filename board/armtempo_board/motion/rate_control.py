@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-_LAW_MARGIN_KITICKS = const(2048)  # 25 ms, within which all joints get the new time law
 _PERMILLE = const(1000)
 
 
@@ -82,15 +81,14 @@ class RateControl:
     def _is_steady(self) -> bool:
         return bool(self._clock.kiticks() > self.override.steady_kiticks)
 
-    def ramp(self, ahead_kiticks: int) -> "array[int] | None":
-        """Begin the change after the steps in the rings; returns the time law for all joints, None if the
+    def ramp(self, now_kiticks: int, ahead_kiticks: int) -> "array[int] | None":
+        """Begin the change after the steps in queues and rings; returns the time law for all joints, None if the
         motion ends before.
 
-        ``ahead_kiticks``: time until the last step in the rings. If rest would be later than the end of the
+        ``ahead_kiticks``: time from now until the last step in the rings. If rest would be later than the end of the
         motion, there is no change.
         """
-        ahead_kiticks = max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
-        start_ticks = (self._clock.kiticks() + ahead_kiticks) << 10
+        start_ticks = (now_kiticks + max(LOOKAHEAD_KITICKS, ahead_kiticks)) << 10
         self.waits = False
         if start_ticks >= self.duration_ticks or (
             self.braked and self.override.ramp_end_ticks(start_ticks, 0) >= self.duration_ticks
@@ -115,7 +113,7 @@ class RateControl:
             if self.stands():
                 end = override.steady_kiticks
             else:
-                start = now + max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
+                start = now + max(LOOKAHEAD_KITICKS, ahead_kiticks)
                 end = min(override.rest_kiticks(max(start, override.steady_kiticks)), end)
         return max(end - now, 0)
 

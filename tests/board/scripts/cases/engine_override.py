@@ -23,8 +23,8 @@ from engine_rig import FEWER, TICK_HZ, Rig, arm
 SEED = 20263
 CHANGES = 6
 BRAKE = -1  # instead of a rate
-LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 13)
-"""A change that has just been asked for begins 75 ms later, and the stop 75 ms after its end."""
+LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 19)
+"""A change that has just been asked for begins 50 ms later, and the stop 50 ms after its end."""
 MOTIONS = int(([word for word in sys.argv[1:] if word.isdigit()] or [4 // FEWER])[0])
 
 
