@@ -226,12 +226,14 @@ class Engine:
             self._check_end()
             self._finish(self.rates.duration_ticks)
 
-    def _refill_queues(self, at_kiticks: "int | None" = None) -> bool:
+    def _refill_queues(self, at_most_kiticks: "int | None" = None) -> bool:
         """Fill all queues; returns False if that ended the motion.
 
-        ``at_kiticks``: only once, and only up to where they were to reach then.
+        ``at_most_kiticks``: once, and as if it were not later than that.
         """
-        now_kiticks = self.clock.kiticks() if at_kiticks is None else at_kiticks
+        now_kiticks = self.clock.kiticks()
+        if at_most_kiticks is not None:
+            now_kiticks = min(now_kiticks, at_most_kiticks)
         self._readings.convert()
         rates = self.rates
         if rates.end_moves and self._sampler.quiet():
@@ -247,7 +249,7 @@ class Engine:
                     return False
                 if joint.can_queue_more:
                     can_queue_more = True
-            if not can_queue_more or at_kiticks is not None:
+            if not can_queue_more or at_most_kiticks is not None:
                 break
             now_kiticks = self.clock.kiticks()
         return True
@@ -301,9 +303,9 @@ class Engine:
     def brake(self) -> None:
         """Brake to rest along the path; freeze if the motion's record has no brake times, or in a pause.
 
-        Acceleration and jerk stay within 1.25 times the arm's limits. Braking begins after what is queued, 50 ms
-        from now, and after a change of rate in progress. If the motion would end earlier than the brake, it
-        simply ends.
+        Acceleration and jerk stay within 1.25 times the arm's limits. Braking begins after what is queued, 54 ms
+        from now with one joint, 75 ms with six, and after a change of rate in progress. If the motion would end
+        earlier than the brake, it simply ends.
         """
         rates = self.rates
         if not self.moving or rates.braked:
@@ -356,7 +358,8 @@ class Engine:
             return
         for joint in self.drives:
             joint.follow(law, rates.braked)
-            if not self._refill_queues(now_kiticks):  # none beyond the beginning of the ramp by the law before
+            # None beyond the beginning of the ramp, as some joints follow the law before
+            if not self._refill_queues(now_kiticks + rates.margin_kiticks):
                 break
 
     def _fail(self, code: int, joint: int) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
+_JOINT_KITICKS = const(341)  # 4.2 ms, in which a joint gets the new time law and computes its first steps by it
 _PERMILLE = const(1000)
 
 
@@ -24,10 +25,12 @@ class RateControl:
 
     ``duration_ticks``: end of the motion unless the rate changes. ``waits``: a requested change has not
     begun. ``end_moves``: the time of the last sample has changed. ``braked``: the motion is to come to rest.
+    A change begins ``margin_kiticks`` after what queues hold, or after what rings hold.
     """
 
-    def __init__(self, clock: MotionClock) -> None:
+    def __init__(self, clock: MotionClock, joints: int) -> None:
         self._clock = clock
+        self.margin_kiticks = _JOINT_KITICKS * joints
         self.override: "Any" = None
         self.wanted = self._before_pause = _PERMILLE
         self.duration_ticks = self._end_kiticks = 0
@@ -82,13 +85,12 @@ class RateControl:
         return bool(self._clock.kiticks() > self.override.steady_kiticks)
 
     def ramp(self, now_kiticks: int, ahead_kiticks: int) -> "array[int] | None":
-        """Begin the change after the steps in queues and rings; returns the time law for all joints, None if the
-        motion ends before.
+        """Begin the change; returns the time law for all joints, None if the motion ends before.
 
         ``ahead_kiticks``: time from now until the last step in the rings. If rest would be later than the end of the
         motion, there is no change.
         """
-        start_ticks = (now_kiticks + max(LOOKAHEAD_KITICKS, ahead_kiticks)) << 10
+        start_ticks = self._start_kiticks(now_kiticks, ahead_kiticks) << 10
         self.waits = False
         if start_ticks >= self.duration_ticks or (
             self.braked and self.override.ramp_end_ticks(start_ticks, 0) >= self.duration_ticks
@@ -98,6 +100,9 @@ class RateControl:
         self._end_at(self.override.steady_ticks() if self.braked else self.override.end_ticks())
         law: "array[int]" = self.override.law
         return law
+
+    def _start_kiticks(self, now_kiticks: int, ahead_kiticks: int) -> int:
+        return now_kiticks + max(LOOKAHEAD_KITICKS + self.margin_kiticks, ahead_kiticks)
 
     def rest_kiticks(self, ahead_kiticks: int) -> int:
         """Time from now until rest after a stop, given earlier or now; 0 by freezing.
@@ -113,7 +118,7 @@ class RateControl:
             if self.stands():
                 end = override.steady_kiticks
             else:
-                start = now + max(LOOKAHEAD_KITICKS, ahead_kiticks)
+                start = self._start_kiticks(now, ahead_kiticks)
                 end = min(override.rest_kiticks(max(start, override.steady_kiticks)), end)
         return max(end - now, 0)
 

@@ -130,7 +130,7 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
 def queue_steps(solver: object, queue: object, law: object) -> int:
     """Queue the subinterval's steps after REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
 
-    _NODES are solved at most, or a few more; each takes about 2000 instructions. A last step that is
+    _NODES are solved at most, or a few more; each takes about 2000 instructions, by a law as much again. A last step that is
     slow is not put in, but HELD_BACK is set. HALTED is set if by the law the next step never comes. Returns one of
     the results above. The words of ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of
     ``law`` in time_law.py.
@@ -183,7 +183,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                         length = i >> 1
             while length > 1:
                 solve(solver, reached, length)
-                budget -= 2
+                budget -= 2 + mode + mode
                 words[_BASE_HIGH] = high
                 verdict = 1
                 if mode:
@@ -238,7 +238,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
             if words[_SINGLE_STEPS]:
                 words[_SINGLE_STEPS] = words[_SINGLE_STEPS] - 1
             solve(solver, reached + 1, 0)
-            budget -= 1
+            budget -= 1 + (mode & _BY_LAW)
             base = 0
             if mode & _BY_LAW:
                 if not int(to_real_time(law, solver, _FIRST_NODE, scale)):

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-_PARTS_PER_CALL = const(4)  # of the motion that one call of ``prepare`` looks at: bounds its time
+_PARTS_PER_CALL = const(2)  # of the motion that one call of ``prepare`` looks at: bounds its time
 # as in step_queue.py: words of the queue
 _STEPS = const(11)
 _TIME_SCALE = const(14)
