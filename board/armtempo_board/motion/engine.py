@@ -303,9 +303,9 @@ class Engine:
     def brake(self) -> None:
         """Brake to rest along the path; freeze if the motion's record has no brake times, or in a pause.
 
-        Acceleration and jerk stay within 1.25 times the arm's limits. Braking begins after what is queued, 54 ms
-        from now with one joint, 75 ms with six, and after a change of rate in progress. If the motion would end
-        earlier than the brake, it simply ends.
+        Acceleration and jerk stay within 1.25 times the arm's limits. Braking begins after what is queued, 33 ms from
+        now with one joint, 75 ms with six, and after a change of rate in progress. If the motion would end earlier
+        than the brake, it simply ends.
         """
         rates = self.rates
         if not self.moving or rates.braked:

@@ -7,7 +7,7 @@ from micropython import const
 from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.motion.clock import MotionClock
-from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS
+from armtempo_board.motion.joint_drive import JOINT_KITICKS
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-_JOINT_KITICKS = const(341)  # 4.2 ms, in which a joint gets the new time law and computes its first steps by it
 _PERMILLE = const(1000)
 
 
@@ -25,12 +24,13 @@ class RateControl:
 
     ``duration_ticks``: end of the motion unless the rate changes. ``waits``: a requested change has not
     begun. ``end_moves``: the time of the last sample has changed. ``braked``: the motion is to come to rest.
-    A change begins ``margin_kiticks`` after what queues hold, or after what rings hold.
+    A change begins ``margin_kiticks`` after ``lookahead_kiticks``, or after what is in the rings.
     """
 
-    def __init__(self, clock: MotionClock, joints: int) -> None:
+    def __init__(self, clock: MotionClock, joints: int, lookahead_kiticks: int) -> None:
         self._clock = clock
-        self.margin_kiticks = _JOINT_KITICKS * joints
+        self.margin_kiticks = JOINT_KITICKS * joints
+        self._ahead_kiticks = lookahead_kiticks + self.margin_kiticks
         self.override: "Any" = None
         self.wanted = self._before_pause = _PERMILLE
         self.duration_ticks = self._end_kiticks = 0
@@ -102,7 +102,7 @@ class RateControl:
         return law
 
     def _start_kiticks(self, now_kiticks: int, ahead_kiticks: int) -> int:
-        return now_kiticks + max(LOOKAHEAD_KITICKS + self.margin_kiticks, ahead_kiticks)
+        return now_kiticks + max(self._ahead_kiticks, ahead_kiticks)
 
     def rest_kiticks(self, ahead_kiticks: int) -> int:
         """Time from now until rest after a stop, given earlier or now; 0 by freezing.

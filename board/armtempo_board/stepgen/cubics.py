@@ -67,9 +67,9 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32, slack: int) -> int:
 
     The Hermite cubic through the first and the end node misses the middle one by D in time and by E / (4 steps) in
     slope. Its fourth derivative alone makes each of the two D / 16 wrong at most, its fifth E / 26. D / 16 + E / 16 <=
-    1/8 tick is asked, which leaves a factor of four for what is not constant about them; by a law of time 2**``slack``
-    times that. The rounding of the third
-    difference (see ``put_cubics``), in groups of G steps 0.004 steps**3 / G**2 units, is allowed an eighth of a tick.
+    1/8 tick is asked, 2**``slack`` times that by a law of time; that leaves a factor of four for what is not constant
+    about them. The rounding of the third difference (see ``put_cubics``), in groups of G steps 0.004 steps**3 / G**2
+    units, is allowed an eighth of a tick.
     """
     # Log2 of the steps, rounded up, and the slopes with one exponent
     power = 0

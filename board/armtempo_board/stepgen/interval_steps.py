@@ -130,9 +130,9 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
 def queue_steps(solver: object, queue: object, law: object) -> int:
     """Queue the subinterval's steps after REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
 
-    _NODES are solved at most, or a few more; each takes about 2000 instructions, by a law as much again. A last step that is
-    slow is not put in, but HELD_BACK is set. HALTED is set if by the law the next step never comes. Returns one of
-    the results above. The words of ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of
+    _NODES are solved at most, or a few more; each takes about 2000 instructions, by a law as much again. A last step
+    that is slow is not put in, but HELD_BACK is set. HALTED is set if by the law the next step never comes. Returns one
+    of the results above. The words of ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of
     ``law`` in time_law.py.
     """
     words = ptr32(queue)  # type: ignore[arg-type]
