@@ -52,7 +52,8 @@ SIX = (
 )
 WORST_CYCLES = 3.0
 CHANGE_EVERY = 8  # of a change of speed, in pairs of other commands
-CHANGES = ((0,), (0, 1000))  # braked, and a pause
+BRAKE = -1
+CHANGES = ((BRAKE,), (0, 1000))
 CHANGED = ((240_000, 1), (40_000, 1), (80_000, 3), (25_000, 3), (8_000, 6), (20_000, 6), (40_000, 6))
 """Rates of each joint, and joints, whose speed is changed."""
 RAMP_S, WHOLE_S = 0.5, 1.2
@@ -90,7 +91,7 @@ class Case:
     motion: bytes
     start: list[int]
     changes: tuple[int, ...] = ()
-    """Speeds that are asked for while it moves, in thousandths; 0: a pause."""
+    """Speeds that are asked for while it moves, in thousandths; 0: a pause, BRAKE: a stop."""
 
 
 @dataclass(frozen=True)
@@ -268,7 +269,8 @@ def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> Non
     for number in range(COMMANDS // 2):
         session += [("status", (), b""), ("samples", (number, 0), b"")]
         if number % CHANGE_EVERY == CHANGE_EVERY - 1:
-            session += [("speed", (rate,), b"") for rate in itertools.islice(changes, 1)]
+            for rate in itertools.islice(changes, 1):
+                session.append(("stop", (0,), b"") if rate == BRAKE else ("speed", (rate,), b""))
     with (tree / "frames").open("wb") as file:
         for sequence, (name, values, tail) in enumerate(session):
             entry = wire.COMMAND[name]
