@@ -97,8 +97,7 @@ if TYPE_CHECKING:
         PlanError,
         RunFolderError,
     )
-    from armtempo.kinematics.many import inverse_many
-    from armtempo.kinematics.of_arm import forward, inverse
+    from armtempo.kinematics.of_arm import forward, inverse, inverse_many
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
@@ -142,8 +141,7 @@ _HOMES = {
         "PlanError",
         "RunFolderError",
     ),
-    "armtempo.kinematics.many": ("inverse_many",),
-    "armtempo.kinematics.of_arm": ("forward", "inverse"),
+    "armtempo.kinematics.of_arm": ("forward", "inverse", "inverse_many"),
     "armtempo.ports.board_port": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job", "Stop"),

@@ -29,7 +29,7 @@ from armtempo.model.tool_way import ToolWay  # noqa: E402
 from armtempo.planning import planner  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 
-from tests.host.independent import faults, sampled  # noqa: E402
+from tests.host.problems import faults, sampled  # noqa: E402
 
 ARMS = ("parol6", "ar4", "thor", "community", "moveo", "scara", "paper")
 _FOLLOWED = 400

@@ -24,7 +24,7 @@ from armtempo.model.plan import Plan  # noqa: E402
 from armtempo.planning import planner  # noqa: E402
 
 from tests.host import problems  # noqa: E402
-from tests.host.independent import faults  # noqa: E402
+from tests.host.problems import faults  # noqa: E402
 
 
 def main() -> None:

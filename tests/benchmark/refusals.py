@@ -24,7 +24,7 @@ from armtempo.model.job import Job  # noqa: E402
 from armtempo.planning import planner  # noqa: E402
 
 from tests.host import problems  # noqa: E402
-from tests.host.independent import faults  # noqa: E402
+from tests.host.problems import faults  # noqa: E402
 
 
 def random_job(seed: int) -> tuple[Arm, Job]:

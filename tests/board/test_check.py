@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
+import random
+from array import array
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 from armtempo_shared import codes, limits, motion
+from armtempo_shared.limits import TICK_HZ
 
-from tests import interpreters
-from tests.board import motions, oracle, walking
+from tests import inprocess, interpreters
+from tests.board import motions, oracle
 
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "judge.py"
 FAR = 10_000_000
@@ -22,7 +27,7 @@ def judge(
     paths = [folder / f"{number}.atm" for number in range(len(records))]
     for path, record in zip(paths, records, strict=True):
         path.write_bytes(record)
-    words = [str(word) for word in (low, high, rate, walking.GAP_TICKS, *paths)]
+    words = [str(word) for word in (low, high, rate, oracle.GAP_TICKS, *paths)]
     return [eval(line) for line in interpreters.run(interpreter, SCRIPT, *words).splitlines()]
 
 
@@ -93,7 +98,7 @@ def ends_of_pieces(record: bytes, at: float) -> list[float]:
 @pytest.mark.parametrize("name", ["feeding", "cubic", "refined"])
 def test_rate(interpreter: str, name: str, tmp_path: Path) -> None:
     record = motions.feeding(degree=3 if name == "cubic" else 5, refine=8 if name == "refined" else 1)
-    peak = walking.peak_rate(record)
+    peak = oracle.peak_rate(record)
     assert judge(interpreter, tmp_path, record, rate=int(peak * 1.0005) + 1) == [None]
     verdict = judge(interpreter, tmp_path, record, rate=int(peak * 0.9995))[0]
     assert verdict is not None
@@ -149,7 +154,7 @@ def test_reversal_that_the_driver_cannot_follow(interpreter: str, tmp_path: Path
     assert verdicts[0] is None
     assert verdicts[1] is not None
     assert verdicts[1][0] == codes.TOO_ABRUPT
-    assert verdicts[1][2] > 0.16 * (limits.TICK_HZ / walking.GAP_TICKS) ** 2
+    assert verdicts[1][2] > 0.16 * (limits.TICK_HZ / oracle.GAP_TICKS) ** 2
 
 
 @pytest.mark.slow
@@ -177,3 +182,66 @@ def test_numbers_beyond_the_evaluator(interpreter: str, tmp_path: Path) -> None:
         0,
         codes.TOO_LONG,
     ]
+
+
+# step rates of subintervals against a limit: the arithmetic by itself, under CPython
+
+
+SEED = 20261123
+LEAST_TICKS, MOST_TICKS = 1 << 20, 1 << 28
+ROUNDED = 8
+"""Steps, of the differences' own unit, that the comparison may be off."""
+
+
+@pytest.fixture(scope="module")
+def rate_check() -> ModuleType:
+    with inprocess.board_modules():
+        return importlib.import_module("armtempo_board.motion.rate_check")
+
+
+def compared(rate_check: ModuleType, steps: list[int], ticks: list[int], rate: int) -> int:
+    """Differences of five Bezier points each, at the scale at which a tick of time is one of theirs."""
+    mantissa, exponent = rate_check.scaled(rate)
+    angle, time = (
+        array("I", [0, *(each + rate_check.DIFFERENCE_BIAS for each in row)]) for row in (steps, ticks)
+    )
+    return int(rate_check.compare(angle, time, mantissa, 30 - exponent))
+
+
+def test_a_rate_just_within_and_just_beyond_the_limit(rate_check: ModuleType) -> None:
+    """All differences at the limit, either way; then one beyond it: at an end that is certain, within it is not."""
+    random.seed(SEED)
+    for _ in range(200):
+        rate = random.randrange(TICK_HZ // 1000, TICK_HZ // 4)
+        ticks = [random.randrange(LEAST_TICKS, MOST_TICKS) for _ in range(5)]
+        steps = [random.choice((-1, 1)) * (each * rate // TICK_HZ) for each in ticks]
+        assert compared(rate_check, steps, ticks, rate) == rate_check.SLOWER, (SEED, rate, ticks)
+        place = random.randrange(5)
+        steps[place] += ROUNDED if steps[place] > 0 else -ROUNDED
+        beyond = rate_check.FASTER if place in (0, 4) else rate_check.UNDECIDED
+        assert compared(rate_check, steps, ticks, rate) == beyond, (SEED, rate, ticks, place)
+
+
+def interval(rate_check: ModuleType, steps: list[int], ticks: list[int]) -> SimpleNamespace:
+    """A subinterval whose differences of angle count 2**-10 steps each, those of time 2**-10 ticks."""
+    measured = [
+        [scale, *(each + rate_check.DIFFERENCE_BIAS for each in (*row, min(row), max(row)))]
+        for scale, row in ((10, steps), (22, ticks))
+    ]
+    return SimpleNamespace(angle_measures=measured[0], time_measures=measured[1])
+
+
+def test_the_rate_that_is_told(rate_check: ModuleType) -> None:
+    """At its ends the greater of the two; else the largest difference of angle over the smallest of time."""
+    ticks = [1 << 20] * 5
+    for steps in ([1024, 2048, 5000, 2048, -3072], [3072, 2048, -5000, 2048, 1024]):
+        found = interval(rate_check, steps, ticks)
+        assert rate_check.at_ends(found) == 3072 * TICK_HZ >> 20
+        assert rate_check.highest(found) == 5000 * TICK_HZ >> 20
+    ticks[2] = 1 << 19
+    assert rate_check.highest(interval(rate_check, steps, ticks)) == 5000 * TICK_HZ >> 19
+
+
+def test_time_that_does_not_advance_has_no_rate(rate_check: ModuleType) -> None:
+    ticks = [LEAST_TICKS, LEAST_TICKS, -1, LEAST_TICKS, LEAST_TICKS]
+    assert compared(rate_check, [0] * 5, ticks, TICK_HZ // 4) == rate_check.UNDECIDED

@@ -16,7 +16,7 @@ from armtempo_shared.motion import Motion
 from numpy.polynomial import Polynomial
 
 from tests import inprocess, interpreters
-from tests.board import motions, oracle, walking
+from tests.board import motions, oracle
 
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 MOTION_PATH = [
@@ -40,9 +40,9 @@ SLOPE_PART = 2.0**-22
 @pytest.mark.parametrize("name", motions.NAMED)
 def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
     record = motions.NAMED[name]()
-    verdicts, steps = walking.walk(QUICK, tmp_path, [record])
+    verdicts, steps = oracle.walk(QUICK, tmp_path, [record])
     assert verdicts == ["None"]
-    assert walking.verify(record, steps[0]) <= 0.77  # half a tick is the rounding
+    assert oracle.verify(record, steps[0]) <= 0.77  # half a tick is the rounding
 
 
 @pytest.mark.parametrize("beyond", [-1e-4, -1e-6, 1e-6, 3e-5, 1e-4, 2e-4, 1e-3, 0.1])
@@ -51,9 +51,9 @@ def test_a_turn_that_just_reaches_a_half_step(sign: int, beyond: float, tmp_path
     """The two steps of a turn that comes too little beyond it are left out; here it lies between two segments."""
     via = sign * np.array([0.0, 20.5 + beyond, 0.0])
     record = motions.record([via], [np.full(2, 0.1)], 5)
-    verdicts, steps = walking.walk(QUICK, tmp_path, [record])
+    verdicts, steps = oracle.walk(QUICK, tmp_path, [record])
     assert verdicts == ["None"]
-    walking.verify(record, steps[0])
+    oracle.verify(record, steps[0])
 
 
 def chance_records(count: int) -> list[bytes]:
@@ -63,13 +63,13 @@ def chance_records(count: int) -> list[bytes]:
 
 @pytest.mark.slow
 def test_fifty_random_motions(tmp_path: Path) -> None:
-    records = [record for record in chance_records(65) if walking.peak_rate(record) < 330_000]
-    verdicts, steps = walking.walk(QUICK, tmp_path, records)
+    records = [record for record in chance_records(65) if oracle.peak_rate(record) < 330_000]
+    verdicts, steps = oracle.walk(QUICK, tmp_path, records)
     accepted = [number for number, verdict in enumerate(verdicts) if verdict == "None"]
     assert len(accepted) >= 50
     for number in accepted:
         try:
-            walking.verify(records[number], steps[number])
+            oracle.verify(records[number], steps[number])
         except AssertionError as error:
             raise AssertionError(f"motion {number} of seed 20240607") from error
 
@@ -83,7 +83,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[bytes], list[
         motions.NAMED["20 ms"](),
         *chance_records(25),
     ]
-    return records, walking.walk(QUICK, tmp_path_factory.mktemp("shared"), records, room=2)[1]
+    return records, oracle.walk(QUICK, tmp_path_factory.mktemp("shared"), records, room=2)[1]
 
 
 @pytest.mark.slow
@@ -91,7 +91,7 @@ def test_all_interpreters_give_the_same_edges(
     interpreter: str, shared: tuple[list[bytes], list[bytes]], tmp_path: Path
 ) -> None:
     records, expected = shared
-    assert walking.walk(interpreter, tmp_path, records, room=2)[1] == expected
+    assert oracle.walk(interpreter, tmp_path, records, room=2)[1] == expected
 
 
 @pytest.mark.slow
@@ -100,7 +100,7 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
 ) -> None:
     records, expected = shared
     for room in (14, 512, 1016):
-        steps = walking.walk(QUICK, tmp_path, records, room=room)[1]
+        steps = oracle.walk(QUICK, tmp_path, records, room=room)[1]
         for mine, other in zip(steps, expected, strict=True):
             edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
             np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
@@ -108,8 +108,8 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
 
 def _brake(start_s: float, length_s: float) -> tuple[int, int]:
     """In ticks; the length whole in a record's unit for it and on the grid of ramps, 64000 ticks: as it is run."""
-    whole = 125 << max(14, (int(length_s * walking.TICK_HZ) // 1900).bit_length())
-    return round(start_s * walking.TICK_HZ), round(length_s * walking.TICK_HZ / whole) * whole
+    whole = 125 << max(14, (int(length_s * oracle.TICK_HZ) // 1900).bit_length())
+    return round(start_s * oracle.TICK_HZ), round(length_s * oracle.TICK_HZ / whole) * whole
 
 
 @pytest.mark.slow
@@ -117,9 +117,9 @@ def _brake(start_s: float, length_s: float) -> tuple[int, int]:
 def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: float, tmp_path: Path) -> None:
     start, length = _brake(start_s, length_s)
     record = motions.feeding()
-    steps = walking.walk(interpreter, tmp_path, [record], brake=(start, length))[1][0]
+    steps = oracle.walk(interpreter, tmp_path, [record], brake=(start, length))[1][0]
     for joint in range(3):
-        _verify_braked(Motion(record), joint, walking.steps_of(steps, joint), start, length)
+        _verify_braked(Motion(record), joint, oracle.steps_of(steps, joint), start, length)
 
 
 @pytest.mark.slow
@@ -134,7 +134,7 @@ def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
     brake = _brake(start_s, length_s)
     records = [motions.feeding()] + [motions.cruise(90_000)] * (start_s < CRUISE_S)
     one_by_one, *others = (
-        walking.walk(QUICK, tmp_path, records, room=room, brake=brake)[1] for room in (2, 14, 1016)
+        oracle.walk(QUICK, tmp_path, records, room=room, brake=brake)[1] for room in (2, 14, 1016)
     )
     for steps in others:
         for mine, other in zip(steps, one_by_one, strict=True):
@@ -150,21 +150,21 @@ def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
 def test_braking_from_full_speed(tmp_path: Path) -> None:
     start, length = _brake(0.9, 0.8)
     record = motions.cruise(333_000)
-    steps = walking.walk(QUICK, tmp_path, [record], brake=(start, length))[1][0]
-    _verify_braked(Motion(record), 0, walking.steps_of(steps, 0), start, length)
+    steps = oracle.walk(QUICK, tmp_path, [record], brake=(start, length))[1][0]
+    _verify_braked(Motion(record), 0, oracle.steps_of(steps, 0), start, length)
 
 
-def _verify_braked(motion: Motion, joint: int, steps: walking.Steps, start: int, length: int) -> None:
-    exact = oracle.without_grazes(oracle.crossings(motion, joint), walking.GAP_TICKS)
-    count = int(np.sum(exact.ticks < walking.braked(np.array([start + length]), start, length)))
+def _verify_braked(motion: Motion, joint: int, steps: oracle.Steps, start: int, length: int) -> None:
+    exact = oracle.without_grazes(oracle.crossings(motion, joint), oracle.GAP_TICKS)
+    count = int(np.sum(exact.ticks < oracle.braked(np.array([start + length]), start, length)))
     assert abs(len(steps.ticks) - count) <= 1
     count = min(count, len(steps.ticks))
     np.testing.assert_array_equal(steps.direction[:count], exact.direction[:count])
-    path = walking.braked(steps.ticks[:count].astype(float), start, length)
+    path = oracle.braked(steps.ticks[:count].astype(float), start, length)
     error = np.abs(path - exact.ticks[:count])
     # of the length, 13.1 / 2**30 at the worst of eleven lengths from 0.5 to 2.9 s
     assert np.max(error, initial=0.0) <= 1.5 + 14 * length / 2**30
-    assert np.max(error * exact.speed[:count], initial=0.0) / walking.TICK_HZ <= 0.02
+    assert np.max(error * exact.speed[:count], initial=0.0) / oracle.TICK_HZ <= 0.02
 
 
 @pytest.mark.parametrize("module", MOTION_PATH, ids=lambda path: path.stem)

@@ -30,7 +30,7 @@ from armtempo.model.tool_pose import Pose
 from armtempo.new_arm.urdf_rows import AxisLine, Near, derive, rounded
 from armtempo.new_arm.urdf_rows import geometry as geometry_of
 
-from tests.host.published_arms import NAMED, PAPER, PUBLISHED, SHAPE, with_wrist_at
+from tests.host.arms import NAMED, PAPER, PUBLISHED, SHAPE, with_wrist_at
 
 ARM = Arm.paper()
 RANGES = Ranges.of(ARM)

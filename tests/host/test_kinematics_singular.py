@@ -20,7 +20,7 @@ from armtempo.kinematics.solutions import (
     WRIST_STRAIGHT,
 )
 
-from tests.host.published_arms import NAMED, PAPER, SHAPE, drawn, turned, with_wrist_at, worst_error
+from tests.host.arms import NAMED, PAPER, SHAPE, drawn, turned, with_wrist_at, worst_error
 
 A1, D1 = abs(SHAPE.shoulder), SHAPE.height
 FAR, NEAR = SHAPE.farthest, SHAPE.nearest

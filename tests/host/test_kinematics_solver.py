@@ -16,7 +16,7 @@ from armtempo.model import pose
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import WHOLE, Pose
 
-from tests.host.small_arms import (
+from tests.host.arms import (
     FITTING,
     FIVE,
     FOUR,

@@ -23,7 +23,7 @@ from armtempo.robot import goto
 from armtempo.splines import bspline
 
 from tests.benchmark.lines import line_faults, random_lines, tool_poses
-from tests.host.independent import faults
+from tests.host.problems import faults
 
 ARM = Arm.of("parol6")
 START = (90.0, -100.0, 200.0, 5.0, 40.0, 180.0)

@@ -19,8 +19,8 @@ from armtempo.records import encode
 from armtempo.robot import arm_state
 from armtempo_shared import armrecord
 
-from tests.host import arm_files
-from tests.host.arm_files import ALL, DOOR, FAN, GRIPPER, PART, PUMP
+from tests.host import arms
+from tests.host.arms import ALL, DOOR, FAN, GRIPPER, PART, PUMP
 
 GPIO = Path(simulator.__file__).parent / "hardware" / "chip" / "gpio.py"
 HARDWARE_PAGE = Path(__file__).parents[2] / "board" / "docs" / "hardware.md"
@@ -28,7 +28,7 @@ HARDWARE_PAGE = Path(__file__).parents[2] / "board" / "docs" / "hardware.md"
 
 @pytest.fixture
 def arm(tmp_path: Path) -> Arm:
-    return arm_files.load(tmp_path, ALL)
+    return arms.load(tmp_path, ALL)
 
 
 def test_what_the_file_says(arm: Arm) -> None:
@@ -125,7 +125,7 @@ def test_the_board_makes_these_pulses(arm: Arm) -> None:
 
 @pytest.mark.parametrize("frequency_hz", [1, 49.9, 50, 333, 1000, 99_999, 100_000])
 def test_frequencies(tmp_path: Path, frequency_hz: float) -> None:
-    arm = arm_files.load(tmp_path, FAN.replace("20000", str(frequency_hz)))
+    arm = arms.load(tmp_path, FAN.replace("20000", str(frequency_hz)))
     fan = armrecord.unpack_outputs(encode.arm_record(arm))[0][0]
     made_hz = 168e6 / ((fan["prescaler"] + 1) * (fan["period"] + 1))
     assert made_hz == pytest.approx(frequency_hz, rel=1e-3)
@@ -186,7 +186,7 @@ def test_json_that_was_altered_is_refused(
 )
 def test_pins_that_cannot_be_had(tmp_path: Path, tables: str, words: list[str]) -> None:
     """Refused by name when the file is read, and a finding of the check."""
-    path = arm_files.write(tmp_path, tables)
+    path = arms.write(tmp_path, tables)
     with pytest.raises(InputError) as caught:
         Arm.load(path)
     found = arm_check.check(path)[1]
@@ -221,29 +221,29 @@ def test_pins_that_cannot_be_had(tmp_path: Path, tables: str, words: list[str]) 
 )
 def test_tables_that_are_not_allowed(tmp_path: Path, tables: str, words: list[str]) -> None:
     with pytest.raises(InputError) as caught:
-        Arm.load(arm_files.write(tmp_path, tables))
+        Arm.load(arms.write(tmp_path, tables))
     for word in words:
         assert word in f"{caught.value.problem} {caught.value.hint}", caught.value
 
 
 def test_boards(tmp_path: Path) -> None:
     """A free pin of one board may be taken, or missing, on another."""
-    arm_files.load(tmp_path, PUMP.replace("PD0", "PB9"))
+    arms.load(tmp_path, PUMP.replace("PD0", "PB9"))
     with pytest.raises(InputError, match="PB9 is taken on the VCC_GND_F407VE by a LED"):
-        arm_files.load(tmp_path, PUMP.replace("PD0", "PB9"), board="VCC_GND_F407VE")
+        arms.load(tmp_path, PUMP.replace("PD0", "PB9"), board="VCC_GND_F407VE")
     with pytest.raises(InputError, match="PA6 is taken on the VCC_GND_F407ZG by the flash chip"):
-        arm_files.load(tmp_path, PUMP.replace("PD0", "PA6"), board="VCC_GND_F407ZG")
+        arms.load(tmp_path, PUMP.replace("PD0", "PA6"), board="VCC_GND_F407ZG")
     with pytest.raises(
         InputError, match=r"PYBV11 does not have the pins that the engine takes: PE12 \(ENABLE"
     ):
-        arm_files.load(tmp_path, board="PYBV11")
+        arms.load(tmp_path, board="PYBV11")
     with pytest.raises(InputError, match="board = 'PYBV10' is not allowed"):
-        arm_files.load(tmp_path, board="PYBV10")
+        arms.load(tmp_path, board="PYBV10")
 
 
 @pytest.mark.parametrize("board", [name for name in BOARDS if name != "PYBV11"])
 def test_every_pin_of_the_engine_is_there_and_free(tmp_path: Path, board: str) -> None:
-    arm = arm_files.load(tmp_path, PUMP.replace("PD0", "PB12"), board=board)
+    arm = arms.load(tmp_path, PUMP.replace("PD0", "PB12"), board=board)
     pins = engine_pins.table()
     used = [*(row[0] for row in pins["STEP"]), *pins["DIR"], *pins["LIMIT"], *pins["LEDS"], pins["ESTOP"]]
     used += [pin for row in pins["ENCODER"] for pin in row[1:3]]
@@ -270,7 +270,7 @@ def test_the_page_lists_boards_and_timer_pins() -> None:
 
 
 def test_difference_in_words(tmp_path: Path) -> None:
-    arm = arm_files.load(tmp_path, ALL)
+    arm = arms.load(tmp_path, ALL)
     old = encode.arm_record(arm)
     fewer = encode.arm_record(replace(arm, outputs=arm.outputs[:2]))
     assert arm_state.difference(old, fewer) == "other outputs"
@@ -280,7 +280,7 @@ def test_difference_in_words(tmp_path: Path) -> None:
 
 def test_placing_takes_the_timer_that_is_free(tmp_path: Path) -> None:
     """PB8 has TIM10 and TIM4; PA6 TIM13, and TIM3 if no encoder has it."""
-    arm = arm_files.load(tmp_path, GRIPPER + GRIPPER.replace("gripper", "hand").replace("PB8", "PA6") + DOOR)
+    arm = arms.load(tmp_path, GRIPPER + GRIPPER.replace("gripper", "hand").replace("PB8", "PA6") + DOOR)
     assert {name: place.timer for name, place in pin_use.timer_outputs(arm).items()} == {
         "gripper": 10,
         "hand": 13,

@@ -25,7 +25,7 @@ from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.robot import goto
 
 from tests.benchmark.rooms import dense_least, random_room
-from tests.host import small_arms
+from tests.host import arms
 
 PAPER = Arm.paper()
 FEEDER = KeepOut("feeder", (-50.0, 150.0, -FAR_MM), (50.0, 400.0, FAR_MM))
@@ -83,11 +83,11 @@ def test_links_do_not_touch_each_other() -> None:
     seed, refused = 5, 0
     rng = np.random.default_rng(seed)
     links = (
-        small_arms.joint(0.0, 100.0, 0.0),
-        small_arms.joint(0.0, 100.0, 0.0),
-        small_arms.joint(0.0, 100.0, 0.0),
+        arms.joint(0.0, 100.0, 0.0),
+        arms.joint(0.0, 100.0, 0.0),
+        arms.joint(0.0, 100.0, 0.0),
     )
-    arm = thick(small_arms.arm("fold", *links), 10.0, None)
+    arm = thick(arms.arm("fold", *links), 10.0, None)
     assert (1, 5) in room_check.Bodies(arm).pairs
     for _ in range(8):
         end = np.array([20.0, *rng.uniform(95.0, 130.0, 2)])

@@ -18,7 +18,7 @@ from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from click.testing import CliRunner, Result
 
 from tests import scripted
-from tests.host import arm_files
+from tests.host import arms
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "wired_pins.py"
 ESTOP = "estop_fitted = true"
@@ -59,7 +59,7 @@ class Bench:
 
 @contextmanager
 def bench(folder: Path, *faults: InjectedFault) -> Iterator[Bench]:
-    path = arm_files.write(folder, arm_files.ALL)
+    path = arms.write(folder, arms.ALL)
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("estop_fitted = false", ESTOP), encoding="utf-8")
     log = folder / "edges"

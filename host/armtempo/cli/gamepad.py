@@ -87,7 +87,6 @@ class KeysAndGamepad:
         self._gamepad = gamepad
 
     def read(self, timeout_s: float) -> str:
-        """See Keys."""
         until_s = time.monotonic() + timeout_s
         while True:
             now_s = time.monotonic()
@@ -96,7 +95,6 @@ class KeysAndGamepad:
                 return key
 
     def flush(self) -> None:
-        """See Keys."""
         self._gamepad.flush()
         self._keys.flush()
 

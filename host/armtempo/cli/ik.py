@@ -69,10 +69,8 @@ class _Given:
     metavar="X Y Z",
     help="Direction of the tool's z axis; rotation about it is free.",
 )
-@click.option(
+@options.file(
     "--poses",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
     help="One pose per line: x y z alone, with roll pitch yaw (- if free) or a quaternion, or 12 or 16 "
     "numbers of a matrix.",
 )

@@ -82,7 +82,6 @@ class PosixKeys:
             termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._before)
 
     def read(self, timeout_s: float) -> str:
-        """See Keys."""
         until_s = time.monotonic() + timeout_s
         while True:
             while self._text:
@@ -98,7 +97,6 @@ class PosixKeys:
             self._text += data.decode(errors="ignore")
 
     def flush(self) -> None:
-        """See Keys."""
         while self.read(0.0) not in ("", END):
             pass
 
@@ -113,7 +111,6 @@ class WindowsKeys:
         self.flush()
 
     def read(self, timeout_s: float) -> str:
-        """See Keys."""
         import msvcrt
 
         console: Any = msvcrt
@@ -128,6 +125,5 @@ class WindowsKeys:
         return _POSIX.get(letter, letter)
 
     def flush(self) -> None:
-        """See Keys."""
         while self.read(0.0):
             pass

@@ -16,12 +16,10 @@ from armtempo.paper.printed import Claim
 
 @click.command("paper")
 @click.option("--quick", is_flag=True, help="Small populations, few seeds, two replays: under a minute.")
-@click.option(
+@options.folder(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
     default=Path("paper"),
     show_default=True,
-    metavar="FOLDER",
     help="Where page and run folders go.",
 )
 @options.as_json

@@ -17,11 +17,9 @@ from armtempo.robot.motor_test import ARM_FILE
 
 
 @click.command("selftest")
-@click.option(
+@options.folder(
     "--out",
     "-o",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="FOLDER",
     help="Write selftest.json and a page with figures, selftest.html, to FOLDER.",
 )
 @options.force("files of an earlier self-test in FOLDER")

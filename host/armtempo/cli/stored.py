@@ -23,7 +23,7 @@ from armtempo.robot.board_state import record_crc
 
 
 @click.command("upload")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=options.PATH)
 @click.option("--name", metavar="NAME", help="Name on the board; default: the job's name.")
 @click.option("--default", "as_default", is_flag=True, help="Let the board's button start it.")
 @options.force("another motion of this name on the board")

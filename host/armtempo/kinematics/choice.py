@@ -22,6 +22,9 @@ from armtempo.kinematics.rejection import Rejection, WristCentre, reasons
 from armtempo.kinematics.shape import Shape
 from armtempo.kinematics.solutions import OK, OUT_OF_REACH, PoseSolutions
 
+_SAME_RAD = 0.1
+"""Postures nearer than this, in joint space, lead to the same one."""
+
 
 @dataclass(eq=False, slots=True)
 class Candidate:
@@ -113,11 +116,25 @@ class Choice:
             return math.inf
         return self.wrist.beyond
 
-    def of_nearer_poses(self, previous: Sequence[float], by: float) -> list[list[float]]:
-        """Postures, (joints,) each, for the tool moved slightly outwards or inwards, for a pose on a border."""
+    def may_fit(self, each: Candidate, moved: float, turned_rad: float) -> bool:
+        """Whether the ranges may hold ``each`` for a wrist centre moved, and a tool turned, by at most this.
+
+        To first order, and quick: mostly it tells where not.
+        """
+        arm = self.wrist.swing_rad(each.index, moved)
+        start = self.geometry.core.start
+        excess = [abs(excess) for excess in self.ranges.excess(each.placed_rad)[start : start + 6]]
+        sin5 = math.sin(each.placed_rad[start + 4] + self.shape.joint_offset[4])
+        return max(excess[:3]) <= arm and max(excess[3:]) * abs(sin5) <= turned_rad + arm
+
+    def of_nearer_poses(self, previous: Sequence[float], by: float, slack_rad: float) -> list[list[float]]:
+        """Postures, (joints,) each, for the tool moved slightly outwards or inwards, for a pose on a border.
+
+        No joint is out of its range by more than ``slack_rad``; of near ones one.
+        """
         x, y, z = self.wrist.position
         z -= self.shape.height
-        found = []
+        found: list[list[float]] = []
         for way in np.array(((x, y, z), (-x, -y, -z), (x, y, 0.0))):
             pose = np.array(self._of_core[:12]).reshape(3, 4)
             pose[:, 3] += 2.0 * by * way / (np.linalg.norm(way) or 1.0)
@@ -125,7 +142,9 @@ class Choice:
             solved = inverse_of_pose(self.geometry.moving, pose.ravel().tolist(), core)
             for angles, outcome in zip(*solved[:2], strict=True):
                 if outcome == OK:
-                    found.append(self.ranges.placed(spread(self.geometry, angles), previous))
+                    placed, outside = self.ranges.fitted(spread(self.geometry, angles), previous)
+                    if outside <= slack_rad and all(math.dist(placed, each) > _SAME_RAD for each in found):
+                        found.append(placed)
         return found
 
     @cached_property

@@ -89,18 +89,33 @@ def descend(problem: PoseProblem, start_rad: Sequence[float]) -> Posture:
 
 
 def most_swing(problem: PoseProblem, angles_rad: Sequence[float], cost: float) -> Array:
-    """Largest change of each moving joint within ``cost``, to first order, at a posture that meets the target.
+    """Largest change of each turning joint within ``cost``, to first order, at a posture that meets a whole pose.
 
-    (moving,), in rad; inf at a singular posture.
+    (6,), in rad; inf at a singular posture.
     """
-    rows, _ = _system(problem, _posture(problem, list(angles_rad)))
-    size = len(rows)
-    full = [[rows[max(i, j)][min(i, j)] for j in range(size)] for i in range(size)]
+    by_length, by_turn = problem.weights
+    axes, levers = _columns(problem, frames(problem.geometry, angles_rad))
+    core = problem.geometry.core
+    slopes = np.concatenate([levers[core], axes[core]], axis=1)
+    slopes[:, :3] *= math.sqrt(by_length)
+    slopes[:, 3:] *= math.sqrt(2.0 * by_turn)
     try:
-        inverse = np.diagonal(np.linalg.inv(full))
+        return np.asarray(np.sqrt(cost * np.square(np.linalg.inv(slopes)).sum(axis=0)))
     except np.linalg.LinAlgError:
-        inverse = np.full(size, np.inf)
-    return np.sqrt(cost * np.where(inverse > 0.0, inverse, np.inf))
+        return np.full(6, np.inf)
+
+
+def _columns(problem: PoseProblem, found: list[Frame[float]]) -> tuple[list[Vector], list[Vector]]:
+    """Turn of the tool and velocity of its point per rad/s of each moving joint."""
+    tool, linked = found[-1].origin, problem.geometry.linked
+    axes = [found[joint].z for joint in problem.moving]
+    levers = [_swept(found[joint], tool) for joint in problem.moving]
+    for i, joint in enumerate(problem.moving if linked else ()):
+        if joint + 1 in linked:  # the next row turns back by the same angle
+            behind = found[joint + 1]
+            axes[i] = _from(behind.z, axes[i])
+            levers[i] = _from(_swept(behind, tool), levers[i])
+    return axes, levers
 
 
 def _posture(problem: PoseProblem, angles: list[float]) -> Posture:
@@ -115,18 +130,10 @@ def _posture(problem: PoseProblem, angles: list[float]) -> Posture:
 
 def _system(problem: PoseProblem, at: Posture) -> tuple[Matrix, list[float]]:
     """Half of the cost's second derivatives (by Gauss and Newton) and of its gradient, for the moving joints."""
-    tool = at.frames[-1].origin
     by_length, by_turn = problem.weights
-    off = _from(problem.constraint.position, tool)
+    off = _from(problem.constraint.position, at.frames[-1].origin)
     _, torque, both, each, along = at.turned
-    linked = problem.geometry.linked
-    axes = [at.frames[joint].z for joint in problem.moving]
-    levers = [_swept(at.frames[joint], tool) for joint in problem.moving]
-    for i, joint in enumerate(problem.moving if linked else ()):
-        if joint + 1 in linked:  # the next row turns back by the same angle
-            behind = at.frames[joint + 1]
-            axes[i] = _from(behind.z, axes[i])
-            levers[i] = _from(_swept(behind, tool), levers[i])
+    axes, levers = _columns(problem, at.frames)
     parts = [dot(axis, along) for axis in axes] if each else [0.0] * len(axes)
     gradient = [
         by_length * dot(lever, off) - by_turn * dot(axis, torque)

@@ -10,9 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.kinematics import formulas
+from armtempo.kinematics.closed_form import (
+    ArmPart,
+    WristPart,
+    duplicates,
+    on_border,
+    solve_arm,
+    solve_wrist,
+)
 from armtempo.kinematics.folding import folded, spread, unfolded
 from armtempo.kinematics.formulas import ARRAYS
-from armtempo.kinematics.geometric import ArmPart, duplicates, on_border, solve_arm
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.shape import Shape
 from armtempo.kinematics.single import solve_pose
@@ -27,7 +34,6 @@ from armtempo.kinematics.solutions import (
     PoseSolutions,
     Solutions,
 )
-from armtempo.kinematics.wrist import WristPart, solve_wrist
 
 CHUNK = 8192
 """Poses per batch: enough to hide the cost of a call, few enough for the caches."""

@@ -16,22 +16,11 @@ TOLERANCE_RAD = 1e-9
 """An angle outside its range by less than this is set to the end of the range."""
 
 
-def placed(angle: float, low: float, high: float, previous: float) -> float:
+def _placed(angle: float, low: float, high: float, previous: float) -> float:
     """Add whole turns to an angle: into the range, there nearest to ``previous``; if none fits, nearest to the range.
 
     All in rad; NaN stays NaN.
     """
-    if high - low < _ONE_TURN and low - math.tau < angle < high + math.tau:
-        # one turn at most to add: several times as fast
-        below, above = angle, angle
-        if angle < low - TOLERANCE_RAD:
-            above = angle + math.tau
-        elif angle > high + TOLERANCE_RAD:
-            below = angle - math.tau
-        at = above if above <= high + TOLERANCE_RAD else below
-        if low - TOLERANCE_RAD <= at <= high + TOLERANCE_RAD:
-            return min(max(at, low), high)
-        return below if low - below < above - high else above
     if math.isnan(angle):
         return angle
     least = math.ceil((low - TOLERANCE_RAD - angle) / math.tau)
@@ -45,6 +34,8 @@ def placed(angle: float, low: float, high: float, previous: float) -> float:
 
 _ONE_TURN = math.tau - 3.0 * TOLERANCE_RAD
 """In a range narrower than this only one number of whole turns fits."""
+
+_remainder, _TURN = math.remainder, math.tau
 
 _STAYS = 0.99 * math.pi
 """An angle in its range and nearer than this to the previous one needs no whole turn added."""
@@ -69,9 +60,11 @@ class Ranges:
         return tuple(zip(self.low.tolist(), self.high.tolist(), strict=True))
 
     @cached_property
-    def _whole(self) -> tuple[tuple[int, float, float, bool], ...]:
-        """Index, low and high of each joint, and whether only one number of whole turns fits."""
-        return tuple((joint, *ends, ends[1] - ends[0] < _ONE_TURN) for joint, ends in enumerate(self.ends))
+    def _whole(self) -> tuple[tuple[float, float, float | None], ...]:
+        """Low and high of each joint, and the middle if only one number of whole turns fits."""
+        return tuple(
+            (low, high, 0.5 * (low + high) if high - low < _ONE_TURN else None) for low, high in self.ends
+        )
 
     def placed(self, angles: Sequence[float], previous: Sequence[float]) -> list[float]:
         """``placed`` for each joint of one posture."""
@@ -79,15 +72,21 @@ class Ranges:
 
     def fitted(self, angles: Sequence[float], previous: Sequence[float]) -> tuple[list[float], float]:
         """As ``placed``, and the largest excess over a range; 0 if all are inside."""
-        found, most = [*angles], 0.0
-        for joint, low, high, narrow in self._whole:
-            angle = found[joint]
-            if low <= angle <= high and (narrow or -_STAYS < angle - previous[joint] < _STAYS):
-                continue
-            found[joint] = angle = placed(angle, low, high, previous[joint])
-            outside = low - angle if angle < low else angle - high
-            if outside > most:
-                most = outside
+        found, most = [], 0.0
+        for angle, before, (low, high, middle) in zip(angles, previous, self._whole, strict=True):
+            if not low <= angle <= high or (middle is None and not -_STAYS < angle - before < _STAYS):
+                if middle is not None:
+                    angle = middle + _remainder(angle - middle, _TURN)
+                elif not low <= (nearest := before + _remainder(angle - before, _TURN)) <= high:
+                    angle = _placed(angle, low, high, before)
+                else:
+                    angle = nearest
+                outside = low - angle if angle < low else angle - high
+                if outside > TOLERANCE_RAD:
+                    most = outside if outside > most else most
+                elif outside > 0.0:
+                    angle = min(max(angle, low), high)
+            found.append(angle)
         return found, most
 
     def excess(self, angles: Sequence[float]) -> list[float]:

@@ -69,6 +69,22 @@ class WristCentre:
         gaps = [max(r - self.shape.farthest, self.shape.nearest - r) for r in self._from_shoulder]
         return min((gap for gap in gaps if gap > 0.0), default=math.inf)
 
+    def swing_rad(self, index: int, moved: float) -> float:
+        """Bound, to first order, of the change of joints 1 to 3 of solution ``index`` for a centre moved by this."""
+        shape, r = self.shape, self._from_shoulder[index // 4]
+        x, y, _ = self.position
+        forward = math.sqrt(max(formulas.square_of_forward(shape, math.sqrt(x * x + y * y)), 0.0))
+        opened, folded = (
+            (shape.farthest - r) * (shape.farthest + r),
+            (r - shape.nearest) * (r + shape.nearest),
+        )
+        # twice the area of the triangle of shoulder, elbow and wrist centre
+        area = 0.5 * math.sqrt(max(opened * folded, 0.0))
+        if not forward or not area:
+            return math.inf
+        first = moved / forward
+        return first + (moved + abs(shape.offset) * first) * shape.farthest / area
+
     def unreachable(self, index: int, outcome: int) -> Rejection:
         """Say which inequality of Eq. (3) it violates for solution ``index``."""
         shape, unit = self.shape, self.unit

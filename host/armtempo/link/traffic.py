@@ -94,23 +94,19 @@ class LoggedTransport:
         self._start = time.monotonic()
 
     def read(self, timeout_s: float) -> bytes:
-        """See Transport."""
         data = self._inner.read(timeout_s)
         if data:
             self._log(FROM_BOARD, data)
         return data
 
     def write(self, data: bytes) -> None:
-        """See Transport."""
         self._log(TO_BOARD, data)
         self._inner.write(data)
 
     def wake(self) -> None:
-        """See Transport."""
         self._inner.wake()
 
     def close(self) -> None:
-        """See Transport."""
         self._inner.close()
 
     def _log(self, direction: str, data: bytes) -> None:

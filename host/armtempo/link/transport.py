@@ -54,7 +54,6 @@ class SerialTransport:
         self._serial = _open(port, exclusive)
 
     def read(self, timeout_s: float) -> bytes:
-        """See Transport."""
         try:
             self._serial.timeout = timeout_s
             return bytes(self._serial.read(max(1, self._serial.in_waiting)))
@@ -62,19 +61,16 @@ class SerialTransport:
             raise _broken(self.name, error) from error
 
     def write(self, data: bytes) -> None:
-        """See Transport."""
         try:
             self._serial.write(data)
         except _BROKEN as error:
             raise _broken(self.name, error) from error
 
     def wake(self) -> None:
-        """See Transport."""
         with suppress(serial.SerialException, OSError, AttributeError, TypeError):  # not all URLs have it
             self._serial.cancel_read()
 
     def close(self) -> None:
-        """See Transport."""
         self._serial.close()
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _TITLE = "The paper, repeated"
 _LEAD = (
     "Every number of “Time-optimal trajectory planning of serial manipulator based on adaptive cuckoo search "
-    "algorithm” beside the one that armtempo finds. Written by: armtempo paper"
+    "algorithm” and the one that armtempo finds. Written by: armtempo paper"
 )
 
 
@@ -46,7 +46,7 @@ def render(
 
 
 def _extent(searched: Sequence[Row], series: Sequence[Series]) -> list[tuple[str, object]]:
-    """How much was computed: ``--quick`` does less."""
+    """The amount of computation; ``--quick`` reduces it."""
     populations = ", ".join(str(population) for population in sorted({row.population for row in searched}))
     return [
         ("populations searched with", populations),

@@ -150,14 +150,12 @@ class LinearisedLimits:
         self._gradient = gradient(angle, time, rows.limits)
 
     def forward(self, step: Array) -> Array:
-        """See there."""
         angle, time = self._rows.derivatives(step)
         change = np.einsum("kopj,op->kpj", self._gradient[:, 3:], time)
         change += np.einsum("kopj,opj->kpj", self._gradient[:, :3], angle)
         return np.concatenate([-change.ravel(), change.ravel()])
 
     def backward(self, weights: Array) -> Array:
-        """See there."""
         upper, lower = weights.reshape(2, 3, *self._angle.shape[1:])
         return self._rows.gradient(np.einsum("kopj,kpj->opj", self._gradient, lower - upper))
 

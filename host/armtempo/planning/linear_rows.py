@@ -42,7 +42,6 @@ class LinearRows:
         return self._split(self._sums(step), 0.0, 0.0)
 
     def backward(self, weights: Array) -> Array:
-        """See there."""
         return np.asarray(self._matrix.T @ self._per_row(weights, -1.0))
 
     def hessian(self, weights: Array, _: Array, __: bool) -> Array:

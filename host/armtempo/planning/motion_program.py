@@ -76,11 +76,9 @@ class MotionProgram:
         return self.duration(x) + float(self._smoothing @ steps**2)
 
     def inequalities(self, x: Array) -> Array:
-        """See there."""
         return np.concatenate([block.values(x) for block in self.blocks])
 
     def linearise(self, x: Array) -> Linearised:
-        """See there."""
         return _Linearised(self, x)
 
 

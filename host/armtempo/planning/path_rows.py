@@ -110,7 +110,7 @@ def _reachable(angle: Array, time: Array, limits: Array) -> list[Array]:
     found[0][(angle[0, points, fastest] < 0.0).astype(np.intp), points, fastest] = True
     for kind in (1, 2):
         # t'' or t''' changes the ratios of all joints in proportion to their effect, until the joint with the
-        # largest # effect reaches its limit
+        # largest effect reaches its limit
         effect = angle[0] / limits[:, kind]
         largest = points, np.abs(effect).argmax(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -169,11 +169,9 @@ class LinearisedPath:
         self._gradient = block.limits.gradient(times)
 
     def forward(self, step: Array) -> Array:
-        """See there."""
         return np.asarray(-np.sum(self._gradient * self._block.times(step), axis=0))
 
     def backward(self, weights: Array) -> Array:
-        """See there."""
         return self._block.spread(-self._gradient * weights)
 
     def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:

@@ -1,23 +1,26 @@
-"""A proven lower bound of the time of all motions through via points, joints together, whatever their path.
+"""A proven lower bound of the motion time through via points: all joints together, for any path.
 
-For a joint between two via points, d apart, and any constant h and functions k(t), l(t),
+Consider one stretch, of duration T, between two via points. For a joint with displacement d, velocity v, acceleration a
+and jerk j, any constant h and functions k(t), l(t) satisfy
 
-    h d + change of (k v + l a) = integral of (h + k') v + (k + l') a + l j
-                               <= integral of V |h + k'| + A |k + l'| + J |l|
+    h d + [k v + l a] = integral of (h + k') v + (k + l') a + l j dt
+                     <= integral of V |h + k'| + A |k + l'| + J |l| dt
 
-over its speed, acceleration and jerk. So with k and l given at both via points, T from one to the other takes
+where V, A, J are the joint's limits and [.] is the value at the end minus the value at the start. h, k and l are
+multipliers of displacement, velocity and acceleration. With
 
-    T + (k v + l a where it starts) - (k v + l a where it ends)  >=  E(T)
-    E(T) = T + sum over joints of (h d - integral of V |h + k'| + A |k + l'| + J |l|)
+    E(T) = T + sum over joints of (h d - integral of V |h + k'| + A |k + l'| + J |l| dt)
 
-Summed over the stretches of a motion from rest to rest, all but T cancels out: no motion takes less than the sum of the
-least E over T, whatever the k and l at via points and, for each T, h and what k and l are between.
+it follows that T >= E(T) + sum over joints of [k v + l a]. If k and l are continuous at via points, those terms cancel
+in the sum over all stretches of a motion from rest to rest. So no motion is shorter than the sum of min over T of E(T),
+whatever k and l are at the via points, and whatever h, k and l are inside a stretch for each T.
 
-Newton's method on smoothed absolute values finds about the best: k and l at via points by a few T near those of a plan
-(``_best``), then, with these, for many T (``_Scan``). What it ends with need not be the best: E is computed from it,
-with integrals that are rather too large. From one T to the next, h and, as functions of t / T, k and l change linearly;
-E is at least its line less s (1 - s) times (T2 - T1) the integral of V |dh| + A |dk| + J |dl|, for the products with T.
-Beyond the last T the functions wait at some t, which costs no more than it takes.
+Good multipliers are found by Newton's method with smoothed absolute values: first k and l at the via points, for a few
+T near those of a plan (``_best``), then, with these fixed, the multipliers inside each stretch for many T (``_Scan``).
+They need not be optimal: E is evaluated for what was found, with integrals rounded upwards. Between two neighbouring T,
+h and, as functions of t / T, k and l are interpolated linearly; because of the products with T, E is then at least its
+linear interpolation minus s (1 - s) (T2 - T1) integral of V |dh| + A |dk| + J |dl|, 0 <= s <= 1. Beyond the largest T
+the multipliers are constant for a while, at the t where that costs least, at most as much as it adds to T.
 """
 
 from __future__ import annotations
@@ -31,43 +34,43 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.progress import alive
 
 _CELLS = 8
-"""Parts of a stretch; on each k is linear, l quadratic."""
-_ABOUT = np.array([0.97, 1.0, 1.03])
-"""Times that k and l at via points are chosen for, as parts of those told."""
-_SCANNED = np.array([0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.96, 1.0, 1.04, 1.09, 1.16, 1.28, 1.5, 2.0, 3.0])
-"""Times for which E is computed at first."""
-_LONGER = 2.0
-"""The next one after the last."""
-_ROUNDS = 6
-"""Times are added so often between those where E may be lower."""
-_SMOOTH, _SHARP, _FALL = 0.1, 1e-5, 0.3
-"""Smoothing of absolute values as a part of the mean time of a stretch: first, last, and what it falls by."""
-_WARM = 1e-2
-"""The first where columns come from a time near by."""
+"""Cells of a stretch; on each k is linear, l quadratic."""
+_TRIAL_TIMES = np.array([0.97, 1.0, 1.03])
+"""Durations for which k and l at via points are optimised, relative to the expected ones."""
+_GRID_TIMES = np.array([0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.96, 1.0, 1.04, 1.09, 1.16, 1.28, 1.5, 2.0, 3.0])
+"""Durations at which E is evaluated first, relative to the expected ones."""
+_EXTENSION = 2.0
+"""Factor from the largest duration to the next one."""
+_MOST_REFINEMENTS = 6
+"""How often durations are added where E may be lower between two of them."""
+_FIRST_SMOOTHING, _LAST_SMOOTHING, _SMOOTHING_FACTOR = 0.1, 1e-5, 0.3
+"""Smoothing of absolute values relative to the mean duration of a stretch: first, last, factor from one to the next."""
+_WARM_SMOOTHING = 1e-2
+"""First smoothing if the multipliers of a similar duration are the start."""
 _MOST_STEPS = 60
 _ARMIJO = 1e-4
-_FINE = 2e-3
-"""E is known well enough if its least is within this part of the time."""
-_ABOVE = 0.1
-"""E is high enough if it is by this part of the time above its least."""
-_WILD = 30.0
-"""Columns that many times those for a longer time are no good start."""
-_SHORTEST = 1e-3
-"""Least time told that is believed, as a part of the mean."""
+_TOLERANCE = 2e-3
+"""Accuracy of the minimum of E, relative to the expected duration."""
+_MARGIN = 0.1
+"""E need not be raised further if it is above its minimum by this, relative to the expected duration."""
+_DIVERGED = 30.0
+"""Multipliers this many times as large as those of a longer duration have diverged."""
+_LEAST_TIME = 1e-3
+"""Smallest expected duration that is used, relative to the mean."""
 _ROUNDING = 1e-9
-"""Part of the terms of E that their rounding is less than."""
+"""Bound of the rounding error of E, relative to the sum of its terms."""
 
-_LOCAL = 3 * _CELLS - 1
-"""Columns of one joint and stretch: h, k and l where cells meet, middle Bernstein coefficients of l; then k and l
-at the start and at the end."""
-_COLUMNS = _LOCAL + 4
-_K = np.array([_LOCAL, *range(1, _CELLS), _LOCAL + 2])
-_L = np.array([_LOCAL + 1, *range(_CELLS, 2 * _CELLS - 1), _LOCAL + 3])
-"""Of k and l where cells meet, from start to end."""
+_INNER = 3 * _CELLS - 1
+"""Multipliers of a joint inside a stretch: h, k and l between cells, middle Bernstein coefficients of l. After them
+come k and l at the start and at the end."""
+_COLUMNS = _INNER + 4
+_K = np.array([_INNER, *range(1, _CELLS), _INNER + 2])
+_L = np.array([_INNER + 1, *range(_CELLS, 2 * _CELLS - 1), _INNER + 3])
+"""Indices of k and l at the ends of the cells, from start to end."""
 
 
 def _patterns() -> Array:
-    """What stands in absolute values by columns, (5, 6 N, C), times T V, V, T A, A and T J."""
+    """Rows of the absolute values' arguments: (5, 6 N, C), to be multiplied by T V, V, T A, A and T J."""
     cells = _CELLS
     found = np.zeros((5, 6 * cells, _COLUMNS))
     for cell in range(cells):
@@ -84,119 +87,119 @@ def _patterns() -> Array:
 _PATTERNS = _patterns()
 
 
-@np.errstate(all="ignore")  # where numbers are too far apart in size nothing is proven
+@np.errstate(all="ignore")  # numbers too far apart in size prove nothing
 def floor_s(via_deg: Array, limits: Array, times_s: Array, rests: bool = True) -> float:
-    """No motion from rest through via angles (n + 1, J), to rest if ``rests``, takes less.
+    """Lower bound of the time of motions from rest through via angles (n + 1, J), to rest if ``rests``; 0: none.
 
-    ``limits``: (J, 3). ``times_s``: (n,), about what it takes from one to the next; 0 if nothing is proven.
+    ``limits``: (J, 3). ``times_s``: (n,), expected durations of the stretches; they decide how tight the bound is.
     """
     moves = np.ptp(via_deg, axis=0) > 0.0
     if not moves.any():
         return 0.0
     size, unit_s = np.ptp(via_deg, axis=0)[moves], float(np.mean(times_s))
-    ways = np.diff(via_deg[:, moves], axis=0) / size
+    distances = np.diff(via_deg[:, moves], axis=0) / size
     rounded = np.finfo(float).eps * np.max(np.abs(via_deg[:, moves]), axis=0) / size
-    ways = np.sign(ways) * np.maximum(np.abs(ways) - 8 * rounded, 0.0)
+    distances = np.sign(distances) * np.maximum(np.abs(distances) - 8 * rounded, 0.0)
     scaled = limits[moves] / size[:, None] * unit_s ** np.arange(1, 4)
-    about = np.maximum(times_s / unit_s, _SHORTEST)
-    times = about[:, None] * _ABOUT
+    expected = np.maximum(times_s / unit_s, _LEAST_TIME)
+    times = expected[:, None] * _TRIAL_TIMES
     try:
-        found = float(np.sum(_Scan(ways, scaled, times, _best(ways, scaled, times, rests)).floor()))
-    except np.linalg.LinAlgError:  # numbers too far apart in size, or no motion takes times so short
+        found = float(np.sum(_Scan(distances, scaled, times, _best(distances, scaled, times, rests)).floor()))
+    except np.linalg.LinAlgError:  # numbers too far apart in size, or durations too short
         return 0.0
     return max(found, 0.0) * unit_s if np.isfinite(found) else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Cost:
-    """E of any stretches and times, by columns x (..., J, C).
+    """E as a function of the multipliers x (..., J, C), for any stretches and durations.
 
-    ``ways``: (..., J); ``times``: (...); ``forms``: (..., J, 6 N, C).
+    ``distances``: (..., J); ``times``: (...); ``rows``: (..., J, 6 N, C).
     """
 
-    ways: Array
+    distances: Array
     times: Array
-    forms: Array
+    rows: Array
 
     @classmethod
-    def of(cls, ways: Array, limits: Array, times: Array) -> _Cost:
+    def of(cls, distances: Array, limits: Array, times: Array) -> _Cost:
         """``limits``: (J, 3)."""
         speed, acceleration, jerk = limits.T
         t = times[..., None]
         one = np.ones_like(t)
         weights = [t * speed, one * speed, t * acceleration, one * acceleration, t * jerk]
-        return cls(ways, times, np.tensordot(np.stack(weights, axis=-1), _PATTERNS, 1))
+        return cls(distances, times, np.tensordot(np.stack(weights, axis=-1), _PATTERNS, 1))
 
     def take(self, which: NDArray[np.intp]) -> _Cost:
-        """Some of them."""
-        return _Cost(self.ways[which], self.times[which], self.forms[which])
+        """Those with the indices ``which``."""
+        return _Cost(self.distances[which], self.times[which], self.rows[which])
 
-    def inside(self, x: Array) -> Array:
-        """What stands in absolute values: (..., J, 6 N)."""
-        return np.asarray((self.forms @ x[..., None])[..., 0])
+    def arguments(self, x: Array) -> Array:
+        """Arguments of the absolute values: (..., J, 6 N)."""
+        return np.asarray((self.rows @ x[..., None])[..., 0])
 
-    def exact(self, x: Array, inside: Array) -> Array:
-        """E, (...), less what rounding may have added."""
-        gained, lost = self.ways * x[..., 0], np.abs(inside).sum(axis=-1)
-        terms = np.abs(gained) + np.sum(np.abs(self.forms) @ np.abs(x)[..., None], axis=(-1, -2))
+    def exact(self, x: Array, arguments: Array) -> Array:
+        """E, rounded downwards: (...)."""
+        gained, lost = self.distances * x[..., 0], np.abs(arguments).sum(axis=-1)
+        terms = np.abs(gained) + np.sum(np.abs(self.rows) @ np.abs(x)[..., None], axis=(-1, -2))
         return np.asarray(self.times + np.sum(gained - lost - _ROUNDING * terms, axis=-1))
 
-    def smooth(self, x: Array, inside: Array, smoothing: float) -> Array:
-        """A little more than E by joint, (..., J), without the time."""
-        root = np.sqrt(smoothing**2 + inside**2)
+    def smooth(self, x: Array, arguments: Array, smoothing: float) -> Array:
+        """E minus the duration, by joint, with smoothed absolute values; slightly too large: (..., J)."""
+        root = np.sqrt(smoothing**2 + arguments**2)
         lost = root - smoothing + smoothing * np.log(2.0 * smoothing / (root + smoothing))
-        return np.asarray(self.ways * x[..., 0] - lost.sum(axis=-1))
+        return np.asarray(self.distances * x[..., 0] - lost.sum(axis=-1))
 
-    def derivatives(self, inside: Array, smoothing: float) -> tuple[Array, Array]:
-        """Of that: gradient (..., J, C), and minus the second derivatives (..., J, C, C)."""
-        root = np.sqrt(smoothing**2 + inside**2)
-        gradient = -((inside / (smoothing + root))[..., None, :] @ self.forms)[..., 0, :]
-        gradient[..., 0] += self.ways
-        weighted = self.forms * np.sqrt(smoothing / (root * (smoothing + root)))[..., None]
-        bend = weighted.swapaxes(-1, -2) @ weighted
+    def derivatives(self, arguments: Array, smoothing: float) -> tuple[Array, Array]:
+        """Of ``smooth``: gradient (..., J, C) and negative Hessian (..., J, C, C)."""
+        root = np.sqrt(smoothing**2 + arguments**2)
+        gradient = -((arguments / (smoothing + root))[..., None, :] @ self.rows)[..., 0, :]
+        gradient[..., 0] += self.distances
+        weighted = self.rows * np.sqrt(smoothing / (root * (smoothing + root)))[..., None]
+        curvature = weighted.swapaxes(-1, -2) @ weighted
         diagonal = np.arange(_COLUMNS)
-        bend[..., diagonal, diagonal] *= 1.0 + 1e-12
-        bend[..., 0, 0] += np.finfo(float).tiny  # of no time h is without effect
-        return gradient, bend
+        curvature[..., diagonal, diagonal] *= 1.0 + 1e-12
+        curvature[..., 0, 0] += np.finfo(float).tiny  # at duration 0 h has no effect
+        return gradient, curvature
 
 
-def _best(ways: Array, limits: Array, times: Array, rests: bool) -> Array:
-    """Columns (n, M, J, C) for times (n, M), equal where stretches meet, with about the highest sum of least E.
+def _best(distances: Array, limits: Array, times: Array, rests: bool) -> Array:
+    """Multipliers (n, M, J, C) for durations (n, M), equal at via points, that nearly maximise the sum of min E.
 
-    The least over times is smooth too: the y with sum of smoothing / (E - y) = 1.
+    The minimum over durations is smoothed, too: the y with sum of smoothing / (E - y) = 1.
     """
-    cost = _Cost.of(ways[:, None], limits, times)
-    x = np.zeros((*times.shape, ways.shape[1], _COLUMNS))
-    inside, smoothing = cost.inside(x), _SMOOTH
+    cost = _Cost.of(distances[:, None], limits, times)
+    x = np.zeros((*times.shape, distances.shape[1], _COLUMNS))
+    arguments, smoothing = cost.arguments(x), _FIRST_SMOOTHING
 
-    def value(x: Array, inside: Array) -> tuple[float, Array]:
-        e = times + cost.smooth(x, inside, smoothing).sum(axis=-1)
+    def value(x: Array, arguments: Array) -> tuple[float, Array]:
+        e = times + cost.smooth(x, arguments, smoothing).sum(axis=-1)
         gap = _gaps(e, smoothing)
         return float(np.sum(e[:, 0] - gap[:, 0] + smoothing * np.sum(np.log(gap / smoothing), axis=1))), gap
 
     for _ in range(_MOST_STEPS):
         alive()
-        here, gap = value(x, inside)
-        gradient, bend = cost.derivatives(inside, smoothing)
-        step = _step(smoothing / gap, smoothing, gradient, bend, rests)
-        change = cost.inside(step)
+        here, gap = value(x, arguments)
+        gradient, curvature = cost.derivatives(arguments, smoothing)
+        step = _step(smoothing / gap, smoothing, gradient, curvature, rests)
+        change = cost.arguments(step)
         slope = float(np.sum((smoothing / gap)[..., None, None] * gradient * step))
         length = 1.0
         while length > 1e-6 and not (
-            value(x + length * step, inside + length * change)[0] >= here + _ARMIJO * length * slope
+            value(x + length * step, arguments + length * change)[0] >= here + _ARMIJO * length * slope
         ):
             length *= 0.5
         if length > 1e-6:
-            x, inside = x + length * step, inside + length * change
-        if length <= 1e-6 or length == 1.0 or slope < smoothing * len(ways):
-            if smoothing <= _SHARP:
+            x, arguments = x + length * step, arguments + length * change
+        if length <= 1e-6 or length == 1.0 or slope < smoothing * len(distances):
+            if smoothing <= _LAST_SMOOTHING:
                 break
-            smoothing = max(_SHARP, smoothing * _FALL)
+            smoothing = max(_LAST_SMOOTHING, smoothing * _SMOOTHING_FACTOR)
     return x
 
 
 def _gaps(e: Array, smoothing: float) -> Array:
-    """E - y, (n, M), for the y below all E (n, M) of a stretch with sum of smoothing / (E - y) = 1."""
+    """E - y, (n, M), where y is the smoothed minimum of each stretch."""
     above = e - e.min(axis=1, keepdims=True)
     down = np.full((len(e), 1), smoothing)
     for _ in range(30):  # Newton's method from the left on a convex function
@@ -208,17 +211,17 @@ def _gaps(e: Array, smoothing: float) -> Array:
     return np.asarray(above + down)
 
 
-def _step(weight: Array, smoothing: float, gradient: Array, bend: Array, rests: bool) -> Array:
-    """Newton's step (n, M, J, C): columns of each stretch and time are eliminated, then what the weights will be.
+def _step(weight: Array, smoothing: float, gradient: Array, curvature: Array, rests: bool) -> Array:
+    """Newton step (n, M, J, C). Multipliers inside stretches and the changes of the weights are eliminated.
 
-    ``weight``: (n, M), of each time. Left is a banded matrix of k and l at via points.
+    ``weight``: (n, M), of each duration. A banded system of k and l at the via points remains.
     """
-    inner, outer = slice(0, _LOCAL), slice(_LOCAL, None)
-    right = np.concatenate([gradient[..., inner, None], bend[..., inner, outer]], axis=-1)
-    solved = np.linalg.solve(bend[..., inner, inner], right)
+    inner, outer = slice(0, _INNER), slice(_INNER, None)
+    right = np.concatenate([gradient[..., inner, None], curvature[..., inner, outer]], axis=-1)
+    solved = np.linalg.solve(curvature[..., inner, inner], right)
     own, by_ends = solved[..., 0], solved[..., 1:]
-    left = bend[..., outer, outer] - bend[..., outer, inner] @ by_ends
-    rise = gradient[..., outer] - (bend[..., outer, inner] @ own[..., None])[..., 0]
+    left = curvature[..., outer, outer] - curvature[..., outer, inner] @ by_ends
+    rise = gradient[..., outer] - (curvature[..., outer, inner] @ own[..., None])[..., 0]
     gain = np.sum(gradient[..., inner] * own, axis=(-1, -2))
     loose = 1.0 / (gain / weight + smoothing / weight**2)
     count, times, joints, _ = rise.shape
@@ -244,10 +247,10 @@ def _step(weight: Array, smoothing: float, gradient: Array, bend: Array, rests: 
 
 
 def _banded(matrix: Array, right: Array, joints: int, rests: bool) -> Array:
-    """Solves for k and l at both ends of each stretch, (n, J, 4), equal where stretches meet; 0 at a free end."""
-    from scipy.linalg import solveh_banded  # here, because loading it takes longer than most commands
+    """Solve for k and l at both ends of each stretch, (n, J, 4), equal at via points; 0 at an end without rest."""
+    from scipy.linalg import solveh_banded  # here: importing it takes longer than most commands
 
-    order = np.arange(4 * joints).reshape(joints, 2, 2).swapaxes(0, 1).ravel()  # by end, joint, k or l
+    order = np.arange(4 * joints).reshape(joints, 2, 2).swapaxes(0, 1).ravel()  # order: end, joint, k or l
     matrix, right = matrix[:, order][:, :, order], right[:, order]
     half, stretches = 2 * joints, len(matrix)
     band, total = np.zeros((2 * half, half * (stretches + 1))), np.zeros(half * (stretches + 1))
@@ -263,69 +266,71 @@ def _banded(matrix: Array, right: Array, joints: int, rests: bool) -> Array:
 
 
 class _Scan:
-    """E of each stretch for more and more times, with k and l at via points as they are.
+    """E of each stretch as a function of its duration, with fixed k and l at via points.
 
-    A row for each stretch and time, sorted: ``stretch``, ``times``, ``e`` (B,), ``x`` (B, J, C).
+    Sorted rows, one for each stretch and duration: ``stretch``, ``times``, ``e`` (B,), ``x`` (B, J, C).
     """
 
-    def __init__(self, ways: Array, limits: Array, times: Array, chosen: Array) -> None:
-        """``chosen``: (n, M, J, C), columns for ``times`` (n, M)."""
-        self._ways, self._limits = ways, limits
-        cost = _Cost.of(ways[:, None], limits, times)
-        self._about = times[:, len(_ABOUT) // 2]
-        self._least = cost.exact(chosen, cost.inside(chosen)).min(axis=1)
+    def __init__(self, distances: Array, limits: Array, times: Array, chosen: Array) -> None:
+        """``chosen``: multipliers (n, M, J, C) for ``times`` (n, M)."""
+        self._distances, self._limits = distances, limits
+        cost = _Cost.of(distances[:, None], limits, times)
+        self._expected = times[:, len(_TRIAL_TIMES) // 2]
+        self._least = cost.exact(chosen, cost.arguments(chosen)).min(axis=1)
         self.stretch = np.empty(0, dtype=np.intp)
         self.times, self.e = np.empty(0), np.empty(0)
         self.x = np.empty((0, *chosen.shape[2:]))
-        # Columns grow and grow for a time in which no motion is possible; more is possible in the longest.
+        # The multipliers of a duration that is too short for any motion diverge; those of the longest are used.
         size = np.abs(chosen).max(axis=(2, 3))
-        chosen = np.where((size > _WILD * size[:, -1:])[..., None, None], chosen[:, -1:], chosen)
-        shortest = np.max(np.abs(ways) / limits[:, 0], axis=1) * (1.0 - _ROUNDING)
-        scanned = self._about[:, None] * _SCANNED
+        chosen = np.where((size > _DIVERGED * size[:, -1:])[..., None, None], chosen[:, -1:], chosen)
+        shortest = np.max(np.abs(distances) / limits[:, 0], axis=1) * (1.0 - _ROUNDING)
+        scanned = self._expected[:, None] * _GRID_TIMES
         stretch, column = np.nonzero(scanned > shortest[:, None])
-        nearest = np.abs(_SCANNED[:, None] - _ABOUT).argmin(axis=1)
-        enough = self._least + _ABOVE * self._about
-        self._add(stretch, scanned[stretch, column], chosen[stretch, nearest[column]], enough)
-        first = np.searchsorted(self.stretch, np.arange(len(ways)))
-        self._add(np.arange(len(ways)), shortest, self.x[first], self._least + _FINE * self._about)
+        nearest = np.abs(_GRID_TIMES[:, None] - _TRIAL_TIMES).argmin(axis=1)
+        target = self._least + _MARGIN * self._expected
+        self._add(stretch, scanned[stretch, column], chosen[stretch, nearest[column]], target)
+        first = np.searchsorted(self.stretch, np.arange(len(distances)))
+        self._add(
+            np.arange(len(distances)), shortest, self.x[first], self._least + _TOLERANCE * self._expected
+        )
 
     def floor(self) -> Array:
-        """The least E of each stretch over all times, proven: (n,)."""
+        """Proven minimum of E over all durations, by stretch: (n,)."""
         low, last = self._between(), self._after()
-        for _ in range(_ROUNDS):
+        for _ in range(_MOST_REFINEMENTS):
             alive()
             least = np.minimum(self._least, self._lowest(self.e, self.stretch))
-            enough = least - _FINE * self._about
-            wide = np.flatnonzero(low < enough[self.stretch[:-1]])
-            longer = np.flatnonzero(last < enough)
+            target = least - _TOLERANCE * self._expected
+            wide = np.flatnonzero(low < target[self.stretch[:-1]])
+            longer = np.flatnonzero(last < target)
             if not len(wide) and not len(longer):
                 break
             ends = np.searchsorted(self.stretch, longer, side="right") - 1
             stretch = np.concatenate([self.stretch[wide], longer])
             times = np.concatenate(
-                [0.5 * (self.times[wide] + self.times[wide + 1]), _LONGER * self.times[ends]]
+                [0.5 * (self.times[wide] + self.times[wide + 1]), _EXTENSION * self.times[ends]]
             )
             self._add(
                 stretch,
                 times,
                 np.concatenate([0.5 * (self.x[wide] + self.x[wide + 1]), self.x[ends]]),
-                least + _ABOVE * self._about,
+                least + _MARGIN * self._expected,
             )
             low, last = self._between(), self._after()
         return np.minimum(self._lowest(low, self.stretch[:-1]), last)
 
     def _lowest(self, values: Array, stretch: NDArray[np.intp]) -> Array:
-        found = np.full(len(self._ways), np.inf)
+        found = np.full(len(self._distances), np.inf)
         np.minimum.at(found, stretch, values)
         return found
 
     def _between(self) -> Array:
-        """E from each row to the next is at least: (B - 1,), infinite where another stretch begins."""
+        """Lower bound of E from each row to the next: (B - 1,), infinite if they are of different stretches."""
         first, second = self.e[:-1], self.e[1:]
         speed, acceleration, jerk = self._limits.T
         change = np.abs(np.diff(self.x, axis=0))
         k, l_ = change[..., _K], change[..., _L]
-        middle = change[..., 2 * _CELLS - 1 : _LOCAL].sum(axis=-1)
+        middle = change[..., 2 * _CELLS - 1 : _INNER].sum(axis=-1)
         by_joint = (
             speed * change[..., 0]
             + (
@@ -335,71 +340,71 @@ class _Scan:
             / _CELLS
         )
         sag = np.diff(self.times) * by_joint.sum(axis=-1) * (1.0 + _ROUNDING)
-        # the least of first + s (second - first) - s (1 - s) sag
+        # minimum over s of first + s (second - first) - s (1 - s) sag
         with np.errstate(all="ignore"):
             s = np.clip(np.nan_to_num(0.5 * (1.0 - (second - first) / sag), nan=0.0), 0.0, 1.0)
         low = np.minimum(np.minimum(first, second), first + s * (second - first) - s * (1.0 - s) * sag)
         return np.where(np.diff(self.stretch) == 0, low, np.inf)
 
     def _after(self) -> Array:
-        """E from the last time of each stretch on is at least: (n,)."""
-        row = np.searchsorted(self.stretch, np.arange(len(self._ways)), side="right") - 1
+        """Lower bound of E beyond the largest duration, by stretch: (n,)."""
+        row = np.searchsorted(self.stretch, np.arange(len(self._distances)), side="right") - 1
         speed, acceleration, jerk = self._limits.T[:, None, :, None]
         x = np.abs(self.x[row])
         waiting = np.min(speed * x[..., :1] + acceleration * x[..., _K] + jerk * x[..., _L], axis=-1).sum(
             axis=-1
         )
         waits = np.where(waiting <= 1.0 - _ROUNDING, self.e[row], -np.inf)
-        # Or k and l fall to 0 at once and h is 0.
+        # Or h is 0, and k and l drop to 0 at once.
         ends = (speed * x[..., _K[[0, -1]]] + acceleration * x[..., _L[[0, -1]]]).sum(axis=(-1, -2))
         return np.asarray(np.maximum(waits, self.times[row] - ends * (1.0 + _ROUNDING)))
 
-    def _add(self, stretch: NDArray[np.intp], times: Array, x: Array, enough: Array) -> None:
-        """Rows with the E that Newton's method reaches from columns x, but not above ``enough`` (n,)."""
-        cost = _Cost.of(self._ways[stretch], self._limits, times)
-        x, e = _improved(cost, x, enough[stretch])
+    def _add(self, stretch: NDArray[np.intp], times: Array, x: Array, target: Array) -> None:
+        """Add rows; Newton's method raises E from multipliers x up to ``target`` (n,)."""
+        cost = _Cost.of(self._distances[stretch], self._limits, times)
+        x, e = _improved(cost, x, target[stretch])
         stretch, times = np.concatenate([self.stretch, stretch]), np.concatenate([self.times, times])
         order = np.lexsort([times, stretch])
         self.stretch, self.times = stretch[order], times[order]
         self.x, self.e = np.concatenate([self.x, x])[order], np.concatenate([self.e, e])[order]
 
 
-def _improved(cost: _Cost, x: Array, enough: Array) -> tuple[Array, Array]:
-    """Columns (B, J, C) with the same ends and a higher E, and E (B,): about the highest, or about ``enough``."""
+def _improved(cost: _Cost, x: Array, target: Array) -> tuple[Array, Array]:
+    """Multipliers (B, J, C) with the same ends and a higher E, and E (B,): nearly the highest, or about ``target``."""
     x = x.copy()
-    best, highest = x.copy(), cost.exact(x, cost.inside(x))
-    rows, smoothing = np.flatnonzero(highest < enough), _WARM
+    best, highest = x.copy(), cost.exact(x, cost.arguments(x))
+    rows, smoothing = np.flatnonzero(highest < target), _WARM_SMOOTHING
     for _ in range(_MOST_STEPS):
         if not len(rows):
             break
         own, here = cost.take(rows), x[rows]
-        inside = own.inside(here)
-        gradient, bend = own.derivatives(inside, smoothing)
+        arguments = own.arguments(here)
+        gradient, curvature = own.derivatives(arguments, smoothing)
         step = np.zeros(here.shape)
-        local = slice(0, _LOCAL)
-        step[..., local] = np.linalg.solve(bend[..., local, local], gradient[..., local, None])[..., 0]
-        change, slope = own.inside(step), np.sum(step * gradient, axis=-1)
-        start, length = own.smooth(here, inside, smoothing), np.ones(slope.shape)
+        local = slice(0, _INNER)
+        step[..., local] = np.linalg.solve(curvature[..., local, local], gradient[..., local, None])[..., 0]
+        change, slope = own.arguments(step), np.sum(step * gradient, axis=-1)
+        start, length = own.smooth(here, arguments, smoothing), np.ones(slope.shape)
         for _ in range(20):
             far = length[..., None]
-            reached = own.smooth(here + far * step, inside + far * change, smoothing)
+            reached = own.smooth(here + far * step, arguments + far * change, smoothing)
             short = ~(reached >= start + _ARMIJO * length * slope)
             if not short.any():
                 break
             length[short] *= 0.5
         here = here + length[..., None] * step
         x[rows] = here
-        e = own.exact(here, own.inside(here))
-        # E is concave: what lies between is at least on the line.
+        e = own.exact(here, own.arguments(here))
+        # E is concave: between two points it is above their chord.
         up = e - highest[rows]
         part = np.where(
-            up > 0.0, np.minimum(1.0, (enough - highest)[rows] / np.where(up > 0.0, up, 1.0)), 0.0
+            up > 0.0, np.minimum(1.0, (target - highest)[rows] / np.where(up > 0.0, up, 1.0)), 0.0
         )
         best[rows] += part[:, None, None] * (here - best[rows])
         highest[rows] += part * up
-        rows = rows[e < enough[rows]]
+        rows = rows[e < target[rows]]
         if np.median(length) == 1.0 or np.mean(slope) < smoothing:
-            if smoothing <= _SHARP:
+            if smoothing <= _LAST_SMOOTHING:
                 break
-            smoothing = max(_SHARP, smoothing * _FALL)
-    return best, cost.exact(best, cost.inside(best))
+            smoothing = max(_LAST_SMOOTHING, smoothing * _SMOOTHING_FACTOR)
+    return best, cost.exact(best, cost.arguments(best))

@@ -1,4 +1,4 @@
-"""What a report says of the plan: its extremes, its timing, what the planner noted, and how to repeat it."""
+"""The report's section on the plan: extremes, timing, the planner's notes, settings to repeat it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _EXTREMES = {
 
 
 def extremes(sheet: html_page.Page, plan: Plan) -> None:
-    """Motion times with their lower bounds and exact extremes next to the limits; then the planner's notes."""
+    """Motion times with their lower bounds, exact extremes with the limits, and the planner's notes."""
     rows = [_extremes_row(plan, joint) for joint in range(len(plan.extremes))]
     sheet.table(tuple(_EXTREMES), rows, "Motion time, and largest magnitudes with their limits", _EXTREMES)
     for note in plan.notes:
@@ -27,7 +27,7 @@ def extremes(sheet: html_page.Page, plan: Plan) -> None:
 
 
 def timing(sheet: html_page.Page, plan: Plan) -> None:
-    """How far apart the joints pass the via points and how far the tool deviates; nothing with shared timing."""
+    """For per-joint timing: differences of the joints' times at the via points, and the tool's deviation."""
     if plan.job.timing != "per-joint" or len(plan.searches) < 2:
         return
     sheet.heading("Per-joint timing")
@@ -47,7 +47,7 @@ def timing(sheet: html_page.Page, plan: Plan) -> None:
 
 
 def origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, object]]) -> None:
-    """Settings and versions that made the plan, and ``others`` about the run."""
+    """Settings and versions of the plan, and ``others`` of the run."""
     job = plan.job
     rows: list[tuple[str, object]] = [
         ("path", job.path),

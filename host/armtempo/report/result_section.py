@@ -1,4 +1,4 @@
-"""What a report says of the result: the verdict, measured against planned, steps, peaks next to limits."""
+"""The report's section on the result: verdict, measured compared with planned, steps, peaks with limits."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _PEAKS = {
     "kept exactly",
 }
 _MEASURED_PEAKS = ("measured", "verdict")
-"""Columns that a table has only if something was measured."""
+"""Columns that are omitted if nothing was measured."""
 _COLOURS = {
     peaks.EXCEEDED: html_page.BAD,
     peaks.KEPT: html_page.GOOD,
@@ -48,9 +48,11 @@ _COLOURS = {
 
 
 def write(sheet: html_page.Page, found: Evaluation) -> None:
-    """The verdict and the tables that it rests on."""
-    told = verdict.of(found)
-    sheet.verdict(told.state, told.summary, [(finding.state, finding.text) for finding in told.findings])
+    """The verdict and its tables."""
+    result = verdict.of(found)
+    sheet.verdict(
+        result.state, result.summary, [(finding.state, finding.text) for finding in result.findings]
+    )
     for text in found.complaints:
         if "cut short" in text:
             sheet.note(text, html_page.BAD)

@@ -1,4 +1,4 @@
-"""The report of a run: one page and its figures, from a run folder."""
+"""The report of a run folder: a page and its figures."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _PATH_POINTS = 300
 def write(folder: Path) -> Path:
     """Write report.html and its figures (SVG) into the run folder; returns the page's path.
 
-    Raises RunFolderError if it is not known what was to move, or there is not one sample.
+    Raises RunFolderError if the motion is not known, or there is no sample.
     """
     found = evaluate(folder)
     drawn = figures(found)
@@ -68,7 +68,7 @@ def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
 
 
 def _of_arm(arm: Arm, trajectory: Trajectory) -> dict[str, tuple[Figure, str]]:
-    """What the motion asks of the motors, and where it leads the arm."""
+    """Figures of the motors' torque and of the arm along its path."""
     drawn = {}
     torques = torque.of_motion(arm, trajectory)
     if torques and (least := torques.least):
@@ -88,7 +88,7 @@ def _of_arm(arm: Arm, trajectory: Trajectory) -> dict[str, tuple[Figure, str]]:
 
 
 def _what_is_seen(found: Evaluation) -> str:
-    """What the curves are of."""
+    """What the curves show."""
     measured = found.curves.measured
     if measured.all():
         return "Measured mean"
@@ -98,7 +98,7 @@ def _what_is_seen(found: Evaluation) -> str:
 
 
 def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
-    """The whole page as HTML text."""
+    """The page as HTML."""
     meta = found.run.meta
     done = sum(repetition.state == COMPLETE for repetition in found.run.repetitions)
     arm = found.arm.name if found.arm else meta.get("arm", "not known")
@@ -144,7 +144,7 @@ def _origin(sheet: html_page.Page, found: Evaluation) -> None:
 
 
 def _flat(value: object) -> str:
-    """A value of run.json as text; a table as name and value pairs."""
+    """A value of run.json as text; a table as pairs of name and value."""
     if isinstance(value, dict):
         return ", ".join(f"{name.replace('_', ' ')} {item}" for name, item in value.items())
     return str(value)

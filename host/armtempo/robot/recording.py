@@ -47,18 +47,15 @@ class ProgressWatcher(Watcher):
         self._ended = 0
 
     def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
-        """See Watcher."""
         self._inner.begin(motion, folder)
 
     def on_sample(self, sample: Sample, duration_s: float) -> None:
-        """See Watcher."""
         if self._progress is not None:
             before_s = self._ended * duration_s
             self._progress(before_s + sample.path_ticks / TICK_HZ, self._repetitions * duration_s)
         self._inner.on_sample(sample, duration_s)
 
     def end(self, repetition: Repetition) -> None:
-        """See Watcher."""
         self._ended += 1
         self._inner.end(repetition)
 

@@ -35,7 +35,6 @@ class Run:
 
     @property
     def path(self) -> Path:
-        """The run folder."""
         return self._content.path
 
     @property

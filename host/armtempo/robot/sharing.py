@@ -71,7 +71,6 @@ class Sharing:
         Thread(target=self._hand_out_states, name="armtempo states", daemon=True).start()
 
     def close(self) -> None:
-        """Stop sharing the port."""
         self._closed.set()
         if self._server is not None:
             self._server.close()

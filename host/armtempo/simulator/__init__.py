@@ -1,4 +1,4 @@
-"""The virtual board: the board program on simulated hardware, in a process with a serial port of its own."""
+"""The virtual board: the board program on simulated hardware, in its own process with its own serial port."""
 
 from __future__ import annotations
 

@@ -1,16 +1,16 @@
-"""Reads a virtual board's edge log: every change of every pin, with its time in timer ticks.
+"""Reads a virtual board's edge log: every edge of every pin, with its time in timer ticks.
 
 The file: ``b"ATE1"``, then records of 16 bytes, little endian, ``<BBBBIq``::
 
     kind  1 edges   pin (16 * port + number), level before, 0, count n, base tick; then n offsets (I):
                     the pin toggles at base + each offset
           2 counter timer number, 1 started or 0 stopped, 0, its counter, tick
-          3 input   as kind 1, with n = 1: an input pin was changed from outside
-          5 pulses pin, 0, 0, ticks high, tick; then the ticks of a period (I): a timer makes such pulses from
-                    that tick on (its channel is in PWM mode); 0 and 0: it makes none
+          3 input   as kind 1, with n = 1: an input pin was driven from outside
           4 reset   the board was powered up or reset; ticks count from 0 again
+          5 pulses  pin, 0, 0, ticks high, tick; then the period in ticks (I): PWM of a timer from that
+                    tick on; 0 and 0: its end
 
-Ticks are of 84 MHz, since the last reset.
+Ticks are those of an 84 MHz clock, counted from the last reset.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Edges = tuple[NDArray[np.int64], NDArray[np.int8]]
 
 
 class Pulses(NamedTuple):
-    """What pulses a timer makes at a pin from a tick on; all 0 if it makes none."""
+    """PWM of a timer on a pin from a tick on; its end if ``high_ticks`` and ``period_ticks`` are 0."""
 
     tick: int
     high_ticks: int
@@ -45,20 +45,20 @@ class Pulses(NamedTuple):
 
 @dataclass
 class PowerCycle:
-    """What happened between two resets: per pin (``"A15"``) its edges, and the motion clock's starts."""
+    """The edges between two resets by pin (``"A15"``), and the starts of the motion clock."""
 
     pins: dict[str, Edges] = field(default_factory=dict)
     starts: list[int] = field(default_factory=list)
     """Tick of motion time 0 of each motion."""
     pulses: dict[str, list[Pulses]] = field(default_factory=dict)
-    """Per pin what pulses a timer made there, in the order of time."""
+    """PWM of timers by pin, in order of time."""
     ends: list[int] = field(default_factory=list)
-    """Tick at which the motion clock was stopped, if it was."""
+    """Ticks at which the motion clock was stopped."""
 
     def motion(self, number: int = -1) -> dict[str, Edges]:
-        """Per pin its edges in the ``number``-th motion, in ticks of the motion clock.
+        """The edges of the ``number``-th motion by pin, in ticks of the motion clock.
 
-        A motion lasts until the next is started. Raises RunFolderError if there was none.
+        A motion lasts until the start of the next one. Raises RunFolderError if there is no such motion.
         """
         if not -len(self.starts) <= number < len(self.starts):
             raise RunFolderError(
@@ -78,7 +78,7 @@ class PowerCycle:
         return cut
 
     def _before(self, zero: int) -> int:
-        """Tick from which on edges belong to the motion of this time 0: the clock was stopped after the one before."""
+        """First tick of the motion whose time 0 this is: not before the clock's stop after the previous motion."""
         stopped = bisect.bisect_left(self.ends, zero)
         return max([zero - _LEAD_TICKS, *self.ends[max(stopped - 1, 0) : stopped]])
 
@@ -87,7 +87,7 @@ _LEAD_TICKS = 8_400_000
 
 
 def read(path: Path) -> list[PowerCycle]:
-    """All power cycles of a log, oldest first. Raises RunFolderError if the file is none."""
+    """All power cycles of a log, oldest first. Raises RunFolderError if the file is not a log."""
     data = path.read_bytes()
     if data[:4] != b"ATE1":
         raise RunFolderError(
@@ -115,7 +115,7 @@ def read(path: Path) -> list[PowerCycle]:
 
 
 class _Collector:
-    """Gathers the pieces of one power cycle."""
+    """Collects the records of one power cycle."""
 
     def __init__(self) -> None:
         self._ticks: dict[int, list[NDArray[np.int64]]] = {}
@@ -133,7 +133,7 @@ class _Collector:
     def counter(self, started: bool, count: int, tick: int) -> None:
         if not started:
             self._cycle.ends.append(tick)
-        elif count >= 1 << 31:  # a motion's clock is started a little before it comes round to 0
+        elif count >= 1 << 31:  # a motion's clock is started shortly before it overflows to 0
             self._cycle.starts.append(tick + (1 << 32) - count)
 
     @property

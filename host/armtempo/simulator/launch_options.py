@@ -1,4 +1,4 @@
-"""How a virtual board is started: what a caller may choose, and what its process is told about it."""
+"""Options of a virtual board: those of ``launch``, and those for its process."""
 
 from __future__ import annotations
 
@@ -24,16 +24,25 @@ DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 @checked_fields
 @dataclass(frozen=True)
 class InjectedFault:
-    """Something that goes wrong ``at_s`` seconds into the ``run``-th motion since power-up.
+    """A fault ``at_s`` seconds into the ``run``-th motion since power-up, or from power-up on (``run`` 0).
 
-    ``kind``: ``stall`` (the main loop loses ``ms``), ``input`` (the pin ``name`` gets ``level`` 0 or 1),
-    ``block`` (the joint ``joint``, counted from 0, cannot turn any more), ``slip`` (its encoder is turned by
-    ``counts``), ``silence`` (the serial cable is out for ``ms``), ``hang`` (the program stops for ever) or
-    ``crash`` (the next look at the time raises).
-
-    From power-up on if ``run`` is 0: ``dead_pin`` (``name`` does not toggle), ``short`` (``name`` "A15-A1": the
-    second pin toggles with the first), ``half_clock`` (TIM2 counts at half its rate), ``slow_flash`` (each operation
-    takes ``ms`` more), ``late_interrupts`` (by ``ms``), ``dead_stream`` (DMA1's stream ``joint`` answers no request).
+    ===================  ==========================================================================
+    ``kind``, in a run
+    ``stall``            the main loop loses ``ms``
+    ``input``            the pin ``name`` gets ``level`` 0 or 1
+    ``block``            the joint ``joint``, from 0, is blocked from then on
+    ``slip``             its encoder turns by ``counts``
+    ``silence``          the serial cable is unplugged for ``ms``
+    ``hang``             the program hangs
+    ``crash``            the next read of the time raises
+    from power-up on
+    ``dead_pin``         the pin ``name`` does not toggle
+    ``short``            of two pins, ``name`` "A15-A1", the second toggles with the first
+    ``half_clock``       TIM2 counts at half its rate
+    ``slow_flash``       each flash operation takes ``ms`` more
+    ``late_interrupts``  interrupts are late by ``ms``
+    ``dead_stream``      stream ``joint`` of DMA1 serves no request
+    ===================  ==========================================================================
     """
 
     kind: str
@@ -49,59 +58,59 @@ class InjectedFault:
 @checked_fields
 @dataclass(frozen=True)
 class LaunchOptions:
-    """What a virtual board may be started with; the defaults make one that is new and undamaged."""
+    """Options of ``launch``; the default is a new, undamaged board."""
 
     flash_dir: Path | str | None = None
-    """The folder that is its flash and lasts; None: a new one that goes with the board."""
+    """The folder of its flash; None: a temporary one."""
     virtual_time: bool = True
-    """Motions run as fast as they can; else in real time."""
+    """Run motions as fast as possible; otherwise in real time."""
     edge_log: Path | str | None = None
-    """File for every pin edge; read it with ``armtempo.simulator.edgelog``."""
+    """File for all edges of the pins; ``armtempo.simulator.edgelog`` reads it."""
     interpreter: Path | str | None = None
     """MicroPython or CPython; None: $ARMTEMPO_MICROPYTHON, ``micropython`` on PATH, or this Python."""
     arm: Arm | None = None
-    """Gets motors with its ``model``; None: ideal motors for whatever arm the board is set up for."""
+    """The arm moved by its motors, with their ``model``; None: ideal motors of the arm that the board is set up for."""
     start_deg: Sequence[float] | None = None
-    """Where the arm is at power-up, degrees (J,); None: at home."""
+    """Posture at power-up, degrees (J,); None: the home posture."""
     seed: int = 0
-    """Tells one board from another, and gives its arm's scatter."""
+    """Seed of the board's id and of its arm's scatter."""
     faults: Sequence[InjectedFault] = ()
     power_cut_at: int = 0
     """The power fails during this flash operation, counted from 1; 0: never."""
     deployed: bool = False
-    """Run the program in the flash (``armtempo deploy`` puts it there) instead of the installed one."""
+    """Run the program in the flash (from ``armtempo deploy``) instead of the installed one."""
     flash_blocks: int | None = None
     """Size of the flash; None: the chip's."""
     button_s: float = 0.0
-    """How long the user button is held from power-up on: safe mode from 0.6 to 1.2, a fresh file system from
-    1.2 to 1.8."""
+    """How long the user button is held from power-up on: 0.6 to 1.2 for the safe mode, 1.2 to 1.8 for a new file
+    system."""
     sd_card: Path | str | None = None
     """Folder used as an SD card in the board."""
     damage: str = ""
-    """Simulated damage of the flash: ``"no file system"``, ``"unreadable"``, or none."""
+    """Simulated damage of the flash: ``"no file system"``, ``"unreadable"`` or ``""``."""
     machine: str = DEFAULT_MACHINE
-    """What the firmware says it was built for."""
+    """The machine for which the firmware says it was built."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessOptions:
-    """The options of ``main.py``, handed over as one JSON file. Paths are absolute."""
+    """The options of ``main.py``, in a JSON file. Paths are absolute."""
 
     flash: str
     """Folder that is the board's ``/flash``."""
     sources: list[str]
-    """Folders with the packages of the board program: how its pins are wired, what an arm record says."""
+    """Folders with the packages of the board program, for its pin table and the layout of the arm record."""
     program: list[str]
-    """Folders with the board's packages, as if they were deployed; empty: only what the flash has."""
+    """Folders with the board program's packages, run as if deployed; empty: only what is in the flash."""
     flash_blocks: int | None
-    """Size of the flash; None: what an STM32F4DISC's file system has for files."""
+    """Size of the flash; None: that of an STM32F4DISC's file system."""
     speed: float
-    """Motions run at this multiple of real time; 0: as fast as they can."""
+    """Motions run at this multiple of real time; 0: as fast as possible."""
     edge_log: str | None
     unique_id: str
     """24 hex digits."""
     dma_preload: bool = True
-    """DMA streams fetch one word ahead, as the chip's do in direct mode (RM0090 10.3.12)."""
+    """DMA streams fetch one word ahead, as on the chip in direct mode (RM0090 10.3.12)."""
     power_cut_at: int
     button_ms: float
     sd_card: str | None
@@ -109,28 +118,28 @@ class ProcessOptions:
     """A kind of damage of ``chip/flash.py``."""
     machine: str
     turn_us: int = 1000
-    """What a turn of the program's main loop takes on the chip beyond its simulated calls."""
+    """Time of a turn of the program's main loop on the chip in addition to its simulated calls."""
     arm: dict[str, Any] | None
-    """Motors and encoders on the pins; None: ideal ones for the arm record in the flash."""
+    """The arm from ``describe``; None: ideal motors for the arm record in the flash."""
     up: str
     """File that is made when the program has started."""
     seed: int
     faults: list[InjectedFault]
 
     def write(self, path: Path) -> None:
-        """Write them for ``main.py``."""
+        """Write the file for ``main.py``."""
         path.write_text(json.dumps(asdict(self)))
 
 
 def unique_id(seed: int) -> str:
-    """A virtual board's 24 hex digits, another for each seed."""
+    """A virtual board's id, 24 hex digits, different for each seed."""
     return (VIRTUAL_ID + hashlib.sha256(b"virtual board %d" % seed).hexdigest())[:24]
 
 
 def describe(arm: Arm, start_deg: Sequence[float] | None = None) -> dict[str, Any]:
-    """The arm record's fields and, per joint, where it is at power-up and its drive's model.
+    """The fields of the arm record and, for each joint, its angle at power-up and its drive's model.
 
-    ``start_deg`` (J,): None means the home posture. Raises InputError if a model makes no sense.
+    ``start_deg`` (J,): None for the home posture. Raises InputError for an impossible model.
     """
     head, rows, _ = armrecord.unpack(encode.arm_record(arm))
     angles = start_deg if start_deg is not None else [joint.home_deg for joint in arm.driven]

@@ -1,4 +1,4 @@
-"""Starts a virtual board as a process of its own and gives it a serial port and a temporary folder."""
+"""Starts a virtual board as a process with a serial port and a temporary folder."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _LOCK = "lock"
 
 
 class VirtualBoard:
-    """A running virtual board; ends with its context, or by ``stop``.
+    """A running virtual board, until ``stop`` or the end of the context.
 
-    ``port`` can be opened like a serial device, again and again, until then.
+    ``port`` can be opened like a serial device, any number of times.
     """
 
     def __init__(self, command: list[str], folder: TemporaryFolder, flash: Path) -> None:
@@ -43,7 +43,7 @@ class VirtualBoard:
             os.set_blocking(master, False)
             self.port = os.ttyname(self._slave)
             with self.log_path.open("wb") as log:
-                # in a session of its own: a Ctrl-C in the terminal is the launcher's to act on
+                # in its own session: Ctrl-C in the terminal is handled by the launcher
                 self._process = subprocess.Popen(
                     command,
                     stdin=master,
@@ -64,19 +64,17 @@ class VirtualBoard:
 
     @property
     def pid(self) -> int:
-        """Process id."""
         return self._process.pid
 
     def running(self) -> bool:
-        """Whether the process lives."""
         return self._process.poll() is None
 
     def log(self) -> str:
-        """What the board program wrote to its error output."""
+        """The board program's stderr."""
         return self.log_path.read_text(errors="replace")
 
     def wait_until_up(self) -> None:
-        """Wait until the board program has started; LinkError if the process ends instead."""
+        """Wait until the board program has started; raises LinkError if the process ends before."""
         limit = time.monotonic() + _START_S
         while not (self._folder.path / "up").exists():
             if not self.running() or time.monotonic() > limit:
@@ -88,12 +86,12 @@ class VirtualBoard:
             time.sleep(0.005)
 
     def stop(self) -> None:
-        """End the board as by pulling its plug; the edge log is complete then. A second call does nothing."""
+        """End the board as by a power cut; then the edge log is complete. A second call does nothing."""
         if self._slave < 0:
             return
         os.close(self._slave)
         self._slave = -1
-        # it ends by itself when nobody has its port open any more
+        # it ends when its port is no longer open
         for end in (self._process.poll, self._process.terminate, self._process.kill):
             end()
             with suppress(subprocess.TimeoutExpired):
@@ -101,7 +99,6 @@ class VirtualBoard:
                 return
 
     def kill(self) -> None:
-        """End it at once."""
         self._process.kill()
         self.stop()
 
@@ -114,7 +111,7 @@ class VirtualBoard:
 
 
 def _pseudo_terminal() -> tuple[int, int]:
-    """Both ends; LinkError if the system has none to give, as in a container without /dev/pts."""
+    """Both ends; raises LinkError if there is none, as in a container without /dev/pts."""
     import pty
 
     try:
@@ -161,7 +158,7 @@ def launch(options: LaunchOptions | None = None) -> VirtualBoard:
 
 
 def _process_options(wanted: LaunchOptions, flash: Path, up: Path) -> ProcessOptions:
-    """What the process is told; ``up`` is the file that it makes when it has started."""
+    """The options for the process; ``up``: the file that it makes when it has started."""
     sources = program_folders()
     return ProcessOptions(
         flash=str(flash),
@@ -202,7 +199,7 @@ def program_folders() -> list[str]:
     import armtempo_shared
 
     shared = Path(armtempo_shared.__file__).resolve().parent.parent
-    beside = shared.parent / "board"  # in a checkout; in site-packages all are together
+    beside = shared.parent / "board"  # in a checkout; in site-packages both are in one folder
     board = beside if (beside / "armtempo_board").is_dir() else shared
     return [str(folder) for folder in dict.fromkeys((board, shared))]
 
@@ -215,7 +212,7 @@ def find_interpreter() -> str:
 def _command(interpreter: Path | str | None, options: Path) -> list[str]:
     chosen = str(interpreter or find_interpreter())
     if os.sep in chosen:
-        chosen = os.path.abspath(chosen)  # the process starts in the folder of its flash
+        chosen = os.path.abspath(chosen)  # the process runs in the folder of its flash
     if chosen == sys.executable or not is_micropython(chosen):
         flags = ["-I", "-S", "-B"]
     else:
@@ -224,7 +221,7 @@ def _command(interpreter: Path | str | None, options: Path) -> list[str]:
 
 
 def is_micropython(interpreter: str) -> bool:
-    """Whether the interpreter is MicroPython; LinkError if it does not run."""
+    """Whether the interpreter is MicroPython; raises LinkError if it does not run."""
     question = "import sys; print(sys.implementation.name)"
     try:
         command = [interpreter, "-c", question]
@@ -244,9 +241,9 @@ def is_micropython(interpreter: str) -> bool:
 
 
 class TemporaryFolder:
-    """A new folder; ``lock`` is a file descriptor that keeps it, also in a process that inherits it.
+    """A new temporary folder; it is in use while the file descriptor ``lock`` is open, also in a child process.
 
-    Making one removes those whose owners were killed.
+    Making one removes those that are no longer in use.
     """
 
     def __init__(self) -> None:
@@ -257,10 +254,10 @@ class TemporaryFolder:
         unlocked = self.path / "new"
         self.lock = os.open(unlocked, os.O_CREAT | os.O_RDWR, 0o600)
         fcntl.flock(self.lock, fcntl.LOCK_EX)
-        unlocked.rename(self.path / _LOCK)  # under this name it is always locked, or abandoned
+        unlocked.rename(self.path / _LOCK)  # a file of this name is locked, or abandoned
 
     def remove(self) -> None:
-        """Remove it with all that is in it; nothing happens the second time."""
+        """Remove it with its contents; a second call does nothing."""
         if self.lock >= 0:
             shutil.rmtree(self.path, ignore_errors=True)
             os.close(self.lock)

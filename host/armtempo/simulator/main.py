@@ -1,8 +1,7 @@
 """The virtual board's process: ``main.py OPTIONS.json``, under MicroPython or CPython.
 
-Puts the simulated hardware in place of ``pyb``, ``machine``, ``stm``, ``time``, ``os``, … and runs the board
-program on it, again after each reset. The serial port is stdin and stdout; the options are described in
-``launch_options.py``.
+Replaces ``pyb``, ``machine``, ``stm``, ``time``, ``os``, … by the simulated hardware and runs the board program
+on it, again after each reset. The serial port is stdin and stdout; for the options see ``launch_options.py``.
 """
 
 import json
@@ -12,7 +11,7 @@ HERE = sys.argv[0].rsplit("/", 1)[0]
 
 
 def prepare():
-    """Make the simulated modules importable; returns the simulator's ``power_cycles`` module and their folders."""
+    """Make the simulated modules importable; returns the module ``power_cycles``, and their folders."""
     folders = [HERE + "/hardware"]
     if sys.implementation.name != "micropython":
         folders.append(HERE + "/cpython")
@@ -30,7 +29,7 @@ def prepare():
 
 
 def main():
-    """Run until the launcher goes."""
+    """Run until the launcher ends."""
     with open(sys.argv[1]) as file:
         options = json.load(file)
     power_cycles, folders = prepare()

@@ -1,4 +1,4 @@
-"""Uniform B-splines: fit through points (Eqs. 13 and 14) and their polynomials (Eq. 15)."""
+"""Uniform B-splines: interpolation of points (Eqs. 13 and 14), and polynomials (Eq. 15)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,12 @@ _REST_ROWS: dict[int, tuple[tuple[float, ...], ...]] = {
     3: ((-1, 0, 1),),
     5: ((1, 2, -6, 2, 1), (-1, -10, 0, 10, 1)),
 }
-"""Derivatives at a point that vanish at rest, highest order first; the first derivative of the cubic,
-the second and first of the quintic."""
+"""Rows of the derivatives that are 0 at rest: the first of the cubic; the second and the first of the quintic."""
 
 
 @cache
 def basis(degree: int) -> Array:
-    """The matrix of Eq. (15): (degree + 1, degree + 1), rows: powers of u, columns: control points.
+    """The matrix of Eq. (15), (degree + 1, degree + 1); rows: powers of u, columns: control points.
 
     Raises InputError for a degree other than 3 or 5.
     """
@@ -37,12 +36,12 @@ def basis(degree: int) -> Array:
 def fit(points_deg: ArrayLike, degree: int, rests: Sequence[int] = ()) -> Array:
     """Control points of the spline through ``points_deg`` that starts and ends at rest.
 
-    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J): Eq. (13) or (14), solved
-    with a full matrix, as importing scipy's banded solver takes longer than most commands. The cubic rests in
-    speed, the quintic also in acceleration. A quintic also rests at the points ``rests``, and may leave them
-    in any direction; it does not pass exactly through the two points before and after each. They must be at
-    least ``degree`` points apart, and from the ends. Raises InputError for fewer than two points or values
-    that are not finite.
+    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J) by Eq. (13) or (14), solved
+    with a full matrix, as importing scipy's banded solver takes longer than most commands. At rest the speed is 0,
+    of the quintic also the acceleration. A quintic is also at rest at the points ``rests``, with any direction
+    afterwards, and then only passes near the two points before and after each; ``rests`` must be at least
+    ``degree`` points apart and from the ends. Raises InputError for fewer than two points or values that are not
+    finite.
     """
     points = np.asarray(points_deg, dtype=float)
     row = basis(degree)[0, :-1]
@@ -81,12 +80,12 @@ def polynomials(control_points: Array, degree: int) -> Array:
     windows = np.lib.stride_tricks.sliding_window_view(control_points, degree + 1, axis=0)
     middle = windows[..., degree // 2]
     pieces = np.einsum("pc,s...c->sp...", basis(degree), windows - middle[..., None])
-    pieces[:, 0] += middle  # subtracted first, so that a small motion far from zero keeps its digits
+    pieces[:, 0] += middle  # subtracted before, so that a small motion far from 0 keeps its precision
     return np.asarray(pieces)
 
 
 def refined(control_points: Array, parts: int, degree: int) -> Array:
-    """Control points of the same spline with each segment cut into ``parts``.
+    """Control points of the same spline with each segment divided into ``parts``.
 
     ``control_points``: (n + degree, ...). Returns (n * parts + degree, ...). Method: ``degree`` + 1 moving
     sums over ``parts`` neighbours.
@@ -103,7 +102,7 @@ def refined(control_points: Array, parts: int, degree: int) -> Array:
 
 
 def subdivide(coefficients: Array, parts: int) -> Array:
-    """The same curve with each segment cut into ``parts`` equal ones, each over [0, 1] again.
+    """The same curve with each segment divided into ``parts`` equal ones, each over [0, 1].
 
     ``coefficients``: (n, k + 1, ...), power basis. Returns (n * parts, k + 1, ...).
     """

@@ -1,4 +1,4 @@
-"""A uniform B-spline as an object: control points, and values and derivatives at any parameter."""
+"""A uniform B-spline: control points, values and derivatives."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Spline:
 
     @classmethod
     def through(cls, points: ArrayLike, degree: int = 5) -> Spline:
-        """The spline that passes ``points``, (n + 1,) or (n + 1, J), at u = 0, 1, … n, and rests at both ends.
+        """The spline through ``points``, (n + 1,) or (n + 1, J), at u = 0, 1, … n, at rest at both ends.
 
-        The cubic rests in its first derivative, the quintic in its second too (Eqs. 13 and 14). Raises
-        InputError for another degree, fewer than two points or values that are not finite.
+        At the ends the first derivative is 0, of the quintic also the second (Eqs. 13 and 14). Raises InputError for
+        another degree, fewer than two points or values that are not finite.
         """
         if degree not in DEGREES or np.ndim(points) not in (1, 2):
             raise InputError(
@@ -58,8 +58,8 @@ class Spline:
     def __call__(self, u: ArrayLike, order: int = 0) -> Array:
         """Value at ``u``, or its derivative of the given ``order`` with respect to u.
 
-        ``u`` of any shape gives an array of that shape, with J in a last axis if the points have it. Raises
-        InputError for a u outside of 0 to n.
+        Returns the shape of ``u``, and (..., J) if the points have joints. Raises InputError for a u outside of
+        0 to n.
         """
         if not 0 <= order <= self.degree:
             raise InputError(

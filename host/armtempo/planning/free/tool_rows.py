@@ -120,11 +120,9 @@ class LinearisedTool:
         self._rows, self._gradient, self._curvature = rows, gradient, curvature
 
     def forward(self, step: Array) -> Array:
-        """See there."""
         return self._rows.change(step, self._gradient)
 
     def backward(self, weights: Array) -> Array:
-        """See there."""
         return self._rows.spread(weights[:, None] * self._gradient)
 
     def hessian(self, weights: Array, multipliers: Array, _: bool) -> Array:

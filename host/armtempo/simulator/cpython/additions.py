@@ -1,4 +1,4 @@
-"""Adds to CPython's ``time``, ``gc`` and ``sys`` what MicroPython's have beyond them."""
+"""Adds MicroPython's extensions of ``time``, ``gc`` and ``sys`` to CPython's modules."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _print_exception(error: BaseException, file: TextIO = sys.stderr) -> None:
 
 
 def _collect() -> int:
-    """Here memory is plenty, and a collection takes long."""
+    """Does nothing: there is enough memory, and a collection takes long."""
     return 0
 
 

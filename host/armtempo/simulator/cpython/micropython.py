@@ -1,9 +1,9 @@
 """Replaces MicroPython's ``micropython`` module when the board program runs under CPython.
 
-Pointer annotations of ``@viper`` functions, and casts such as ``ptr32(address)`` inside them, get views that
-behave like the chip's memory: 8, 16 or 32 bit wide, stores wrap, loads of ``ptr8`` and ``ptr16`` are
-unsigned, loads of ``ptr32`` signed. Everything else in a viper function is unchanged: board code keeps
-its words within 31 bits (or lets only a store wrap).
+Pointer arguments of ``@viper`` functions, and casts such as ``ptr32(address)`` in them, become views of memory
+that behave as on the chip: 8, 16 or 32 bits wide; stores wrap; loads of ``ptr8`` and ``ptr16`` are unsigned,
+those of ``ptr32`` signed. The rest of a viper function is ordinary Python, so board code keeps its words
+within 31 bits (or lets only a store wrap).
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ def _address(pointer: Any) -> int:
 
 
 def _caster(cell: type[Any]) -> Callable[[Any], Any]:
-    """A cast to a pointer: an array of ctypes, whose stores wrap, that knows its address.
+    """A cast to a pointer: a ctypes array with its address; its stores wrap.
 
-    Pointers to addresses and arrays are kept: most calls come with the same ones.
+    Pointers are cached, as most calls pass the same addresses and arrays.
     """
     width = ctypes.sizeof(cell)
     kept: dict[int, Any] = {}
-    alive: list[Any] = []  # what they point at: another object may take the number of one that is gone
+    alive: list[Any] = []  # the targets: after one is freed, another object may have its id
 
     @functools.cache
     def kind(count: int) -> Any:
@@ -48,7 +48,7 @@ def _caster(cell: type[Any]) -> Callable[[Any], Any]:
             view = memoryview(target).cast("B")
             pointer = kind(len(view) // width)
             pointer = pointer.from_buffer_copy(view) if view.readonly else pointer.from_buffer(view)
-        if key < 0 or isinstance(target, (array, memoryview)):  # a bytearray may want to grow
+        if key < 0 or isinstance(target, (array, memoryview)):  # a bytearray could no longer be resized
             if len(kept) >= _MOST_KEPT:
                 kept.clear()
                 alive.clear()
@@ -67,22 +67,22 @@ _CASTS = {
 
 
 def const(value: Any) -> Any:
-    """A constant that MicroPython's compiler would fold."""
+    """The value itself; MicroPython's compiler folds it."""
     return value
 
 
 def native(function: Function) -> Function:
-    """No machine code here: the function itself."""
+    """The function itself."""
     return function
 
 
 def viper(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function with its pointer arguments turned into views of memory."""
+    """The function, with its pointer arguments converted to views of memory."""
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
     casts = {name: _cast_of(function.__annotations__.get(name)) for name in names}
     values = [f"cast_{name}({name})" if casts[name] else name for name in names]
     known = {"function": function, **{f"cast_{name}": cast for name, cast in casts.items()}}
-    # a function of just these arguments: taking and handing on any number of them would cost more than the casts
+    # with exactly these arguments: *args would cost more than the casts
     call = eval(f"lambda {', '.join(names)}: function({', '.join(values)})", known)
     return functools.wraps(function)(call)
 

@@ -22,7 +22,7 @@ def bytearray_at(address: int, size: int) -> memoryview:
 
 
 def struct(address: int, descriptor: tuple[int, int]) -> memoryview:
-    """Of all that it can be elsewhere: this many signed words at an address, ``(ARRAY, count | INT32)``."""
+    """Signed words at an address; the only supported ``descriptor`` is ``(ARRAY, count | INT32)``."""
     kind, items = descriptor
     assert kind == ARRAY
     assert items & ~_COUNT == INT32

@@ -1,8 +1,8 @@
-"""A board without a launcher, for tests of hardware code: import this before the code under test.
+"""A board without a launcher, for tests of hardware code: import it before the code under test.
 
-``start(edge_log=…)`` powers a new board up and returns it; its time passes in simulated calls, or by
-``board.spend(ticks)``. Options are those of ``ProcessOptions`` on the host; with ``flash`` the built-in ``open``
-sees that folder as ``/flash``.
+``start(edge_log=…)`` powers up a new board and returns it; time passes in simulated calls, or by
+``board.spend(ticks)``. The options are those of ``ProcessOptions``; with ``flash`` the built-in ``open`` uses
+that folder as ``/flash``.
 """
 
 import builtins
@@ -39,7 +39,7 @@ DEFAULTS = {
 
 
 def start(cause=1, line=None, **options):
-    """Power up; ``line`` is the serial port, with nobody at the other end by default."""
+    """Power up; ``line``: the serial port, by default without a host."""
     machine_state.serial = line or SilentPort()
     machine_state.edges = machine_state.flash = None
     setup.power_up(dict(DEFAULTS, **options), cause)

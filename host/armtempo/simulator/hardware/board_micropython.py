@@ -1,4 +1,4 @@
-"""The board program's ``micropython``: the interpreter's own, and what the unix port lacks."""
+"""The board program's ``micropython``: the interpreter's own, and what the Unix port lacks."""
 
 import machine_state
 import micropython as _own
@@ -8,14 +8,14 @@ const = _own.const
 
 
 def alloc_emergency_exception_buf(size):
-    """The unix port has such a buffer without asking."""
+    """Does nothing: the Unix port always has this buffer."""
 
 
 def kbd_intr(char):
-    """Which byte interrupts the program; -1 none."""
+    """Set the byte that interrupts the program; -1: none."""
     machine_state.serial.interrupt_char = char
 
 
 def schedule(function, argument):
-    """Call soon, outside interrupts."""
+    """Call ``function(argument)`` soon, outside of interrupts."""
     machine_state.board.schedule(function, argument)

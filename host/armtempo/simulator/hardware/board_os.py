@@ -7,12 +7,10 @@ from chip import flash as _flash
 
 
 def getcwd():
-    """Current folder."""
     return machine_state.flash.cwd
 
 
 def chdir(path):
-    """Change the current folder."""
     absolute = machine_state.flash.absolute(path)
     if absolute != "/" and not _flash.is_folder(machine_state.flash.real(path)):
         raise OSError(2)
@@ -20,7 +18,6 @@ def chdir(path):
 
 
 def listdir(path=""):
-    """Names in a folder."""
     if machine_state.flash.absolute(path) == "/":
         return [point[1:] for point in machine_state.flash.mounts]
     return sorted(_own.listdir(machine_state.flash.real(path)))
@@ -61,7 +58,6 @@ def rename(old, new):
 
 
 def remove(path):
-    """Remove a file."""
     machine_state.flash.change(_own.remove, path)
 
 
@@ -69,12 +65,10 @@ unlink = remove
 
 
 def mkdir(path):
-    """Make a folder."""
     machine_state.flash.change(_own.mkdir, path)
 
 
 def rmdir(path):
-    """Remove an empty folder."""
     machine_state.flash.change(_own.rmdir, path)
 
 
@@ -85,11 +79,11 @@ def sync():
 
 
 class VfsFat:
-    """The kind of file system that the flash has."""
+    """The flash's file system."""
 
     @staticmethod
     def mkfs(device):
-        """Make a fresh one, without files."""
+        """Make a new one, without files."""
         machine_state.flash.format()
 
 
@@ -99,22 +93,21 @@ def mount(device, point):
 
 
 def umount(point):
-    """Unmount a file system."""
     machine_state.flash.umount(point)
 
 
 def dupterm(stream, index=0):
-    """Attach the REPL to the serial port, or with None detach it; returns what was attached."""
+    """Attach the REPL to the serial port (None: detach it); returns the previous stream."""
     before = machine_state.port if machine_state.serial.attached else None
     machine_state.serial.attached = stream is not None
     return before
 
 
 def urandom(count):
-    """Random bytes; of the hardware generator on the chip."""
+    """Random bytes; on the chip from its hardware generator."""
     return _own.urandom(count)
 
 
 def uname():
-    """What runs where."""
+    """System, release, version and machine."""
     return ("pyboard", "pyboard", "1.25.0", "virtual board", machine_state.options["machine"])

@@ -1,4 +1,4 @@
-"""The board program's ``sys``: the interpreter's own, with the STM32 port's name and the serial port."""
+"""The board program's ``sys``: the interpreter's own, with the STM32 port's name, and the serial port as stdio."""
 
 import sys as _own
 
@@ -9,7 +9,7 @@ platform = "pyboard"
 
 
 class _Implementation(tuple):
-    """As the firmware of STM32F4DISC shows itself; version and ``.mpy`` kind are the interpreter's."""
+    """As in the firmware for the STM32F4DISC; version and ``.mpy`` format are the interpreter's."""
 
     name = "micropython"
     version = tuple(_own.implementation.version[:3]) + ("",)
@@ -33,14 +33,14 @@ class _Stdout:
         return len(data)
 
     def flush(self):
-        """Nothing waits here."""
+        """Does nothing: there is no buffer."""
 
 
 class _Stdin:
     """``sys.stdin``."""
 
     def read(self, count):
-        """Wait for that many bytes."""
+        """Read ``count`` bytes; waits for them."""
         return _the.port.recv(count, timeout=1 << 30)
 
 

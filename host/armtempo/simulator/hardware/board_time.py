@@ -30,32 +30,29 @@ def ticks_add(ticks, delta):
 
 
 def sleep_us(us):
-    """Wait."""
     machine_state.pace.sleep_us(us)
 
 
 def sleep_ms(ms):
-    """Wait."""
     machine_state.pace.sleep_us(1000 * ms)
 
 
 def sleep(seconds):
-    """Wait."""
     machine_state.pace.sleep_us(int(seconds * 1000000))
 
 
 def time():
-    """Seconds since 2000, from an unset clock."""
+    """Seconds since 2000; the clock is not set."""
     return _EPOCH_S + machine_state.pace.milliseconds() // 1000
 
 
 def time_ns():
-    """Nanoseconds, to the microsecond."""
+    """Nanoseconds since 2000, with a resolution of 1 us."""
     return _EPOCH_S * 1000000000 + machine_state.pace.microseconds() * 1000
 
 
 def localtime(seconds=None):
-    """Not kept: the first second of 2026."""
+    """Always the first second of 2026."""
     return (2026, 1, 1, 0, 0, 0, 3, 1)
 
 

@@ -1,4 +1,4 @@
-"""The board program's ``uctypes``: the interpreter's own; remembers what DMA may be pointed at."""
+"""The board program's ``uctypes``: the interpreter's own; remembers the buffers that DMA can use."""
 
 import uctypes as _own
 from chip import memory
@@ -6,7 +6,7 @@ from uctypes import *  # noqa: F403
 
 
 def addressof(buffer):
-    """Address of a buffer; the DMA streams will find it there."""
+    """Address of a buffer, at which DMA streams find it."""
     where = _own.addressof(buffer)
     memory.objects[where & memory.MASK] = buffer
     return where

@@ -1,4 +1,4 @@
-"""Writes every pin edge with its time to a file. The format is in the host's ``armtempo.simulator.edgelog``."""
+"""Writes every edge of a pin, with its time, to a file; the format is in ``armtempo.simulator.edgelog``."""
 
 import struct
 from array import array
@@ -12,7 +12,7 @@ _CHUNK = 8192
 
 
 class EdgeLog:
-    """Listens to all pins of a board, and of those that follow after a reset."""
+    """Logs all pins of a board, also after resets."""
 
     def __init__(self, path):
         self._file = real_open(path, "wb")
@@ -39,7 +39,7 @@ class EdgeLog:
             self._write()
 
     def pulses(self, line, pulses, now):
-        """The pulses on a pin changed."""
+        """The PWM on a pin changed."""
         high, period = pulses
         self._record(PULSES, line, 0, high, now)
         self._buffer.extend(struct.pack("<I", period))
@@ -66,6 +66,6 @@ class EdgeLog:
         self._buffer = bytearray()
 
     def flush(self):
-        """Bring the file up to date."""
+        """Write the buffered edges."""
         if self._buffer:
             self._write()

@@ -1,4 +1,4 @@
-"""Things that go wrong at a given time of a motion, or from power-up on, as the options ask for."""
+"""The injected faults of the options: at a time in a motion, or from power-up on."""
 
 import machine_state
 from chip.processor import TICKS_PER_MS
@@ -9,7 +9,7 @@ _HALF = 1 << 31
 
 
 class Faults:
-    """Waits for motions (TIM2 starting) and schedules each fault at its time."""
+    """Schedules each fault in its motion (TIM2 starts)."""
 
     def __init__(self, board, faults):
         self._board = board
@@ -23,7 +23,7 @@ class Faults:
     def counting(self, timer, now):
         """A timer started or stopped."""
         if timer.number != 2 or not timer.running or timer.count(0) < _HALF:
-            return  # motions are started a little before the counter comes round to 0
+            return  # motions are started shortly before the counter overflows to 0
         self._run += 1
         zero = now + timer.modulus - timer.count(0)
         for fault in self._faults:

@@ -1,16 +1,16 @@
-"""MicroPython's ``machine`` of the STM32 port, as far as the board program uses it."""
+"""The part of the STM32 port's ``machine`` that the board program uses."""
 
 import machine_state
 from chip import memory
-from chip.processor import CALL_TICKS
-from chip.watchdog import WDT  # noqa: F401
+from chip.processor import CALL_TICKS, TICKS_PER_MS
 from firmware.pin_api import Pin  # noqa: F401
 
 PWRON_RESET, HARD_RESET, WDT_RESET, DEEPSLEEP_RESET, SOFT_RESET = 1, 2, 3, 4, 0
+_RLR = 2  # word of IWDG
 
 
 class _Memory:
-    """``mem32`` and its narrower siblings. Reads are signed beyond 31 bits, as on the chip."""
+    """``mem32``, ``mem16`` and ``mem8``. Reads beyond 31 bits are signed, as on the chip."""
 
     def __init__(self, size):
         self._mask = (1 << 8 * size) - 1
@@ -38,7 +38,7 @@ mem32 = _Memory(4)
 
 
 def idle():
-    """Sleep until the next interrupt; SysTick comes every millisecond."""
+    """Sleep until the next interrupt; SysTick's comes every millisecond."""
     machine_state.pace.idle()
 
 
@@ -58,24 +58,51 @@ def reset_cause():
 
 
 def disable_irq():
-    """Hold interrupts back; returns the state before for ``enable_irq``."""
+    """Disable interrupts; returns the previous state for ``enable_irq``."""
     before = not machine_state.board.masked
     machine_state.board.masked = True
     return before
 
 
 def enable_irq(state=True):
-    """Let interrupts through again."""
+    """Restore the state of interrupts."""
     machine_state.board.masked = not state
     if state:
         machine_state.board.spend(CALL_TICKS)
 
 
 def soft_reset():
-    """Start MicroPython again; the hardware keeps its registers."""
+    """Restart MicroPython; the hardware keeps its registers."""
     raise machine_state.Reset(SOFT_RESET)
 
 
 def reset():
-    """As the reset button."""
     raise machine_state.Reset(HARD_RESET)
+
+
+class WDT:
+    """The independent watchdog: resets the board unless ``feed`` is called every ``timeout`` ms; cannot be stopped."""
+
+    def __init__(self, id=0, timeout=5000):
+        if not 1 <= timeout <= 32000:
+            raise ValueError("WDT timeout must be from 1 to 32000 ms")
+        machine_state.board.watchdog_ticks = timeout * TICKS_PER_MS
+        memory.poke(memory.index("IWDG") + _RLR, timeout // 8)
+        machine_state.board.watchdog_deadline = machine_state.board.now + machine_state.board.watchdog_ticks
+        _schedule_check()
+
+    def feed(self):
+        """Start the time over."""
+        board = machine_state.board
+        board.watchdog_deadline = board.now + board.watchdog_ticks
+        board.call()
+
+
+def _schedule_check():
+    machine_state.board.at(machine_state.board.watchdog_deadline, _check_watchdog)
+
+
+def _check_watchdog():
+    if machine_state.board.now >= machine_state.board.watchdog_deadline:
+        raise machine_state.Reset(WDT_RESET)
+    _schedule_check()

@@ -1,4 +1,4 @@
-"""The one virtual board of this process, what is connected to it (made by ``setup.power_up``), and what ends it."""
+"""This process's virtual board and what is connected to it (set by ``setup.power_up``), and its ends."""
 
 board = None
 pace = None
@@ -13,7 +13,7 @@ settings = {}
 
 
 class Reset(BaseException):
-    """The processor starts again; ``cause`` as ``machine.reset_cause()`` will say it."""
+    """A reset; ``cause``: for ``machine.reset_cause()``."""
 
     def __init__(self, cause):
         super().__init__(cause)
@@ -21,4 +21,4 @@ class Reset(BaseException):
 
 
 class PowerOff(BaseException):
-    """The virtual board ends because its launcher has ended."""
+    """The launcher has ended."""

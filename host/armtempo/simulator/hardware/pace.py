@@ -1,10 +1,12 @@
-"""How virtual time passes relative to real time, and the calls that wait.
+"""The speed of virtual time, and the calls that wait.
 
-While a timer has something to do soon, virtual time runs as fast as this process can, or, with ``speed``, at
-that multiple of real time. It keeps to real time while nothing moves (asleep until input comes), if the
-arm is to stop when the host falls silent (the host's silence is real), for a while after the host has spoken twice in
-quick succession, as one does that holds a motion (the same), and while the host does not read, so that a host which is
-busy for a moment loses no more than with a real board.
+While a timer has an event soon, virtual time runs as fast as this process can, or, with ``speed``, at that
+multiple of real time. It runs in real time
+
+- while nothing moves (the process sleeps until input comes);
+- if the arm stops when the host is silent, and for a while after two messages in quick succession, as from a host
+  that holds a motion: both depend on the host's real time;
+- while the host does not read, so that a busy host loses no more than with a real board.
 """
 
 import time
@@ -23,7 +25,7 @@ _NEVER_US = 1 << 28
 
 
 class Pace:
-    """Ties the board's virtual time to real time."""
+    """Runs the board's virtual time against real time."""
 
     def __init__(self, board, serial, speed):
         self._board = board
@@ -40,12 +42,12 @@ class Pace:
         board.millisecond = self._first_millisecond
 
     def idle(self):
-        """Until the next interrupt or the next millisecond; in real time if nothing moves."""
+        """Wait until the next interrupt or millisecond; in real time if nothing moves."""
         board = self._board
         board.run_until(board.next_ms, wake=True)
 
     def _first_millisecond(self):
-        """The program runs: make the file that the launcher waits for."""
+        """The program has started: make the file that the launcher waits for."""
         self._board.millisecond = self._millisecond
         if machine_state.options["up"]:
             real_open(machine_state.options["up"], "w").close()
@@ -71,7 +73,7 @@ class Pace:
             self._free = True
 
     def _host_talks(self):
-        """Whether input has come twice within a short time since the motion began, and not long ago."""
+        """Whether two messages came in quick succession during the motion, not long ago."""
         now = self._ticks_us()
         passed = self._ticks_diff(now, self._looked_us)
         self._looked_us = now
@@ -91,7 +93,7 @@ class Pace:
         return elapsed
 
     def _nap(self):
-        """Nothing moves: sleep until input comes, and let as much virtual time pass as that took."""
+        """Nothing moves: sleep until input comes, and let the same virtual time pass."""
         if not self._serial.received and not self._serial.stuck():
             self._serial.wait(_NAP_MS)
             self._serial.pump()
@@ -111,7 +113,7 @@ class Pace:
 
     def _keep_pace(self, speed):
         """Moving in real time: sleep while virtual time is ahead."""
-        if self._free:  # virtual time that passed unpaced is not waited for
+        if self._free:  # do not wait for virtual time that ran freely
             self._free = False
             self._elapsed_us()
             self._last_tick = self._board.now
@@ -129,7 +131,7 @@ class Pace:
             self._board.run_until(min(target, self._board.next_ms))
 
     def milliseconds(self):
-        """Milliseconds since power-up, modulo 2**30; where an injected crash comes to light."""
+        """Milliseconds since power-up, modulo 2**30; raises an injected crash."""
         if self._board.crash:
             self._board.crash = False
             raise RuntimeError("injected crash")

@@ -5,7 +5,7 @@ import sys
 
 import machine_state
 import setup
-from chip import memory, timer_registers
+from chip import memory, timers
 from firmware import boot
 from firmware.repl import Repl, SoftReset, board_print
 from machine_state import PowerOff, Reset
@@ -14,7 +14,7 @@ _POWER_ON, _SOFT = 1, 0
 
 
 def run(options, hardware):
-    """Run the board until the launcher ends; ``hardware``: the folders of its built-in modules."""
+    """Run the board until the launcher ends; ``hardware``: folders of the built-in modules."""
     setup.learn(options["sources"])
     path = hardware, options["program"] + sys.path
     before = list(sys.modules)
@@ -35,7 +35,7 @@ def run(options, hardware):
 
 
 def _live(options, before, mode, path):
-    """Run the program, then the prompt, again after each soft reset, which ends the safe mode."""
+    """Run the program, then the prompt; again after each soft reset, which ends the safe mode."""
     raw = False
     while True:
         boot.mount(mode, path)
@@ -55,7 +55,7 @@ def _live(options, before, mode, path):
 
 
 def _start(options, repl):
-    """boot.py, and if that went well main.py, unless the host talks to the raw REPL."""
+    """Run boot.py and, if it raises nothing, main.py, unless the host uses the raw REPL."""
     if not _execute(options, repl, "boot.py"):
         boot.flash_error(boot.BOOT_ERROR)
     elif not repl.raw and not _execute(options, repl, "main.py"):
@@ -63,7 +63,7 @@ def _start(options, repl):
 
 
 def _execute(options, repl, name):
-    """Run a file of flash or card, or of the program that is not deployed; False if it raises."""
+    """Run a file of the flash or card, or of a program that is not deployed; False if it raises."""
     folders = [machine_state.flash.cwd] + [folder + "/armtempo_board" for folder in options["program"]]
     for folder in folders:
         try:
@@ -76,13 +76,11 @@ def _execute(options, repl, name):
 
 
 def _soft_reset():
-    """What the firmware does between two runs: timers it made stop, callbacks go; registers stay."""
+    """As the firmware between two runs: stop its timers, remove callbacks; registers stay."""
     board = machine_state.board
     for number in board.api:
         at = board.timers[number].at
-        memory.words[at + timer_registers.CR1] = memory.words[at + timer_registers.CCER] = memory.words[
-            at + timer_registers.DIER
-        ] = 0
+        memory.words[at + timers.CR1] = memory.words[at + timers.CCER] = memory.words[at + timers.DIER] = 0
     for known in (board.api, board.callbacks, board.extints):
         known.clear()
     board.scheduled = []
@@ -95,10 +93,10 @@ def _soft_reset():
 
 
 def _forget(before):
-    """The program's modules are loaded afresh the next time."""
+    """Unload the program's modules."""
     for name in list(sys.modules):
         if name not in before:
             del sys.modules[name]
     caches = getattr(sys, "path_importer_cache", None)
-    if caches:  # CPython remembers which folders there were
+    if caches:  # CPython caches the folders
         caches.clear()

@@ -1,4 +1,4 @@
-"""MicroPython's ``pyb`` of the STM32F4DISC board, as far as the board program uses it."""
+"""The part of the STM32F4DISC's ``pyb`` that the board program uses."""
 
 import machine_state
 from firmware.external_interrupts import ExtInt
@@ -13,21 +13,18 @@ _LED_PINS = ("PD14", "PD12", "PD13", "PD15")
 
 
 class LED:
-    """1 red, 2 green, 3 orange, 4 blue."""
+    """LED 1 red, 2 green, 3 orange, 4 blue."""
 
     def __init__(self, number):
         self._pin = Pin(_LED_PINS[number - 1], Pin.OUT_PP)
 
     def on(self):
-        """Light it."""
         self._pin.high()
 
     def off(self):
-        """Darken it."""
         self._pin.low()
 
     def toggle(self):
-        """Change it."""
         self._pin.value(1 - self._pin.value())
 
 
@@ -53,11 +50,11 @@ class Flash:
     """The flash as a block device, for ``os.mount`` and ``os.VfsFat.mkfs``."""
 
     def __init__(self, *, start=-1, len=-1):
-        """There is one file system, in all of it."""
+        """The file system fills the flash, whatever the arguments."""
 
 
 def usb_mode(mode=None, *args, **kwargs):
-    """Read or set what the USB port shows itself as."""
+    """Read or set the USB mode."""
     if mode is None:
         return machine_state.settings.get("usb_mode", "VCP+MSC")
     machine_state.settings["usb_mode"] = mode
@@ -65,7 +62,7 @@ def usb_mode(mode=None, *args, **kwargs):
 
 
 def main(name):
-    """Which file is run after ``boot.py``."""
+    """Set the file that is run after ``boot.py``."""
     machine_state.settings["main"] = name
 
 
@@ -80,18 +77,16 @@ def millis():
 
 
 def delay(ms):
-    """Wait."""
     machine_state.pace.sleep_us(1000 * ms)
 
 
 def udelay(us):
-    """Wait."""
     machine_state.pace.sleep_us(us)
 
 
 def country(code=None):
-    """Nothing to set."""
+    """Does nothing: of the network."""
 
 
 def fault_debug(value):
-    """Nothing to set: a fault of the virtual processor is a traceback."""
+    """Does nothing: a fault of the virtual processor is a traceback."""

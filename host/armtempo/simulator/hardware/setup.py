@@ -1,4 +1,4 @@
-"""Builds the virtual board as its options say."""
+"""Builds the virtual board from its options."""
 
 import sys
 from binascii import unhexlify
@@ -16,9 +16,9 @@ _ARM_RECORD = "/armtempo/arm.ata"
 
 
 def power_up(options, cause):
-    """A new board; the flash's folder, the serial line and the edge log's file outlive it.
+    """Make a new board; the flash's folder, the serial line and the edge log are kept over resets.
 
-    Returns the mode of ``firmware`` in which it starts.
+    Returns the mode in which it starts, of ``firmware.boot``.
     """
     first = machine_state.flash is None
     machine_state.options = options
@@ -35,7 +35,7 @@ def power_up(options, cause):
     machine_state.serial.reset()
     machine_state.pace = pace.Pace(board, machine_state.serial, options["speed"])
     machine_state.port = usb_serial.USB_VCP()
-    cut_at = options["power_cut_at"] if first else 0  # the power fails once
+    cut_at = options["power_cut_at"] if first else 0  # only once
     damage = options["damage"] if first else machine_state.flash.damage
     root, programs = options["flash"], options["program"]
     blocks = options["flash_blocks"] or flash.BLOCKS
@@ -45,7 +45,7 @@ def power_up(options, cause):
 
 
 def learn(folders):
-    """Load the pin table and the arm record's layout from the sources in ``folders``, whatever the board has."""
+    """Load the pin table and the layout of the arm record from ``folders``, whatever is in the board's flash."""
     path = list(sys.path)
     sys.path[0:0] = folders
     from arm import motors  # noqa: F401  with its armrecord
@@ -59,7 +59,7 @@ def learn(folders):
 
 
 def connect(pins):
-    """Put motors and encoders on the pins; ``pins`` is the board program's own table."""
+    """Connect motors and encoders to the pins; ``pins``: the board program's table."""
     from arm import motors
 
     angles = [motor.angle_deg() for motor in machine_state.arm.motors] if machine_state.arm else ()
@@ -70,7 +70,7 @@ def connect(pins):
 
 
 def _arm_record():
-    """(head, joints) of the arm that the options or the record in the flash describe, or None."""
+    """(head, joints) of the arm in the options or of the record in the flash, or None."""
     from arm.motors import armrecord
 
     given = machine_state.options["arm"]
@@ -85,5 +85,5 @@ def _arm_record():
 
 
 def _stall(ms):
-    """The processor stands still for that time; the timers do not."""
+    """Halt the processor, but not the timers."""
     machine_state.board.stall(ms * TICKS_PER_MS)

@@ -1,13 +1,13 @@
-"""Register addresses by the names that MicroPython's own ``stm`` module uses.
+"""MicroPython's ``stm``: addresses of registers.
 
-A block's address is where its memory is in this process; offsets are the chip's (RM0090).
+The blocks' addresses are those of their memory in this process; the offsets are the chip's (RM0090).
 """
 
 from chip import memory as _memory
 
 for _name in _memory.BLOCKS:
     globals()[_name] = _memory.address(_name)
-BKPSRAM = _memory.backup_base  # as NVIC_IPR not in MicroPython's table
+BKPSRAM = _memory.backup_base  # like NVIC_IPR, not in MicroPython's table
 
 _OFFSETS = {
     "TIM_": "CR1 CR2 SMCR DIER SR EGR CCMR1 CCMR2 CCER CNT PSC ARR RCR CCR1 CCR2 CCR3 CCR4 BDTR DCR DMAR OR",

@@ -11,7 +11,7 @@ import injected_faults  # replaces time, os, uctypes, micropython; so before eve
 import machine_state
 import pace
 import power_cycles
-from chip import memory, timer_registers, timers
+from chip import memory, timers
 from chip.flash import real_open
 from chip.processor import TICKS_PER_US
 from firmware import repl, usb_serial
@@ -597,7 +597,7 @@ def case_timers_of_the_faster_bus_count_twice_as_fast():
 
 def case_a_new_timer_has_nothing_to_do():
     timer = timers.TimerUnit(bare_board.start(), 2, 32)
-    assert (timer.next_match(), timer.next_interrupt()) == (timer_registers.NEVER, timer_registers.NEVER)
+    assert (timer.next_match(), timer.next_interrupt()) == (timers.NEVER, timers.NEVER)
 
 
 def case_each_timer_is_clocked_by_its_bit():

@@ -1,11 +1,10 @@
-"""The motors and limit switches on the board's pins, as its arm record has them."""
+"""The motors and limit switches of the arm record, on the board's pins."""
 
 from armtempo_shared import armrecord
 from chip import gpio
 from firmware.external_interrupts import set_level
 
-from arm.ideal_motor import IdealMotor
-from arm.stepper import Stepper
+from arm.stepper import IdealMotor, Stepper
 
 
 class Enable:
@@ -16,14 +15,14 @@ class Enable:
         self._active = 1 if active_high else 0
 
     def on(self):
-        """Whether the drivers hold their motors."""
+        """Whether the drivers are enabled."""
         return self._line.level == self._active and self._line.mode() == gpio.OUTPUT
 
 
 class ArmOnPins:
-    """All motors, as the arm record in the flash has them.
+    """All motors of the arm record in the flash.
 
-    ``record()`` gives (head, joints) or None; ``angles``: the joints' angles, else those in ``joints``.
+    ``record()`` returns (head, joints) or None; ``angles``: the joints' angles, default those in ``joints``.
     """
 
     def __init__(self, board, pins, record, seed, angles):
@@ -41,7 +40,7 @@ class ArmOnPins:
         self.connect()
 
     def connect(self):
-        """Put motors on the pins if the record has changed."""
+        """Connect motors to the pins if the record has changed."""
         found = self._record()
         if found == self._known:
             return
@@ -91,7 +90,7 @@ class ArmOnPins:
 
 
 class LimitSwitch:
-    """One end of a joint: ``side`` 1 trips at and above the angle ``trip_deg``, -1 at and below."""
+    """The switch at one end: it trips at ``trip_deg`` and above (``side`` 1) or below (-1)."""
 
     def __init__(self, motor, side, trip_deg, pin, active_high):
         self._motor = motor
@@ -102,7 +101,7 @@ class LimitSwitch:
         self._tripped = None
 
     def look(self):
-        """Set the input by the joint's angle."""
+        """Set the input from the joint's angle."""
         tripped = self._side * self._motor.angle_deg() >= self._trip
         if tripped != self._tripped:
             self._tripped = tripped
@@ -110,7 +109,7 @@ class LimitSwitch:
 
 
 def limit_switches(motor, joint, pins):
-    """The switches of a joint whose angle is known; the inputs of the others are left untripped."""
+    """The joint's switches of known angle; the inputs of others stay untripped."""
     found = []
     for side, channel, trip_deg in (
         (-1, joint["limit_low"], joint.get("low_deg")),

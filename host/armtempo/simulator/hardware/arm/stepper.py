@@ -1,29 +1,83 @@
-"""A stepper motor that is more than ideal: it lags, rings and, driven too hard, loses steps.
+"""Models of a motor with its encoder: ideal, or with lag, ringing and, if overloaded, lost steps.
 
-The rotor hangs on the turning field as on a spring that slips (P. Acarnley, Stepping Motors, 4th ed., 2002,
-chapters 3 to 5)::
+The field pulls the rotor like a spring that slips (P. Acarnley, Stepping Motors, 4th ed., 2002, chapters
+3 to 5)::
 
     J x'' = T(v) sin(2 pi (c - x) / 4 m) - D (v - c') - T_load(x)
 
 with x the rotor's angle and c the command, both in microsteps, m microsteps a step. ``T(v)`` falls with speed
-as the winding's inductance holds the current back. Lag, ringing and lost steps come out of it. The joint
-follows the rotor through gear and backlash.
+as the winding's inductance limits the current. The joint follows the rotor through gear and backlash.
 
-It is integrated in steps of 1 ms from the start of each motion, drift-kick-drift, more finely if the rotor
-swings fast; each step sees the mean of what was commanded in it, so a pulse counts from its own moment on.
+The integration (drift-kick-drift) starts with each motion, in steps of 1 ms, or smaller ones if the rotor
+oscillates fast. Each step uses the mean of the command within it, so that a pulse acts from its own time on.
 """
 
 from math import asin, ceil, cos, pi, sin, sqrt
 
-from arm.ideal_motor import IdealMotor
-
 _DT_TICKS = 84_000
 _DT_S = 0.001
-_FINEST = 0.25  # rad that the rotor's free swing may turn in one part of a step
+_FINEST = 0.25  # rad: largest phase of the rotor's free oscillation in one part of a step
 _REST_STEPS = 0.002
-_SCATTER_LENGTH_DEG = 2.0  # of motion, over which a new repetition's scatter fades in
+_SCATTER_LENGTH_DEG = 2.0  # of motion, over which the scatter of a new repetition fades in
 _MULTIPLIER = 48271  # Park and Miller, Communications of the ACM 36 (1993) 7, page 105
 _MODULUS = 0x7FFFFFFF
+
+
+class IdealMotor:
+    """An ideal motor: it loses no step, and the encoder follows without delay.
+
+    ``step``, ``direction``: its pins; ``encoder``: the timer in encoder mode, or None; ``joint``: with
+    ``dir_inverted``, ``encoder_inverted``, ``counts_num``, ``counts_den`` of the arm record.
+    """
+
+    def __init__(self, step, direction, enable, encoder, joint):
+        self._pulses = step
+        self._dir = direction
+        self._enable = enable
+        self._inverted = joint["dir_inverted"]
+        self._encoder = encoder
+        self._num = -joint["counts_num"] if joint["encoder_inverted"] else joint["counts_num"]
+        self._den = joint["counts_den"]
+        self.moved = False  # the encoder must be updated
+        self._counts = self._at(0)
+        self.position = 0  # steps taken since power-up
+        self.blocked = False
+        self._start_deg = joint.get("start_deg", 0.0)
+        self._steps_per_deg = joint.get("steps_per_deg", 1.0)
+        step.sinks.append(self)
+
+    def disconnect(self):
+        self._pulses.sinks.remove(self)
+
+    def _at(self, position):
+        return (2 * position * self._num + self._den) // (2 * self._den)
+
+    def edges(self, line, before, count, times, origin):
+        """STEP toggled; each rising edge is a step."""
+        if self._enable.on() and not self.blocked:
+            steps = (count + 1 - before) // 2
+            forward = self._dir.level ^ self._inverted
+            self.position += steps if forward else -steps
+            self.moved = True
+
+    def slip(self, counts):
+        """The encoder's coupling slips by ``counts``."""
+        self._counts -= counts
+        self.moved = True
+
+    def angle_deg(self):
+        return self._start_deg + self.position / self._steps_per_deg
+
+    def begin(self, now):
+        """A motion begins."""
+
+    def follow(self, now):
+        """Turn the encoder to the motor's position."""
+        self.moved = False
+        counts = self._at(self.position)
+        if self._encoder and counts != self._counts:
+            self._encoder.turn(counts - self._counts)
+        self._counts = counts
 
 
 class Noise:
@@ -40,12 +94,12 @@ class Noise:
         return self._state / _MODULUS
 
     def normal(self):
-        """Standard normal, as near as the sum of twelve uniform numbers is."""
+        """Standard normal, approximated by the sum of twelve uniform numbers."""
         return sum([self.uniform() for _ in range(12)]) - 6.0
 
 
 class Stepper(IdealMotor):
-    """``joint``: also what the arm file says of the joint's drive, and its ``model``."""
+    """``joint``: also with the joint's drive from the arm file, and its ``model``."""
 
     def __init__(self, step, direction, enable, encoder, joint, seed):
         super().__init__(step, direction, enable, encoder, joint)
@@ -74,7 +128,7 @@ class Stepper(IdealMotor):
         self._counts = self._reading()
 
     def edges(self, line, before, count, times, origin):
-        """STEP toggled: note the moments of its rising edges."""
+        """STEP toggled: store the times of its rising edges."""
         rises = [origin + time for time in times[before::2]]
         if not rises or not self._enable.on():
             return
@@ -87,11 +141,10 @@ class Stepper(IdealMotor):
         self.position += way * len(rises)
 
     def angle_deg(self):
-        """The joint's angle."""
         return self._start_deg + self._joint / self._steps_per_deg
 
     def begin(self, now):
-        """A motion begins: the grid of time steps starts here, and a new scatter is drawn."""
+        """A motion begins: start the time steps here, and draw a new scatter."""
         self._done = now
         self._wanted = self._noise.normal() * self._scatter
 
@@ -123,7 +176,7 @@ class Stepper(IdealMotor):
             self._settle()
 
     def _command(self):
-        """Mean of the command over the next step; takes the pulses in it."""
+        """Mean of the command over the next step; consumes its pulses."""
         begun = self._commanded
         end = self._done + _DT_TICKS
         weight = taken = 0
@@ -139,7 +192,7 @@ class Stepper(IdealMotor):
         return begun + weight / _DT_TICKS
 
     def _kick(self, lead, x, v, speed, part):
-        """The new speed after the torques at ``x`` have acted for ``part`` seconds."""
+        """Speed after the torques at ``x`` have acted for ``part`` seconds."""
         pull = self._pull
         if self._corner:
             pull /= sqrt(1 + (v / self._corner) ** 2)
@@ -147,7 +200,7 @@ class Stepper(IdealMotor):
         return (v + self._damping * speed * part) / (1 + self._damping * part)
 
     def _weight(self, x):
-        """Acceleration that gravity's torque gives the rotor at ``x``, in steps/s²."""
+        """Acceleration of the rotor by gravity at ``x``, in steps/s²."""
         if not self._gravity:
             return 0.0
         return self._gravity * cos((self._start_deg + x / self._steps_per_deg) * pi / 180)
@@ -159,7 +212,7 @@ class Stepper(IdealMotor):
             self._offset += (self._wanted - self._offset) * share
 
     def _rest(self, near):
-        """The rotor's rest position under its load: near the commanded microstep, or cycles of four steps away."""
+        """The rotor's rest position under load: near the commanded microstep, or multiples of four steps away."""
         cycle = 2 * pi / self._electrical
         aim = self._commanded - self._offset
         aim += round((near - aim) / cycle) * cycle

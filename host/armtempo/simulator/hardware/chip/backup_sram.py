@@ -1,6 +1,6 @@
-"""The backup domain (RM0090 5.1.2): without write access SRAM and RTC keep what they had.
+"""The backup domain (RM0090 5.1.2): without write access its SRAM and RTC keep their values.
 
-Without its clock the SRAM reads as 0.
+Without a clock the SRAM reads as 0.
 """
 
 from chip import memory
@@ -11,11 +11,11 @@ _RTC_BYTES = memory.BLOCK_BYTES
 
 
 class BackupSram:
-    """``is_open``: the program may write to it. Else ``undo`` takes back what it wrote."""
+    """``is_open``: it is writable; otherwise ``undo`` restores it after a write."""
 
     def __init__(self):
         for word in range(memory.BACKUP_WORDS):
-            memory.backup[word] = (word + 1) * 0x9E3779B1 & memory.MASK  # whatever it has at power-up
+            memory.backup[word] = (word + 1) * 0x9E3779B1 & memory.MASK  # arbitrary at power-up
         self.is_open = True
         self._kept = b""
         self.sync()
@@ -25,7 +25,7 @@ class BackupSram:
         if self.is_open:
             self._kept = bytes(memory.raw_backup)
         rcc, power = memory.index("RCC"), memory.index("PWR")
-        if not memory.words[rcc + _APB1ENR] >> _PWREN & 1:  # without its clock it takes nothing
+        if not memory.words[rcc + _APB1ENR] >> _PWREN & 1:  # without a clock writes have no effect
             memory.poke(power, memory.seen[power])
         clocked = memory.words[rcc + _AHB1ENR] >> _BKPSRAMEN & 1
         self._shown = self._kept if clocked else bytes(len(self._kept))
@@ -39,5 +39,5 @@ class BackupSram:
             memory.raw[at : at + _RTC_BYTES] = memory.raw_seen[at : at + _RTC_BYTES]
 
     def undo(self):
-        """What was written to it is lost."""
+        """Restore its values."""
         memory.raw_backup[0 : len(self._shown)] = self._shown

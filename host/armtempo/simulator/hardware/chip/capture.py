@@ -1,15 +1,15 @@
 """DMA2: circular streams that copy a port's input register into memory at requests of TIM1 (RM0090 10.3.3, table 43).
 
-Only DMA2 reaches the ports, which are on AHB1. Its samples are made when time has passed, from the edges of the
-port's pins since.
+Only DMA2 can access the ports, which are on AHB1. The samples are computed afterwards, from the edges of the
+port's pins.
 """
 
 from chip import memory
 from chip.gpio import IDR, PORTS
-from chip.timer_registers import ARR, CCR1, CNT, CR1, DIER
+from chip.timers import ARR, CCR1, CNT, CR1, DIER
 
 REQUESTS = {(5, 6): 0, (1, 6): 1, (3, 6): 1, (2, 6): 2, (6, 6): 3}
-"""(stream, channel selection): TIM1's update, 0, or compare channel that asks for a transfer."""
+"""(stream, channel selection): the request, TIM1's update (0) or a compare channel."""
 _CR, _NDTR, _PAR, _M0AR = range(4)
 _NEEDS = ((0xC0, 0, "direction peripheral to memory"), (0x600, 0x400, "memory increment alone"),
           (0x7800, 0x2800, "half words"), (0x100, 0x100, "circular mode"))  # fmt: skip
@@ -18,7 +18,7 @@ _UDE = 8
 
 
 class PortStream:
-    """One running stream; it listens to the pins of the port that it reads."""
+    """A running stream; receives the edges of the port that it reads."""
 
     def __init__(self, number, timer, port, ring, size):
         words = memory.words
@@ -39,7 +39,7 @@ class PortStream:
             line.sinks.append(self)
 
     def stop(self):
-        """Listen no more."""
+        """Disconnect from the port."""
         for line in self._port.lines:
             line.sinks.remove(self)
 
@@ -51,7 +51,7 @@ class PortStream:
             self._edges.append((origin + time, bit, bit * before))
 
     def run(self, now):
-        """All samples up to ``now``."""
+        """Write all samples up to ``now``."""
         edges = sorted(self._edges)
         self._edges = []
         for time, bit, level in edges:
@@ -61,7 +61,7 @@ class PortStream:
         memory.poke(self.at + _NDTR, self._size - self._place)
 
     def _fill(self, until):
-        """Samples before a tick, all alike."""
+        """Write the samples before a tick, all of the present level."""
         count = (until * self._rate - self._next - 1) // self._period + 1
         if count <= 0:
             return
@@ -77,7 +77,7 @@ class PortStream:
 
 
 class PortReader:
-    """DMA2 as a whole."""
+    """The controller DMA2."""
 
     def __init__(self, board):
         self._board = board

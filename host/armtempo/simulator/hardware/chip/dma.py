@@ -2,7 +2,7 @@
 
 from chip import memory
 
-# (stream, channel selection): timer and its compare channels that ask for a transfer (RM0090 10.3.3)
+# (stream, channel selection): the timers' compare channels that request a transfer (RM0090 10.3.3)
 REQUESTS = {
     (5, 3): ((2, 1),),
     (6, 3): ((2, 2), (2, 4)),
@@ -17,7 +17,7 @@ REQUESTS = {
 CR, NDTR, PAR, M0AR = 0, 1, 2, 3
 _EN = 1
 _CIRC = 1 << 8
-# fields of CR that a stream into a compare register needs: direction, increments, word sizes
+# fields of CR required for a stream into a compare register
 _NEEDS = ((0xC0, 0x40, "direction memory to peripheral"), (0x600, 0x400, "memory increment alone"),
           (0x7800, 0x5000, "word sizes"), (_CIRC, _CIRC, "circular mode"))  # fmt: skip
 _FLAG_SHIFT = (0, 6, 16, 22)
@@ -33,7 +33,7 @@ class Stream:
 
     def __init__(self, number):
         self.number = number
-        self.is_dead = False  # an injected fault: it answers no request
+        self.is_dead = False  # an injected fault: it serves no request
         self.at = memory.index("DMA1") + 4 + 6 * number
         self.ring = None
         self.place = 0
@@ -41,7 +41,7 @@ class Stream:
         self.ahead = 0
 
     def requests(self):
-        """(timer, channel) pairs that this stream listens to."""
+        """(timer, channel) pairs whose requests reach this stream."""
         if self.is_dead:
             return ()
         selection = (memory.words[self.at + CR] >> 25) & 7
@@ -75,7 +75,7 @@ class Stream:
         return memory.word_at_low(memory.words[self.at + PAR])
 
     def moved(self, count):
-        """``count`` words were transferred: bring the registers up to date."""
+        """``count`` words were transferred: update the registers."""
         left = self.left - count
         if left <= 0:
             left = (left - 1) % self.size + 1
@@ -86,7 +86,7 @@ class Stream:
 
 
 class Controller:
-    """DMA1 as a whole."""
+    """The controller DMA1."""
 
     def __init__(self):
         self.at = memory.index("DMA1")

@@ -1,12 +1,16 @@
-"""The board's flash: a folder of the host, seen as ``/flash``, with the chip's size, write times and failures.
+"""The board's flash: a folder of the host used as ``/flash``, with the chip's size, write times and failures.
 
-A second folder may be an SD card, seen as ``/sd``: without limits of size, and without failures.
+A second folder may be used as an SD card, ``/sd``, of unlimited size and without failures.
 
-Each change (a file opened for writing, a piece written, a close, a rename, a removal, a new folder) is one
-flash operation. A power cut can be injected at the n-th of them: it leaves that operation half done (a
-piece of the data written; a rename over an existing file stopped after the old one is gone, as FAT does it),
-files still open for writing empty, and files that were closed but not synced since, whatever their name now; and the
-board starts again. The chip writes through a cache: only ``sync`` makes what was written last.
+Each change (open for writing, write, close, rename, remove, mkdir) is one flash operation. A power cut can be
+injected at the n-th one. It leaves
+
+- that operation incomplete: part of the data is written; of a rename over an existing file, as in FAT, only the
+  old file is gone;
+- files empty that are open for writing, or were not synced since their close (the chip writes through a
+  cache), also after a rename.
+
+Then the board restarts.
 """
 
 import os
@@ -15,23 +19,23 @@ from machine_state import Reset
 
 BLOCK = 512
 BLOCKS = 190
-"""Of an STM32F4DISC's 224 blocks (112 KB) those that FAT12 has for files and folders; it takes 34 itself: one for the
-boot sector, one for the table, 32 for the root folder."""
+"""Blocks for files and folders: an STM32F4DISC's 224 (112 KB) less the 34 of FAT12's boot sector (1), table (1)
+and root folder (32)."""
 _WRITE_MS = 1
 _CLOSE_MS = 60
 _FORMAT_MS = 2000
 _POWER_ON = 1
 _DIRECTORY = 0x4000
-_ENTRY = 32  # bytes in a folder for a short name, and for each 13 letters of one that is not short
+_ENTRY = 32  # bytes in a folder for a short name, and for each 13 characters of a long one
 _EPERM, _ENOENT, _EIO, _EEXIST, _EISDIR, _EINVAL, _ENOSPC = 1, 2, 5, 17, 21, 22, 28
 NO_FILE_SYSTEM, UNREADABLE = "no file system", "unreadable"
-"""Kinds of damage: the firmware finds no file system; it mounts one in which nothing can be read or written."""
+"""Kinds of damage: the firmware finds no file system, or mounts one in which every access fails."""
 
 
 class FlashFolder:
-    """The folder ``root`` of ``size`` blocks; ``stall(ms)`` lets time pass while the flash is busy.
+    """The folder ``root``, with ``size`` blocks; ``stall(ms)`` is called while the flash is busy.
 
-    ``programs``: folders of the host that hold a program which is not deployed to the flash; read only.
+    ``programs``: folders of the host with a program that is not deployed to the flash; read only.
     ``damage``: a kind of damage, or "". ``mounts``: folder of the host by mount point.
     """
 
@@ -51,7 +55,7 @@ class FlashFolder:
         self.renamed = None
 
     def real(self, path):
-        """Where a path of the board is on the host; OSError if nothing is mounted, or can be read."""
+        """The host's path of a path on the board; OSError if nothing is mounted there, or it is unreadable."""
         for program in self._programs:
             if path.startswith(program):
                 return path
@@ -64,7 +68,7 @@ class FlashFolder:
         return self.mounts[point] + path[len(point) :]
 
     def absolute(self, path):
-        """A path of the board, without dots, from its root."""
+        """An absolute path on the board, without dots."""
         parts = []
         for point, root in self.mounts.items():
             if path.startswith(root + "/"):  # a module's __file__
@@ -84,7 +88,7 @@ class FlashFolder:
         return self.operations == self._cut_at
 
     def power_fails(self):
-        """Files that were being written, or were not synced, are left empty; the board starts again."""
+        """Empty the files that are open for writing or not synced, and restart the board."""
         for file in self._writing:
             file.cut()
         for path in self._unsynced:
@@ -94,7 +98,7 @@ class FlashFolder:
         raise Reset(_POWER_ON)
 
     def blocks(self, path):
-        """Blocks that a file takes, or a folder with all that is in it."""
+        """Blocks of a file, or of a folder with its contents."""
         if not is_folder(path):
             return -(-os.stat(path)[6] // BLOCK)
         names = os.listdir(path)
@@ -106,7 +110,7 @@ class FlashFolder:
         return max(0, self.size - self.blocks(self.root))
 
     def mount(self, point):
-        """Mount the flash there."""
+        """Mount the flash at ``point``."""
         if point in self.mounts:
             raise OSError(_EPERM)
         self.mounts[point] = self.root
@@ -119,7 +123,7 @@ class FlashFolder:
         self.cwd = "/"
 
     def format(self):
-        """Make a fresh, empty file system."""
+        """Make a new, empty file system."""
         self._stall(_FORMAT_MS)
         self.damage = ""
         for name in os.listdir(self.root):
@@ -145,11 +149,11 @@ class FlashFolder:
             self._unsynced.append(file.path)
 
     def sync(self):
-        """What was written lasts."""
+        """Make all closed files durable."""
         self._unsynced = []
 
     def rename(self, old, new):
-        """As FAT does it: an existing file of the new name is removed first."""
+        """As in FAT: an existing file of the new name is removed first."""
         old, new = self.real(old), self.real(new)
         os.stat(old)
         if exists(new) and old != new:
@@ -167,7 +171,7 @@ class FlashFolder:
             self.renamed()
 
     def change(self, function, path):
-        """A change of one path by ``function``."""
+        """Change a path with ``function``."""
         real = self.real(path)
         if function is not os.mkdir:
             os.stat(real)
@@ -198,7 +202,7 @@ class Written:
         return self._file.write(data)
 
     def cut(self):
-        """The power failed: the directory still has the length 0."""
+        """The power failed: the directory entry still has length 0."""
         self._file.close()
         real_open(self.path, "wb").close()
 
@@ -221,7 +225,7 @@ real_open = open
 
 
 def _entry_bytes(name):
-    """What a name takes in a folder."""
+    """Bytes of a name in a folder."""
     base, _, extension = name.partition(".")
     fits = len(base) <= 8 and len(extension) <= 3 and "." not in extension
     one_case = all([part in (part.lower(), part.upper()) for part in (base, extension)])
@@ -234,7 +238,7 @@ def is_folder(path):
 
 
 def exists(path):
-    """Whether a path of the host is there."""
+    """Whether a path of the host exists."""
     try:
         os.stat(path)
     except OSError:
@@ -243,7 +247,7 @@ def exists(path):
 
 
 def remove_all(path):
-    """Remove a file, or a folder with all that is in it, of the host."""
+    """Remove a file, or a folder with its contents, of the host."""
     if is_folder(path):
         for name in os.listdir(path):
             remove_all(path + "/" + name)

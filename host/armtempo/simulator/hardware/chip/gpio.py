@@ -5,7 +5,7 @@ from chip import memory
 MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR = range(7)
 AFR = 8
 AT_RESET = (
-    # JTAG's pins, of which PA13, PA15 and PB4 are pulled up: 8.4.1, 8.4.4
+    # JTAG pins; PA13, PA15 and PB4 are pulled up (8.4.1, 8.4.4)
     ("GPIOA", MODER, 0xA8000000), ("GPIOA", PUPDR, 0x64000000),
     ("GPIOB", MODER, 0x280), ("GPIOB", PUPDR, 0x100),
 )  # fmt: skip
@@ -31,7 +31,7 @@ INPUT, OUTPUT, ALTERNATE, ANALOG = range(4)
 
 
 class Line:
-    """One pin: the level driven from outside, its own level, and the objects that get its edges."""
+    """One pin: the level driven from outside, its output level, and the receivers of its edges."""
 
     def __init__(self, port, number):
         self.port = port
@@ -39,8 +39,8 @@ class Line:
         self.name = PORTS[port.index] + str(number)
         self.external = None
         self.driven = False  # by a timer channel
-        self.is_dead = False  # injected faults: it does not toggle;
-        self.tied_to = None  # another line toggles with it
+        self.is_dead = False  # injected faults: it does not toggle,
+        self.tied_to = None  # or another one toggles with it
         self.level = 0
         self.pulses = (0, 0)
         self.sinks = []
@@ -56,13 +56,13 @@ class Line:
         return (word >> (4 * (self.number & 7))) & 15
 
     def timer(self):
-        """(timer, channel) whose output or input this pin is now, or None."""
+        """(timer, channel) that the pin's alternate function selects, or None."""
         if self.mode() != ALTERNATE:
             return None
         return TIMER_PINS.get((self.name, self.alternate()))
 
     def read(self):
-        """Level that the program reads: from outside, or the pull resistor, or its own output."""
+        """Level that the program reads: driven from outside, by the pull resistor, or by its own output."""
         if self.mode() == OUTPUT or self.driven:
             return self.level
         if self.external is not None:
@@ -82,7 +82,7 @@ class Line:
             sink.edges(self, before, count, times, origin)
 
     def pulse(self, pulses, now):
-        """From now on a timer makes pulses here: ticks high, ticks of the period; (0, 0) if it ended."""
+        """PWM begins: (ticks high, ticks of the period); (0, 0): it ends."""
         self.pulses = pulses
         for sink in self.pulse_sinks:
             sink.pulses(self, pulses, now)
@@ -114,7 +114,7 @@ class GpioPort:
         return changed
 
     def _end_pulses(self, now):
-        """A pin that is no timer's any more makes none."""
+        """End the PWM of a pin that no timer drives any more."""
         for line in self.lines:
             if line.pulses != (0, 0) and line.mode() != ALTERNATE:
                 line.pulse((0, 0), now)
@@ -129,7 +129,7 @@ class GpioPort:
                     line.edges(line.level, 1, (now,), 0)
 
     def refresh(self):
-        """Bring IDR up to date."""
+        """Update IDR."""
         levels = 0
         for line in self.lines:
             levels |= line.read() << line.number
@@ -137,24 +137,24 @@ class GpioPort:
 
 
 class Pins:
-    """All ports, and which timer channel leads to which pin."""
+    """All ports, and the pins of each timer channel."""
 
     def __init__(self):
         self.ports = [GpioPort(index) for index in range(len(PORTS))]
 
     def line(self, name):
-        """The line of a pin by its name, with or without the leading P: ``PA15``."""
+        """A pin by its name, with or without the leading P: ``PA15``."""
         if name[0] == "P":
             name = name[1:]
         return self.ports[PORTS.index(name[0])].lines[int(name[1:])]
 
     def of_channel(self, timer, channel):
-        """The pins that a timer's channel leads to now."""
+        """The pins that a timer's channel drives."""
         lines = [line for port in self.ports for line in port.lines if line.mode() == ALTERNATE]
         return [line for line in lines if line.timer() == (timer, channel)]
 
     def route(self, timers):
-        """Connect each timer's channels to the pins whose alternate function selects them."""
+        """Connect the timers' channels to the pins whose alternate functions select them."""
         for timer in timers:
             for channel in timer.channels:
                 channel.sink = None

@@ -1,21 +1,21 @@
-"""The peripheral registers: one piece of real memory, so that viper code reaches it as on the chip.
+"""The peripheral registers, in real memory, so that viper code can access them as on the chip.
 
-``words`` is what the program sees. ``seen`` is what the models last saw or wrote: where the two differ, the
-program has written a register since.
+``words`` are the registers; ``seen`` are their values when the models last read or wrote them: a difference
+means that the program has written a register since.
 """
 
 import sys
 
 import uctypes
 
-# from TIM2 to TIM5, and from port to port, it is as far as on the chip: code may count on that
+# TIM2 to TIM5, and the ports, are as far apart as on the chip: code may rely on that
 BLOCKS = (
     "TIM1", "TIM2", "GPIOA", "TIM3", "TIM4", "TIM6", "GPIOB", "TIM7", "TIM8", "DMA1",
     "GPIOC", "DMA2", "RCC", "TIM5", "GPIOD", "EXTI", "SYSCFG", "DBGMCU", "GPIOE", "PWR",
     "IWDG", "FLASH", "TIM9", "TIM10", "TIM11", "TIM12", "TIM13", "TIM14",
     "RTC", "DWT", "SCS", "NVIC_IPR",
 )  # fmt: skip
-# where the chip has them (RM0090 table 1), for programs that name addresses themselves
+# the chip's addresses (RM0090 table 1), for programs with literal addresses
 _ON_CHIP = (
     0x40010000, 0x40000000, 0x40020000, 0x40000400, 0x40000800, 0x40001000, 0x40020400, 0x40001400, 0x40010400,
     0x40026000, 0x40020800, 0x40026400, 0x40023800, 0x40000C00, 0x40020C00, 0x40013C00, 0x40013800, 0xE0042000,
@@ -46,11 +46,11 @@ raw, words = _memory(SIZE)
 raw_seen, seen = _memory(SIZE)
 base = uctypes.addressof(words)
 raw_backup, backup = _memory(4 * BACKUP_WORDS)
-"""The backup SRAM: no register, so it is not checked when the program writes."""
+"""The backup SRAM; it has no registers, so writes to it are not detected."""
 backup_base = uctypes.addressof(backup)
 
 objects = {}
-"""Buffers whose address the program has asked for, by the low 32 bits of it: what a DMA stream can reach."""
+"""Buffers that a DMA stream can use, by the low 32 bits of their address: those of ``uctypes.addressof``."""
 
 
 def index(name):
@@ -106,13 +106,13 @@ def changed_blocks():
 
 
 def accept(block):
-    """What the program wrote to this block has been looked at."""
+    """The models have handled the writes to this block."""
     start = block * BLOCK_BYTES
     raw_seen[start : start + BLOCK_BYTES] = raw[start : start + BLOCK_BYTES]
 
 
 def clear():
-    """A reset: all registers zero but the RTC's, whose backup registers it spares (RM0090 5.1.2)."""
+    """A reset: all registers are 0, except the RTC's with its backup registers (RM0090 5.1.2)."""
     kept = index("RTC")
     for at in range(SIZE // 4):
         if not kept <= at < kept + BLOCK_WORDS:

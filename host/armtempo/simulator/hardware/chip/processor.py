@@ -1,47 +1,70 @@
-"""The board: virtual time, interrupts, and what happens in between.
+"""The chip: virtual time and interrupts.
 
-Time is counted in ticks of 84 MHz since power-up and passes only in calls of simulated functions: each costs
-what its like costs on the chip, roughly. ``run_until`` advances the models to a time; interrupts are served
-on the way, each a little late, as on the chip.
+Time is in ticks of the 84 MHz clock since power-up. It passes only in calls of simulated functions, each of which takes
+about as long as on the chip. ``run_until`` advances the models to a time and serves interrupts on the way, with
+the chip's latency.
 """
 
 import sys
 
-from chip import (
-    backup_sram,
-    capture,
-    cycle_counter,
-    dma,
-    gpio,
-    memory,
-    timer_registers,
-    timers,
-)
+from chip import backup_sram, capture, dma, gpio, memory, timers
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
 CALL_TICKS = 84
-"""A simulated function or register access: 1 us, about 130 instructions of the interpreter."""
+"""Time of a simulated call or register access: 1 us, about 130 instructions of the interpreter."""
 FLASH_ACR = 0x705
-"""What the firmware sets: 5 wait states, prefetch and both caches on (RM0090 3.9.1)."""
+"""The firmware's setting: 5 wait states, prefetch and both caches on (RM0090 3.9.1)."""
 _MOST_UNSPENT_TICKS = 40 * CALL_TICKS
 INTERRUPT_TICKS = 160
-"""From an event to the first line of its callback: 1.9 us (an empty callback's instructions)."""
+"""From an event to the first line of its callback: 1.9 us (instructions of an empty callback)."""
 CALLBACK_TICKS = 250
-"""What a callback takes on top of its own simulated calls."""
-NEVER = timer_registers.NEVER
+"""Time of a callback in addition to its simulated calls."""
+NEVER = timers.NEVER
 _SWIER = 4  # word of EXTI
 _RCC_TIMERS = {
     1: (17, 0), 8: (17, 1), 2: (16, 0), 3: (16, 1), 4: (16, 2), 5: (16, 3), 6: (16, 4), 7: (16, 5),
     9: (17, 16), 10: (17, 17), 11: (17, 18), 12: (16, 6), 13: (16, 7), 14: (16, 8),
 }  # fmt: skip
+_CYCLES_PER_TICK = 2  # 168 MHz, in ticks of 84 MHz
+_CTRL, _CYCCNT = 0, 1  # words of DWT
+_DEMCR = 63  # word of the block from 0xE000ED00 on
+_TRCENA = 24
+
+
+class CycleCounter:
+    """The DWT cycle counter (ARMv7-M Architecture Reference Manual C1.8.8), enabled by its and the trace's bit.
+
+    ``look`` updates the register before a read; ``sync`` handles a write.
+    """
+
+    def __init__(self, board):
+        self._board = board
+        self.at = memory.index("DWT") + _CYCCNT
+        self._since = 0
+
+    def _on(self):
+        words = memory.words
+        return words[self.at - _CYCCNT + _CTRL] & 1 and words[memory.index("SCS") + _DEMCR] >> _TRCENA & 1
+
+    def look(self):
+        """The register is about to be read."""
+        self._board.spend(0)
+        if self._on():
+            passed = (self._board.now - self._since) * _CYCLES_PER_TICK
+            memory.poke(self.at, (memory.words[self.at] + passed) & memory.MASK)
+        self._since = self._board.now
+
+    def sync(self):
+        """The counter or its enable bits were written: count from the new value."""
+        self._since = self._board.now
 
 
 class Chip:
-    """Everything between the program and what is connected to the pins.
+    """All peripherals, interrupts and the virtual time.
 
-    ``observers`` are notified of timers that start or stop and of inputs that change; ``follow()`` is called after
-    each stretch of time.
+    ``observers`` are notified of starts and stops of timers and of changed inputs; ``follow()`` is called whenever
+    time has passed.
     """
 
     def __init__(self, dma_preload=True):
@@ -51,7 +74,7 @@ class Chip:
         self.dma = dma.Controller()
         self.pins = gpio.Pins()
         self.backup = backup_sram.BackupSram()
-        self.cycles = cycle_counter.CycleCounter(self)
+        self.cycles = CycleCounter(self)
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
                                    (6, 16, 1), (7, 16, 1), (9, 16, 2), (10, 16, 2), (11, 16, 2),
@@ -64,7 +87,7 @@ class Chip:
         self.masked = False
         self.serving = False
         self.woken = False
-        self.next_happening = 0
+        self.next_event = 0
         self.events = []
         self.callbacks = {}
         self.scheduled = []
@@ -76,7 +99,7 @@ class Chip:
         self.unspent_ticks = 0
         self.lost_ticks = 0
         self.crash = False
-        self.late_ticks = 0  # an injected fault: interrupts come late by this
+        self.late_ticks = 0  # an injected fault: additional interrupt latency
         self.watchdog_ticks = 0
         self.watchdog_deadline = None
         self.millisecond = None
@@ -90,7 +113,7 @@ class Chip:
     # -- what the program wrote ------------------------------------------------------------------
 
     def sync(self, everything=False):
-        """Look at the registers that the program has written since the last look."""
+        """Handle the registers that the program has written since the last call."""
         blocks = range(len(memory.BLOCKS)) if everything else memory.changed_blocks()
         if not self.backup.is_open:
             self.backup.undo()
@@ -120,7 +143,7 @@ class Chip:
             self._sync_triggers()
         for block in blocks:
             memory.accept(block)
-        self._find_happening()
+        self._find_event()
 
     def _sync_pins(self, names):
         routed = False
@@ -128,12 +151,12 @@ class Chip:
             if "GPIO" + gpio.PORTS[port.index] in names:
                 routed = port.sync(self.now) or routed
                 for extint in self.extints.values():
-                    extint.look()  # a pull resistor may have drawn its pin
+                    extint.look()  # its pull resistor may have changed
         if routed:
             self.pins.route((self.timers[2], self.timers[5]))
 
     def _sync_triggers(self):
-        """EXTI was written: a bit of its software trigger (RM0090 12.3.5) asks for the line's interrupt."""
+        """EXTI was written: a bit of SWIER requests the line's interrupt (RM0090 12.3.5)."""
         at = memory.index("EXTI") + _SWIER
         asked = memory.words[at]
         if asked:
@@ -143,36 +166,36 @@ class Chip:
                     self.pend("exti", line)
 
     def recount(self):
-        """A timer was started or stopped: find those that time moves."""
+        """A timer was started or stopped: list the timers that count by a clock."""
         self.counting = [timer for timer in self.timers.values() if timer.counts_by_clock()]
 
     # -- time ------------------------------------------------------------------------------------
 
     def at(self, tick, action):
-        """Call ``action()`` when time comes to ``tick``."""
+        """Call ``action()`` at ``tick``."""
         self.events.append((tick, action))
         self.events.sort(key=lambda event: event[0])
-        self._find_happening()
+        self._find_event()
 
-    def _find_happening(self):
+    def _find_event(self):
         due = self.events[0][0] if self.events else NEVER
         for timer in self.counting:
             due = min(due, timer.next_interrupt())
-        self.next_happening = due
+        self.next_event = due
 
     def call(self):
-        """The program made a cheap call. The time of several is kept and spent together."""
+        """The program made a short call; the time of several is spent together."""
         self.unspent_ticks += CALL_TICKS
         if self.unspent_ticks > _MOST_UNSPENT_TICKS:
             self.spend(0)
 
     def wrote(self):
-        """The program wrote a register: it acts at once."""
+        """The program wrote a register, which takes effect at once."""
         self.sync()
         self.call()
 
     def spend(self, ticks):
-        """The program takes so long."""
+        """The program takes ``ticks``."""
         ticks += self.unspent_ticks
         self.unspent_ticks = 0
         self.run_until(self.now + ticks)
@@ -184,7 +207,7 @@ class Chip:
             self._between()
 
     def _between(self):
-        """What comes to the main program between two of its steps: faults, the millisecond."""
+        """Between two steps of the main program: faults, the millisecond."""
         if self.lost_ticks:
             lost, self.lost_ticks = self.lost_ticks, 0
             self._pass(self.now + lost, False)
@@ -196,22 +219,22 @@ class Chip:
         self.sync()
         self.woken = False
         self._serve()
-        while self.next_happening <= target and not (wake and self.woken):
-            self._run(max(self.next_happening, self.now))
+        while self.next_event <= target and not (wake and self.woken):
+            self._run(max(self.next_event, self.now))
             while self.events and self.events[0][0] <= self.now:
                 self.events.pop(0)[1]()
-            self._find_happening()
+            self._find_event()
             self._serve()
         if target > self.now and not (wake and self.woken):
             self._run(target)
 
     def stall(self, ticks):
-        """The processor cannot do anything for so long, not even serve interrupts."""
+        """The processor halts for ``ticks``, and serves no interrupt."""
         self.sync()
         self._run(self.now + ticks)
 
     def _run(self, target):
-        """The hardware alone runs to ``target``."""
+        """Run the hardware alone to ``target``."""
         for timer in self.counting:
             timer.run(target)
         self.now = target
@@ -221,7 +244,7 @@ class Chip:
             self.follow()
 
     def moving(self, horizon_ticks):
-        """Whether a timer will do something within that many ticks."""
+        """Whether a timer has an event within ``horizon_ticks``."""
         limit = self.now + horizon_ticks
         return any([timer.next_match() < limit for timer in self.counting])
 
@@ -233,12 +256,12 @@ class Chip:
     # -- interrupts ------------------------------------------------------------------------------
 
     def pend(self, source, detail):
-        """An interrupt asks to be served."""
+        """Request an interrupt."""
         if (source, detail) not in self.pending:
             self.pending.append((source, detail))
 
     def schedule(self, function, argument):
-        """Call ``function(argument)`` soon, outside interrupts; eight can wait (MICROPY_SCHEDULER_DEPTH)."""
+        """Call ``function(argument)`` soon, outside of interrupts; at most eight wait (MICROPY_SCHEDULER_DEPTH)."""
         if len(self.scheduled) >= 8:
             raise RuntimeError("schedule queue full")
         self.scheduled.append((function, argument))
@@ -264,14 +287,14 @@ class Chip:
         try:
             function(argument)
         except Exception as error:
-            # as the firmware: say it, and never call it again
+            # as the firmware: print it, and disable the callback
             sys.stderr.write("uncaught exception in interrupt handler\n")
             print_exception(error)
             del self.callbacks[(source, detail)]
         self.sync()
         self._run(self.now + CALLBACK_TICKS)
         self.serving = False
-        self._find_happening()
+        self._find_event()
 
 
 def print_exception(error):

@@ -1,1 +1,1 @@
-"""What MicroPython's stm32 port does: boot, prompt, the serial port, and its modules' objects."""
+"""MicroPython's stm32 port: boot, prompt, serial port, and the objects of its modules."""

@@ -1,7 +1,7 @@
-"""What the firmware does between reset and Python, after ports/stm32: boardctrl.c, main.c, factoryreset.c.
+"""The firmware between reset and Python, after ports/stm32: boardctrl.c, main.c, factoryreset.c.
 
-The user button held at a reset chooses how to start; the file systems are mounted, and a flash without one
-gets a fresh one.
+The user button, held at a reset, selects how to start. The file systems are mounted; a flash without one gets a
+new one.
 """
 
 import os
@@ -16,18 +16,18 @@ from firmware.pin_api import Pin
 
 NORMAL, SAFE, FACTORY = 1, 2, 3
 BOOT_ERROR, MAIN_ERROR = 4, 3
-"""How often red and green flash in turn after an exception in boot.py, in main.py."""
+"""Number of times that red and green flash alternately after an exception in boot.py, in main.py."""
 _BUTTON = "PA0"
 _RED, _GREEN, _ORANGE, _BLUE = "PD14", "PD12", "PD13", "PD15"
-_LOOKS = 30  # at the button, while a mode is shown
+_LOOKS = 30  # times that the button is read while a mode is shown
 _LOOK_MS = 20
 _FACTORY_FILES = {"boot.py": 454, "main.py": 34, "README.txt": 526, "pybcdc.inf": 2597}
-"""Bytes of the files of a fresh file system, by MicroPython 1.29 for an STM32F4DISC: they take 10 blocks."""
+"""Bytes of the files of a new file system, by MicroPython 1.29 for an STM32F4DISC: they take 10 blocks."""
 _COMMENT = "# a file of a fresh file system\n"
 
 
 def choose_mode(board, held_ms):
-    """How to start, by the button that is held for so long from the reset on; the LEDs count along."""
+    """The mode to start in, for a button held for ``held_ms`` from the reset on; the LEDs show the modes."""
     if not held_ms:
         return NORMAL
     external_interrupts.set_level(_BUTTON, 1)
@@ -44,7 +44,7 @@ def choose_mode(board, held_ms):
 
 
 def _held(board, mode, release):
-    """Show a mode; whether the button is still held at the end."""
+    """Show a mode; returns whether the button is still held at the end."""
     _show(board, mode, 0)
     for _ in range(_LOOKS):
         board.stall(_LOOK_MS * TICKS_PER_MS)
@@ -55,14 +55,14 @@ def _held(board, mode, release):
 
 
 def _show(board, mode, ms):
-    """Green, orange and blue are the bits of the mode."""
+    """Show a mode: green, orange and blue are its bits."""
     for bit, name in enumerate((_GREEN, _ORANGE, _BLUE)):
         Pin(name, Pin.OUT_PP).value(mode >> bit & 1)
     board.stall(ms * TICKS_PER_MS)
 
 
 def flash_error(times):
-    """Red and green in turn."""
+    """Flash red and green alternately."""
     for _ in range(times):
         for red in (1, 0):
             Pin(_RED, Pin.OUT_PP).value(red)
@@ -86,12 +86,12 @@ def mount(mode, path):
 
 
 def _is_new():
-    """Whether nothing was ever in the flash."""
+    """Whether the flash is empty."""
     return not machine_state.flash.damage and not os.listdir(machine_state.flash.root)
 
 
 def _make_file_system():
-    """Start files are left out if the program has its own elsewhere."""
+    """Write the files of a new file system, except start files if the program has its own elsewhere."""
     machine_state.flash.format()
     for name, size in _FACTORY_FILES.items():
         if name.endswith(".py") and machine_state.options["program"]:
@@ -101,7 +101,7 @@ def _make_file_system():
 
 
 def _library_folders():
-    """Where the interpreter finds modules, the card first."""
+    """The folders in which the interpreter searches modules, the card's first."""
     folders = []
     for point in ("/sd", "/flash"):
         root = machine_state.flash.mounts.get(point)

@@ -1,10 +1,10 @@
-"""Puts the board's own versions of built-in modules in their place."""
+"""Replaces built-in modules by the board's versions."""
 
 import sys
 
 
 def replace():
-    """From here on ``import os`` and its like get the board's; earlier imports keep the real ones."""
+    """Later imports of ``os`` and so on get the board's; earlier ones keep the real modules."""
     import board_micropython
     import board_os
     import board_time
@@ -17,7 +17,7 @@ def replace():
 
 
 def replace_sys():
-    """The same for ``sys``, whose ``stdout`` is then the serial port."""
+    """The same for ``sys``, with the serial port as ``stdout``."""
     import board_sys
 
     sys.modules["sys"] = board_sys

@@ -1,4 +1,4 @@
-"""External interrupts (``pyb.ExtInt``) and levels that are put on input pins from outside."""
+"""External interrupts (``pyb.ExtInt``), and input pins driven from outside."""
 
 import machine_state
 from chip.processor import CALL_TICKS
@@ -9,11 +9,11 @@ _RISING, _FALLING = 1, 2
 
 
 def _nothing(_):
-    """An edge that was pending when its callback was taken away."""
+    """Callback of an edge that was pending when its own was removed."""
 
 
 class ExtInt:
-    """Calls ``callback(line)`` at an edge of a pin; one object a line number."""
+    """Calls ``callback(line)`` at an edge of a pin; there is one object for each line number."""
 
     IRQ_RISING, IRQ_FALLING, IRQ_RISING_FALLING = 0x10110000, 0x10210000, 0x10310000
     EVT_RISING, EVT_FALLING, EVT_RISING_FALLING = 0x10120000, 0x10220000, 0x10320000
@@ -35,15 +35,12 @@ class ExtInt:
         machine_state.board.call()
 
     def line(self):
-        """The line number."""
         return self._line
 
     def enable(self):
-        """Let the interrupt through."""
         self.enabled = True
 
     def disable(self):
-        """Hold the interrupt back."""
         self.enabled = False
 
     def swint(self):
@@ -59,7 +56,7 @@ class ExtInt:
 
 
 def set_level(name, level):
-    """Drive an input pin from outside to 0 or 1, or release it (None)."""
+    """Drive an input pin from outside with 0 or 1, or release it (None)."""
     line = machine_state.board.pins.line(name)
     before = line.read()
     line.external = level

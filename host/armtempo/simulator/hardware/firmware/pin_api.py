@@ -7,7 +7,7 @@ _PULL_NONE, _PULL_UP, _PULL_DOWN = 0, 1, 2
 
 
 class Pin:
-    """One pin. ``mode`` and ``pull`` as in MicroPython; ``alt`` or ``af`` is its alternate function."""
+    """One pin; arguments as in MicroPython."""
 
     IN, OUT_PP, OUT_OD, AF_PP, AF_OD, ANALOG = 0, 1, 0x11, 2, 0x12, 3
     OUT, ALT, OPEN_DRAIN, ALT_OPEN_DRAIN = OUT_PP, AF_PP, OUT_OD, AF_OD
@@ -51,11 +51,9 @@ class Pin:
     __call__ = value
 
     def high(self):
-        """Drive the pin high."""
         self.value(1)
 
     def low(self):
-        """Drive the pin low."""
         self.value(0)
 
     on = high
@@ -78,15 +76,13 @@ class Pin:
         return memory.address("GPIO" + gpio.PORTS[self.line.port.index])
 
     def mode(self):
-        """The mode in force."""
         return self.line.mode()
 
     def af(self):
-        """The alternate function in force."""
         return self.line.alternate()
 
 
 def _field(at, bits, number, value):
-    """Write field ``number`` of that many bits each in a register."""
+    """Write field ``number`` of ``bits`` bits in a register."""
     mask = (1 << bits) - 1
     memory.words[at] = memory.words[at] & ~(mask << bits * number) | (value & mask) << bits * number

@@ -1,4 +1,4 @@
-"""MicroPython's prompt on the serial port: friendly and raw REPL with raw paste (shared/runtime/pyexec.c)."""
+"""MicroPython's REPL on the serial port: friendly, raw and raw paste (shared/runtime/pyexec.c)."""
 
 import errno
 import io
@@ -14,7 +14,7 @@ _WINDOW = 128
 
 
 class SoftReset(Exception):
-    """Ctrl-D, or the code that was run asked to leave."""
+    """Ctrl-D, or SystemExit in the code that was run."""
 
 
 def send(text):
@@ -28,7 +28,7 @@ def send(text):
 
 
 def show(text):
-    """What a program prints: to the host while the REPL has the port, else to the log."""
+    """Print to the host while the REPL has the port, otherwise to the log."""
     if machine_state.serial.attached:
         send(text.replace("\n", "\r\n"))
     else:
@@ -49,7 +49,7 @@ def traceback(error):
     text = io.StringIO()
     sys.print_exception(error, text)
     lines = text.getvalue().split("\n")
-    # As MicroPython says it on every system
+    # MicroPython's text on every system
     if isinstance(error, OSError) and error.errno in errno.errorcode:
         lines[-2] = "OSError: [Errno %d] %s" % (error.errno, errno.errorcode[error.errno])
     return "\n".join([line for line in lines if "/hardware/" not in line])
@@ -64,7 +64,7 @@ def _first_of(data, one, other):
 
 
 class Repl:
-    """The prompt, in the mode that it was left in. ``names``: the globals of ``__main__``."""
+    """The prompt; it keeps its mode. ``names``: the globals of ``__main__``."""
 
     def __init__(self, raw=False):
         self.raw = raw
@@ -72,7 +72,7 @@ class Repl:
 
     def run(self):
         """Serve the host until it asks for a soft reset."""
-        machine_state.serial.interrupt_char = -1  # at the prompt Ctrl-C is a byte like others
+        machine_state.serial.interrupt_char = -1  # at the prompt Ctrl-C is an ordinary byte
         machine_state.board.interrupted = False
         try:
             while True:
@@ -84,11 +84,11 @@ class Repl:
             send("MPY: sync filesystems\r\nMPY: soft reboot\r\n")
 
     def execute(self, text, name="<stdin>", log=False):
-        """Run code; False if it raises, which is shown to the host. SoftReset if it asks to leave."""
+        """Run code; False if it raises (the host gets the traceback). Raises SoftReset on SystemExit."""
         return self._run(lambda: exec(compile(text, name, "exec"), self.names), log)
 
     def _run(self, action, log=False):
-        """Run something with Ctrl-C on; True if it raised nothing."""
+        """Run something with Ctrl-C enabled; True if it raised nothing."""
         machine_state.serial.interrupt_char = _CTRL_C
         try:
             action()
@@ -108,7 +108,7 @@ class Repl:
             machine_state.serial.interrupt_char = -1
 
     def _end_of_output(self):
-        """In raw mode the host waits for this between output and errors."""
+        """Send the separator between output and errors in raw mode."""
         if self._marking:
             self._marking = False
             send("\x04")
@@ -116,7 +116,7 @@ class Repl:
     _marking = False
 
     def _bytes(self, most):
-        """What has come, at least one byte."""
+        """The received bytes, at least one, at most ``most``."""
         while not machine_state.serial.received:
             machine_state.pace.idle()
         return machine_state.serial.take(most)
@@ -162,7 +162,7 @@ class Repl:
         send("\x04")
 
     def _paste(self):
-        """Take code with flow control: the host may send a window at a time."""
+        """Receive code with flow control: the host sends one window at a time."""
         send(b"R\x01" + bytes((_WINDOW, 0, 1)))
         command = bytearray()
         left = _WINDOW
@@ -199,7 +199,7 @@ class Repl:
                 self._run(lambda text=line: self._one(text))
 
     def _one(self, text):
-        """Run what was typed; show the value if it is an expression."""
+        """Run what was typed; print the value of an expression."""
         try:
             code = compile(text, "<stdin>", "eval")
         except SyntaxError:
@@ -210,7 +210,7 @@ class Repl:
             show(repr(value) + "\n")
 
     def _line(self, inside):
-        """One line from the host, echoed; None if the mode changes."""
+        """A line from the host, echoed; None if the mode changes."""
         line = bytearray()
         while True:
             byte = self._byte()
@@ -228,7 +228,7 @@ class Repl:
                 return ""
             if byte in b"\r\n":
                 send("\r\n")
-                return "".join([chr(byte) for byte in line])  # whatever it is, it is no reason to end
+                return "".join([chr(byte) for byte in line])  # any bytes, without an error
             if byte in b"\x08\x7f":
                 if line:
                     line = line[:-1]

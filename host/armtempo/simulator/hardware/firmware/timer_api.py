@@ -1,7 +1,7 @@
-"""``pyb.Timer`` and its channels on the simulated timers, with the firmware's register habits (timer.c)."""
+"""``pyb.Timer`` and its channels on the simulated timers; they write the same registers as the firmware (timer.c)."""
 
 import machine_state
-from chip import gpio, memory, timer_registers
+from chip import gpio, memory, timers
 from chip.processor import _RCC_TIMERS, CALL_TICKS
 
 from firmware.pin_api import Pin
@@ -15,7 +15,7 @@ def _change(at, mask, value):
 
 
 class Timer:
-    """A hardware timer; every ``Timer(n)`` is the same one."""
+    """A hardware timer; ``Timer(n)`` is always the same object."""
 
     UP, DOWN, CENTER = 0, 0x10, 0x20
     PWM, PWM_INVERTED, OC_TIMING, OC_ACTIVE, OC_INACTIVE, OC_TOGGLE = range(6)
@@ -53,12 +53,12 @@ class Timer:
         register, bit = _RCC_TIMERS[self._number]
         _change(memory.index("RCC") + register, 0, 1 << bit)
         at = self._model.at
-        memory.words[at + timer_registers.PSC] = prescaler & 0xFFFF
-        memory.words[at + timer_registers.ARR] = period & (self._model.full - 1)
-        memory.words[at + timer_registers.CR1] = 0x80
-        memory.words[at + timer_registers.EGR] = 1
+        memory.words[at + timers.PSC] = prescaler & 0xFFFF
+        memory.words[at + timers.ARR] = period & (self._model.full - 1)
+        memory.words[at + timers.CR1] = 0x80
+        memory.words[at + timers.EGR] = 1
         machine_state.board.sync()
-        _change(at + timer_registers.CR1, 1, 1)
+        _change(at + timers.CR1, 1, 1)
         self.callback(callback)
         machine_state.board.spend(20 * CALL_TICKS)
 
@@ -75,8 +75,8 @@ class Timer:
         for channel in self._channels.values():
             channel.callback(None)
         self._channels.clear()
-        memory.words[self._model.at + timer_registers.CCER] = 0
-        memory.words[self._model.at + timer_registers.CR1] = 0
+        memory.words[self._model.at + timers.CCER] = 0
+        memory.words[self._model.at + timers.CR1] = 0
         machine_state.board.wrote()
 
     def source_freq(self):
@@ -84,18 +84,18 @@ class Timer:
         return 84_000_000 * self._model.rate
 
     def callback(self, function):
-        """Call ``function(timer)`` at each update event; None: do not."""
+        """Set the callback ``function(timer)`` of update events; None: remove it."""
         self.interrupt(0, function)
 
     def interrupt(self, flag, function):
         """Set or clear the callback of one interrupt flag."""
         if function is None:
             machine_state.board.callbacks.pop((self._number, flag), None)
-            _change(self._model.at + timer_registers.DIER, 1 << flag, 0)
+            _change(self._model.at + timers.DIER, 1 << flag, 0)
         else:
             machine_state.board.callbacks[(self._number, flag)] = (function, self)
-            _change(self._model.at + timer_registers.SR, 1 << flag, 0)
-            _change(self._model.at + timer_registers.DIER, 0, 1 << flag)
+            _change(self._model.at + timers.SR, 1 << flag, 0)
+            _change(self._model.at + timers.DIER, 0, 1 << flag)
         machine_state.board.wrote()
 
     def register(self, at, value=None):
@@ -110,19 +110,16 @@ class Timer:
         return None
 
     def counter(self, value=None):
-        """Read or set the counter."""
-        return self.register(timer_registers.CNT, value)
+        return self.register(timers.CNT, value)
 
     def period(self, value=None):
-        """Read or set the period register."""
-        return self.register(timer_registers.ARR, value)
+        return self.register(timers.ARR, value)
 
     def prescaler(self, value=None):
-        """Read or set the prescaler register."""
-        return self.register(timer_registers.PSC, value)
+        return self.register(timers.PSC, value)
 
     def channel(self, number, mode=None, callback=None, pin=None, compare=0, polarity=0, pulse_width=0):
-        """Set up a channel, or get the one that was."""
+        """Set up a channel; without a mode, return the one set up before."""
         if not 1 <= number <= 4:
             raise ValueError("invalid channel (%d)" % number)
         if mode is None:
@@ -151,7 +148,7 @@ class Timer:
 
     def start(self):
         """Set the counter-enable bit."""
-        _change(self._model.at + timer_registers.CR1, 1, 1)
+        _change(self._model.at + timers.CR1, 1, 1)
 
 
 class TimerChannel:
@@ -164,32 +161,31 @@ class TimerChannel:
 
     def setup_encoder(self, mode):
         """Count the edges of two inputs."""
-        self._timer.register(timer_registers.SMCR, mode)
-        self._timer.register(timer_registers.CCMR1, 0x0101)
-        _change(self._at + timer_registers.CCER, 0xBB, 0x11)
+        self._timer.register(timers.SMCR, mode)
+        self._timer.register(timers.CCMR1, 0x0101)
+        _change(self._at + timers.CCER, 0xBB, 0x11)
         self._timer.start()
 
     def setup_compare(self, mode, compare, polarity, callback):
-        """Output compare; as in the firmware this starts the counter."""
+        """Output compare; also starts the counter, as in the firmware."""
         number = self._number - 1
-        _change(self._at + timer_registers.CCER, 3 << 4 * number, polarity << 4 * number)
+        _change(self._at + timers.CCER, 3 << 4 * number, polarity << 4 * number)
         shift = 8 * (number & 1)
-        _change(self._at + timer_registers.CCMR1 + (number >> 1), 0xFF << shift, mode << 4 + shift)
-        memory.words[self._at + timer_registers.CCR1 + number] = compare & memory.MASK
-        _change(self._at + timer_registers.CCER, 0, 1 << 4 * number)
+        _change(self._at + timers.CCMR1 + (number >> 1), 0xFF << shift, mode << 4 + shift)
+        memory.words[self._at + timers.CCR1 + number] = compare & memory.MASK
+        _change(self._at + timers.CCER, 0, 1 << 4 * number)
         if self._timer._number in (1, 8):
-            _change(self._at + timer_registers.BDTR, 0, 1 << 15)  # MOE
+            _change(self._at + timers.BDTR, 0, 1 << 15)  # MOE
         self._timer.start()
         if callback:
             self.callback(callback)
 
     def callback(self, function):
-        """Call ``function(timer)`` at each match; None: do not. Stops and restarts the channel on the way."""
+        """Set the callback ``function(timer)`` of matches; None: remove it."""
         self._timer.interrupt(self._number, function)
 
     def compare(self, value=None):
-        """Read or set the compare register."""
-        return self._timer.register(timer_registers.CCR1 + self._number - 1, value)
+        return self._timer.register(timers.CCR1 + self._number - 1, value)
 
     capture = compare
     pulse_width = compare

@@ -1,8 +1,7 @@
 """The USB serial port: ``pyb.USB_VCP`` with the firmware's buffers, on this process's stdin and stdout.
 
-The launcher makes both the master end of a pseudo terminal. Buffers and their habits are the firmware's
-(usbd_cdc_interface.c): 1024 bytes each way; input beyond that is lost unless RTS flow control holds the host
-back.
+Both are the master end of a pseudo terminal from the launcher. The buffers are the firmware's
+(usbd_cdc_interface.c): 1024 bytes each way; further input is lost, unless RTS flow control stops the host.
 """
 
 import select
@@ -16,9 +15,9 @@ _POLLIN = 1
 
 
 class SilentPort:
-    """The port's buffers, and a host that neither sends nor reads.
+    """The port's buffers, with a host that neither sends nor reads.
 
-    ``attached``: the REPL has the port, and ``interrupt_char`` interrupts.
+    ``attached``: the REPL has the port, and ``interrupt_char`` interrupts the program.
     """
 
     ended = False
@@ -27,10 +26,10 @@ class SilentPort:
         self.reset()
 
     def reset(self):
-        """The board was reset: what was under way is lost."""
+        """The board was reset: buffered bytes are lost."""
         self.silent = False
         self.received = bytearray()
-        self.pieces = 0  # how often input has come
+        self.pieces = 0  # number of times that input arrived
         self.sending = bytearray()
         self.rts = self.cts = False
         self.attached = True
@@ -48,20 +47,20 @@ class SilentPort:
         return bool(self.sending) and not self.silent
 
     def put(self, data):
-        """Queue bytes for the host; how many there was room for."""
+        """Queue bytes for the host; returns how many fit."""
         count = min(len(data), BUFFER - len(self.sending))
         self.sending.extend(memoryview(data)[:count])
         return count
 
     def take(self, count):
-        """Up to that many received bytes."""
+        """Up to ``count`` received bytes."""
         data = bytes(self.received[:count])
         self.received = self.received[count:]
         return data
 
 
 class Serial(SilentPort):
-    """The line to the host that has the pseudo terminal open."""
+    """The line to the host at the pseudo terminal."""
 
     def __init__(self):
         super().__init__()
@@ -73,7 +72,7 @@ class Serial(SilentPort):
         self._chunk = memoryview(bytearray(_CHUNK))
 
     def wait(self, ms):
-        """Wait in real time for input, at most so long; True if there is some. Silenced, it looks at none."""
+        """As ``SilentPort.wait``; input is ignored while ``silent``."""
         return bool((self._nothing if self.silent else self._poll).poll(ms))
 
     def pump(self):
@@ -91,7 +90,7 @@ class Serial(SilentPort):
             piece = self._chunk[: min(room, _CHUNK)] if self.rts else self._chunk
             try:
                 count = self._in.readinto(piece)
-            except OSError:  # the other end of the pseudo terminal has gone
+            except OSError:  # the other end of the pseudo terminal is closed
                 count = 0
             if not count:
                 self.ended = count == 0
@@ -111,7 +110,7 @@ class Serial(SilentPort):
 
 
 class USB_VCP:
-    """The firmware's virtual serial port object."""
+    """``pyb.USB_VCP``."""
 
     RTS, CTS, IRQ_RX = 1, 2, 1
 
@@ -119,13 +118,13 @@ class USB_VCP:
         self._line = machine_state.serial
 
     def init(self, flow=-1):
-        """Set flow control: RTS holds the host back, CTS makes ``write`` write only what fits."""
+        """Set flow control: RTS stops the host at a full buffer, CTS makes ``write`` write only what fits."""
         if flow >= 0:
             self._line.rts = bool(flow & self.RTS)
             self._line.cts = bool(flow & self.CTS)
 
     def setinterrupt(self, char):
-        """Which byte interrupts the program while the REPL has the port; -1 none."""
+        """Set the byte that interrupts the program while the REPL has the port; -1: none."""
         self._line.interrupt_char = char
 
     def isconnected(self):
@@ -139,7 +138,7 @@ class USB_VCP:
         return bool(self._line.received)
 
     def recv(self, data, timeout=5000):
-        """Receive into a buffer, or that many bytes; the time-out is per byte, in ms."""
+        """Receive into a buffer, or a number of bytes; the time-out is per byte, in ms."""
         wanted = data if isinstance(data, int) else len(data)
         waited = 0
         while len(self._line.received) < wanted and waited < timeout:
@@ -154,7 +153,7 @@ class USB_VCP:
         return len(got)
 
     def send(self, data, timeout=5000):
-        """Send a buffer (or one byte); how many bytes went. The time-out is per byte, in ms."""
+        """Send a buffer or one byte; returns the number of bytes sent. The time-out is per byte, in ms."""
         if isinstance(data, int):
             data = bytes((data,))
         sent = self._line.put(data)
@@ -168,10 +167,10 @@ class USB_VCP:
         return sent
 
     def read(self, size=-1):
-        """What has been received, up to ``size``; None if nothing has.
+        """The received bytes, up to ``size``; None if there are none.
 
-        A program looks here once a turn of its main loop, so finding nothing also stands for the time that the turn's
-        own work takes on the chip (option ``turn_us``).
+        A program calls this once in each turn of its main loop, so an empty read also takes the time of the turn's
+        own work on the chip (option ``turn_us``).
         """
         if not self._line.received:
             machine_state.board.spend(machine_state.options["turn_us"] * TICKS_PER_US)
@@ -180,7 +179,7 @@ class USB_VCP:
         return self.recv(there if size < 0 else min(size, there), timeout=0)
 
     def readinto(self, buffer, size=None):
-        """What has been received, into a buffer; None if nothing has."""
+        """As ``read``, into a buffer; returns the number of bytes, or None."""
         got = self.read(len(buffer) if size is None else size)
         if got is None:
             return None
@@ -188,7 +187,7 @@ class USB_VCP:
         return len(got)
 
     def write(self, data, start=0, size=None):
-        """With CTS flow control: what fits at once, None if nothing does. Without: waits, then drops."""
+        """With CTS flow control: write what fits, None if nothing does. Without: wait, then drop the rest."""
         if size is not None:
             data = memoryview(data)[start : start + size]
         if self._line.cts:

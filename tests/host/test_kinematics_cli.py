@@ -1,4 +1,4 @@
-"""``armtempo ik`` from the command line: forms of a pose, table, JSON, exit codes."""
+"""``armtempo fk`` and ``armtempo ik``: forms of input, tables, JSON, exit codes."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.kinematics import forward
-from armtempo.model import shipped
+from armtempo.kinematics.forward import all_frames
+from armtempo.model import pose, shipped
 from click.testing import CliRunner, Result
 
-from tests.host.published_arms import PAPER
-from tests.host.small_arms import FOUR, toml
+from tests.host.arms import FOUR, PAPER, toml
 
 EQ_16_AT_1_TO_5 = "0 0 -1 -536.404 0 1 0 0 1 0 0 434.698"
 POSITION = ("--position", "-536.404", "0", "434.698")
@@ -267,4 +267,95 @@ def test_wrong_input_ends_with_2_and_one_clear_message(arguments: tuple[str, ...
     assert result.exit_code == 2, result.output
     assert words in result.stderr
     assert "Traceback" not in result.stderr
+    assert result.stdout == ""
+
+
+# ``armtempo fk``: the tool's pose and every frame, as a table and as JSON
+
+
+def run_fk(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["fk", *map(str, arguments)])
+
+
+def fk_values(*arguments: str | Path) -> dict[str, Any]:
+    result = run_fk(*arguments, "--json")
+    assert result.exit_code == 0, result.output
+    found: dict[str, Any] = json.loads(result.stdout)
+    return found
+
+
+def test_the_paper_s_last_via_point_stands_at_eq_16() -> None:
+    tool = fk_values("180,-38,-52")["tool"]
+    np.testing.assert_allclose(tool["position_mm"], [-536.404, 0.0, 434.698], atol=1e-3)
+    np.testing.assert_allclose(
+        tool["matrix"], forward(PAPER, np.radians([180, -38, -52, 0, 0, 0])), atol=1e-9
+    )
+    np.testing.assert_allclose(
+        pose.from_rpy((0, 0, 0), tool["rpy_deg"])[:3, :3], np.array(tool["matrix"])[:3, :3], atol=1e-12
+    )
+    assert tool["quaternion"] == pytest.approx([0.7071068, 0.0, -0.7071068, 0.0], abs=1e-6)
+
+
+def test_every_frame_is_listed_from_the_base_to_the_tool() -> None:
+    found = fk_values("10,-60,40,20,30,170")
+    frames = found["frames"]
+    assert [frame["name"] for frame in frames] == [
+        "base",
+        *(f"joint {n}" for n in range(1, 6)),
+        "joint 6 (tool)",
+    ]
+    assert frames[0]["position_mm"] == [0.0, 0.0, 0.0]
+    wanted = all_frames(PAPER, np.radians([10.0, -60.0, 40.0, 20.0, 30.0, 170.0]).tolist())
+    np.testing.assert_allclose([frame["matrix"] for frame in frames], wanted, atol=1e-9)
+    assert frames[-1]["matrix"] == found["tool"]["matrix"]
+
+
+@pytest.mark.parametrize(
+    "form", [("0", "-60", "40"), ("0,-60,40",), ("0 -60 40",), ("0,-60,40,0,0,0",), ("P0",), ()]
+)
+def test_every_form_of_a_posture_means_the_same(form: tuple[str, ...]) -> None:
+    assert fk_values(*form)["angles_deg"] == [0.0, -60.0, 40.0, 0.0, 0.0, 0.0]
+    assert fk_values(*form)["tool"] == fk_values("0,-60,40")["tool"]
+
+
+def test_the_table_has_units_and_a_row_a_frame() -> None:
+    result = run_fk("-10", "-60", "40")
+    assert result.exit_code == 0
+    title, heads, units, *rows = result.stdout.splitlines()
+    assert title == "paper-1to5 at -10.0000 -60.0000 40.0000 0.0000 0.0000 0.0000 deg"
+    assert heads.split() == ["frame", "x", "y", "z", "roll", "pitch", "yaw"]
+    assert units.split() == ["mm", "mm", "mm", "deg", "deg", "deg"]
+    assert rows[0].split() == ["base", *["0.0000"] * 6]
+    assert " ".join(rows[6].split()) == "joint 6 (tool) 295.0200 -52.0200 54.9730 180.0000 -20.0000 -10.0000"
+    assert rows[7] == "tool as a matrix, lengths in mm:"
+    assert rows[12].startswith("tool as a quaternion w x y z: 0.0151")
+
+
+def test_angles_out_of_range_are_shown_with_a_note() -> None:
+    result = run_fk("300,-60,40")
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[-1] == "note: joint 1 at 300 deg is 110 deg above its range -10 to 190"
+    assert fk_values("300,-60,40")["out_of_range"] == [
+        "joint 1 at 300 deg is 110 deg above its range -10 to 190"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            ("1,2",),
+            "2 angles given, but arm 'paper-1to5' has 6 joints, of which 3 have a motor\nhint: give one angle",
+        ),
+        (("1,2,x",), "the angles: 'x' is not a number"),
+        (("1,2,nan",), "the angles: 'nan' is not a finite number"),
+        (("P99",), "has no via point P99\nhint: give one of P0 to P6"),
+        (("none.json",), "none.json: no such file"),
+        (("0,0,0", "--arm", "none.toml"), "none.toml: neither a file"),
+    ],
+)
+def test_wrong_input_of_fk_ends_with_2_and_one_clear_message(arguments: tuple[str, ...], words: str) -> None:
+    result = run_fk(*arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
     assert result.stdout == ""
