@@ -35,11 +35,15 @@ _TURN_SLACK_TICKS = const(8400)  # 100 us: how late the interrupt that turns DIR
 _TURNS = const(8)
 
 
+def lookahead_kiticks(joints: int) -> int:
+    """How far ahead steps are computed: 29 ms with one joint, 50 ms with six."""
+    return _LOOP_KITICKS + JOINT_KITICKS * joints
+
+
 class JointDrive:
     """``arm``: head and joints of the arm record; ``sampler`` has the memory that the interrupts read.
 
-    ``ring_words``: see ``Ring``; ``memory``: for the step generator. ``lookahead_kiticks``: how far ahead steps are
-    computed, 29 ms with one joint, 50 ms with six.
+    ``ring_words``: see ``Ring``; ``memory``: for the step generator.
     """
 
     def __init__(
@@ -55,7 +59,7 @@ class JointDrive:
         head, rows = arm
         row = rows[number]
         self._sampler = sampler
-        self.lookahead_kiticks = _LOOP_KITICKS + JOINT_KITICKS * len(rows)
+        self.lookahead_kiticks = lookahead_kiticks(len(rows))
         block = sampler.block
         self._words_at = sampler.joint_at(number)
         self.ring = Ring(row["channel"], block, self._words_at, ring_words)

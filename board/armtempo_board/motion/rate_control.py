@@ -7,7 +7,7 @@ from micropython import const
 from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.motion.clock import MotionClock
-from armtempo_board.motion.joint_drive import JOINT_KITICKS
+from armtempo_board.motion.joint_drive import JOINT_KITICKS, lookahead_kiticks
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -27,10 +27,10 @@ class RateControl:
     A change begins ``margin_kiticks`` after ``lookahead_kiticks``, or after what is in the rings.
     """
 
-    def __init__(self, clock: MotionClock, joints: int, lookahead_kiticks: int) -> None:
+    def __init__(self, clock: MotionClock, joints: int) -> None:
         self._clock = clock
         self.margin_kiticks = JOINT_KITICKS * joints
-        self._ahead_kiticks = lookahead_kiticks + self.margin_kiticks
+        self._ahead_kiticks = lookahead_kiticks(joints) + self.margin_kiticks
         self.override: "Any" = None
         self.wanted = self._before_pause = _PERMILLE
         self.duration_ticks = self._end_kiticks = 0
