@@ -128,7 +128,7 @@ if TYPE_CHECKING:
     from armtempo.robot.run import Run
     from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
-    from armtempo.splines.spline import Spline
+    from armtempo.splines.bspline import Spline
     from armtempo.splines.trajectory import Trajectory
 
 _HOMES = {
@@ -182,7 +182,7 @@ _HOMES = {
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
     "armtempo.report.sequence_reader": ("SequenceRun",),
-    "armtempo.splines.spline": ("Spline",),
+    "armtempo.splines.bspline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }
 _MODULES = ("deploy", "optimise", "simulator")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
 from armtempo.cli import doctor, main, state
-from armtempo.diagnosis import drives, figures, resolution, torque
+from armtempo.diagnosis import drives, figures, torque
 from armtempo.diagnosis.arm_check import check, check_arm
 from armtempo.diagnosis.finding import Level
 from armtempo.kinematics.chain import chains_mm, outline_mm
@@ -235,9 +235,9 @@ def test_a_job_is_not_looked_at_before_its_arm_is_right(tmp_path: Path) -> None:
 
 
 def test_the_longest_lever_is_that_of_the_stretched_arm() -> None:
-    scara = [found.lever_mm for found in resolution.resolutions(Arm.load("scara"))]
+    scara = [found.lever_mm for found in figures.resolutions(Arm.load("scara"))]
     np.testing.assert_allclose(scara, [228 + 136.5, 136.5, 0], rtol=1e-4, atol=1e-6)
-    lower = resolution.resolutions(Arm.load("community"))[1]
+    lower = figures.resolutions(Arm.load("community"))[1]
     # The rods keep forearm and hand from turning with it
     assert lower.lever_mm == pytest.approx(120, rel=1e-4)
 

@@ -10,7 +10,7 @@ import click
 from armtempo import deploy as deployment
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.deploy import package as packages
 from armtempo.model.arm import Arm
 from armtempo.robot import engine_room

@@ -10,7 +10,7 @@ import click
 from armtempo.basics.errors import InputError
 from armtempo.basics.settings import PORT, ProjectSettings
 from armtempo.cli import options, results
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.deploy import changes
 from armtempo.deploy.firmware import build, checkout, frozen, image, write
 from armtempo.deploy.firmware.image import Image

@@ -9,7 +9,7 @@ import click
 
 from armtempo.basics.atomic_file import replace_text
 from armtempo.cli import options, results
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.paper import experiment, motions, postures, searches, sheet
 from armtempo.paper.printed import Claim
 

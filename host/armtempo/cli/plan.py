@@ -12,7 +12,7 @@ from armtempo import pipeline
 from armtempo.basics.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.cli import chosen, options, results, sequences
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan

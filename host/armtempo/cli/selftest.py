@@ -10,7 +10,7 @@ import click
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.diagnosis.selftest.result import Measurement, SelfTest
 from armtempo.report import selftest_page as page
 from armtempo.robot.motor_test import ARM_FILE

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.diagnosis import drives, geometry, resolution, torque, units, wiring
+from armtempo.diagnosis import drives, figures, geometry, torque, units, wiring
 from armtempo.diagnosis.finding import Finding, Level, error, note
 from armtempo.model.arm import STILL_DEG, Arm
 from armtempo.model.posture import HOME
@@ -37,7 +37,7 @@ def check_arm(arm: Arm) -> list[Finding]:
     found = [*units.findings(arm), *geometry.findings(arm), *_motors(arm)]
     if arm.driven:
         found += drives.findings(arm)
-        found += resolution.findings(arm)
+        found += figures.findings(arm)
         found += drives.encoder_findings(arm)
         found += torque.findings(arm)
         found += wiring.findings(arm)

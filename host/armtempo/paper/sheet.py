@@ -12,7 +12,7 @@ from armtempo.paper import motions, searches
 from armtempo.paper.experiment import CUBIC, QUINTIC, Series
 from armtempo.paper.printed import DIFFERS, Claim
 from armtempo.paper.searches import Row
-from armtempo.report import arm_picture, drawing, html_page, plan_section, plots, run_report
+from armtempo.report import arm_picture, drawing, html_page, plots, run_report, sections
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def render(
         sheet.figure(drawing.inline_svg(figure, name, caption), caption)
     sheet.heading("How to repeat it")
     sheet.code("armtempo paper")
-    plan_section.origin(sheet, made.quintic, _extent(searched, series))
+    sections.plan_origin(sheet, made.quintic, _extent(searched, series))
     return sheet.render()
 
 

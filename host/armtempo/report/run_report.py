@@ -12,7 +12,7 @@ from armtempo.basics.atomic_file import replace_text
 from armtempo.kinematics import chain
 from armtempo.model.arm import Arm
 from armtempo.planning import torque
-from armtempo.report import arm_picture, drawing, html_page, plan_section, plots, result_section
+from armtempo.report import arm_picture, drawing, html_page, plots, sections
 from armtempo.report.evaluation import Evaluation, evaluate
 from armtempo.report.run_folder import COMPLETE
 from armtempo.splines.trajectory import Trajectory
@@ -106,7 +106,7 @@ def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
         f"Run of {meta['name']!r}",
         f"{meta['started']}, arm {arm}, {done} of {len(found.run.repetitions)} repetitions complete",
     )
-    result_section.write(sheet, found)
+    sections.result(sheet, found)
     for name, (figure, caption) in drawn.items():
         if name in _HEADINGS:
             sheet.heading(_HEADINGS[name])
@@ -120,8 +120,8 @@ def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
 def _planned(sheet: html_page.Page, found: Evaluation) -> None:
     sheet.heading("The plan")
     if found.plan:
-        plan_section.extremes(sheet, found.plan)
-        plan_section.timing(sheet, found.plan)
+        sections.plan_extremes(sheet, found.plan)
+        sections.plan_timing(sheet, found.plan)
         return
     sheet.note(
         f"How this motion was planned is not known: it was on the board, and is read back from its record. It lasts "
@@ -138,7 +138,7 @@ def _origin(sheet: html_page.Page, found: Evaluation) -> None:
     if "virtual" in meta:
         known.append(("virtual board", "yes" if meta["virtual"] else "no"))
     if plan:
-        plan_section.origin(sheet, plan, known)
+        sections.plan_origin(sheet, plan, known)
     else:
         sheet.table(("what", "value"), known)
 

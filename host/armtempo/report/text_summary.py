@@ -9,7 +9,7 @@ from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
 from armtempo.basics.text import aligned
-from armtempo.diagnosis.resolution import findings as coarse_steps
+from armtempo.diagnosis.figures import findings as coarse_steps
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
