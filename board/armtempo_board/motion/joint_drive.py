@@ -21,9 +21,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_shared.motion import MotionHead
 
-JOINT_KITICKS = const(341)
-"""4.2 ms, in which a joint gets another time law and computes its first steps by it, or its first steps at a start."""
-_LOOP_KITICKS = const(2048)  # 25 ms, for which the loop may be busy with something else
+# How far ahead steps are computed: 25 ms, for which the loop may be busy with something else, and 4.2 ms for each joint
+_LOOP_KITICKS = const(2048)
+_JOINT_KITICKS = const(341)
 
 _GUARD_KITICKS = const(16)  # 195 us: a change of DIR is queued only after an edge that is later than this
 _OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings has failed
@@ -35,15 +35,11 @@ _TURN_SLACK_TICKS = const(8400)  # 100 us: how late the interrupt that turns DIR
 _TURNS = const(8)
 
 
-def lookahead_kiticks(joints: int) -> int:
-    """How far ahead steps are computed: 29 ms with one joint, 50 ms with six."""
-    return _LOOP_KITICKS + JOINT_KITICKS * joints
-
-
 class JointDrive:
     """``arm``: head and joints of the arm record; ``sampler`` has the memory that the interrupts read.
 
-    ``ring_words``: see ``Ring``; ``memory``: for the step generator.
+    ``ring_words``: see ``Ring``; ``memory``: for the step generator. ``lookahead_kiticks``: how far ahead steps are
+    computed, 29 ms with one joint, 50 ms with six.
     """
 
     def __init__(
@@ -59,7 +55,7 @@ class JointDrive:
         head, rows = arm
         row = rows[number]
         self._sampler = sampler
-        self.lookahead_kiticks = lookahead_kiticks(len(rows))
+        self.lookahead_kiticks = _LOOP_KITICKS + _JOINT_KITICKS * len(rows)
         block = sampler.block
         self._words_at = sampler.joint_at(number)
         self.ring = Ring(row["channel"], block, self._words_at, ring_words)

@@ -7,7 +7,6 @@ from micropython import const
 from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.motion.clock import MotionClock
-from armtempo_board.motion.joint_drive import JOINT_KITICKS, lookahead_kiticks
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -16,6 +15,9 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
+# As in joint_drive.py; a joint gets another time law, and computes its first steps by it, within _JOINT_KITICKS
+_LOOP_KITICKS = const(2048)
+_JOINT_KITICKS = const(341)
 _PERMILLE = const(1000)
 
 
@@ -24,13 +26,12 @@ class RateControl:
 
     ``duration_ticks``: end of the motion unless the rate changes. ``waits``: a requested change has not
     begun. ``end_moves``: the time of the last sample has changed. ``braked``: the motion is to come to rest.
-    A change begins ``margin_kiticks`` after ``lookahead_kiticks``, or after what is in the rings.
+    A change begins ``margin_kiticks`` after what is computed ahead, or after what is in the rings.
     """
 
     def __init__(self, clock: MotionClock, joints: int) -> None:
         self._clock = clock
-        self.margin_kiticks = JOINT_KITICKS * joints
-        self._ahead_kiticks = lookahead_kiticks(joints) + self.margin_kiticks
+        self.margin_kiticks = _JOINT_KITICKS * joints
         self.override: "Any" = None
         self.wanted = self._before_pause = _PERMILLE
         self.duration_ticks = self._end_kiticks = 0
@@ -90,7 +91,7 @@ class RateControl:
         ``ahead_kiticks``: time from now until the last step in the rings. If rest would be later than the end of the
         motion, there is no change.
         """
-        start_ticks = self._start_kiticks(now_kiticks, ahead_kiticks) << 10
+        start_ticks = (now_kiticks + max(_LOOP_KITICKS + 2 * self.margin_kiticks, ahead_kiticks)) << 10
         self.waits = False
         if start_ticks >= self.duration_ticks or (
             self.braked and self.override.ramp_end_ticks(start_ticks, 0) >= self.duration_ticks
@@ -100,9 +101,6 @@ class RateControl:
         self._end_at(self.override.steady_ticks() if self.braked else self.override.end_ticks())
         law: "array[int]" = self.override.law
         return law
-
-    def _start_kiticks(self, now_kiticks: int, ahead_kiticks: int) -> int:
-        return now_kiticks + max(self._ahead_kiticks, ahead_kiticks)
 
     def rest_kiticks(self, ahead_kiticks: int) -> int:
         """Time from now until rest after a stop, given earlier or now; 0 by freezing.
@@ -118,7 +116,7 @@ class RateControl:
             if self.stands():
                 end = override.steady_kiticks
             else:
-                start = self._start_kiticks(now, ahead_kiticks)
+                start = now + max(_LOOP_KITICKS + 2 * self.margin_kiticks, ahead_kiticks)
                 end = min(override.rest_kiticks(max(start, override.steady_kiticks)), end)
         return max(end - now, 0)
 

@@ -17,6 +17,7 @@ from armtempo_board.stepgen.time_law import (
     AFTER,
     BEFORE,
     END_HIGH,
+    GIVEN_WORDS,
     MOTION_HIGH,
     PERMILLE,
     REAL_END_HIGH,
@@ -147,7 +148,8 @@ class JointLaw:
 
     def take(self, law: "array[int]", high: int) -> int:
         """Follow a law; the rest as ``count_from``."""
-        time_law.copy_law(law, self._words)
+        for word in range(GIVEN_WORDS):
+            self._words[word] = law[word]
         return self.count_from(high)
 
     def count_from(self, high: int) -> int:

@@ -88,15 +88,6 @@ def set_times(law: "array[int]", at: int, ticks: int) -> None:
     law[at + 1] = ticks & 4095
 
 
-@micropython.viper
-def copy_law(law: ptr32, joint: ptr32) -> object:
-    """Copy what is given of a law to a joint's."""
-    i = GIVEN_WORDS
-    while i:
-        i -= 1
-        joint[i] = law[i]
-
-
 def set_length(law: "array[int]", ticks: int) -> None:
     """The length of the ramp, a multiple of RAMP_GRID_TICKS up to LONGEST_RAMP_TICKS."""
     unit = 0
