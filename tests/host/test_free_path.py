@@ -234,10 +234,10 @@ def test_per_joint_timing_takes_each_joint_through_its_own_angles() -> None:
 
 @pytest.mark.slow
 def test_a_seed_repeats_and_starts_are_reported() -> None:
-    job = replace(FEED, via=FEED.via[:4], refine=4, starts=3)
+    job = replace(FEED, via=FEED.via[:3], refine=4, starts=2)
     one, two = planner.plan(ARM, job), planner.plan(ARM, job)
     assert np.array_equal(one.trajectory.joints[0].time_points_s, two.trajectory.joints[0].time_points_s)
-    assert len(one.searches[0].starts_s) == 3
+    assert len(one.searches[0].starts_s) == 2
 
 
 @pytest.mark.parametrize(
@@ -263,9 +263,8 @@ def test_refuses_what_a_free_path_cannot_be(changes: dict[str, object], message:
         planner.plan(ARM, replace(FEED, **changes))
 
 
-@pytest.mark.slow
 def test_time_that_does_not_increase_is_refused() -> None:
-    plan = planner.plan(ARM, replace(FEED, refine=3))
+    plan = planner.plan(ARM, replace(FEED, path="through", refine=1, iterations=5))
     spline = plan.trajectory.joints[0]
     times = spline.time_points_s.copy()
     times[4] = times[3]

@@ -158,7 +158,7 @@ def test_command_prints_the_port_and_ends_with_ctrl_c(tmp_path: Path) -> None:
 # the simulated hardware behaves like the chip's, on every interpreter
 
 
-SCRIPTS = tuple(CASES / f"virtual_{name}.py" for name in ("hardware", "time", "flash"))
+SCRIPTS = tuple(CASES / f"virtual_{name}.py" for name in ("hardware", "time", "memory"))
 
 
 @scripted.each(scripted.together(scripted.cases(*SCRIPTS)))
