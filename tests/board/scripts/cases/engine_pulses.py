@@ -56,7 +56,7 @@ def case_anywhere():  # slow
         rig.engine.brake()
         rig.engine.brake()
         end = rig.engine.rates.duration_ticks
-        assert asked + BRAKE_TICKS < end < asked + BRAKE_TICKS + TICK_HZ // 6, (asked, end)
+        assert asked + BRAKE_TICKS < end < asked + BRAKE_TICKS + TICK_HZ // 9, (asked, end)
         rig.run_to(3 * TICK_HZ)
         assert rig.engine.fault == 0, rig.engine.fault
         assert rig.engine.known == 7
@@ -92,7 +92,7 @@ def case_never_longer_than_the_motion():  # not emulated
         left_ms = rig.engine.rest_ms()
         rig.engine.brake()
         assert abs(rig.engine.rest_ms() - left_ms) <= 1
-        assert (rig.engine.rates.duration_ticks == end) == (asked + TICK_HZ // 13 + BRAKE_TICKS > end)
+        assert (rig.engine.rates.duration_ticks == end) == (asked + TICK_HZ // 20 + BRAKE_TICKS > end)
         now = rig.board.now - rig.zero()
         assert abs(rig.engine.rates.duration_ticks - now - 84000 * left_ms) <= 84000, (asked, left_ms)
         rig.run_to(3 * TICK_HZ)
