@@ -97,8 +97,7 @@ if TYPE_CHECKING:
         PlanError,
         RunFolderError,
     )
-    from armtempo.kinematics.many import inverse_many
-    from armtempo.kinematics.of_arm import forward, inverse
+    from armtempo.kinematics.of_arm import forward, inverse, inverse_many
     from armtempo.model.arm import Arm
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
@@ -129,7 +128,7 @@ if TYPE_CHECKING:
     from armtempo.robot.run import Run
     from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
-    from armtempo.splines.spline import Spline
+    from armtempo.splines.bspline import Spline
     from armtempo.splines.trajectory import Trajectory
 
 _HOMES = {
@@ -142,8 +141,7 @@ _HOMES = {
         "PlanError",
         "RunFolderError",
     ),
-    "armtempo.kinematics.many": ("inverse_many",),
-    "armtempo.kinematics.of_arm": ("forward", "inverse"),
+    "armtempo.kinematics.of_arm": ("forward", "inverse", "inverse_many"),
     "armtempo.ports.board_port": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
     "armtempo.model.job": ("Job", "Stop"),
@@ -184,7 +182,7 @@ _HOMES = {
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
     "armtempo.report.sequence_reader": ("SequenceRun",),
-    "armtempo.splines.spline": ("Spline",),
+    "armtempo.splines.bspline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }
 _MODULES = ("deploy", "optimise", "simulator")

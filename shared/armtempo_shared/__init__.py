@@ -1,1 +1,1 @@
-"""Definitions shared by host and board; runs on CPython and MicroPython, without numpy."""
+"""Definitions of host and board; for CPython and MicroPython, without numpy."""

@@ -1,9 +1,9 @@
-"""The arm record: the arm's figures for the board, in steps, counts and ticks only.
+"""The arm record: the arm's data for the board, in steps, counts and ticks.
 
-The host makes it from the arm file; the board keeps it in its flash. A motion record names its arm by this
-record's crc32.
-Little endian: the header, then one entry a joint, then the crc32 over all before it. An arm with outputs or inputs has
-another version, and after its joints the number of outputs and of inputs (a byte each), then an entry for each.
+The host makes it from the arm file; the board stores it in its flash. A motion record identifies its arm by this
+record's crc32. Little endian: the header, an entry for each joint, the crc32 of everything before it. The record of an
+arm with outputs or inputs has another version; after its joints are the numbers of outputs and inputs (a byte each) and
+their entries.
 """
 
 import struct
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 MAGIC = b"ATA1"
 NONE = 255
-"""Channel number that means: this joint has no such thing."""
+"""Channel number: none."""
 POLLED = 128
-"""Instead of a limit switch input: this plus a pin as in OUTPUT, whose switch only ends homing motions."""
+"""Instead of a limit switch input: this plus a pin as in OUTPUT; its switch only ends homing motions."""
 
 HEAD = (
     ("flags", "H"),  # see the FLAG_ constants
@@ -30,8 +30,11 @@ HEAD = (
     ("low_ticks", "H"),  # least STEP low time
     ("dir_setup_ticks", "H"),  # DIR stable before the rising STEP edge
     ("dir_hold_ticks", "H"),  # DIR stable after the falling STEP edge
-    ("link_timeout_ms", "H"),  # after this silence of the host while moving: see FLAG_STOP_ON_LINK_LOSS
-    ("identity", "I"),  # hash of the arm's geometry, motors, encoders and switches: of all but its limits
+    (
+        "link_timeout_ms",
+        "H",
+    ),  # time without a message from the host during a motion: see FLAG_STOP_ON_LINK_LOSS
+    ("identity", "I"),  # hash of geometry, motors, encoders and switches, without limits
 )
 FLAG_ENABLE_HIGH = 1  # ENABLE pin is active high
 FLAG_ESTOP_RELEASES = 2  # an E-stop also releases ENABLE
@@ -64,7 +67,7 @@ OUTPUT = (
     ("period", "H"),  # value of the period register
     ("low", "H"),  # pulse width in counts of the timer, or level of the pin, at value 0,
     ("high", "H"),  # and at value 65535
-    ("safe", "H"),  # value that it takes when the arm is taken, at a fault, and when the program ends
+    ("safe", "H"),  # value at the start, at a fault, and when the program ends
 )
 INPUT = (
     ("pin", "B"),
@@ -84,10 +87,10 @@ _OUTPUT_SIZE = struct.calcsize(_layout(OUTPUT))
 _INPUT_SIZE = struct.calcsize(_layout(INPUT))
 VERSION = 2
 VERSION_WITH_OUTPUTS = 3
-"""Of a record that has outputs or inputs."""
+"""Version of a record with outputs or inputs."""
 _VERSION_AT, _JOINTS_AT = 4, 5
 _LIMITS = ("min_steps", "max_steps", "max_rate", "following_counts", "link_timeout_ms")
-"""Fields that may change without any doubt about where the joints are; besides them FLAG_STOP_ON_LINK_LOSS."""
+"""Fields that do not affect the joints' positions, as FLAG_STOP_ON_LINK_LOSS."""
 
 
 class ArmRecordError(ValueError):
@@ -116,7 +119,7 @@ def _packed(rows: "Rows", fields: "Fields") -> bytes:
 
 
 def without_limits(head: "dict[str, int]", joints: "list[dict[str, int]]") -> int:
-    """crc32 of all but the limits: two records with the same one are of one arm, with other limits at most."""
+    """crc32 without the limits: equal for records of the same arm with different limits."""
     rows = [dict(head)] + [dict(joint) for joint in joints]
     rows[0]["flags"] &= ~FLAG_STOP_ON_LINK_LOSS
     for row in rows:
@@ -130,7 +133,7 @@ def without_limits(head: "dict[str, int]", joints: "list[dict[str, int]]") -> in
 
 
 def unpack(data: bytes) -> "tuple[dict[str, int], list[dict[str, int]], int]":
-    """(head dict, list of joint dicts, crc32) of an arm record; ArmRecordError if it is not one."""
+    """(head dict, list of joint dicts, crc32) of an arm record; raises ArmRecordError if it is none."""
     if len(data) < _HEAD_SIZE + 4:
         raise ArmRecordError("too short")
     values = struct.unpack_from(_HEAD_FORMAT, data, 0)
@@ -147,7 +150,7 @@ def unpack(data: bytes) -> "tuple[dict[str, int], list[dict[str, int]], int]":
 
 
 def unpack_outputs(data: bytes) -> "tuple[list[dict[str, int]], list[dict[str, int]]]":
-    """Dicts of the outputs and of the inputs of an arm record that ``unpack`` takes."""
+    """Dicts of the outputs and of the inputs of a valid arm record."""
     at = _HEAD_SIZE + data[_JOINTS_AT] * _JOINT_SIZE
     if data[_VERSION_AT] == VERSION:
         return [], []
@@ -156,7 +159,7 @@ def unpack_outputs(data: bytes) -> "tuple[list[dict[str, int]], list[dict[str, i
 
 
 def _size(data: bytes, joints: int) -> int:
-    """Bytes of a whole record that begins so; 0 if it cannot be one."""
+    """Size of the record that begins with ``data``, in bytes; 0 if it is none."""
     size = _HEAD_SIZE + joints * _JOINT_SIZE + 4
     if data[_VERSION_AT] == VERSION:
         return size

@@ -1,4 +1,4 @@
-"""Limits of the board, for host and board: clock, sampling, highest step rates, sizes."""
+"""Limits of the board: clock, sampling, step rates, sizes."""
 
 TICK_HZ = 84_000_000
 """Timer ticks per second: TIM2 and TIM5 unscaled (RM0090, APB1 timer clock at 168 MHz core)."""
@@ -13,19 +13,19 @@ SAMPLE_TICKS = TICK_HZ // 10
 """Ticks between two samples: 0.1 s exactly."""
 
 HOLD_TIMEOUT_MS = 300
-"""A held motion brakes when the host has not said hold for this long."""
+"""A held motion brakes after this time without a ``hold`` of the host."""
 
 LONGEST_TICKS = 1 << 38
-"""A time control point is below it, a little under an hour: units of 1024 ticks stay small integers of the board."""
+"""Bound of time control points, almost an hour: in units of 1024 ticks they are small integers of MicroPython."""
 LONGEST_RUN_TICKS = 1 << 39
 """A run at a lower speed, with its pauses, lasts at most 1 h 49 min."""
 LONGEST_SPAN_TICKS = 1 << 36
-"""The time control points of a segment differ by less."""
+"""Bound of the differences of a segment's time control points."""
 
 MOST_STEPS = 1 << 27
-"""An angle control point is below it."""
+"""Bound of angle control points."""
 MOST_SPAN_STEPS = 1 << 24
-"""The angle control points of a segment differ by less."""
+"""Bound of the differences of a segment's angle control points."""
 
 MAX_JOINTS = 6
 MAX_ENCODERS = 4
@@ -49,4 +49,4 @@ MAX_STEP_RATE_SUM = 240_000
 """Highest sum of the step rates of all joints, steps/s. The same."""
 
 MAX_MOTION_BYTES = 16384
-"""Largest motion record that the board takes: it must fit into its memory whole."""
+"""Largest motion record of the board, which must fit into its memory."""

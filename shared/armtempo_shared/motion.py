@@ -1,7 +1,7 @@
-"""The motion record: uploaded by the host, kept in the flash, read by the evaluator.
+"""The motion record: uploaded by the host, stored in the flash, read by the evaluator.
 
-Little endian. Control points are integers, so host and board have exactly the same spline:
-angles in steps / 2**28, times in ticks / 2**16.
+Little endian. Control points are integers, so that host and board have exactly the same splines: angles in
+steps / 2**28, times in ticks / 2**16.
 
 ::
 
@@ -14,10 +14,9 @@ angles in steps / 2**28, times in ticks / 2**16.
     8       H      segments n of the angle splines
     10      H      refine R: the time axes have n * R segments
     12      I      crc32 of the arm record it was made for
-    16      H[64]  the ramp to rest, by where it begins: at 64 equal steps of the motion's time from its start to its
-                   end. Low 11 bits: its length, linear in between. The rest: its shape (RAMP_SHAPES), up to the
-                   next step. All 0: it cannot
-    144     H[32]  the same at 32 steps for any other change of the speed
+    16      H[64]  ramps to rest that begin at 64 equidistant times from start to end. Low 11 bits: length,
+                   interpolated linearly. High bits: shape (RAMP_SHAPES), up to the next time. All 0: not possible
+    144     H[32]  the same at 32 times for all other changes of speed
     208     q[]    per joint: n + k angle control points; its n * R + k time control points,
                    or, with a shared axis, those once after the last joint
     end     I      crc32 over all before it
@@ -41,12 +40,12 @@ SHARED_AXIS = 1
 REST_ENTRIES = 64
 OTHER_ENTRIES = 32
 RAMP_LENGTH = 2047
-"""Mask of an entry's length, and the longest."""
+"""Mask of an entry's length, and the largest length."""
 RAMP_SHAPE_BIT = 11
-"""Its shape is in the bits from this one on."""
+"""First bit of an entry's shape."""
 LEAST_RAMP_BITS = 6
 MOST_RAMP_BITS = 19
-"""Of the unit of lengths; the longest ramp takes 12.8 s then."""
+"""Largest unit of lengths; the longest ramp is then 12.8 s."""
 _HEAD = "<4sBBBBHHI"
 _RAMPS = "<%dH" % (REST_ENTRIES + OTHER_ENTRIES)
 _RAMPS_AT = struct.calcsize(_HEAD)
@@ -55,18 +54,18 @@ RAMP_SHAPES = (
     b"\xb5\xc2\x95\x43\x64\x82\xe5\xf1\xf1\x21\xf1\x71\x43\xc2\xf4\x76\xf6\xa6\xf1\xf5\x84\x93\xf3\xf1"
     b"\xa4\x82\xf3\xf1\xf3\xf6\xc8\x82"
 )
-"""Of each shape of ramps p + 16 q: from the end of a ramp at which the rate is least, its slope rises to s1 over p/16
-of its length, goes to s2 until q/16, and falls to 0. For each of 30 random motions one is close to its best."""
+"""p + 16 q of each shape: from the end with the lower rate, the slope of the ramp rises linearly to s1 over p/16 of
+its length, changes linearly to s2 until q/16, and falls to 0. Of 30 random motions each has one close to its best."""
 RAMP_WAYS = (
     b"\x20\x2a\x26\x36\x24\x20\x20\x20\x1c\x37\x24\x2c\x26\x20\x1e\x22\x1e\x20\x28\x22\x21\x29\x28\x1e"
     b"\x2a\x26\x24\x22\x1e\x22\x1e\x24"
 )
-"""Of each shape 64 w: w of the ramp's length is the way of a rate from 0 to 1, which with p and q says what s1 and s2
-are."""
+"""64 w of each shape: the motion's time in a ramp from 0 to 1, as a fraction of its length, which with p and q
+determines s1 and s2."""
 EVEN_RAMP = 0
-"""The shape for changes that are none to rest."""
+"""The shape of ramps that do not end at rest."""
 NO_RAMPS = (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS
-"""Of a motion that can neither brake nor change its speed."""
+"""Ramps of a motion that can neither brake nor change its speed."""
 
 
 class MotionError(ValueError):
@@ -111,10 +110,10 @@ def pack(
 
 
 class MotionHead:
-    """What the head of a motion record says; ``length``: bytes of the whole record.
+    """The head of a motion record; ``length``: bytes of the whole record.
 
-    Raises MotionError if the record is cut or of an unknown kind. Who subclasses it checks the checksum, and gives
-    the control points in ``stream``.
+    Raises MotionError if the record is incomplete or of an unknown kind. A subclass checks the checksum, and
+    provides the control points by ``stream``.
     """
 
     def __init__(self, head: bytes, length: int) -> None:
@@ -135,11 +134,11 @@ class MotionHead:
             raise MotionError("length does not fit the header")
 
     def ramp(self, at: int, duration: int, to_rest: bool) -> int:
-        """The entry for a change of speed that begins at a time of the motion; its length is linear between two.
+        """The entry for a change of speed that begins at time ``at`` of the motion; its length is interpolated.
 
-        ``at``, and how long the motion lasts, in a unit of which that is less than 8192, so all are small integers of
-        the board: ``at`` rounded down, ``duration`` up. What is between two entries is taken up to 2 units later if
-        the next one is longer.
+        ``at`` (rounded down) and the motion's ``duration`` (rounded up) are in a unit in which the duration is below
+        8192, so that all are small integers of MicroPython. If the next entry is longer, it is interpolated for a time
+        up to 2 units later.
         """
         parts = (REST_ENTRIES if to_rest else OTHER_ENTRIES) - 1
         at = parts * min(max(at, 0), duration)
@@ -166,11 +165,11 @@ class MotionHead:
         return self.angle_offset(last) + 8 * int(self.segments + self.degree)
 
     def stream(self, offset: int) -> "BinaryIO":
-        """A file at a byte offset of the record; who asks for it closes it."""
+        """A file at a byte offset of the record; the caller closes it."""
         raise NotImplementedError
 
     def points(self, offset: int, count: int) -> "tuple[int, ...]":
-        """``count`` control points from a byte offset on."""
+        """``count`` control points from a byte offset."""
         stream = self.stream(offset)
         try:
             return struct.unpack("<%dq" % count, stream.read(8 * count))
@@ -179,10 +178,10 @@ class MotionHead:
 
 
 class Motion(MotionHead):
-    """A checked view of a motion record in memory; copies nothing but the header.
+    """A checked view of a motion record in memory; only the header is copied.
 
-    Raises MotionError if the record is cut, damaged or of an unknown kind. It does not check the
-    motion itself (ranges, rates, order of times): the board does before a start.
+    Raises MotionError if the record is incomplete, damaged or of an unknown kind. The motion itself (ranges, rates,
+    order of times) is not checked; the board does that before a start.
     """
 
     def __init__(self, data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""The hash by which host and board compare the program that each has."""
+"""The hash by which host and board compare their programs."""
 
 import os
 from binascii import crc32
@@ -7,7 +7,7 @@ _PIECE = 512
 
 
 def program_crc(board: str, shared: str) -> int:
-    """The hash of the program, by the files of its two packages. A deployed program has another function here."""
+    """The hash of the program, from the files of its two packages; a deployed program has another function."""
     board, shared = [path[: path.rindex("/")] for path in (board, shared)]
     return sources_crc(board, shared)
 
@@ -22,7 +22,7 @@ def sources_crc(board: str, shared: str) -> int:
 
 
 def _sources(folder: str) -> "list[str]":
-    """Paths of the Python files, from the folder on; what has no dot in its name is taken for a folder."""
+    """Paths of the Python files, relative to the folder; a name without a dot is a folder."""
     found = []
     for name in os.listdir(folder):
         if name.endswith(".py"):

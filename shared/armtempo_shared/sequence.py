@@ -1,6 +1,6 @@
-"""The sequence record: which stored motions the board runs one after the other, and what it does between them.
+"""The sequence record: the stored motions that the board runs one after the other, and the steps between them.
 
-Little endian. It names its motions by name and checksum, and carries no motion itself.
+Little endian. It refers to its motions by name and checksum.
 
 ::
 
@@ -15,17 +15,17 @@ Little endian. It names its motions by name and checksum, and carries no motion 
     ...     24 C   the counters: 24s name (padded with 0)
     end     I      crc32 over all before it
 
-A repeat whose first pass begins elsewhere than the others has the rows of that pass before it. ``step`` is the step
-of the sequence file that a row comes from (from 1), for those who follow it. The others, by op:
+If the first pass of a repeat begins at another posture than the others, its rows are before the repeat. ``step`` is
+the step of the sequence file (from 1) of a row, for reports. The other fields by op:
 
 ====  ===========  ==================  ===============================  ================================
 op                 number              value                            amount
 ====  ===========  ==================  ===============================  ================================
 1     MOVE         of the motion       0                                0
-2     OUTPUT       of the output       what it is set to, 0 to 65535    0
+2     OUTPUT       of the output       value, 0 to 65535                0
 3     WAIT         0                   0                                ms
-4     WAIT_INPUT   of the input        level | what a time-out does     ms until the time-out, 0: for ever
-5     REPEAT       0                   1: a pass is before it      how many times, 0: for ever
+4     WAIT_INPUT   of the input        level | effect of a time-out     ms until the time-out, 0: none
+5     REPEAT       0                   1: a pass is before it           number of times, 0: for ever
 6     END          0                   1: its passes count as cycles    0
 7     COUNT        of the counter      0                                0
 ====  ===========  ==================  ===============================  ================================
@@ -40,14 +40,14 @@ from armtempo_shared.limits import MAX_NAME
 
 MAGIC = b"ATS2"
 KIND_BYTES = 3
-"""Of the magic that are the same in all versions."""
+"""Bytes of the magic that are the same in all versions."""
 MOVE, OUTPUT, WAIT, WAIT_INPUT, REPEAT, END, COUNT = 1, 2, 3, 4, 5, 6, 7
 ACTIVE = 1
-"""Bit of the value of WAIT_INPUT: the level waited for. The others say what a time-out does:"""
+"""Bit of the value of WAIT_INPUT: the level to wait for. The other bits are the effect of a time-out:"""
 STOP_THEN, FAULT_THEN, NEXT_THEN = 0, 2, 4
 
 ENDINGS = ("none", "running", "finished", "stopped", "timed_out", "fault", "refused")
-"""The state of a sequence, or how it ended, by its number on the wire; none: there was none since the start."""
+"""State of a sequence, or how it ended, by its number on the wire; none: no sequence since the start."""
 NONE, RUNNING, FINISHED, STOPPED, TIMED_OUT, FAULTED, REFUSED = 0, 1, 2, 3, 4, 5, 6
 
 MAX_ROWS, MAX_MOTIONS, MAX_NESTING, MAX_COUNTERS = 500, 64, 4, 8
@@ -92,10 +92,10 @@ def pack(
 
 
 class SequenceRecord:
-    """What a record of ``length`` bytes says; who subclasses it gives the bytes in ``part``, and checks the checksum.
+    """A record of ``length`` bytes; a subclass provides the bytes by ``part``, and checks the checksum.
 
-    Raises SequenceError if the record is cut or of an unknown kind, OtherVersionError if it is of another
-    version. What its rows say is judged by ``sequence_check.check``.
+    Raises SequenceError if the record is incomplete or of an unknown kind, OtherVersionError if it is of another
+    version. ``sequence_check.check`` checks the rows.
     """
 
     def __init__(self, length: int) -> None:
@@ -115,7 +115,7 @@ class SequenceRecord:
             raise SequenceError("more of something than the board takes")
 
     def part(self, offset: int, size: int) -> bytes:
-        """That many bytes of the record from ``offset`` on."""
+        """``size`` bytes of the record from ``offset`` on."""
         raise NotImplementedError
 
     def row(self, index: int) -> "tuple[int, ...]":

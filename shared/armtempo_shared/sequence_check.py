@@ -1,4 +1,4 @@
-"""What a sequence record must keep besides its checksum: before it is stored, and again before it is run."""
+"""Checks of a sequence record, before it is stored, and again before it is run."""
 
 from armtempo_shared import sequence
 from armtempo_shared.sequence import SequenceError
@@ -9,13 +9,13 @@ if TYPE_CHECKING:
 
 _MOST_VALUES = (0, 0, 0xFFFF, 0, sequence.ACTIVE | sequence.NEXT_THEN, 1, 1, 0)
 _MOST_AMOUNTS = (0, 0, 0, sequence.MAX_WAIT_MS, sequence.MAX_WAIT_MS, sequence.MAX_REPEATS, 0, 0)
-"""The most that a row's value and amount may be, by its op."""
+"""Largest amount of a row by its op."""
 
 
 def check(record: "SequenceRecord") -> None:
-    """SequenceError with the row that is not understood: nothing of such a record may be run."""
+    """Raise SequenceError, with the row, for an invalid record."""
     depth = 0
-    # of outputs and inputs the arm says how many there are
+    # the numbers of outputs and inputs are checked with the arm
     most_numbers = (0, record.motions - 1, 0xFF, 0, 0xFF, 0, 0, record.counters - 1)
     for index in range(record.rows):
         op, number, value, amount, step = record.row(index)

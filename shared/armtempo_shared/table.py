@@ -1,12 +1,17 @@
-"""The message table: every command, answer, event and reply with its number and fields. Their only home.
+"""The message table: every command, answer, event and reply with its number and fields.
 
-``wire.py`` encodes and decodes by it, ``shared/docs/protocol.md`` is generated from it. It is one text, so
-that the board can parse it and free the memory again.
+``wire.py`` encodes and decodes with it, ``shared/docs/protocol.md`` is generated from it. It is a single text, so that
+the board can parse it and free the memory.
 
-A row: kind (C command, A the answer to it; O and P the same of commands that a board only knows if its arm has
-outputs or inputs, S and T of that which it knows when a sequence was started; E event, R reply), name, number in hex,
-fields as ``name:type`` in the letters of ``struct``, little endian without padding, then ``text`` (UTF-8) or ``bytes``
-if the rest of the payload is such a tail. A line that begins with a blank continues with the row.
+A row has
+
+- the kind: C command, A its answer; O and P the same of commands that a board only knows if its arm has outputs or
+  inputs; S and T of those that it knows once a sequence was started; E event; R reply;
+- the name, and the number in hex;
+- fields as ``name:type`` with the letters of ``struct``, little endian without padding;
+- ``text`` (UTF-8) or ``bytes`` if the rest of the payload is such a tail.
+
+A line that begins with a blank continues the row.
 """
 
 from struct import calcsize
@@ -76,7 +81,7 @@ R error 7f command:B code:B joint:B value:q
 
 
 def rows(kind: str) -> "Iterator[tuple[str, int, str, list[str], str]]":
-    """(name, number, struct format, field names, tail) of each row of a kind, in their order."""
+    """(name, number, struct format, field names, tail) of each row of a kind, in order."""
     for line in _TABLE.replace("\n ", " ").split("\n"):
         if line[:1] == kind:
             words = line.split()
@@ -87,7 +92,7 @@ def rows(kind: str) -> "Iterator[tuple[str, int, str, list[str], str]]":
 
 
 def offset(kind: str, name: str, field: str) -> int:
-    """Bytes of the payload of a message before one of its fields; KeyError if there is none."""
+    """Offset of a field in the payload of a message; raises KeyError if there is none."""
     for found, _, layout, fields, _ in rows(kind):
         if found == name and field in fields:
             return calcsize(layout[: 1 + fields.index(field)])

@@ -1,16 +1,11 @@
-"""The wire protocol for the host: making and finding frames by ``table.py``.
+"""The wire protocol of the host: making and finding frames with ``table.py``.
 
 A frame::
 
     0xA5 | length N (H) | sequence (B) | message id (B) | payload, N bytes | crc32 over length..payload (I)
 
-little endian. A frame whose checksum fails is ignored and the search for 0xA5 continues at the next byte. The host
-sends commands; the board answers each with ``ok`` or ``error`` carrying the command's sequence number. A repeated
-command is answered again from memory but not executed again. The board sends events by itself, under their own
-sequence numbers.
-
-The board has its own frame finder, which allocates nothing (``armtempo_board/link/frame_reader.py``); a test feeds
-both the same bytes.
+little endian; see shared/docs/protocol.md. The board has its own frame finder, which allocates nothing
+(``armtempo_board/link/frame_reader.py``); a test feeds both the same bytes.
 """
 
 import struct
@@ -59,13 +54,13 @@ class WireError(ValueError):
 
 
 def encode(entry: "Any", values: "Any" = (), tail: "bytes | str" = b"") -> bytes:
-    """The payload of a message: ``entry`` from an index above, its field values in order, its tail."""
+    """The payload of a message: ``entry`` from an index above, field values in order, and tail."""
     rest = tail.encode() if isinstance(tail, str) else tail
     return struct.pack(entry[2], *values) + rest
 
 
 def decode(entry: "Any", payload: bytes) -> "tuple[tuple[Any, ...], Any]":
-    """(tuple of field values, tail) of a payload; WireError if it does not fit."""
+    """(tuple of field values, tail) of a payload; raises WireError if it does not fit."""
     _, _, fields, _, kind = entry
     size = struct.calcsize(fields)
     if len(payload) < size or (not kind and len(payload) != size):
@@ -80,9 +75,9 @@ def decode(entry: "Any", payload: bytes) -> "tuple[tuple[Any, ...], Any]":
 
 
 def record_crc(data: bytes) -> int:
-    """The number that identifies a record in commands and answers: its own crc32, the last four bytes.
+    """The number that identifies a record: its own crc32, the last four bytes.
 
-    (The crc32 over all of a record that ends with its crc32 is the same number for every record.)
+    (The crc32 of everything, including it, is the same for all records.)
     """
     return int(struct.unpack_from("<I", data, len(data) - 4)[0])
 
@@ -96,7 +91,7 @@ def frame(sequence: int, number: int, payload: bytes) -> bytes:
 class Parser:
     """Finds frames in a byte stream; keeps an incomplete one.
 
-    ``bad`` counts sequences of bytes that belonged to no frame.
+    ``bad`` counts sequences of bytes outside of frames.
     """
 
     def __init__(self, limit: int = MAX_PAYLOAD) -> None:
@@ -110,11 +105,11 @@ class Parser:
         self._buffer.extend(data)
 
     def pending(self) -> int:
-        """Number of bytes that wait for the rest of their frame."""
+        """Number of bytes of an incomplete frame."""
         return len(self._buffer)
 
     def drop(self) -> None:
-        """Skip the oldest byte: for a frame whose rest does not come."""
+        """Skip the oldest byte, for a frame whose rest does not arrive."""
         self._skip(1)
 
     def _skip(self, count: int) -> None:
@@ -125,7 +120,7 @@ class Parser:
             self._buffer = self._buffer[count:]
 
     def next(self) -> "Frame | None":
-        """The next whole frame, or None."""
+        """The next complete frame, or None."""
         while True:
             start = self._buffer.find(bytes((SYNC,)))
             self._skip(len(self._buffer) if start < 0 else start)

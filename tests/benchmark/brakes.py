@@ -5,7 +5,7 @@ law from just that moment, and over that of any law, which an optimiser of its o
 rate of the motion's own time go from 1 to 0 (its second derivative constant over each of 24 parts), with acceleration
 and jerk within EXCESS times the limits? Linear programs, each linear in the change of the rate, for shorter and
 shorter times; what none is found for counts as too short, so the optimum may be missed by a little. The look-ahead
-of the board (75 ms) comes on top of each.
+of the board (33 to 75 ms) comes on top of each.
 
 ``--parts N``: instead, how close a table would come that holds a shape of N parts for each of its spaces, fit for a
 brake that begins at its start, middle or end.

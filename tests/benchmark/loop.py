@@ -11,13 +11,13 @@ files; only what stands around it is built in, as its heap is not the program's.
 
 from __future__ import annotations
 
+import itertools
 import re
 import struct
 import sys
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -51,6 +51,11 @@ SIX = (
     (40_000, 6, 2.0, 4.2),
 )
 WORST_CYCLES = 3.0
+CHANGE_EVERY = 8  # of a change of speed, in pairs of other commands
+BRAKE = -1
+CHANGES = ((BRAKE,), (0, 1000))
+CHANGED = ((240_000, 1), (40_000, 1), (80_000, 3), (25_000, 3), (8_000, 6), (20_000, 6), (40_000, 6))
+"""Rates of each joint, and joints, whose speed is changed."""
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
 RAMPS = (TICK_HZ // 2 >> MOST_RAMP_BITS,) * (REST_ENTRIES + OTHER_ENTRIES)
@@ -85,6 +90,8 @@ class Case:
     rows: list[Row]
     motion: bytes
     start: list[int]
+    changes: tuple[int, ...] = ()
+    """Speeds that are asked for while it moves, in thousandths; 0: a pause, BRAKE: a stop."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +116,9 @@ class Run:
     seconds: float
 
 
-def cruise(rate: int, joints: int, ramp_s: float = RAMP_S, whole_s: float = WHOLE_S) -> Case:
+def cruise(
+    rate: int, joints: int, ramp_s: float = RAMP_S, whole_s: float = WHOLE_S, changes: tuple[int, ...] = ()
+) -> Case:
     """All joints alike: up to a rate, and down again. All limit switches and two encoders are fitted."""
     flags = armrecord.FLAG_ESTOP_FITTED | armrecord.FLAG_ESTOP_ACTIVE_HIGH
     rows = [
@@ -125,7 +134,12 @@ def cruise(rate: int, joints: int, ramp_s: float = RAMP_S, whole_s: float = WHOL
     ]
     motion = motions.cruise(rate, joints, ramp_s, whole_s)
     return Case(
-        "cruise", {**HEAD, "flags": flags, "pulse_ticks": 100, "low_ticks": 100}, rows, motion, [0] * joints
+        "cruise",
+        {**HEAD, "flags": flags, "pulse_ticks": 100, "low_ticks": 100},
+        rows,
+        motion,
+        [0] * joints,
+        changes,
     )
 
 
@@ -251,8 +265,12 @@ def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> Non
         ("home", ((1 << joints) - 1,), struct.pack(f"<{joints}i", *case.start)),
         ("start", (0, wire.record_crc(bytes(motion))), b"go"),
     ]
+    changes = iter(case.changes)
     for number in range(COMMANDS // 2):
         session += [("status", (), b""), ("samples", (number, 0), b"")]
+        if number % CHANGE_EVERY == CHANGE_EVERY - 1:
+            for rate in itertools.islice(changes, 1):
+                session.append(("stop", (0,), b"") if rate == BRAKE else ("speed", (rate,), b""))
     with (tree / "frames").open("wb") as file:
         for sequence, (name, values, tail) in enumerate(session):
             entry = wire.COMMAND[name]
@@ -293,7 +311,7 @@ def _turn(took: int, command: bool, answer: bool, log: str, scale: float) -> Tur
     entries = [(what >> 16, time * scale) for what, time in zip(numbers[::2], numbers[1::2], strict=True)]
     feeds = [
         end - begin
-        for (what, begin), (after, end) in pairwise(entry for entry in entries if entry[0] != _CELL)
+        for (what, begin), (after, end) in itertools.pairwise(entry for entry in entries if entry[0] != _CELL)
         if (what, after) == (_FEED, _FED)
     ]
     cells = sum(what == _CELL for what, _ in entries)
@@ -359,6 +377,12 @@ def _at_limits(board: Board) -> None:
         for rate, joints in AT_LIMITS:
             run = board.run(cruise(rate, joints), cycles)
             print(f"    {cycles} cycles, joints {joints}, {rate} steps/s: {_end(run)}", flush=True)
+        for (rate, joints), changes in itertools.product(CHANGED, CHANGES):
+            run = board.run(cruise(rate, joints, 0.6, 3.0, changes), cycles)
+            print(
+                f"    {cycles} cycles, joints {joints}, {rate} steps/s, speeds {changes}: {_end(run)}",
+                flush=True,
+            )
         for rate, joints, ramp_s, whole_s in SIX:
             run = board.run(cruise(rate, joints, ramp_s, whole_s), cycles)
             print(

@@ -30,8 +30,8 @@ from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
 
 from tests.system import panels
-from tests.system.held_jogs import Cable
 from tests.system.panels import Panel, Panels
+from tests.system.relay import Cable
 
 HOWS = ("button", "tab", "browser", "server", "cable")
 WATCHING = 10

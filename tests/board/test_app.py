@@ -21,20 +21,10 @@ from tests import interpreters, scripted
 SCRIPTS = Path(__file__).parent / "scripts"
 BASICS = SCRIPTS / "probes" / "app_basics.py"
 SUBJECTS = [
-    SCRIPTS / "cases" / f"app_{name}.py"
-    for name in (
-        "commands",
-        "storing",
-        "runs",
-        "held",
-        "faults",
-        "outputs",
-        "prompt",
-        "start",
-        "sequence_start",
-        "sequences",
-    )
-] + [SCRIPTS / "cases" / "heap_modules.py"]
+    *(SCRIPTS / "cases" / f"app_{name}.py" for name in ("commands", "runs", "faults", "start")),
+    *(SCRIPTS / "cases" / f"app_{name}.py" for name in ("sequence_start", "sequences")),
+    SCRIPTS / "cases" / "heap_modules.py",
+]
 
 
 @pytest.mark.parametrize("name", interpreters.EACH)

@@ -11,7 +11,7 @@ from tests import interpreters, scripted
 CASES = Path(__file__).parent / "scripts" / "cases"
 SCRIPTS = [
     CASES / f"{name}.py"
-    for name in ("engine_pulses", "engine_faults", "engine_brake", "engine_override", "rings", "encoders")
+    for name in ("engine_pulses", "engine_faults", "engine_override", "rings", "encoders")
 ]
 QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 

@@ -15,7 +15,7 @@ from types import ModuleType
 from unittest.mock import patch
 
 import pytest
-from armtempo_shared.motion import RAMP_SHAPES, Motion
+from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPES, Motion
 
 from tests import inprocess, interpreters, ramps
 from tests.board import motions
@@ -144,6 +144,8 @@ class Tried:
     fitted: int = 0
     rejected: int = 0
     steps: int = 0
+    solved: int = 0
+    """Calls of ``solve``, for one node or two."""
 
 
 class Arrays:
@@ -154,17 +156,17 @@ class Arrays:
         return array("i", bytes(4 * words))
 
 
-def walk(board: Modules, record: bytes) -> Tried:
-    """Through a motion of one joint."""
+def walk(board: Modules, record: bytes, brake: tuple[int, int] = (0, 0)) -> Tried:
+    """Through a motion of one joint; ``brake``: where it begins and how long it takes, ticks."""
     generators, intervals = (
         importlib.import_module(f"armtempo_board.stepgen.{name}")
         for name in ("step_generator", "interval_steps")
     )
     tried = Tried()
-    fit, put = intervals.cubics_fit, intervals.put_cubics
+    fit, put, solve = intervals.cubics_fit, intervals.put_cubics, intervals.solve
 
-    def fitting(steps: int, solver: array[int], queue: array[int]) -> int:
-        verdict: int = fit(steps, solver, queue)
+    def fitting(steps: int, *others: object) -> int:
+        verdict: int = fit(steps, *others)
         tried.rejected += not verdict
         return verdict
 
@@ -173,9 +175,15 @@ def walk(board: Modules, record: bytes) -> Tried:
         tried.steps += 2 * steps
         put(steps, *others)
 
-    with patch.multiple(intervals, cubics_fit=fitting, put_cubics=putting):
+    def solving(*others: object) -> None:
+        tried.solved += 1
+        solve(*others)
+
+    with patch.multiple(intervals, cubics_fit=fitting, put_cubics=putting, solve=solving):
         generator = generators.StepGenerator(Arrays())
         generator.load(Motion(record), 0, 0, 168, 20_000)
+        if brake[1]:
+            generator.follow(braked(*brake), True)
         while not generator.ended:
             generator.prepare(NEVER_KITICKS)
             generator.queue[board.queue.STEPS] = 0
@@ -193,6 +201,25 @@ def test_how_long_the_next_cubics_may_be_is_found_without_many_trials(
     assert 0.95 * rate * 0.7 < tried.steps < rate * 0.7, tried
     assert tried.rejected <= 0.12 * tried.fitted, tried
     assert tried.steps >= LEAST_STEPS[rate] * tried.fitted, tried
+
+
+def braked(start: int, length: int) -> array[int]:
+    """The law of a brake; the length is a multiple of 128 000 ticks."""
+    time_law = importlib.import_module("armtempo_board.stepgen.time_law")
+    law = array("i", bytes(4 * time_law.LAW_WORDS))
+    time_law.set_length(law, length)
+    time_law.set_ramp(law, EVEN_RAMP, 1000, 0)
+    for place, motion_ticks, ticks in (("START", start, start), ("END", start + length // 2, start + length)):
+        time_law.set_times(law, getattr(time_law, f"{place}_HIGH"), motion_ticks)
+        time_law.set_times(law, getattr(time_law, f"REAL_{place}_HIGH"), ticks)
+    return law
+
+
+def test_a_brake_solves_few_nodes(board: Modules) -> None:
+    """Half a second from 80 000 steps/s, which solved so many that three joints had an underrun."""
+    tried = walk(board, motions.cruise(80_000, 1, 0.5, 1.6), (50_400_000, 41_984_000))
+    assert tried.steps > 47_500, tried
+    assert tried.solved < 280, tried
 
 
 # bezier points of spline segments, to the unit, under CPython

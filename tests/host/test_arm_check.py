@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.cli import main, state
-from armtempo.diagnosis import drives, figures, machine, resolution, torque
+from armtempo.cli import doctor, main, state
+from armtempo.diagnosis import drives, figures, torque
 from armtempo.diagnosis.arm_check import check, check_arm
 from armtempo.diagnosis.finding import Level
 from armtempo.kinematics.chain import chains_mm, outline_mm
@@ -20,7 +20,6 @@ from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.parts import JointModel
 from armtempo.ports.board_port import Port
-from armtempo.robot import board_check
 from armtempo.robot.board_state import BoardState
 from click.testing import CliRunner
 
@@ -236,9 +235,9 @@ def test_a_job_is_not_looked_at_before_its_arm_is_right(tmp_path: Path) -> None:
 
 
 def test_the_longest_lever_is_that_of_the_stretched_arm() -> None:
-    scara = [found.lever_mm for found in resolution.resolutions(Arm.load("scara"))]
+    scara = [found.lever_mm for found in figures.resolutions(Arm.load("scara"))]
     np.testing.assert_allclose(scara, [228 + 136.5, 136.5, 0], rtol=1e-4, atol=1e-6)
-    lower = resolution.resolutions(Arm.load("community"))[1]
+    lower = figures.resolutions(Arm.load("community"))[1]
     # The rods keep forearm and hand from turning with it
     assert lower.lever_mm == pytest.approx(120, rel=1e-4)
 
@@ -345,7 +344,7 @@ STATE = BoardState(
 
 
 def test_a_sound_board_has_nothing_wrong() -> None:
-    assert {item.level for item in board_check.examine_board(STATE)} == {Level.GOOD}
+    assert {item.level for item in doctor.examine_board(STATE)} == {Level.GOOD}
 
 
 @pytest.mark.parametrize(
@@ -364,9 +363,7 @@ def test_a_sound_board_has_nothing_wrong() -> None:
     ],
 )
 def test_what_is_wrong_with_a_board(change: dict[str, object], level: Level, words: str, cure: str) -> None:
-    found = [
-        item for item in board_check.examine_board(replace(STATE, **change)) if item.level is not Level.GOOD
-    ]  # type: ignore[arg-type]
+    found = [item for item in doctor.examine_board(replace(STATE, **change)) if item.level is not Level.GOOD]  # type: ignore[arg-type]
     assert [item.level for item in found] == [level]
     assert words in found[0].what
     assert cure in found[0].next_step
@@ -380,26 +377,26 @@ def test_another_version_of_the_program_is_told_with_both_and_what_to_do() -> No
 
 
 def test_a_board_that_does_not_answer() -> None:
-    (item,) = board_check.examine_board(LinkError("no answer within 2 s; check power and cable"))
+    (item,) = doctor.examine_board(LinkError("no answer within 2 s; check power and cable"))
     assert item.level is Level.ERROR
     assert "no answer" in item.what
 
 
 def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(machine, "find_ports", lambda: [Port("/dev/ttyACM0", "board", True)])
-    monkeypatch.setattr(machine.os, "access", lambda *_: False)
-    monkeypatch.setattr(machine.sys, "platform", "linux")
-    (item,) = machine.ports()
+    monkeypatch.setattr(doctor.board_port, "find_ports", lambda: [Port("/dev/ttyACM0", "board", True)])
+    monkeypatch.setattr(doctor.os, "access", lambda *_: False)
+    monkeypatch.setattr(doctor.sys, "platform", "linux")
+    (item,) = doctor.ports()
     assert item.level is Level.ERROR
     assert "dialout" in item.next_step
 
 
 def test_packages_that_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(name: str) -> str:
-        raise machine.PackageNotFoundError(name)
+        raise doctor.PackageNotFoundError(name)
 
-    monkeypatch.setattr(machine, "version", nothing)
-    levels = {item.where: item.level for item in machine.packages()}
+    monkeypatch.setattr(doctor, "version", nothing)
+    levels = {item.where: item.level for item in doctor.packages()}
     assert levels["numpy"] is Level.ERROR
     assert levels["matplotlib"] is Level.NOTE
     assert "sphinx" not in levels

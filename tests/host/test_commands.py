@@ -173,15 +173,19 @@ def test_interrupt_brakes_then_freezes_and_keeps_the_samples(
 def test_arm_is_not_replaced_silently(run: Run, file: str, tmp_path: Path) -> None:
     run("upload", file)
     other = tmp_path / "other.toml"
-    other.write_text(shipped.arm_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0"))
+    text = shipped.arm_path().read_text().replace("pulse_us = 2.0", "pulse_us = 3.0")
+    other.write_text(text.replace("microsteps = 8, gear_ratio = 20.0", "microsteps = 16, gear_ratio = 20.0"))
     run("home")
     refused = run("home", "--arm", str(other), code=1).output
     assert "set up for a different arm" in refused
-    assert "driver timing" in refused
+    assert "switches; joint 2: encoder counts a step, range, speed limit\n" in refused
     assert "armtempo configure" in refused
     assert "idle" in run("status").output
     run("home", "--arm", str(other), "--replace-arm")
     assert "set up for a different arm" in run("home", code=1).output
+    unsaid = run("home", code=2, ARMTEMPO_ARM="").output
+    assert "which arm does the board move? It is set up for an arm other than the paper's" in unsaid
+    assert "give --arm" in unsaid
     assert "planned for a different arm" in run("run", file, "--arm", str(other), code=2).output
 
 
@@ -211,6 +215,7 @@ def test_ports_and_missing_ports() -> None:
     result = CliRunner().invoke(main, ["status"], env={"ARMTEMPO_PORT": "/dev/nowhere"})
     assert result.exit_code == 2
     assert "there is no port /dev/nowhere" in result.output
+    assert "armtempo ports" in result.output
 
 
 def test_a_typing_error_names_the_file_that_is_meant(run: Run, tmp_path: Path) -> None:

@@ -200,21 +200,6 @@ def test_slopes_of_the_tool_are_those_of_its_position(linkage: bool) -> None:
         assert state.axes_deg[0, :, joint] == pytest.approx(axis, abs=1e-8)
 
 
-@pytest.mark.parametrize("linkage", [False, True])
-def test_the_tool_deviation_is_a_bound(linkage: bool) -> None:
-    joints = [replace(joint, parallel_linkage=linkage and n == 2) for n, joint in enumerate(ARM.joints)]
-    arm = replace(ARM, joints=tuple(joints))
-    rng = np.random.default_rng(2)
-    path, through = rng.uniform(-60, 60, (2, 1, 6, 3))
-    found = corridor.tool_deviation_mm(path, through, Tool(arm, [0, 1, 2], np.zeros(3)))
-    u = np.linspace(0, 1, 5001)[:, None]
-    bernstein = np.array([1, 5, 10, 10, 5, 1]) * u ** np.arange(6) * (1 - u) ** (5 - np.arange(6))
-    sampled_mm = np.linalg.norm(
-        tool_mm(arm, bernstein @ path[0]) - tool_mm(arm, bernstein @ through[0]), axis=1
-    )
-    assert sampled_mm.max() <= found <= sampled_mm.max() * 1.002
-
-
 def poses(tolerance_mm: float, tolerance_deg: float) -> Job:
     """Three poses, the middle one with a tolerance; all joints have motors."""
     angles = np.array([[0.0, -60.0, 40.0], [60.0, -80.0, 60.0], [20.0, -50.0, 30.0]])
@@ -249,10 +234,10 @@ def test_per_joint_timing_takes_each_joint_through_its_own_angles() -> None:
 
 @pytest.mark.slow
 def test_a_seed_repeats_and_starts_are_reported() -> None:
-    job = replace(FEED, via=FEED.via[:4], refine=4, starts=3)
+    job = replace(FEED, via=FEED.via[:3], refine=4, starts=2)
     one, two = planner.plan(ARM, job), planner.plan(ARM, job)
     assert np.array_equal(one.trajectory.joints[0].time_points_s, two.trajectory.joints[0].time_points_s)
-    assert len(one.searches[0].starts_s) == 3
+    assert len(one.searches[0].starts_s) == 2
 
 
 @pytest.mark.parametrize(
@@ -278,9 +263,8 @@ def test_refuses_what_a_free_path_cannot_be(changes: dict[str, object], message:
         planner.plan(ARM, replace(FEED, **changes))
 
 
-@pytest.mark.slow
 def test_time_that_does_not_increase_is_refused() -> None:
-    plan = planner.plan(ARM, replace(FEED, refine=3))
+    plan = planner.plan(ARM, replace(FEED, path="through", refine=1, iterations=5))
     spline = plan.trajectory.joints[0]
     times = spline.time_points_s.copy()
     times[4] = times[3]
@@ -333,15 +317,16 @@ def test_the_curve_names_both_its_ends() -> None:
     assert plots.corridor_csv(points, "deg").splitlines()[1:] == ["0.0,4.0", "1.0,3.0", "2.0,2.8", ",2.5"]
 
 
-@pytest.mark.parametrize("away_deg", [0.003, 0.3, 10.0])
-def test_the_tools_deviation_is_bounded_sharply(away_deg: float) -> None:
+@pytest.mark.parametrize(("away_deg", "linkage"), [(0.003, False), (0.3, True), (10.0, False), (60.0, True)])
+def test_the_tools_deviation_is_bounded_sharply(away_deg: float, linkage: bool) -> None:
     """Against the distance at many places of random pieces that are farthest apart off their middles and ends."""
     rng = np.random.default_rng(20261123)
     posture = np.array([0.0, -60.0, 40.0])
     through = posture + rng.uniform(-15.0, 15.0, (4, 6, 3))
     path = through.copy()
     path[:, 1] += rng.uniform(0.5, 1.0, (4, 3)) * away_deg
-    tool = Tool(Arm.paper(), [0, 1, 2], posture)
+    joints = [replace(joint, parallel_linkage=linkage and n == 2) for n, joint in enumerate(ARM.joints)]
+    tool = Tool(replace(ARM, joints=tuple(joints)), [0, 1, 2], posture)
     u = np.linspace(0.0, 1.0, 2001)
     at = np.array([comb(5, k) * u**k * (1.0 - u) ** (5 - k) for k in range(6)])
     places = [

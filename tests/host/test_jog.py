@@ -76,16 +76,12 @@ def test_the_law_keeps_its_limits_and_its_speed_in_the_middle() -> None:
 @pytest.mark.slow
 def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond_and_stops_soon() -> None:
     """Braking from a constant speed takes what EXCESS of the limits allows, as the rise of a jog uses half of them."""
-    for arm, numbers in ((PAPER, (0, 1, 2)), (AR4, (1, 4))):
+    for arm, numbers in ((PAPER, (0, 2)), (AR4, (1,))):
         here = on_steps(arm, list(arm.home_deg))
         for number in numbers:
             joint = arm.driven[number]
             for sign in (1, -1):
-                try:
-                    motion = jog_motion.plan("x", arm, here, JogMove(sign * INF, joint=number))
-                except InputError:  # it is at home already
-                    assert here[number] in joint.range_deg
-                    continue
+                motion = jog_motion.plan("x", arm, here, JogMove(sign * INF, joint=number))
                 assert "end of its range" in motion.ends
                 check_limits(motion, arm, jog_motion.SPEED)
                 edge = joint.range_deg[sign > 0]
@@ -112,8 +108,7 @@ def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("by", [0.1, -1.0, 10.0])
-@pytest.mark.parametrize("speed", [0.01, 0.25, 1.0])
+@pytest.mark.parametrize(("by", "speed"), [(0.1, 1.0), (-1.0, 0.25), (10.0, 0.01), (10.0, 1.0)])
 def test_a_step_goes_as_far_as_it_says(by: float, speed: float) -> None:
     here = on_steps(AR4, ELBOW_DEG)
     motion = jog_motion.plan("x", AR4, here, JogMove(by, joint=4), speed)
@@ -123,8 +118,10 @@ def test_a_step_goes_as_far_as_it_says(by: float, speed: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("axis", ["x", "y", "z", "tool-x", "tool-y", "tool-z"])
-@pytest.mark.parametrize("by", [-INF, 5.0, -0.1])
+@pytest.mark.parametrize(
+    ("axis", "by"),
+    [("x", -INF), ("y", 5.0), ("z", -0.1), ("tool-x", 5.0), ("tool-y", -0.1), ("tool-z", -INF)],
+)
 def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: float) -> None:
     here = on_steps(AR4, ELBOW_DEG)
     motion = jog_motion.plan("x", AR4, here, JogMove(by, axis=axis))

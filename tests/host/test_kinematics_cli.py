@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from armtempo.cli import main
 from armtempo.kinematics import forward
-from armtempo.kinematics.forward import all_frames, array_frames
+from armtempo.kinematics.forward import all_frames
 from armtempo.model import pose, shipped
 from click.testing import CliRunner, Result
 
-from tests.host.arms import FOUR, NAMED, PAPER, toml
+from tests.host.arms import FOUR, PAPER, toml
 
 EQ_16_AT_1_TO_5 = "0 0 -1 -536.404 0 1 0 0 1 0 0 434.698"
 POSITION = ("--position", "-536.404", "0", "434.698")
@@ -308,18 +308,6 @@ def test_every_frame_is_listed_from_the_base_to_the_tool() -> None:
     wanted = all_frames(PAPER, np.radians([10.0, -60.0, 40.0, 20.0, 30.0, 170.0]).tolist())
     np.testing.assert_allclose([frame["matrix"] for frame in frames], wanted, atol=1e-9)
     assert frames[-1]["matrix"] == found["tool"]["matrix"]
-
-
-def test_floats_and_arrays_give_the_same_frames() -> None:
-    rng = np.random.default_rng(61)
-    for geometry in NAMED.values():
-        angles = rng.uniform(-3, 3, (5, 6))
-        together = [np.stack([np.array(axis) for axis in frame]) for frame in array_frames(geometry, angles)]
-        for i, one in enumerate(angles):
-            alone = all_frames(geometry, one.tolist())
-            for frame, whole in zip(alone, together, strict=True):
-                columns = np.swapaxes(whole, 0, 1)[..., i] if whole.ndim == 3 else whole.T
-                np.testing.assert_allclose(frame[:3], columns, atol=1e-12 * geometry.reach)
 
 
 @pytest.mark.parametrize(

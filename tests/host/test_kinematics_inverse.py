@@ -17,9 +17,9 @@ from armtempo.kinematics import (
     refusals,
 )
 from armtempo.kinematics.inverse import CHUNK
-from armtempo.kinematics.moved_tool import moved_tool_deg
 from armtempo.kinematics.shape import Shape
 from armtempo.kinematics.solutions import DUPLICATE, ELBOW_STRETCHED, OK, WRIST_STRAIGHT
+from armtempo.kinematics.solver import moved_tool_deg
 
 from tests.host.arms import (
     EQ_16,

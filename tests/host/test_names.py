@@ -128,11 +128,8 @@ def ends(line: str) -> list[int]:
     return [found.end() for found in re.finditer(r"\S(?=  |$)", line)]
 
 
-def test_rows_are_filled_up_to_the_widths() -> None:
+def test_rows_are_filled_up_to_the_widths_and_what_is_longer_widens_its_column() -> None:
     assert aligned([("ab", "1"), ("", "23")], (4, 3)) == ["ab    1", "     23"]
-
-
-def test_what_is_longer_widens_its_column() -> None:
     rows = [("joint", "s", "x"), ("a long name", "12345", "1"), ("b", "1", "1")]
     assert aligned(rows, (6, 3, 3)) == [
         "joint           s  x",

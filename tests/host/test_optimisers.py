@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from armtempo import optimise
 from armtempo.basics.errors import InputError
-from armtempo.optimise import cs, ga, iaga, swarm
+from armtempo.optimise import cs, ga, iaga, pso
 from armtempo.optimise.task import Array, Number, Task
 from armtempo.planning.fitness import Fitness
 
@@ -234,7 +234,7 @@ def test_every_individual_mutates_at_least_so_often(monkeypatch: pytest.MonkeyPa
 
 def test_selection_keeps_the_better_half_and_the_memories() -> None:
     bowl = Bowl()
-    moved = swarm.Swarm(Task(bowl, BOUNDS, np.random.default_rng(2), 8, 1), 0.2)
+    moved = pso.Swarm(Task(bowl, BOUNDS, np.random.default_rng(2), 8, 1), 0.2)
     before = moved.values.copy()
     places = moved.positions[before.argmin()].copy()
     moved.select(rivals=2000)  # with that many rivals the score is the rank

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.cli.live import Live
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.kinematics import chain
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.paper import searches
 from armtempo.records import encoded_motion
-from armtempo.report import analysis, arm_picture, drawing, html_page, plan_section, plots, run_folder
+from armtempo.report import analysis, arm_picture, drawing, html_page, plots, run_folder, sections
 from armtempo.report.live_plot import LivePlot
 from armtempo.report.run_folder import RunFolder
 
@@ -127,7 +127,7 @@ def test_figures_are_no_larger_than_they_must_be() -> None:
 
 def test_per_joint_timing_has_a_section() -> None:
     sheet = html_page.Page("feed")
-    plan_section.timing(sheet, shipped_plan())
+    sections.plan_timing(sheet, shipped_plan())
     assert "<h2>Per-joint timing</h2>" in sheet.render()
 
 

@@ -92,7 +92,7 @@ def test_port_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
     master, slave = os.openpty()
     try:
         first = SerialTransport(os.ttyname(slave))
-        with pytest.raises(LinkError, match="in use by another program"):
+        with pytest.raises(LinkError, match=r"in use by another program.*close it"):
             SerialTransport(os.ttyname(slave))
         with pytest.raises(LinkError, match="in use by another program"):  # mpremote is not asked
             deploy.deploy(os.ttyname(slave), False, print, lambda *_: None)

@@ -404,9 +404,9 @@ def test_a_whole_run() -> None:
 @pytest.mark.parametrize(
     ("found", "legs", "state", "text"),
     [
-        (recorded(passed=5), leg(), OPEN, "3 rows passed without the host hearing of them"),
-        (recorded(), leg(runs=5), OPEN, "of 2 runs of motions not every sample came, or they did not reach"),
-        (recorded(), leg(end_steps=7.0), BAD, "a motion ended 7.0 steps from where it was to end"),
+        (recorded(passed=5), leg(), OPEN, "3 rows were not reported to the host"),
+        (recorded(), leg(runs=5), OPEN, "2 runs of motions lack samples, or did not reach their end"),
+        (recorded(), leg(end_steps=7.0), BAD, "a motion ended 7.0 steps from its planned end"),
         (recorded(), leg(measured_deg=np.nan), OPEN, f"{JOINT} has no encoder"),
         (recorded("stopped"), leg(), OPEN, "stopped in step 1 after 3 whole cycles"),
         (recorded("refused", code="busy"), leg(), BAD, "refused (busy) in step 1 after 3 whole cycles"),

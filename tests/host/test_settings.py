@@ -15,25 +15,11 @@ from armtempo.ports.board_port import Port
 from click.testing import CliRunner, Result
 
 SEED = 1301
-BOARD_COMMANDS = (
-    ("status",),
-    ("stop",),
-    ("stop", "--now"),
-    ("clear",),
-    ("list",),
-    ("show", "m"),
-    ("remove", "m"),
-    ("rename", "m", "n"),
-    ("configure", "--arm", "paper"),
-    ("home", "--arm", "paper"),
-    ("goto", "home", "--arm", "paper"),
-    ("run", "m", "--arm", "paper"),
-    ("fetch", "--arm", "paper"),
-    ("watch",),
-    ("monitor",),
-    ("deploy",),
-    ("undeploy",),
-)
+BOARD_COMMANDS = [
+    *(["status"], ["stop"], ["stop", "--now"], ["clear"], ["list"], ["show", "m"], ["remove", "m"]),
+    *(["rename", "m", "n"], ["watch"], ["monitor"], ["deploy"], ["undeploy"]),
+    *([*words.split(), "--arm", "paper"] for words in ("configure", "home", "goto home", "run m", "fetch")),
+]
 
 
 @pytest.fixture(autouse=True)
@@ -54,7 +40,7 @@ def plugged_in(monkeypatch: pytest.MonkeyPatch, *devices: str) -> None:
 
 @pytest.mark.parametrize("arguments", BOARD_COMMANDS, ids=" ".join)
 def test_no_command_takes_a_virtual_board_unasked(
-    arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plugged_in(monkeypatch)
     done = run(*arguments)

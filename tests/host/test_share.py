@@ -299,27 +299,8 @@ def test_an_id_that_cannot_be_repeated_is_refused(owner: tuple[Owner, PortClaim]
     assert not owner[0].told
 
 
-VALUES = (
-    0,
-    1,
-    -1,
-    10,
-    999,
-    1000,
-    65535,
-    65536,
-    10**30,
-    0.5,
-    1e999,
-    -1e999,
-    1e300,
-    True,
-    None,
-    "",
-    "50",
-    "\ud800",
-)
-VALUES += ("\x1b[2J", "x" * 201, [], {}, ["sample"], ["sample", 1], [[]], {"rate": 1}, "status")
+VALUES = (0, 1, -1, 10, 999, 1000, 65535, 65536, 10**30, 0.5, 1e999, -1e999, 1e300, True, None, "", "50")
+VALUES += ("\ud800", "\x1b[2J", "x" * 201, [], {}, ["sample"], ["sample", 1], [[]], {"rate": 1}, "status")
 NAMES = (*REQUESTS, "", "Speed", None, 3)
 FIELDS = ("version", "token", "topics", "now", "by", "rate", "number", "value", "id", "x", "\ud800")
 

@@ -45,19 +45,8 @@ OWN_PARAMETERS = ("search",)
 """``optimise.*.search`` takes an algorithm's own parameters, each by its name in the algorithm's table."""
 THREE_BY_DESIGN = ("values", "resolve_command")
 """Speed, acceleration and jerk; what click makes of a command's name."""
-SAME_BY_DESIGN = {
-    "Timer",
-    "Pin",
-    "Switch",
-    "Flash",
-    "ExtInt",
-    "WDT",
-    "RTC",
-    "USB_VCP",
-    "Encoder",
-    "Joint",
-    "Store",
-}
+SAME_BY_DESIGN = {"Timer", "Pin", "Switch", "Flash", "ExtInt", "WDT", "RTC", "USB_VCP", "Encoder", "Joint"}
+SAME_BY_DESIGN |= {"Store"}
 """Names that MicroPython gives, or that the board program has for its own part of the same thing."""
 
 

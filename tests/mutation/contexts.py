@@ -21,8 +21,8 @@ from tests.interpreters import ROOT
 KEPT = ROOT / ".cache" / "mutation"
 SETTINGS = KEPT / "coverage.ini"
 LEFT_OUT = (
-    "not micropython-arm and not cut_off and not test_demo and not test_examples"
-    " and not test_first_hour and not test_recovery and not test_site and not test_speed and not cpython-engine"
+    "not micropython-arm and not cut_off and not test_examples and not test_first_hour"
+    " and not test_recovery and not test_speed and not cpython-engine"
 )
 """The emulator, the slowest, and those that build or install."""
 _CALL = re.compile(r"^([\d.]+)s (?:call|setup) +(tests/\S.*)$", re.MULTILINE)

@@ -1,4 +1,4 @@
-"""The armtempo command as a user meets it: in this process by click's runner, or as a process of its own.
+"""The armtempo command as a user meets it: in this process by click's runner, or as a process of its own; a small plan.
 
 In the process it has its imports already, which take a second of processor time. What sends a signal, kills, or runs at
 the same time as something else needs ``start``.
@@ -18,11 +18,17 @@ from pathlib import Path
 from typing import Any
 
 from armtempo.cli import main
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.planning import planner
 from click.testing import CliRunner
 
 COMMAND = (sys.executable, "-c", "from armtempo.__main__ import main; main()")
 SLOW_S = 600.0
 """Nothing here takes longer, on however loaded a machine."""
+ARM = Arm.paper()
+SOURCES_BLOCKS = 1200
+"""A flash in which the sources have room; the chip takes compiled files."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,7 @@ def start(*arguments: str | Path, folder: Path, **environment: str) -> subproces
     return subprocess.Popen(
         [*COMMAND, *map(str, arguments)],
         cwd=folder,
-        env={**os.environ, "ARMTEMPO_PORT": "sim", **environment},
+        env={**os.environ, "ARMTEMPO_PORT": "sim", "PYTHONUNBUFFERED": "1", **environment},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -93,3 +99,27 @@ def wait_for(condition: Callable[[], bool], what: str) -> None:
     while not condition():
         assert time.monotonic() < limit_s, f"waited in vain for {what}"
         time.sleep(0.02)
+
+
+def small_plan(path: Path, end_deg: tuple[float, ...] = (20.0, -75.0, 50.0), name: str = "small") -> Path:
+    """A trajectory file that needs little search: from the paper arm's home straight to ``end_deg``."""
+    start_deg = tuple(joint.home_deg for joint in ARM.driven)
+    job = Job(
+        name,
+        (start_deg, end_deg),
+        timing="per-joint",
+        refine=1,
+        polish=False,
+        bounds_s=(0.1, 3.0),
+        population=5,
+        iterations=20,
+    )
+    planner.plan(ARM, job).save(path)
+    return path
+
+
+def armtempo(*arguments: str | Path, folder: Path, code: int = 0) -> str:
+    """A command's output, both streams; it must end with ``code``."""
+    done = run(*arguments, folder=folder)
+    assert done.exit_code == code, done.output + done.errors
+    return done.output + done.errors

@@ -26,9 +26,8 @@ from armtempo.simulator import LaunchOptions, launch
 
 from tests import browser, interpreters
 from tests.system import commandline
-from tests.system.boards import SOURCES_BLOCKS
-from tests.system.held_jogs import Cable
-from tests.system.relay import Relay
+from tests.system.commandline import SOURCES_BLOCKS
+from tests.system.relay import Cable, Relay
 
 _ARM_TEXT = f"""{shipped.arm_path().read_text(encoding="utf-8")}
 [output.gripper]

@@ -16,7 +16,7 @@ from armtempo_shared.messages import START_HELD
 
 from tests import interpreters
 from tests.system import commandline
-from tests.system.boards import SOURCES_BLOCKS, armtempo, small_plan
+from tests.system.commandline import SOURCES_BLOCKS, armtempo, small_plan
 
 INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
 
@@ -40,9 +40,9 @@ def steps_of_a_run(folder: Path, deployed: bool) -> dict[str, list[int]]:
         LaunchOptions(folder / "flash", interpreter=starter, deployed=deployed, edge_log=log)
     ) as found:
         if deployed:
-            armtempo("deploy", "--port", found.port, cwd=folder)
-        armtempo("home", "--arm", "paper", "--port", found.port, cwd=folder)
-        armtempo("run", small_plan(folder / "small.json"), "--port", found.port, cwd=folder)
+            armtempo("deploy", "--port", found.port, folder=folder)
+        armtempo("home", "--arm", "paper", "--port", found.port, folder=folder)
+        armtempo("run", small_plan(folder / "small.json"), "--port", found.port, folder=folder)
     edges = edgelog.read(log)[-1].motion()
     return {pin: edges[pin][0].tolist() for pin in ("A15", "A1", "B10")}
 
@@ -65,22 +65,22 @@ def test_sources_on_an_empty_board_and_back(tmp_path: Path) -> None:
     (flash / "main.py").write_text("print('somebody else')\n")
     with board("cpython", flash) as found:
         port = found.port
-        assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
-        assert "kept as /flash/main.py.before-armtempo" in armtempo("deploy", "--port", port, cwd=tmp_path)
-        assert "unconfigured" in armtempo("status", "--port", port, cwd=tmp_path)
-        again = armtempo("deploy", "--arm", "paper", "--port", port, cwd=tmp_path)
+        assert "armtempo deploy" in armtempo("status", "--port", port, folder=tmp_path, code=1)
+        assert "kept as /flash/main.py.before-armtempo" in armtempo("deploy", "--port", port, folder=tmp_path)
+        assert "unconfigured" in armtempo("status", "--port", port, folder=tmp_path)
+        again = armtempo("deploy", "--arm", "paper", "--port", port, folder=tmp_path)
         assert "up to date" in again
         assert "memory for an arm:" in again
         assert "bytes for 3 joints of" in again
         damaged = next((flash / "lib").rglob("program.py"))
         damaged.write_bytes(b"")
-        assert "1 files of the library written" in armtempo("deploy", "--port", port, cwd=tmp_path)
-        armtempo("home", "--arm", "paper", "--port", port, cwd=tmp_path)
+        assert "1 files of the library written" in armtempo("deploy", "--port", port, folder=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", port, folder=tmp_path)
         file = small_plan(tmp_path / "small.json")
-        assert "complete" in armtempo("run", file, "--port", port, cwd=tmp_path)
+        assert "complete" in armtempo("run", file, "--port", port, folder=tmp_path)
         assert "boot.py" in mpremote(port, "ls", ":/flash")
-        armtempo("undeploy", "--port", port, cwd=tmp_path)
-        assert "armtempo deploy" in armtempo("status", "--port", port, cwd=tmp_path, code=1)
+        armtempo("undeploy", "--port", port, folder=tmp_path)
+        assert "armtempo deploy" in armtempo("status", "--port", port, folder=tmp_path, code=1)
     assert (flash / "main.py").read_text() == "print('somebody else')\n"
     assert not (flash / "boot.py").exists()
     assert not (flash / "lib").exists(), "its packages are gone too"
@@ -104,10 +104,10 @@ def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
     with board(INTERPRETERS[-1], flash) as found:
         before = {path.name: path.read_bytes() for path in flash.iterdir()}
         assert {"boot.py", "main.py", "README.txt", "pybcdc.inf"} == set(before)
-        armtempo("deploy", "--mpy", "--port", found.port, cwd=tmp_path)
+        armtempo("deploy", "--mpy", "--port", found.port, folder=tmp_path)
         file = small_plan(tmp_path / "small.json")
-        armtempo("home", "--arm", "paper", "--port", found.port, cwd=tmp_path)
-        armtempo("upload", file, "--default", "--port", found.port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", found.port, folder=tmp_path)
+        armtempo("upload", file, "--default", "--port", found.port, folder=tmp_path)
         with open_board(found.port) as link:
             assert not link.info.features
             for command, values in (("speed", (500,)), ("hold", ()), ("output", (0, 1)), ("inputs", ())):
@@ -123,13 +123,13 @@ def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
             assert link.fetch("small") == data
             for name in more:
                 link.remove(name)
-        slow = armtempo("run", file, "--speed", "50", "--port", found.port, cwd=tmp_path, code=1)
+        slow = armtempo("run", file, "--speed", "50", "--port", found.port, folder=tmp_path, code=1)
         assert "another speed" in slow
         assert "armtempo flash" in slow
     with board(INTERPRETERS[-1], flash) as found:
-        armtempo("home", "--arm", "paper", "--port", found.port, cwd=tmp_path)
-        assert "complete" in armtempo("run", file, "--port", found.port, cwd=tmp_path)
-        armtempo("undeploy", "--port", found.port, cwd=tmp_path)
+        armtempo("home", "--arm", "paper", "--port", found.port, folder=tmp_path)
+        assert "complete" in armtempo("run", file, "--port", found.port, folder=tmp_path)
+        armtempo("undeploy", "--port", found.port, folder=tmp_path)
     shutil.rmtree(flash / "armtempo")
     assert {path.name: path.read_bytes() for path in flash.iterdir()} == before
 
@@ -140,18 +140,18 @@ def test_cut_off_deployment_is_completed_by_the_next(tmp_path: Path, monkeypatch
     with board(INTERPRETERS[-1], tmp_path / "flash", power_cut_at=60) as found:
         with pytest.raises(LinkError, match="repaired by doing it again"):
             deploy(found.port, False, lambda text: None, lambda done, whole: None)
-        assert "armtempo deploy" in armtempo("status", "--port", found.port, cwd=tmp_path, code=1)
-        armtempo("deploy", "--port", found.port, cwd=tmp_path)
-        assert "unconfigured" in armtempo("status", "--port", found.port, cwd=tmp_path)
+        assert "armtempo deploy" in armtempo("status", "--port", found.port, folder=tmp_path, code=1)
+        armtempo("deploy", "--port", found.port, folder=tmp_path)
+        assert "unconfigured" in armtempo("status", "--port", found.port, folder=tmp_path)
 
 
 def test_a_deployment_that_cannot_succeed_leaves_the_program_running(tmp_path: Path) -> None:
     with launch(LaunchOptions(tmp_path / "flash", interpreter=interpreters.starter("cpython"))) as found:
-        failed = armtempo("deploy", "--port", found.port, cwd=tmp_path, code=1)
+        failed = armtempo("deploy", "--port", found.port, folder=tmp_path, code=1)
         assert "takes no compiled files" in failed
         assert "--mpy" not in failed
         assert "runs again" in failed
-        armtempo("status", "--port", found.port, cwd=tmp_path)
+        armtempo("status", "--port", found.port, folder=tmp_path)
 
 
 def test_without_a_compiler_the_program_is_not_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,11 +188,11 @@ def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
         LaunchOptions(flash, interpreter=starter, deployed=True, flash_blocks=SOURCES_BLOCKS)
     ) as found:
         port = found.port
-        assert "part of the board's firmware" in armtempo("deploy", "--port", port, cwd=tmp_path)
+        assert "part of the board's firmware" in armtempo("deploy", "--port", port, folder=tmp_path)
         assert not old.exists()
-        assert "unconfigured" in armtempo("status", "--port", port, cwd=tmp_path)
-        assert "up to date" in armtempo("deploy", "--port", port, cwd=tmp_path)
-        assert "does not start" in armtempo("undeploy", "--port", port, cwd=tmp_path)
+        assert "unconfigured" in armtempo("status", "--port", port, folder=tmp_path)
+        assert "up to date" in armtempo("deploy", "--port", port, folder=tmp_path)
+        assert "does not start" in armtempo("undeploy", "--port", port, folder=tmp_path)
         (flash / "armtempo_shared" / "firmware.py").write_text("CRC = 1\n")
-        assert "the firmware must be updated" in armtempo("deploy", "--port", port, cwd=tmp_path, code=1)
+        assert "the firmware must be updated" in armtempo("deploy", "--port", port, folder=tmp_path, code=1)
         assert not (flash / "main.py").exists()

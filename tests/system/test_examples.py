@@ -29,7 +29,7 @@ from tests import interpreters
 from tests.host.firmware import fakes
 from tests.interpreters import ROOT
 from tests.system import commandline
-from tests.system.boards import small_plan
+from tests.system.commandline import small_plan
 from tests.system.conftest import FASTEST
 
 README = ROOT / "README.md"

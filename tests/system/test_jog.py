@@ -24,7 +24,7 @@ from armtempo.simulator import LaunchOptions, launch
 from click.testing import CliRunner
 
 from tests.system import commandline
-from tests.system.held_jogs import KINDS, HeldCase, HeldJogs
+from tests.system.relay import KINDS, HeldCase, HeldJogs
 
 PAPER = armtempo.Arm.paper()
 SEED = 5

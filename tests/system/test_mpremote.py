@@ -18,10 +18,10 @@ from mpremote.transport import TransportError
 from mpremote.transport_serial import SerialTransport
 
 from tests import interpreters
-from tests.system import boards, commandline
+from tests.system import commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
-HOME_DEG = np.array(boards.ARM.home_deg)
+HOME_DEG = np.array(commandline.ARM.home_deg)
 AWAY_DEG = HOME_DEG + np.array([40.0, -10.0, 15.0])
 REPLAY = "import armtempo_board; armtempo_board.replay('go')"
 
@@ -31,10 +31,10 @@ def flash(tmp_path: Path) -> Path:
     """A flash with the shipped arm and the motion ``go`` from home to AWAY_DEG."""
     folder = tmp_path / "flash" / "armtempo"
     folder.mkdir(parents=True)
-    (folder / "arm.ata").write_bytes(encode.arm_record(boards.ARM))
+    (folder / "arm.ata").write_bytes(encode.arm_record(commandline.ARM))
     (folder / "go.atm").write_bytes(
         encoded_motion.of_trajectory(
-            point_to_point.straight("go", HOME_DEG, AWAY_DEG, boards.ARM), boards.ARM
+            point_to_point.straight("go", HOME_DEG, AWAY_DEG, commandline.ARM), commandline.ARM
         ).data
     )
     return tmp_path / "flash"
@@ -50,7 +50,8 @@ def mpremote(port: str, *arguments: str) -> str:
 def steps(angles_deg: np.ndarray) -> list[int]:
     """Of postures, degrees to steps."""
     return [
-        round(angle * joint.steps_per_deg) for angle, joint in zip(angles_deg, boards.ARM.driven, strict=True)
+        round(angle * joint.steps_per_deg)
+        for angle, joint in zip(angles_deg, commandline.ARM.driven, strict=True)
     ]
 
 
@@ -68,7 +69,7 @@ def test_replay_from_the_prompt(flash: Path, tmp_path: Path) -> None:
     log = tmp_path / "edges"
     with launch(LaunchOptions(flash, interpreter=INTERPRETER, edge_log=log)) as process:
         with open_board(process.port) as board:
-            arm_state.home(board, boards.ARM)
+            arm_state.home(board, commandline.ARM)
         said = mpremote(process.port, "resume", "exec", REPLAY)
         assert said.splitlines() == [f"done at steps {steps(AWAY_DEG)}"]
         assert mpremote(process.port, "resume", "exec", REPLAY).startswith("refused: wrong_start joint 1")
@@ -98,7 +99,7 @@ def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
     """mpremote gives up; the motion comes to its end, if it should; then mpremote is let in."""
     with launch(LaunchOptions(flash, interpreter=INTERPRETER, virtual_time=False)) as process:
         with open_board(process.port) as board:
-            arm_state.home(board, boards.ARM)
+            arm_state.home(board, commandline.ARM)
             started = _start(board)
             begun_s = time.monotonic()
         # A pseudo terminal: without one its read waits for ever

@@ -363,39 +363,18 @@ _SOCKET = b"/_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1\r\nUpgrad
 _KEY = b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
 
 
+_OTHER = b"Host: HOST\r\nOrigin: http://evil.example\r\n\r\n"
+_CHUNKED = b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n"
+_LONG = b"X: " + 400_000 * b"x"
+_TOO_LARGE = b"POST / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 1000001\r\n\r\n"
 _REFUSED = {
     "host": (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", b"403", "this name is not the server's"),
-    "origin": (
-        b"GET / HTTP/1.1\r\nHost: HOST\r\nOrigin: http://evil.example\r\n\r\n",
-        b"403",
-        "a page of another origin",
-    ),
-    "socket": (
-        b"GET " + _SOCKET + _KEY + b"Host: HOST\r\nOrigin: http://evil.example\r\n\r\n",
-        b"403",
-        "a page of another origin",
-    ),
-    "size": (
-        b"POST / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 1000001\r\n\r\n",
-        b"403",
-        "more than 1000000",
-    ),
-    "chunks": (
-        b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n"
-        + 17 * (b"10000\r\n" + 0x10000 * b"x" + b"\r\n"),
-        b"413",
-        "more than 1000000",
-    ),
-    "chunk": (
-        b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\nmany\r\n",
-        b"400",
-        "Invalid HTTP request",
-    ),
-    "header": (
-        b"GET / HTTP/1.1\r\nHost: HOST\r\nX: " + 400_000 * b"x" + b"\r\n\r\n",
-        b"400",
-        "Invalid HTTP request",
-    ),
+    "origin": (b"GET / HTTP/1.1\r\n" + _OTHER, b"403", "a page of another origin"),
+    "socket": (b"GET " + _SOCKET + _KEY + _OTHER, b"403", "a page of another origin"),
+    "size": (_TOO_LARGE, b"403", "more than 1000000"),
+    "chunks": (_CHUNKED + 17 * (b"10000\r\n" + 0x10000 * b"x" + b"\r\n"), b"413", "more than 1000000"),
+    "chunk": (_CHUNKED + b"many\r\n", b"400", "Invalid HTTP request"),
+    "header": (b"GET / HTTP/1.1\r\nHost: HOST\r\n" + _LONG + b"\r\n\r\n", b"400", "Invalid HTTP request"),
     "bytes": (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", b"400", "Invalid HTTP request"),
     "path": (b"GET /runs/..%2f..%2fjob.toml HTTP/1.1\r\nHost: HOST\r\n\r\n", b"404", "job.toml not found"),
     "escape": (b"GET /%1b[2J HTTP/1.1\r\nHost: HOST\r\n\r\n", b"403", "'/\\x1b[2J' from"),

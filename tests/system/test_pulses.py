@@ -7,10 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.system import pulses
 from tests.system.conftest import SAME
-from tests.system.pulses import TICK_HZ
-from tests.system.replays import Replay
+from tests.system.replays import TICK_HZ, Replay, exact, pulses
 
 JOINTS = range(3)
 EDGE_TICKS = 2.0
@@ -35,13 +33,13 @@ def joint(request: pytest.FixtureRequest) -> int:
 
 
 def test_every_step_is_there_none_extra_each_in_its_direction(replay: Replay, joint: int) -> None:
-    made, wanted = pulses.pulses(replay, joint), pulses.exact(replay, joint).crossings()
+    made, wanted = pulses(replay, joint), exact(replay, joint).crossings()
     assert len(made.rises) == len(made.falls) == len(wanted.ticks)
     np.testing.assert_array_equal(made.directions, wanted.directions)
 
 
 def test_edges_are_where_the_spline_crosses_half_a_step(replay: Replay, joint: int) -> None:
-    made, spline = pulses.pulses(replay, joint), pulses.exact(replay, joint)
+    made, spline = pulses(replay, joint), exact(replay, joint)
     wanted = spline.crossings().ticks
     rates = spline.rate(wanted)
     off = np.abs(made.rises - wanted)
@@ -51,7 +49,7 @@ def test_edges_are_where_the_spline_crosses_half_a_step(replay: Replay, joint: i
 
 
 def test_the_commanded_position_keeps_to_the_spline_at_all_times(replay: Replay, joint: int) -> None:
-    made, spline = pulses.pulses(replay, joint), pulses.exact(replay, joint)
+    made, spline = pulses(replay, joint), exact(replay, joint)
     # between two edges the position rests and the spline is monotone but at its turns: these are the extremes
     edges = made.rises.astype(float)
     for ticks in (edges - 1.0, edges, spline.turn_ticks()):
@@ -60,7 +58,7 @@ def test_the_commanded_position_keeps_to_the_spline_at_all_times(replay: Replay,
 
 
 def test_it_ends_within_half_a_step_of_the_last_via_point(replay: Replay, joint: int) -> None:
-    made, spline = pulses.pulses(replay, joint), pulses.exact(replay, joint)
+    made, spline = pulses(replay, joint), exact(replay, joint)
     motor = replay.plan.arm.driven[joint].motor
     assert motor is not None
     end = spline.start + made.directions.sum()
@@ -68,19 +66,8 @@ def test_it_ends_within_half_a_step_of_the_last_via_point(replay: Replay, joint:
     assert replay.repetition["commanded_steps"][joint] == end
 
 
-def test_joint_1_makes_6400_steps(replay: Replay) -> None:
-    """Half of the motion ends after half of the way."""
-    made = pulses.pulses(replay, 0).directions.sum()
-    assert made == {7: 6400, 4: 3200}[len(replay.plan.via_deg)]
-
-
-def test_joints_2_and_3_turn_round(replay: Replay) -> None:
-    for joint in (1, 2):
-        assert set(pulses.pulses(replay, joint).directions) == {-1, 1}
-
-
 def test_dir_changes_well_before_the_next_step_and_after_the_last(replay: Replay, joint: int) -> None:
-    made = pulses.pulses(replay, joint)
+    made = pulses(replay, joint)
     following = np.searchsorted(made.rises, made.dir_ticks, side="right")
     before = made.dir_ticks[following < len(made.rises)]
     after = made.dir_ticks[following > 0]
@@ -89,19 +76,21 @@ def test_dir_changes_well_before_the_next_step_and_after_the_last(replay: Replay
 
 
 def test_pulses_are_as_wide_and_as_far_apart_as_the_arm_file_says(replay: Replay, joint: int) -> None:
-    made, driver = pulses.pulses(replay, joint), replay.plan.arm.driver
+    made, driver = pulses(replay, joint), replay.plan.arm.driver
     wide, apart = made.falls - made.rises, made.rises[1:] - made.falls[:-1]
     assert np.all(wide == round(driver.pulse_us * TICK_HZ / 1e6))
     assert np.all(apart >= driver.low_us * TICK_HZ / 1e6)
 
 
 @pytest.mark.parametrize(("job", "name", "other"), SAME)
-def test_the_pin_log_is_the_same_on_all_interpreters(
+def test_all_interpreters_give_the_same_pin_log_and_samples(
     replay_of: Callable[[str, str], Replay], job: str, name: str, other: str
 ) -> None:
     ours, theirs = replay_of(job, name), replay_of(job, other)
+    assert np.max(np.abs(ours.samples.time_s - theirs.samples.time_s)) <= LATE_S
+    assert np.max(np.abs(ours.samples.commanded_steps - theirs.samples.commanded_steps)) <= 1
     for joint in JOINTS:
-        one, two = pulses.pulses(ours, joint), pulses.pulses(theirs, joint)
+        one, two = pulses(ours, joint), pulses(theirs, joint)
         np.testing.assert_array_equal(one.rises, two.rises)
         np.testing.assert_array_equal(one.falls, two.falls)
         np.testing.assert_array_equal(one.directions, two.directions)
@@ -112,41 +101,29 @@ def test_the_pin_log_is_the_same_on_all_interpreters(
 
 def end_s(replay: Replay) -> float:
     """The motion time as the splines have it."""
-    return max(pulses.exact(replay, joint).duration_ticks for joint in JOINTS) / TICK_HZ
+    return max(exact(replay, joint).duration_ticks for joint in JOINTS) / TICK_HZ
 
 
-def test_there_is_one_every_100_ms_and_one_at_the_end(replay: Replay) -> None:
-    end = end_s(replay)
+def test_a_sample_every_100_ms_and_one_at_the_end_none_missing_or_doubled(replay: Replay) -> None:
+    end, times, repetition = end_s(replay), replay.samples.time_s, replay.repetition
     wanted = np.append(np.arange(0.0, end, EVERY_S), end)
-    assert len(replay.samples.time_s) == len(wanted)
-    late = replay.samples.time_s - wanted
-    assert np.min(late) >= -1 / TICK_HZ
-    assert np.max(late) <= LATE_S
-
-
-def test_none_is_missing_or_doubled(replay: Replay) -> None:
-    np.testing.assert_array_equal(replay.samples.index, np.arange(len(replay.samples.time_s)))
-    assert replay.repetition["samples"] == len(replay.samples.time_s)
-    assert replay.repetition["lost"] == []
-
-
-def test_the_end_is_reported_with_the_motion_s_own_time(replay: Replay) -> None:
-    assert abs(replay.repetition["duration_s"] - end_s(replay)) <= LATE_S
-    assert replay.repetition["state"] == "complete"
+    assert len(times) == len(wanted) == repetition["samples"]
+    assert np.min(times - wanted) >= -1 / TICK_HZ
+    assert np.max(times - wanted) <= LATE_S
+    np.testing.assert_array_equal(replay.samples.index, np.arange(len(times)))
+    assert replay.samples.commanded_steps[-1].tolist() == repetition["commanded_steps"]
+    assert (repetition["lost"], repetition["state"]) == ([], "complete")
+    assert abs(repetition["duration_s"] - end) <= LATE_S
 
 
 def test_commanded_steps_are_those_on_the_pins_at_that_time(replay: Replay) -> None:
     ticks = np.rint(replay.samples.time_s * TICK_HZ)
     for joint in JOINTS:
-        made, start = pulses.pulses(replay, joint), pulses.exact(replay, joint).start
+        made, start = pulses(replay, joint), exact(replay, joint).start
         # the clock is read first, then the counts, within a microsecond or two
         earliest, latest = made.position(start, ticks - 1), made.position(start, ticks + LATE_S * TICK_HZ)
         found = replay.samples.commanded_steps[:, joint]
         assert np.all((found == earliest) | (found == latest))
-
-
-def test_the_last_sample_shows_the_whole_motion(replay: Replay) -> None:
-    assert replay.samples.commanded_steps[-1].tolist() == replay.repetition["commanded_steps"]
 
 
 def test_encoders_follow_the_commanded_angle(replay: Replay) -> None:
@@ -157,10 +134,3 @@ def test_encoders_follow_the_commanded_angle(replay: Replay) -> None:
         off = replay.samples.angle_deg[:, joint] - replay.samples.commanded_deg[:, joint]
         # half a count for the start, half a count for the reading
         assert np.max(np.abs(off)) <= count_deg
-
-
-@pytest.mark.parametrize(("job", "name", "other"), SAME)
-def test_interpreters_agree(replay_of: Callable[[str, str], Replay], job: str, name: str, other: str) -> None:
-    one, two = replay_of(job, name).samples, replay_of(job, other).samples
-    assert np.max(np.abs(one.time_s - two.time_s)) <= LATE_S
-    assert np.max(np.abs(one.commanded_steps - two.commanded_steps)) <= 1

@@ -21,7 +21,7 @@ from armtempo.simulator import LaunchOptions, VirtualBoard, launch
 
 from tests import interpreters
 from tests.system import commandline
-from tests.system.boards import armtempo, small_plan
+from tests.system.commandline import armtempo, small_plan
 
 PAGE = (interpreters.ROOT / "host" / "docs" / "recovery.md").read_text(encoding="utf-8")
 INTERPRETER = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
@@ -195,7 +195,7 @@ def full_flash(bench: Bench) -> None:
 def full_of_motions(bench: Bench) -> None:
     bench.power()
     assert bench.board
-    armtempo("upload", "feed.json", "--name", "old", "--port", bench.board.port, cwd=bench.folder)
+    armtempo("upload", "feed.json", "--name", "old", "--port", bench.board.port, folder=bench.folder)
     bench.hardware["flash_blocks"] = bench.used_blocks() + 1
 
 

@@ -1,17 +1,23 @@
-"""Runs on the virtual board through the command line; Ctrl-C and SIGTERM: the arm rests, port free, folder readable."""
+"""Runs through the command line, and interrupts: from the first import on, in a run, while the board is silent."""
 
 from __future__ import annotations
 
 import json
+import random
 import signal
+import subprocess
+import sys
 import time
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 from armtempo import simulator
+from armtempo.cli import raised_by_signals
 from armtempo.link import open_board
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
@@ -20,8 +26,9 @@ from armtempo.report import run_folder, run_reader
 from armtempo.robot import arm_state
 from armtempo.simulator import InjectedFault, LaunchOptions, launch
 
-from tests.system import boards, commandline
-from tests.system.boards import TIMEOUT_S, armtempo, small_plan, start
+from tests.interpreters import ROOT
+from tests.system import commandline
+from tests.system.commandline import SLOW_S, armtempo, small_plan, start
 
 ENDS_WITHIN_S = 60.0
 """Far more than braking and freezing may take, for loaded machines."""
@@ -32,7 +39,7 @@ def test_board_on_a_port(tmp_path: Path) -> None:
     with launch(LaunchOptions(tmp_path / "flash")) as board:
 
         def on_board(*arguments: str | Path, code: int = 0) -> str:
-            return armtempo(*arguments, "--port", board.port, cwd=tmp_path, code=code)
+            return armtempo(*arguments, "--port", board.port, folder=tmp_path, code=code)
 
         assert "armtempo home" in on_board("run", file, code=1)
         on_board("home", "--arm", "paper")
@@ -45,33 +52,22 @@ def test_board_on_a_port(tmp_path: Path) -> None:
         assert output.count("complete") == 2
         assert "upload" not in on_board("list")
         assert "small " in on_board("list")
-        assert "start run=" in armtempo("monitor", "traffic.log", cwd=tmp_path)
+        assert "start run=" in armtempo("monitor", "traffic.log", folder=tmp_path)
     found = run_reader.load(tmp_path / "runs" / "small-001")
     first, second = found.repetitions
     np.testing.assert_array_equal(first.commanded_steps, second.commanded_steps)
     with launch(LaunchOptions(tmp_path / "flash")) as board:
-        assert "small " in armtempo("list", "--port", board.port, cwd=tmp_path)
-        assert "position unknown" in armtempo("status", "--port", board.port, cwd=tmp_path)
+        assert "small " in armtempo("list", "--port", board.port, folder=tmp_path)
+        assert "position unknown" in armtempo("status", "--port", board.port, folder=tmp_path)
 
 
 def test_stored_motion_keeps_its_place_in_a_sim_folder(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
-    armtempo("upload", file, "--port", "sim:flash", cwd=tmp_path)
+    armtempo("upload", file, "--port", "sim:flash", folder=tmp_path)
     done = commandline.run("run", "small", "--port", "sim:flash", folder=tmp_path)
     assert "samples-01.csv: complete" in done.output
     assert done.errors.count("started for this command: its arm begins at home") == 1
     assert "started for this command" not in done.output
-
-
-def test_board_set_up_for_another_arm(tmp_path: Path) -> None:
-    text = shipped.arm_path().read_text().replace("microsteps = 8", "microsteps = 16")
-    (tmp_path / "other.toml").write_text(text)
-    armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
-    assert "give --arm" in armtempo("home", "--port", "sim:flash", cwd=tmp_path, code=2)
-    refused = armtempo("home", "--arm", "paper", "--port", "sim:flash", cwd=tmp_path, code=1)
-    assert "set up for a different arm" in refused
-    assert "armtempo configure" in refused
-    armtempo("home", "--arm", "other.toml", "--port", "sim:flash", cwd=tmp_path)
 
 
 def test_live_says_where_there_is_no_display(tmp_path: Path) -> None:
@@ -90,20 +86,13 @@ def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> Non
     (tmp_path / "heavy.toml").write_text(heavy)
     job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\niterations = 20\n'
     (tmp_path / "job.toml").write_text(job)
-    armtempo("plan", "--arm", "heavy.toml", "--job", "job.toml", "-o", "throw.json", cwd=tmp_path)
-    output = armtempo("run", "throw.json", cwd=tmp_path, code=1)
+    armtempo("plan", "--arm", "heavy.toml", "--job", "job.toml", "-o", "throw.json", folder=tmp_path)
+    output = armtempo("run", "throw.json", folder=tmp_path, code=1)
     assert "samples-01.csv: fault (following)" in output
     assert "joint 1" in output
     assert run_reader.load(tmp_path / "runs" / "throw-001").repetitions[0].state == "fault"
-    armtempo("report", "runs/throw-001", cwd=tmp_path)
+    armtempo("report", "runs/throw-001", folder=tmp_path)
     assert "cut short, ended as fault (following)" in (tmp_path / "runs/throw-001/report.html").read_text()
-
-
-@pytest.mark.parametrize("arguments", [("run", "missing.json"), ("upload", "missing.json")])
-def test_missing_file(tmp_path: Path, arguments: tuple[str, ...]) -> None:
-    output = armtempo(*arguments, cwd=tmp_path, code=2)
-    assert "missing.json" in output
-    assert "Traceback" not in output
 
 
 # a run that the board's button started while no host was there, and its samples afterwards
@@ -111,13 +100,13 @@ def test_missing_file(tmp_path: Path, arguments: tuple[str, ...]) -> None:
 
 def test_button_then_fetch(tmp_path: Path) -> None:
     """The press comes 2.5 s after a first motion's time 0: long after it."""
-    file = boards.small_plan(tmp_path / "small.json")
+    file = commandline.small_plan(tmp_path / "small.json")
     press = InjectedFault("input", at_s=2.5, name="A0", level=1)
     with launch(LaunchOptions(faults=[press])) as process:
         port = process.port
 
         def on_board(*arguments: str | Path, code: int = 0) -> str:
-            return armtempo(*arguments, "--port", port, cwd=tmp_path, code=code)
+            return armtempo(*arguments, "--port", port, folder=tmp_path, code=code)
 
         on_board("home", "1,-60,40", "--arm", "paper")
         assert "fetched" in on_board("fetch", file, code=1)
@@ -142,16 +131,20 @@ def ran(port: str) -> int:
         return 0 if status.moving else status.run
 
 
+def samples_in(folder: Path) -> int:
+    """Whole sample lines of the one run in ``folder``."""
+    return sum(path.read_text().count("\n") for path in folder.glob("*-001/samples-01.csv"))
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
     with launch(LaunchOptions(virtual_time=False)) as board:
-        armtempo("home", "--arm", "paper", "--port", board.port, cwd=tmp_path)
-        process = start("run", file, "--port", board.port, cwd=tmp_path)
-        samples = tmp_path / "runs" / "small-001" / "samples-01.csv"
-        _wait_for_lines(samples, 4)
+        armtempo("home", "--arm", "paper", "--port", board.port, folder=tmp_path)
+        process = start("run", file, "--port", board.port, folder=tmp_path)
+        commandline.wait_for(lambda: samples_in(tmp_path / "runs") > 3, "the first samples")
         process.send_signal(number)
-        out, error = process.communicate(timeout=TIMEOUT_S)
+        out, error = process.communicate(timeout=SLOW_S)
         assert process.returncode == 130, out + error
         assert "interrupted" in error
         assert "Traceback" not in error
@@ -169,22 +162,15 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
 def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
     with launch(LaunchOptions(virtual_time=False)) as board:
-        armtempo("home", "--arm", "paper", "--port", board.port, cwd=tmp_path)
-        process = start("run", file, "--port", board.port, cwd=tmp_path)
-        _wait_for_lines(tmp_path / "runs" / "small-001" / "samples-01.csv", 4)
+        armtempo("home", "--arm", "paper", "--port", board.port, folder=tmp_path)
+        process = start("run", file, "--port", board.port, folder=tmp_path)
+        commandline.wait_for(lambda: samples_in(tmp_path / "runs") > 3, "the first samples")
         process.kill()
         process.communicate()
-        assert "state" in armtempo("stop", "--port", board.port, cwd=tmp_path)
+        assert "state" in armtempo("stop", "--port", board.port, folder=tmp_path)
     run = run_reader.load(tmp_path / "runs" / "small-001")
     assert run.repetitions[0].state == run_folder.RUNNING
     assert len(run.repetitions[0].index) >= 2
-
-
-def _wait_for_lines(path: Path, count: int) -> None:
-    limit = time.monotonic() + TIMEOUT_S
-    while not path.is_file() or path.read_text().count("\n") < count:
-        assert time.monotonic() < limit, "no samples arrived"
-        time.sleep(0.02)
 
 
 # interrupts that meet a board that has fallen silent, or a user in a hurry
@@ -199,11 +185,6 @@ def board_at_home(*faults: InjectedFault) -> Iterator[simulator.VirtualBoard]:
             arm_state.configure(board, arm, replace=True)
             arm_state.home(board, arm)
         yield process
-
-
-def samples_in(folder: Path) -> int:
-    """Whole sample lines of the one run in ``folder``."""
-    return sum(path.read_text().count("\n") for path in folder.glob("*-001/samples-01.csv"))
 
 
 def long_plan(folder: Path) -> Path:
@@ -239,3 +220,125 @@ def test_a_second_ctrl_c_ends_it_at_once(tmp_path: Path) -> None:
     done.said("interrupted")
     assert done.exit_code == 130
     assert run_reader.load(tmp_path / "feed-001").meta["repetitions"][0]["state"] == "interrupted"
+
+
+# ctrl-C while the command is still being imported: quiet, with exit code 130, as at any later time
+
+
+START = pytest.mark.xdist_group("start")  # what they share is made once
+
+IMPORTING = (sys.executable, "-X", "importtime", "-c", "from armtempo.__main__ import main; main()", "plan")
+SHORT = ("--iterations", "1", "--population", "4")
+ENDLESS = ("--iterations", "1000000")
+SAID = "no arm and no job given; using the shipped feeding job and arm\n"
+MOMENTS = 8
+SEED = 20266
+
+
+class Watched:
+    """The command with ``options``, run to its end; ``at(process)`` is called when it has imported ``after`` modules.
+
+    They are counted from the one that follows ``armtempo.__main__``: only then the command surely minds the signal.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        options: tuple[str, ...],
+        after: int = 0,
+        at: Callable[[subprocess.Popen[str]], None] = lambda process: None,
+        prepare: Callable[[], object] | None = None,
+    ) -> None:
+        self.first: list[str] = []
+        self.imported: list[str] = []
+        self.errors = ""
+        with subprocess.Popen(
+            [*IMPORTING, *options],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            preexec_fn=prepare,
+        ) as process:
+            assert process.stderr is not None
+            for line in process.stderr:
+                if not line.startswith("import time:"):
+                    self.errors += line
+                    continue
+                begun = "armtempo.__main__" in self.first
+                (self.imported if begun else self.first).append(line.rsplit("|", 1)[1].strip())
+                if begun and len(self.imported) == after:
+                    at(process)
+        self.exit_code = process.returncode
+
+
+def interrupt(process: subprocess.Popen[str]) -> None:
+    """Ctrl-C."""
+    process.send_signal(signal.SIGINT)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Watched:
+    """A run that nobody interrupts."""
+    run = Watched(tmp_path_factory.mktemp("whole"), SHORT)
+    assert run.exit_code == 0, run.errors
+    return run
+
+
+def test_the_installed_command_begins_there() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["scripts"] == {"armtempo": "armtempo.__main__:main"}
+
+
+@START
+def test_little_is_imported_before_an_interrupt_is_minded(whole: Watched) -> None:
+    ours = [name for name in whole.first if name.startswith("armtempo")]
+    basics = ["armtempo.basics", "armtempo.basics.installation", "armtempo.basics.errors"]
+    assert ours == ["armtempo", *basics, "armtempo.__main__"]
+    assert {"click", "numpy", "armtempo.planning.planner"} <= set(whole.imported)
+
+
+@pytest.mark.parametrize("number", range(MOMENTS))
+@START
+def test_an_interrupt_during_the_imports_ends_it_quietly(number: int, whole: Watched, tmp_path: Path) -> None:
+    most = whole.imported.index("armtempo.planning.planner")  # what comes after it, comes after the search
+    after = 1 + int((number + random.Random(SEED + number).random()) / MOMENTS * most)
+    run = Watched(tmp_path, ENDLESS, after, interrupt)
+    what = f"seed {SEED}, after {whole.imported[after - 1]}, module {after}"
+    assert run.exit_code == 130, f"{what}: {run.errors}"
+    assert run.errors.removeprefix(SAID) == "armtempo: interrupted\n", what
+    assert not list(tmp_path.iterdir()), what
+
+
+@START
+def test_in_the_background_ctrl_c_stays_ignored(whole: Watched, tmp_path: Path) -> None:
+    for after in (len(whole.imported) // 10, len(whole.imported) // 2):
+        run = Watched(tmp_path, SHORT, after, interrupt, lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
+        assert run.exit_code == 0, run.errors
+
+
+def test_an_interrupt_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is imported here would swallow it; what comes then would take a minute."""
+    (tmp_path / "swallowing.py").write_text(
+        "import signal, time\n"
+        "swallowed = False\n"
+        "try:\n"
+        "    signal.raise_signal(signal.SIGINT)\n"
+        "    time.sleep(0.1)\n"
+        "except BaseException:\n"
+        "    swallowed = True\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def import_and_sleep() -> None:
+        assert not import_module("swallowing").swallowed
+        time.sleep(1200.0)
+
+    handler = signal.getsignal(signal.SIGINT)
+    begin_s = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), raised_by_signals():
+        import_and_sleep()
+    assert time.monotonic() - begin_s < 600.0
+    assert signal.getsignal(signal.SIGINT) == handler

@@ -26,7 +26,7 @@ from armtempo.simulator.launch_options import InjectedFault
 from armtempo_shared import codes
 
 from tests import interpreters
-from tests.system import boards, commandline
+from tests.system import commandline
 
 INTERPRETER = interpreters.starter("micropython" if "micropython" in interpreters.AVAILABLE else "cpython")
 ON_BOARD = Path(prompt.__file__).with_name("on_board")
@@ -34,7 +34,7 @@ ENABLE, STEPS = "E12", ("A15", "A1", "B10")
 
 
 @contextmanager
-def board(folder: Path, record: Arm = boards.ARM, **options: Any) -> Iterator[str]:
+def board(folder: Path, record: Arm = commandline.ARM, **options: Any) -> Iterator[str]:
     """The port of a virtual board that is set up for an arm, the paper's; its edges go to ``folder/edges``."""
     flash = folder / "flash" / "armtempo"
     flash.mkdir(parents=True)
@@ -193,40 +193,35 @@ CABLE_OUT = 5
 """The motion, counted from power-up, at which the cable is out: the first E-stop."""
 HANGS = 2
 """The same of the first one whose pulses are captured."""
-BROKEN = (
-    (
-        (
-            InjectedFault("short", 0, 0, name="A15-A1"),
-            InjectedFault("dead_pin", 0, 0, name="B10"),
-            InjectedFault("slow_flash", 0, 0, ms=1500),
-            InjectedFault("late_interrupts", 0, 0, ms=0.05),
-        ),
-        (
-            "PA1, forward together: 383 steps, those of PA15 among them",
-            "PB10, forward together: 0 steps",
-            "flash: erase and write",
-            "E-stop by software to frozen outputs",
-            "E-stop by an edge to frozen outputs",
-            "limit switch by an edge to frozen outputs",
-        ),
+BAD_PINS = [InjectedFault("short", 0, 0, name="A15-A1"), InjectedFault("dead_pin", 0, 0, name="B10")]
+BAD_PINS += [InjectedFault("slow_flash", 0, 0, ms=1500), InjectedFault("late_interrupts", 0, 0, ms=0.05)]
+BAD_CABLE = [
+    InjectedFault("dead_stream", 0, 0, joint=1),
+    InjectedFault("silence", 0.01, CABLE_OUT, ms=60_000),
+]
+BROKEN: dict[str, tuple[Any, ...]] = {
+    "pins": (
+        BAD_PINS,
+        "PA1, forward together: 383 steps, those of PA15 among them",
+        "PB10, forward together: 0 steps",
+        "flash: erase and write",
+        "E-stop by software to frozen outputs",
+        "E-stop by an edge to frozen outputs",
+        "limit switch by an edge to frozen outputs",
     ),
-    (
-        (
-            InjectedFault("dead_stream", 0, 0, joint=1),
-            InjectedFault("silence", 0.01, CABLE_OUT, ms=60_000),
-        ),
-        (
-            "fault internal",
-            "PB10, forward together: 1 steps",
-            "steps of a longer motion, 0.3 s:",
-            "the whole part: the board fell silent in 'estop'",
-        ),
+    "stream and cable": (
+        BAD_CABLE,
+        "fault internal",
+        "PB10, forward together: 1 steps",
+        "steps of a longer motion, 0.3 s:",
+        "the whole part: the board fell silent in 'estop'",
     ),
-    (
-        (InjectedFault("half_clock", 0, 0),),
-        ("a tick of TIM2: 4.000", "motion forward together: fault start_failed"),
+    "clock": (
+        [InjectedFault("half_clock", 0, 0)],
+        "a tick of TIM2: 4.000",
+        "motion forward together: fault start_failed",
     ),
-)
+}
 
 
 @pytest.mark.parametrize("interpreter", [one for one in interpreters.AVAILABLE if one != "micropython-arm"])
@@ -248,10 +243,9 @@ def test_a_part_leaves_nothing_at_the_prompt(
     assert interpreters.run(interpreter, script).split() == ["1", "0", "True"]
 
 
-@pytest.mark.parametrize(("faults", "wrong"), BROKEN, ids=("pins", "stream and cable", "clock"))
-def test_what_is_wrong_is_named(
-    tmp_path: Path, faults: tuple[InjectedFault, ...], wrong: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("broken", BROKEN)
+def test_what_is_wrong_is_named(tmp_path: Path, broken: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    faults, *wrong = BROKEN[broken]
     if any(fault.run for fault in faults):
         impatient(monkeypatch, "estop")
     with board(tmp_path, faults=faults) as port:
@@ -277,8 +271,8 @@ def test_motors_that_turn_in_spite_of_enable_stop_it(tmp_path: Path) -> None:
 
     No joint goes further than its encoder needs to show it.
     """
-    wrong = replace(boards.ARM, driver=Driver(enable_active="high"), safety=Safety(estop_fitted=True))
-    with board(tmp_path, wrong, arm=boards.ARM) as port:
+    wrong = replace(commandline.ARM, driver=Driver(enable_active="high"), safety=Safety(estop_fitted=True))
+    with board(tmp_path, wrong, arm=commandline.ARM) as port:
         code, found = selftest(port, tmp_path)
     assert (code, words(found, "wrong")) == (1, ["drivers: encoders while STEP toggles"])
     assert all(rises(tmp_path, pin) < 40 for pin in STEPS)
@@ -316,9 +310,9 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     the arm is held and homed as before; so without the firmware."""
     for name, value in (("_TRIES", 1), ("_SPEED", 0.5), ("SLOWEST", 0.2)):
         monkeypatch.setattr(motor_test, name, value)
-    (joint,) = boards.ARM.joints[:1]
+    (joint,) = commandline.ARM.joints[:1]
     joint = replace(joint, model=JointModel(), switches=LimitSwitches(low=1, high=2))
-    real = replace(boards.ARM, joints=(joint,), safety=Safety(estop_fitted=True))
+    real = replace(commandline.ARM, joints=(joint,), safety=Safety(estop_fitted=True))
     named = replace(real, joints=(_encoder(joint, direction=-1),))
     said: list[str] = []
     with board(tmp_path, named, arm=real, faults=PRESSED) as port, connect(port) as used:
@@ -363,7 +357,7 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 )
 def test_what_an_encoder_shows(part: float, lines: list[str]) -> None:
     """It counts so much of what is due."""
-    joint = boards.ARM.driven[0]
+    joint = commandline.ARM.driven[0]
     steps = 640
     line, found = motor_test.judge_encoder(joint, steps, round(part * float(steps * joint.counts_per_step)))
     assert [one.removesuffix(" times as far") for one in found] == lines

@@ -17,8 +17,8 @@ from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared.motion import EVEN_RAMP
 
 from tests import ramps
-from tests.system import boards, commandline
-from tests.system.boards import small_plan
+from tests.system import commandline
+from tests.system.commandline import small_plan
 
 NEAR_DEG = 0.03
 """More than half a step and a sample's 20 us."""
@@ -97,14 +97,14 @@ def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) 
     with launch(LaunchOptions(tmp_path / "flash", virtual_time=False)) as board:
 
         def on_board(*arguments: str | Path, code: int = 0) -> str:
-            return boards.armtempo(*arguments, "--port", board.port, cwd=tmp_path, code=code)
+            return commandline.armtempo(*arguments, "--port", board.port, folder=tmp_path, code=code)
 
         on_board("home", "--arm", "paper")
         assert "nothing moves" in on_board("speed", "50", code=1)
         on_board("speed", "0.5", code=2)
         on_board("run", file, "--speed", "101", code=2)
         on_board("goto", file, "--arm", "paper")
-        running = boards.start("run", file, "--speed", "5", "--port", board.port, cwd=tmp_path)
+        running = commandline.start("run", file, "--speed", "5", "--port", board.port, folder=tmp_path)
 
         def slow() -> bool:
             assert running.poll() is None, running.communicate()
@@ -116,7 +116,7 @@ def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) 
         on_board("resume")
         assert "at 5 %" in on_board("status")
         on_board("speed", "100")
-        output, _ = running.communicate(timeout=boards.TIMEOUT_S)
+        output, _ = running.communicate(timeout=commandline.SLOW_S)
         assert running.returncode == 0, output
         assert "complete" in output
 
@@ -124,7 +124,7 @@ def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) 
 def test_changes_keep_the_brake_times_limits() -> None:
     """Numerically, on the stretched path itself: any two rates, anywhere, acceleration and jerk within EXCESS."""
     rng = np.random.default_rng(20_264)
-    arm = boards.ARM
+    arm = commandline.ARM
     limits = [joint.limits for joint in arm.driven]
     allowed = np.array([limit.values for limit in limits])
     for _ in range(2):

@@ -23,7 +23,7 @@ from armtempo.simulator import LaunchOptions, launch
 from click.testing import CliRunner, Result
 
 from tests.system import commandline
-from tests.system.boards import small_plan, start
+from tests.system.commandline import small_plan, start
 
 SEED = 1
 ORDERS = 30
@@ -120,8 +120,8 @@ def moving(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     plan = planner.plan(Arm.paper(), Job("long", (START, (170.0, -10.0, -50.0)), population=5, iterations=5))
     plan.save(folder / "long.json")
     with launch(LaunchOptions(folder / "flash", virtual_time=False)) as board:
-        commandline.ended(start("home", "--arm", "paper", "--port", board.port, cwd=folder))
-        owner = start("run", "long.json", "--port", board.port, cwd=folder)
+        commandline.ended(start("home", "--arm", "paper", "--port", board.port, folder=folder))
+        owner = start("run", "long.json", "--port", board.port, folder=folder)
         try:
             samples = folder / "runs" / "long-001" / "samples-01.csv"
             commandline.wait_for(lambda: samples.exists() and samples.stat().st_size > 200, "samples")

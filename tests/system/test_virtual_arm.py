@@ -1,35 +1,39 @@
-"""The virtual arm: its motors by themselves, what they make of whole motions, and the faults that it can suffer."""
+"""The virtual arm: its motors, what they make of whole motions, homing to switches, and the faults it can suffer."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.link import open_board
+from armtempo.basics.errors import BoardError, InputError, LinkError
+from armtempo.link import Client, open_board
 from armtempo.link.board_messages import Sample, Status
 from armtempo.link.follow import RunEnd
+from armtempo.model import engine_pins, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.model.parts import JointModel, LimitSwitches
+from armtempo.model.parts import DrivenJoint, JointModel
 from armtempo.planning import planner, point_to_point
 from armtempo.records import encode
-from armtempo.robot import arm_state, homing, stored_motion
+from armtempo.robot import arm_state, goto, homing, stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.wire import ERROR_CODES
 
 from tests import scripted
-from tests.system import boards
+from tests.system import commandline
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "virtual_arm.py"
 FINE_COUNTS = 400_000
 """Counts per revolution of an encoder that shows what the paper's cannot."""
 TARGET_DEG = np.array([30.0, -85.0, 60.0])
-GUARDED = replace(boards.ARM, safety=replace(boards.ARM.safety, estop_fitted=True))
+GUARDED = replace(commandline.ARM, safety=replace(commandline.ARM.safety, estop_fitted=True))
 
 
 @scripted.each(scripted.cases(SCRIPT))
@@ -44,10 +48,10 @@ def first_joint(arm: Arm, **changed: object) -> Arm:
 
 def swing_deg(degree: int) -> float:
     """How far joint 1 swings about its command in the first 0.6 s of the feeding motion."""
-    encoder = boards.ARM.joints[0].encoder
+    encoder = commandline.ARM.joints[0].encoder
     assert encoder is not None
-    model = replace(boards.ARM.joints[0].model, backlash_deg=0.0, scatter_deg=0.0)
-    arm = first_joint(boards.ARM, encoder=replace(encoder, counts_per_rev=FINE_COUNTS), model=model)
+    model = replace(commandline.ARM.joints[0].model, backlash_deg=0.0, scatter_deg=0.0)
+    arm = first_joint(commandline.ARM, encoder=replace(encoder, counts_per_rev=FINE_COUNTS), model=model)
     job = replace(Job.paper(arm), degree=degree, iterations=50)
     trajectory = planner.plan(arm, job).trajectory
     samples: list[Sample] = []
@@ -67,71 +71,58 @@ def test_cubic_starts_ring_more_than_quintic_ones() -> None:
     assert 0.0 < 1.5 * quintic_deg < cubic_deg, (quintic_deg, cubic_deg)
 
 
-def test_homing_by_limit_switch(tmp_path: Path) -> None:
-    """The virtual arm's switch trips at its angle; after the homing run the board knows where it is."""
-    switches = LimitSwitches(low=1, low_deg=-8.0)
-    arm = first_joint(boards.ARM, switches=switches, model=JointModel())
-    start_deg = [6.0, -60.0, 40.0]
-    log = tmp_path / "edges"
-    with (
-        launch(LaunchOptions(arm=arm, start_deg=start_deg, edge_log=log)) as process,
-        open_board(process.port) as board,
-        StopRequest() as stop,
-    ):
-        arm_state.configure(board, arm, replace=True)
-        homing.home_to_switches(board, arm, stop)
-        believed = board.status().positions.commanded_steps[0]
-        assert board.status().joint_known(0)
-    (session,) = edgelog.read(log)
-    steps, directions = session.pins["A15"], session.pins["E7"]
-    rises = steps[0][steps[1] == 1]
-    before = np.searchsorted(directions[0], rises) - 1
-    forward = np.where(before >= 0, directions[1][before], 0)
-    moved = np.sum(np.where(forward == 1, 1, -1))
-    true = start_deg[0] * arm.driven[0].steps_per_deg + moved
-    assert abs(believed - true) <= 2, (believed, true)
+def short_motion(arm: Arm) -> bytes:
+    """From home."""
+    return encode.motion_record(point_to_point.straight("move", np.array(arm.home_deg), TARGET_DEG, arm), arm)
 
 
 def run(
-    *faults: InjectedFault, arm: Arm = boards.ARM, model: Arm | None = None, log: Path | None = None
+    *faults: InjectedFault, arm: Arm = commandline.ARM, model: Arm | None = None, log: Path | None = None
 ) -> tuple[RunEnd, Status]:
     """A short motion from home, and how the board stands after it."""
-    home_deg = np.array(arm.home_deg)
-    data = encode.motion_record(point_to_point.straight("move", home_deg, TARGET_DEG, arm), arm)
     with (
         launch(LaunchOptions(faults=faults, arm=model, edge_log=log)) as process,
         open_board(process.port) as board,
     ):
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
-        stored = stored_motion.store(board, "move", data)
+        stored = stored_motion.store(board, "move", short_motion(arm))
         with StopRequest() as stop:
             end = stored_motion.replay(board, stored, stop)
         return end, board.status()
 
 
 def code(end: RunEnd) -> str:
-    """Name of the fault that ended a run."""
-    return stored_motion.fault_name(end.fault)
+    """Name of the fault that ended a run, or nothing."""
+    return stored_motion.fault_name(end.fault) if end.fault else ""
 
 
-def test_nothing() -> None:
+def test_without_a_fault_it_ends_where_it_was_to() -> None:
     end, status = run()
-    steps = np.array([joint.steps_per_deg for joint in boards.ARM.driven])
+    steps = np.array([joint.steps_per_deg for joint in commandline.ARM.driven])
     assert not end.fault
     assert np.all(np.abs(np.array(status.positions.commanded_steps) - TARGET_DEG * steps) <= 0.5)
 
 
-def test_short_stall_does_no_harm() -> None:
-    end, _ = run(InjectedFault("stall", at_s=0.4, ms=10))
-    assert not end.fault
-
-
-@pytest.mark.parametrize("at_s", [0.3, 0.55, 0.8])
-def test_long_stall_is_an_underrun(at_s: float) -> None:
-    end, status = run(InjectedFault("stall", at_s=at_s, ms=1500))
-    assert code(end) == "underrun"
-    assert status.known == 7
+@pytest.mark.parametrize(
+    ("fault", "ends", "joint"),
+    [
+        (InjectedFault("stall", at_s=0.4, ms=10), "", None),
+        (InjectedFault("stall", at_s=0.3, ms=1500), "underrun", None),
+        (InjectedFault("stall", at_s=0.8, ms=1500), "underrun", None),
+        (InjectedFault("block", at_s=0.3, joint=1), "following", 1),
+        (InjectedFault("slip", at_s=0.5, joint=2, counts=-60), "following", 2),
+        (InjectedFault("crash", at_s=0.5), "internal", None),
+    ],
+)
+def test_a_fault_ends_the_run_by_its_name(fault: InjectedFault, ends: str, joint: int | None) -> None:
+    end, status = run(fault)
+    assert code(end) == ends
+    assert joint is None or end.fault_joint == joint
+    if ends == "underrun":
+        assert status.known == 7
+    if ends == "internal":
+        assert "injected crash" in end.notices[0]
 
 
 @pytest.mark.parametrize("at_s", [0.0, 0.41, 0.77])
@@ -148,28 +139,14 @@ def test_estop_freezes_within_20_us(at_s: float, tmp_path: Path) -> None:
         assert not levels[ticks > tripped + 20 * 84].any()
 
 
-def test_blocked_joint_is_a_following_error() -> None:
-    end, _ = run(InjectedFault("block", at_s=0.3, joint=1))
-    assert (code(end), end.fault_joint) == ("following", 1)
-
-
-def test_slipped_coupling_is_a_following_error() -> None:
-    end, _ = run(InjectedFault("slip", at_s=0.5, joint=2, counts=-60))
-    assert (code(end), end.fault_joint) == ("following", 2)
-
-
 def test_hang_makes_the_watchdog_bite() -> None:
     with (
         launch(LaunchOptions(faults=[InjectedFault("hang", at_s=0.3)])) as process,
         open_board(process.port) as board,
     ):
-        arm_state.configure(board, boards.ARM, replace=True)
-        arm_state.home(board, boards.ARM)
-        home_deg = np.array(boards.ARM.home_deg)
-        data = encode.motion_record(
-            point_to_point.straight("move", home_deg, TARGET_DEG, boards.ARM), boards.ARM
-        )
-        stored = stored_motion.store(board, "move", data)
+        arm_state.configure(board, commandline.ARM, replace=True)
+        arm_state.home(board, commandline.ARM)
+        stored = stored_motion.store(board, "move", short_motion(commandline.ARM))
         board.start(stored.name, stored.crc)
         before = board.info
         assert before is not None
@@ -184,20 +161,104 @@ def test_hang_makes_the_watchdog_bite() -> None:
         assert board.status().known == 0
 
 
-def test_crash_is_an_internal_fault() -> None:
-    end, _ = run(InjectedFault("crash", at_s=0.5))
-    assert code(end) == "internal"
-    assert "injected crash" in end.notices[0]
-
-
 def test_motor_driven_beyond_its_torque_loses_steps() -> None:
-    heavy = replace(boards.ARM.joints[0].model, inertia_kg_m2=6.0)
-    joints = (replace(boards.ARM.joints[0], model=heavy), *boards.ARM.joints[1:])
-    end, _ = run(model=replace(boards.ARM, joints=joints))
+    heavy = replace(commandline.ARM.joints[0].model, inertia_kg_m2=6.0)
+    end, _ = run(model=first_joint(commandline.ARM, model=heavy))
     assert (code(end), end.fault_joint) == ("following", 0)
 
 
 def test_without_a_model_the_motors_are_ideal() -> None:
-    joints = tuple(replace(joint, model=JointModel()) for joint in boards.ARM.joints)
-    ends = [run(model=model)[0] for model in (None, replace(boards.ARM, joints=joints))]
+    joints = tuple(replace(joint, model=JointModel()) for joint in commandline.ARM.joints)
+    ends = [run(model=model)[0] for model in (None, replace(commandline.ARM, joints=joints))]
     assert ends[0].positions == ends[1].positions
+
+
+# A homing run to limit switches on the virtual board, whose switches trip if the arm file says so
+
+
+PAPER = Arm.paper()
+SWITCH = """
+[joint.switches]
+low = 1
+active = "low"
+low_deg = {angle}
+"""
+
+
+def switched_arm(folder: Path, angle: float = -9.0) -> Arm:
+    """The paper's arm with a switch at the low end of joint 1."""
+    text = shipped.arm_path().read_text()
+    parts = text.split("[[joint]]")
+    parts[1] += SWITCH.format(angle=angle)
+    (folder / "arm.toml").write_text("[[joint]]".join(parts))
+    return Arm.load(folder / "arm.toml")
+
+
+@contextmanager
+def unhomed(found: Arm, real: Arm | None = None) -> Iterator[tuple[Client, StopRequest]]:
+    """A virtual board set up for an arm; ``real``: what its motors move instead."""
+    with launch(LaunchOptions(arm=real or found)) as virtual, open_board(virtual.port) as board:
+        arm_state.configure(board, found, replace=True)
+        with StopRequest() as stop:
+            yield board, stop
+
+
+@pytest.mark.parametrize("angle", [-9.0, -12.0])
+def test_homing_run_finds_where_the_arm_stands(tmp_path: Path, angle: float) -> None:
+    found = switched_arm(tmp_path, angle)
+    with unhomed(found) as (board, stop):
+        arm_state.home(board, found, np.array([30.0, -60.0, 40.0]))  # wrong: it is at 0
+        homing.home_to_switches(board, found, stop)
+        stands_deg = arm_state.posture_deg(board, found)
+    assert stands_deg == pytest.approx([0.0, -60.0, 40.0], abs=0.03)
+
+
+HOMED_FROM = (-24, -141, 113, 100, -85, 185)
+
+
+@pytest.mark.slow
+def test_six_joints_by_their_switches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Homing from far off ends at home; so say the board and, by their pulses, the motors."""
+    found, log = Arm.load("parol6"), tmp_path / "log"
+    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(homing, "SLOW", 0.2)
+    options = LaunchOptions(arm=found, start_deg=HOMED_FROM, edge_log=log)
+    with launch(options) as virtual, open_board(virtual.port) as board, StopRequest() as stop:
+        arm_state.configure(board, found, replace=True)
+        homing.home_to_switches(board, found, stop)
+        assert board.status().known == 0b111111
+        assert arm_state.posture_deg(board, found) == pytest.approx(list(found.home_deg), abs=0.02)
+    (cycle,) = edgelog.read(log)
+    moved_deg = [_moved_deg(cycle, joint) for joint in found.driven]
+    assert np.add(HOMED_FROM, moved_deg) == pytest.approx(list(found.home_deg), abs=0.1)
+
+
+def _moved_deg(cycle: edgelog.PowerCycle, joint: DrivenJoint) -> float:
+    """How far the pulses have moved a joint's motor since power-up."""
+    pins, channel = engine_pins.table(), joint.motor.channel - 1
+    ticks, levels = cycle.pins[pins["STEP"][channel][0]]
+    turns, to = cycle.pins[pins["DIR"][channel]]
+    at = np.searchsorted(turns, ticks[levels == 1], side="right")
+    signs = np.where(np.concatenate(([1 - to[0]], to))[at] == 1, 1, -1)
+    return float(signs.sum()) * joint.motor.direction / joint.steps_per_deg
+
+
+def test_switch_with_a_broken_wire(tmp_path: Path) -> None:
+    with unhomed(switched_arm(tmp_path), PAPER) as (board, stop):  # the input is drawn to where it trips
+        with pytest.raises(LinkError, match="degrees after it had been left"):
+            homing.home_to_switches(board, switched_arm(tmp_path), stop)
+        assert board.status().known == 0
+
+
+def test_switch_that_trips_in_a_motion_is_a_fault(tmp_path: Path) -> None:
+    found = switched_arm(tmp_path)
+    with unhomed(found) as (board, stop):
+        arm_state.home(board, found, np.array([20.0, -60.0, 40.0]))  # wrong by 20 degrees
+        with pytest.raises(BoardError, match="limit switch"):
+            goto.go_to(board, found, np.array([0.0, -60.0, 40.0]), stop)
+
+
+def test_arm_without_switches() -> None:
+    found = Arm.paper()
+    with unhomed(found) as (board, stop), pytest.raises(InputError, match="no limit switch"):
+        homing.home_to_switches(board, PAPER, stop)

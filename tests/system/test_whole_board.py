@@ -16,7 +16,7 @@ from armtempo.records import encode, encoded_motion
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters, scripted
-from tests.system import soak
+from tests.system import sequences
 
 CASES = Path(__file__).parent / "scripts" / "cases"
 SCRIPTS = [CASES / f"{name}.py" for name in ("standalone", "faults", "prompt", "sequences")]
@@ -118,6 +118,5 @@ def test_case_with_the_compact_program(
 
 
 def test_every_motion_of_a_soak_makes_the_steps_of_its_record(tmp_path: Path) -> None:
-    """A short one; ``python -m tests.benchmark.soak`` runs a long one."""
-    soak.make_flash(tmp_path / "flash", soak.AWAY[:2])
-    print(soak.run(QUICKEST, tmp_path / "flash", 10, seed=20268))
+    sequences.make_flash(tmp_path / "flash", sequences.AWAY[:2])
+    print(sequences.soak(QUICKEST, tmp_path / "flash", 10, seed=20268))

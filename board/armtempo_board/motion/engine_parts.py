@@ -51,7 +51,7 @@ class EngineParts:
         self.encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
         self.clock = MotionClock()
-        self.rates = RateControl(self.clock)
+        self.rates = RateControl(self.clock, len(joints))
         self.readings = Readings(self.sampler, self.clock, self.drives, self.encoders, slots)
         self.following = [FollowingError(row) for row in joints]
         self.inputs = Inputs(head, joints, self.sampler)

@@ -21,8 +21,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_shared.motion import MotionHead
 
-LOOKAHEAD_KITICKS = const(4096)
-"""How far ahead steps are computed: 50 ms. A change of rate begins after what is computed."""
+# How far ahead steps are computed: 25 ms, for which the loop may be busy with something else, and 4.2 ms for each joint
+_LOOP_KITICKS = const(2048)
+_JOINT_KITICKS = const(341)
 
 _GUARD_KITICKS = const(16)  # 195 us: a change of DIR is queued only after an edge that is later than this
 _OVERDUE_KITICKS = const(-164)  # 2 ms ago: the interrupt that fills the rings has failed
@@ -37,7 +38,8 @@ _TURNS = const(8)
 class JointDrive:
     """``arm``: head and joints of the arm record; ``sampler`` has the memory that the interrupts read.
 
-    ``ring_words``: see ``Ring``; ``memory``: for the step generator.
+    ``ring_words``: see ``Ring``; ``memory``: for the step generator. ``lookahead_kiticks``: how far ahead steps are
+    computed, 29 ms with one joint, 50 ms with six.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class JointDrive:
         head, rows = arm
         row = rows[number]
         self._sampler = sampler
+        self.lookahead_kiticks = _LOOP_KITICKS + _JOINT_KITICKS * len(rows)
         block = sampler.block
         self._words_at = sampler.joint_at(number)
         self.ring = Ring(row["channel"], block, self._words_at, ring_words)
@@ -95,7 +98,7 @@ class JointDrive:
         self.ring.stop()
         self._count_from(self._base)
         self.ended = False
-        self._next_refill_kiticks = -LOOKAHEAD_KITICKS  # nothing is to be done before
+        self._next_refill_kiticks = -_NEVER_KITICKS  # nothing is to be done before
 
     def position(self, matches: int) -> int:
         """Commanded steps after ``matches`` matches of the ring; call it in the order of the matches."""
@@ -125,7 +128,7 @@ class JointDrive:
         if now_kiticks < self._next_refill_kiticks:
             return 0
         generator = self.generator
-        can_queue_more = self.can_queue_more = generator.prepare(now_kiticks + LOOKAHEAD_KITICKS)
+        can_queue_more = self.can_queue_more = generator.prepare(now_kiticks + self.lookahead_kiticks)
         if can_queue_more and self.ring.state[isr.FED]:
             return 0  # served once the queue is full
         ahead_kiticks = self.ring.fed_kiticks()
@@ -168,7 +171,7 @@ class JointDrive:
                 ring.push_away()
                 self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS
             return 0
-        if generator.next_kiticks() - now_kiticks > LOOKAHEAD_KITICKS:
+        if generator.next_kiticks() - now_kiticks > self.lookahead_kiticks:
             ring.push_away()
             self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS
             return 0
@@ -180,15 +183,13 @@ class JointDrive:
 
     def follow(self, law: "array[int]", is_last: bool) -> None:
         """Follow another time law (see ``StepGenerator.follow``)."""
-        fed = self.ring.feed(0)
-        self.generator.follow(law, is_last)
-        self._next_refill_kiticks = -LOOKAHEAD_KITICKS
-        self.ring.feed(fed)
+        self.generator.follow(law, is_last, self.ring)
+        self._next_refill_kiticks = -_NEVER_KITICKS
 
     def finish(self) -> None:
         """End the motion where its time stops."""
         self.generator.finish()
-        self._next_refill_kiticks = -LOOKAHEAD_KITICKS
+        self._next_refill_kiticks = -_NEVER_KITICKS
 
     def empty(self) -> None:
         """Empty the ring; the position stays."""

@@ -17,7 +17,6 @@ from armtempo_board.hardware import isr
 from armtempo_board.memory import Memory
 from armtempo_board.motion import endpoints
 from armtempo_board.motion.engine import LEAD_TICKS
-from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS
 from armtempo_board.stepgen.override import Override
 from armtempo_board.stepgen.step_generator import StepGenerator
 
@@ -31,10 +30,10 @@ if TYPE_CHECKING:
     from armtempo_board.motion.engine import Engine
     from armtempo_board.motion.joint_drive import JointDrive
 
-_RESERVE_KITICKS = const(3277)
-"""40 ms, in Ki ticks (1024 ticks). A slice of the work takes 1 to 2 ms at 1.3 cycles an instruction, a
-garbage collection 5 ms, the checksum of the largest motion 10 ms; the running motion may need the loop
-afterwards."""
+_RESERVE_KITICKS = const(819)
+"""10 ms, in Ki ticks (1024 ticks): so much less than is computed ahead, 19 to 40 ms, has to be queued. A slice of the
+work takes 1 to 2 ms at 1.3 cycles an instruction, a garbage collection 5 ms, the checksum of the largest motion 10 ms;
+the running motion may need the loop afterwards."""
 _FAST_PART = const(4)
 """If the arm's rates exceed this fraction of the highest rates, the running motion needs the loop until its
 last step is queued."""
@@ -93,7 +92,7 @@ class NextMotion:
             if rate != _PERMILLE:
                 yield
                 generator.follow(override.law, False)
-            while generator.prepare(LOOKAHEAD_KITICKS):
+            while generator.prepare(self._engine.drives[number].lookahead_kiticks):
                 yield
         self.motion = motion
         self.override = override
@@ -109,7 +108,7 @@ class NextMotion:
     def has_time(self) -> bool:
         """Whether the running motion needs no ``Engine.refill`` during a slice: its queues hold its last
         steps, or many."""
-        until_kiticks = self._engine.clock.kiticks() + _RESERVE_KITICKS
+        now_kiticks = self._engine.clock.kiticks()
         for joint in self._engine.drives:
             generator = joint.generator
             if generator.ended:
@@ -118,7 +117,7 @@ class NextMotion:
                 self._is_fast
                 or joint.can_queue_more
                 or generator.at_turn
-                or generator.latest_kiticks() < until_kiticks
+                or generator.latest_kiticks() < now_kiticks + joint.lookahead_kiticks - _RESERVE_KITICKS
             ):
                 return False
         return True

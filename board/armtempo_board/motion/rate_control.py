@@ -7,7 +7,6 @@ from micropython import const
 from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.motion.clock import MotionClock
-from armtempo_board.motion.joint_drive import LOOKAHEAD_KITICKS
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -16,7 +15,9 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-_LAW_MARGIN_KITICKS = const(2048)  # 25 ms, within which all joints get the new time law
+# As in joint_drive.py; a joint gets another time law, and computes its first steps by it, within _JOINT_KITICKS
+_LOOP_KITICKS = const(2048)
+_JOINT_KITICKS = const(341)
 _PERMILLE = const(1000)
 
 
@@ -25,10 +26,12 @@ class RateControl:
 
     ``duration_ticks``: end of the motion unless the rate changes. ``waits``: a requested change has not
     begun. ``end_moves``: the time of the last sample has changed. ``braked``: the motion is to come to rest.
+    A change begins ``margin_kiticks`` after what is computed ahead, or after what is in the rings.
     """
 
-    def __init__(self, clock: MotionClock) -> None:
+    def __init__(self, clock: MotionClock, joints: int) -> None:
         self._clock = clock
+        self.margin_kiticks = _JOINT_KITICKS * joints
         self.override: "Any" = None
         self.wanted = self._before_pause = _PERMILLE
         self.duration_ticks = self._end_kiticks = 0
@@ -82,15 +85,13 @@ class RateControl:
     def _is_steady(self) -> bool:
         return bool(self._clock.kiticks() > self.override.steady_kiticks)
 
-    def ramp(self, ahead_kiticks: int) -> "array[int] | None":
-        """Begin the change after the steps in the rings; returns the time law for all joints, None if the
-        motion ends before.
+    def ramp(self, now_kiticks: int, ahead_kiticks: int) -> "array[int] | None":
+        """Begin the change; returns the time law for all joints, None if the motion ends before.
 
-        ``ahead_kiticks``: time until the last step in the rings. If rest would be later than the end of the
+        ``ahead_kiticks``: time from now until the last step in the rings. If rest would be later than the end of the
         motion, there is no change.
         """
-        ahead_kiticks = max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
-        start_ticks = (self._clock.kiticks() + ahead_kiticks) << 10
+        start_ticks = (now_kiticks + max(_LOOP_KITICKS + 2 * self.margin_kiticks, ahead_kiticks)) << 10
         self.waits = False
         if start_ticks >= self.duration_ticks or (
             self.braked and self.override.ramp_end_ticks(start_ticks, 0) >= self.duration_ticks
@@ -115,7 +116,7 @@ class RateControl:
             if self.stands():
                 end = override.steady_kiticks
             else:
-                start = now + max(LOOKAHEAD_KITICKS + _LAW_MARGIN_KITICKS, ahead_kiticks)
+                start = now + max(_LOOP_KITICKS + 2 * self.margin_kiticks, ahead_kiticks)
                 end = min(override.rest_kiticks(max(start, override.steady_kiticks)), end)
         return max(end - now, 0)
 

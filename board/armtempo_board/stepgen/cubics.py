@@ -60,15 +60,16 @@ _LONGEST_GROUP = const(4)
 
 
 @micropython.viper
-def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
+def cubics_fit(steps: int, solver: ptr32, queue: ptr32, slack: int) -> int:
     """Above 0 if two cubics of ``steps`` each, from FIRST_NODE over MIDDLE_NODE to END_NODE, keep the error bound.
 
     Then the next ones may have that many eighths of these steps, as the error grows with their fourth power.
 
     The Hermite cubic through the first and the end node misses the middle one by D in time and by E / (4 steps) in
     slope. Its fourth derivative alone makes each of the two D / 16 wrong at most, its fifth E / 26. D / 16 + E / 16 <=
-    1/8 tick is asked, which leaves a factor of four for what is not constant about them. The rounding of the third
-    difference (see ``put_cubics``), in groups of G steps 0.004 steps**3 / G**2 units, is allowed an eighth of a tick.
+    1/8 tick is asked, 2**``slack`` times that by a law of time; that leaves a factor of four for what is not constant
+    about them. The rounding of the third difference (see ``put_cubics``), in groups of G steps 0.004 steps**3 / G**2
+    units, is allowed an eighth of a tick.
     """
     # Log2 of the steps, rounded up, and the slopes with one exponent
     power = 0
@@ -138,7 +139,7 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32) -> int:
     if first < 0:
         first = 0 - first
     off += 4 * first
-    limit = 8 << queue[_TIME_SCALE]
+    limit = 8 << slack << queue[_TIME_SCALE]
     if off > limit:
         return 0
     if off <= limit >> 4:

@@ -10,6 +10,8 @@ from armtempo_board.stepgen.time_law import scale_slope, to_real_time
 
 _MOST_STEPS = const(1024)  # of a cubic
 _NODES = const(12)  # solved in one call
+_RAMP_SLACK = const(2)  # log2 of how much wider the error bound is within a ramp, whose nodes are less exact
+_MOST_SLACK = const(8)  # and with the time that a tick of the motion takes
 # results of ``queue_steps``
 NO_ROOM = const(0)  # the queue is full, or reaches UNTIL_KITICKS
 GOES_ON = const(1)
@@ -52,6 +54,7 @@ _MANTISSA = const(29)  # = FIRST_NODE + NODE_MANTISSA
 _EXPONENT = const(30)  # = FIRST_NODE + NODE_EXPONENT
 _FIRST_DELAY = const(31)  # = FIRST_NODE + NODE_DELAY
 _MIDDLE_NODE = const(33)
+_MIDDLE_RATE = const(37)  # = MIDDLE_NODE + NODE_RATE
 _END_NODE = const(38)
 _END_MANTISSA = const(39)  # = END_NODE + NODE_MANTISSA
 _END_EXPONENT = const(40)  # = END_NODE + NODE_EXPONENT
@@ -63,6 +66,11 @@ _TIME_OFFSET = const(23)
 _NODE_TIME = const(0)
 _NODE_DELAY = const(3)
 _NODE_WORDS = const(5)
+# as in time_law.py: words of the law
+_REAL_START_HIGH = const(4)
+_REAL_START_LOW = const(5)
+_REAL_END_HIGH = const(8)
+_REAL_END_LOW = const(9)
 # as in subintervals.py: arrays of a subinterval
 _ANGLE = const(0)
 _TIME = const(1)
@@ -122,9 +130,9 @@ def begin(solver: object, queue: object, arrays: object, position: int, at_start
 def queue_steps(solver: object, queue: object, law: object) -> int:
     """Queue the subinterval's steps after REACHED, until all are in, or the queue is full or reaches UNTIL_KITICKS.
 
-    _NODES are solved at most, or a few more; each takes about 2000 instructions. A last step that is
-    slow is not put in, but HELD_BACK is set. HALTED is set if by the law the next step never comes. Returns one of
-    the results above. The words of ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of
+    _NODES are solved at most, or a few more; each takes about 2000 instructions, by a law as much again. A last step
+    that is slow is not put in, but HELD_BACK is set. HALTED is set if by the law the next step never comes. Returns one
+    of the results above. The words of ``queue`` are named in step_queue.py, those of ``solver`` in newton.py, those of
     ``law`` in time_law.py.
     """
     words = ptr32(queue)  # type: ignore[arg-type]
@@ -152,9 +160,30 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                 length = (last - reached) // (2 * ((last - reached - 1) // (2 * size) + 1))
                 if length < 8:
                     length = size if size < 8 else 8
+            slack = 0
+            if mode:
+                # Times count from the first node on
+                i = nodes[_FIRST_TIME] >> scale
+                nodes[_FIRST_TIME] = nodes[_FIRST_TIME] - (i << scale)
+                base = nodes[_FIRST_DELAY] + i
+                nodes[_FIRST_DELAY] = base
+                # and no cubic goes beyond an end of the ramp, where nodes leap by a tick; steps until there
+                node = ptr32(law)  # type: ignore[arg-type]
+                i = ((node[_REAL_START_HIGH] - high) << 12) + node[_REAL_START_LOW] - base
+                if node[_REAL_START_HIGH] < high + (base >> 12):
+                    i = ((node[_REAL_END_HIGH] - high) << 12) + node[_REAL_END_LOW] - base
+                    slack = _RAMP_SLACK
+                    if node[_REAL_END_HIGH] < high + (base >> 12):
+                        i = -1
+                        slack = 0
+                if i >= 0:
+                    i = i // ((nodes[_MANTISSA] >> nodes[_EXPONENT]) + 1)
+                    i -= i >> 4
+                    if length + length > i:
+                        length = i >> 1
             while length > 1:
                 solve(solver, reached, length)
-                budget -= 2
+                budget -= 2 + mode + mode
                 words[_BASE_HIGH] = high
                 verdict = 1
                 if mode:
@@ -178,10 +207,17 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                                 node = ptr32(int(node) + 4 * _NODE_WORDS)
                                 i -= 1
                 if verdict:
-                    verdict = int(cubics_fit(length, solver, queue))
+                    # The bound is one of the motion's time
+                    i = slack
+                    if mode:
+                        base = nodes[_MIDDLE_RATE]
+                        while base < 1 << 29 and i < _MOST_SLACK:
+                            base += base
+                            i += 1
+                    verdict = int(cubics_fit(length, solver, queue, i))
                 if verdict:
                     break
-                length = (length * 3) >> 2
+                length = (length * (3 - mode)) >> 2  # by a law, trying costs most
                 words[_CUBIC_STEPS] = length if length > 2 else 2
             if length > 1:
                 reached += length + length
@@ -202,7 +238,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
             if words[_SINGLE_STEPS]:
                 words[_SINGLE_STEPS] = words[_SINGLE_STEPS] - 1
             solve(solver, reached + 1, 0)
-            budget -= 1
+            budget -= 1 + (mode & _BY_LAW)
             base = 0
             if mode & _BY_LAW:
                 if not int(to_real_time(law, solver, _FIRST_NODE, scale)):

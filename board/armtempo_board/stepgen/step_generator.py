@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-_PARTS_PER_CALL = const(4)  # of the motion that one call of ``prepare`` looks at: bounds its time
+_PARTS_PER_CALL = const(2)  # of the motion that one call of ``prepare`` looks at: bounds its time
 # as in step_queue.py: words of the queue
 _STEPS = const(11)
 _TIME_SCALE = const(14)
@@ -225,13 +225,13 @@ class StepGenerator:
         self.direction = -self.direction
         self.at_turn = False
 
-    def follow(self, law: "array[int]", is_last: bool) -> None:
+    def follow(self, law: "array[int]", is_last: bool, ring: "Any" = None) -> None:
         """Take the motion's time by a law from the real time on at which its ramp begins (time_law.py).
 
-        Nothing may be written meanwhile. That time must not lie before any ``until_kiticks`` that ``prepare`` was
-        given. Only what was put into the queue last lies beyond that: steps of one subinterval, or one that was held
-        back. The ramp of the law before must be after what was written. ``is_last``: if the motion's time stands
-        still after the ramp, it is the end.
+        That time must not lie before any ``until_kiticks`` that ``prepare`` was given. Only what was put into the
+        queue last lies beyond that: steps of one subinterval, or one that was held back. The ramp of the law before
+        must be after what was written. ``is_last``: if the motion's time stands still after the ramp, it is the end.
+        ``ring``: the one that an interrupt may write to meanwhile.
         """
         queue = self.queue
         high = self._high()
@@ -240,6 +240,8 @@ class StepGenerator:
         start_kiticks = _kiticks(self._law_words[_REAL_START_HIGH], 0)
         reached = queue[_REACHED]
         if queue[_LATEST_KITICKS] >= start_kiticks and self.waits():
+            # For no longer than this: a full ring may last only 2 ms
+            fed = ring.feed(0) if ring else 0
             if self._last_is_queued:
                 step_queue.withdraw(queue, queue[_IN] - 1 & 0xFFFF, start_kiticks)
                 self._pending |= _LAST
@@ -248,6 +250,8 @@ class StepGenerator:
                 if self._pending == _LAST:
                     self._pending = _NOTHING
                     reached -= 1
+            if ring:
+                ring.feed(fed)
         if reached < 0:
             reached = 0
             self._pending = _FIRST

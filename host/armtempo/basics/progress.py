@@ -78,9 +78,9 @@ def alive() -> None:
 
 
 def _tell(progress: Progress, name: str) -> None:
-    told = getattr(progress, "stage", None)
-    if told is not None:
-        told(name)
+    method = getattr(progress, "stage", None)
+    if method is not None:
+        method(name)
 
 
 def _silent(_done: float, _whole: float) -> None:

@@ -22,10 +22,8 @@ from armtempo.report import arm_picture, drawing
 @click.command("check")
 @options.arm
 @options.job
-@click.option(
+@options.file(
     "--picture",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
     help="Draw the arm at home and at the ends of its ranges into FILE (PNG or SVG). Needs the extra 'plot'.",
 )
 @options.force("an existing picture")

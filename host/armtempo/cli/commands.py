@@ -45,13 +45,13 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "plan --path free --corridor-mm 5",
         ),
         "ik": Entry(
-            "ik:ik",
+            "kinematics:ik",
             "Print all solutions of the inverse kinematics for a pose, or for each pose of a file.",
             "ik --position 240 180 80",
             "ik --arm ar4 --position 300 0 300 --rpy 0 90 0 --json",
         ),
         "fk": Entry(
-            "fk:fk",
+            "kinematics:fk",
             "Print the tool's pose and every frame for given joint angles.",
             "fk 0,-60,40",
             "fk first.json",

@@ -11,7 +11,7 @@ from armtempo import pipeline
 from armtempo.basics.errors import ArmtempoError, InputError, MissingPackageError
 from armtempo.cli import chosen, options, results, sequences
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.cli.run import run_and_tell
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

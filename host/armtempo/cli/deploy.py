@@ -10,7 +10,7 @@ import click
 from armtempo import deploy as deployment
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.deploy import package as packages
 from armtempo.model.arm import Arm
 from armtempo.robot import engine_room
@@ -18,10 +18,8 @@ from armtempo.robot import engine_room
 
 @click.command("deploy")
 @click.option("--mpy", is_flag=True, help="Compile with mpy-cross: smaller, and faster to start.")
-@click.option(
+@options.folder(
     "--package",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="FOLDER",
     help="Instead write FOLDER for 'mpremote mip install --target /flash FOLDER/package.json'.",
 )
 @options.arm

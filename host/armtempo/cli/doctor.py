@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+import os
+import platform
+import re
+import shutil
+import sys
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 import click
 
-from armtempo.basics import settings
+from armtempo.basics import installation, settings
 from armtempo.basics.errors import ArmtempoError
 from armtempo.basics.settings import ProjectSettings
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.diagnosis import arm_check, machine
+from armtempo.diagnosis import arm_check
 from armtempo.diagnosis.finding import Finding, Level, error, good, note
+from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.model import shipped
 from armtempo.ports import board_port
-from armtempo.robot import board_check
+from armtempo.ports.board_port import Port
 from armtempo.robot.board_state import BoardState
+
+_LEAST_HEAP = 8_000
+"""Bytes of free heap below which a long motion may not fit."""
+_LEAST_PYTHON = (3, 11)
+_NO_PORT = "connect a board by its USB socket, or use --port sim; a board without MicroPython: armtempo flash"
+_GROUP = "sudo usermod -a -G dialout $USER, then log in again"
 
 
 @click.command("doctor")
@@ -30,9 +43,9 @@ def doctor(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     Exit code 1 if something is wrong.
     """
     parts = {
-        "machine": machine.examine_machine(),
-        "packages": machine.packages(),
-        "ports": machine.ports(),
+        "machine": machine(),
+        "packages": packages(),
+        "ports": ports(),
         "project": _project(arm_path, port),
         "arm": _arm(arm_path),
         "board": _board(port, arm_path),
@@ -70,9 +83,9 @@ def _board(port: str | None, arm_path: Path | None) -> list[Finding]:
     except ArmtempoError:  # no port is set and no board is plugged in: not an error
         return [note("board", "not checked", "give --port PORT, or --port sim")]
     try:
-        return board_check.examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
+        return examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
     except ArmtempoError as refused:
-        return board_check.examine_board(refused)
+        return examine_board(refused)
 
 
 def _named(state: BoardState, arm_path: Path | None) -> BoardState:
@@ -102,3 +115,95 @@ def _print(parts: dict[str, list[Finding]]) -> None:
             click.echo(f"  {item.level.word:<6}{item.where:<{width}}  {item.what}")
             if item.next_step:
                 click.echo(f"  {'':<6}{'':<{width}}  -> {item.next_step}")
+
+
+def examine_board(state: BoardState | ArmtempoError) -> list[Finding]:
+    """Findings about a board's state, or about the error with which it could not be read."""
+    if isinstance(state, ArmtempoError):
+        return [error("board", str(state), "see 'armtempo help recovery' for each of its states")]
+    found = [
+        good("board", f"{state.board_id}{' (virtual)' if state.virtual else ''}, port {state.port}"),
+        _program(state),
+        _room(state),
+        good(
+            "arm on the board", state.arm or (f"record {state.arm_crc:08x}" if state.arm_crc else "none yet")
+        ),
+        good("state", state.state),
+    ]
+    if state.arm_problem:
+        found.append(error("stored arm", state.arm_problem, "armtempo configure"))
+    if state.fault:
+        found.append(error("fault", state.fault, "remove its cause, then 'armtempo clear'"))
+    if state.frames_bad or state.samples_lost:
+        text = f"{state.frames_bad} damaged messages, {state.samples_lost} samples lost"
+        found.append(note("link", text, "if it continues, try another cable or USB socket"))
+    return found
+
+
+def _program(state: BoardState) -> Finding:
+    text = f"{state.program_crc:08x}, protocol {state.protocol}"
+    if state.program_current:
+        return good("program", f"{text}, as installed here")
+    return error("program", f"{text}, which differs from the one installed here, {own_crc():08x}", UPDATE)
+
+
+def _room(state: BoardState) -> Finding:
+    text = f"{state.free_heap} bytes of heap, {state.free_flash} of flash"
+    if state.free_heap >= _LEAST_HEAP:
+        return good("free", text)
+    return note("free", text, "flash a firmware with the program built in: 'armtempo flash'")
+
+
+def machine() -> list[Finding]:
+    """Versions of armtempo, Python and the operating system."""
+    python = f"{platform.python_version()} ({platform.python_implementation()})"
+    fits = sys.version_info[:2] >= _LEAST_PYTHON
+    least = ".".join(map(str, _LEAST_PYTHON))
+    found = good("Python", python) if fits else error("Python", python, f"install Python {least} or newer")
+    system = good("system", f"{platform.system()} {platform.release()}, {platform.machine()}")
+    return [good("armtempo", installation.installed_version()), found, _flash_tool(), system]
+
+
+def _flash_tool() -> Finding:
+    found = shutil.which("dfu-util") or shutil.which("st-flash")
+    if found:
+        return good("flash tool", found)
+    return note("flash tool", "not installed", "for 'armtempo flash': install dfu-util")
+
+
+def packages() -> list[Finding]:
+    """Each required or optional package, with its version, or how to install it."""
+    found: dict[str, Finding] = {}
+    for requirement in requires("armtempo") or []:
+        name = re.split(r"[^A-Za-z0-9._-]", requirement)[0]
+        extra = re.search(r"extra == ['\"](\w+)['\"]", requirement)
+        if extra is not None and extra[1] == "docs":  # for developers
+            continue
+        if not (name in found or "platform_machine" in requirement):  # which also has an extra
+            found[name] = _package(name, extra[1] if extra else "")
+    return [*found.values()]
+
+
+def _package(name: str, extra: str) -> Finding:
+    """A package of the core (``extra`` = "") or of an extra."""
+    try:
+        return good(name, version(name))
+    except PackageNotFoundError:
+        if extra:
+            advice = f"{installation.command(name, extra)} if you want it"
+            return note(name, "not installed", advice)
+        return error(name, "missing", "pip install --force-reinstall armtempo")
+
+
+def ports() -> list[Finding]:
+    """The serial ports, and whether this user can open them."""
+    found = [_port(port) for port in board_port.find_ports()]
+    return found or [note("ports", "none", _NO_PORT)]
+
+
+def _port(port: Port) -> Finding:
+    what = f"{port.description or 'serial port'}{', a MicroPython board' if port.board else ''}"
+    if sys.platform == "linux" and not os.access(port.device, os.R_OK | os.W_OK):
+        level = Level.ERROR if port.board else Level.NOTE
+        return Finding(level, port.device, f"{what}; no permission to open it", _GROUP)
+    return good(port.device, what)

@@ -22,7 +22,7 @@ from armtempo.new_arm import urdf_reader as reader
 
 
 @click.command("import")
-@click.argument("table", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("table", type=options.FILE)
 @options.arm
 @click.option("--name", help="Name of the job; default: the table's file name.")
 @click.option("--radians", is_flag=True, help="The angles are in radians.")
@@ -32,11 +32,9 @@ from armtempo.new_arm import urdf_reader as reader
     metavar="DEG",
     help="Leave out lines that change the path by less than DEG. Default for a table with a column time_s: 0.1.",
 )
-@click.option(
+@options.file(
     "-o",
     "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
     help="Job file to write; without it the job's name with .toml. An existing file with other content is not "
     "replaced.",
 )
@@ -87,7 +85,7 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
 
 
 @click.command("export")
-@click.argument("trajectory", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("trajectory", type=options.FILE)
 @click.option(
     "--format",
     "kind",
@@ -98,11 +96,9 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
 )
 @click.option("--rate", type=float, default=100.0, show_default=True, metavar="HZ", help="Points a second.")
 @click.option("--frame-id", default="", help="header.frame_id of the ROS message.")
-@click.option(
+@options.file(
     "-o",
     "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
     help="File to write; without it standard output. An existing FILE with other content is not replaced.",
 )
 @options.force("an existing FILE with other content")
@@ -137,13 +133,11 @@ def export(
 
 
 @click.command("import-urdf")
-@click.argument("urdf", type=click.Path(dir_okay=False, path_type=Path))
-@click.option(
+@click.argument("urdf", type=options.FILE)
+@options.file(
     "-o",
     "--out",
     required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
     help="Arm file to write (TOML).",
 )
 @click.option("--base", metavar="LINK", help="Base link of the arm; default: the URDF's root.")

@@ -10,7 +10,7 @@ import click
 from armtempo.basics.errors import InputError
 from armtempo.basics.settings import PORT, ProjectSettings
 from armtempo.cli import options, results
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.deploy import changes
 from armtempo.deploy.firmware import build, checkout, frozen, image, write
 from armtempo.deploy.firmware.image import Image
@@ -25,20 +25,18 @@ from armtempo.deploy.firmware.image import Image
 )
 @click.option(
     "--micropython",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=options.FOLDER,
     metavar="DIR",
     help="A checkout of MicroPython with its submodules.",
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=options.PATH,
     metavar="FOLDER",
     help="New folder for the firmware; default: firmware-NAME here.",
 )
-@click.option(
+@options.folder(
     "--program",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="FOLDER",
     help="Only write the program and a manifest.py to FOLDER, for your own build.",
 )
 @options.as_json
@@ -91,7 +89,7 @@ def _values(made: Image) -> dict[str, Any]:
 @click.option(
     "--image",
     "given",
-    type=click.Path(path_type=Path),
+    type=options.PATH,
     metavar="FILE",
     help="The zip file of a release, or a folder that 'armtempo firmware' made. Default: the only one in this folder.",
 )

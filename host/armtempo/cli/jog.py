@@ -119,10 +119,10 @@ def screen(
     pressed: Keys,
     speed: float = 25,
     more: dict[str, Callable[[], str]] | None = None,
-    told: str = "",
+    more_help: str = "",
 ) -> JogScreen:
-    """The jog screen, after printing its keys; ``more``: keys of the caller, described by ``told``."""
-    click.echo(f"{KEYS}\n{told}" if told else KEYS)
-    made = JogScreen(board, pressed, more, told)
+    """The jog screen, after printing its keys; ``more``: keys of the caller, described by ``more_help``."""
+    click.echo(f"{KEYS}\n{more_help}" if more_help else KEYS)
+    made = JogScreen(board, pressed, more, more_help)
     made.choice.speed = min(range(len(SPEEDS)), key=lambda index: abs(SPEEDS[index] - speed))
     return made

@@ -94,12 +94,12 @@ class JogChoice:
 class JogScreen:
     """The jog screen; ``loop`` runs it until the user ends it.
 
-    ``more``: keys of the caller, each with a function that gives the text to show; ``told``: their help for
+    ``more``: keys of the caller, each with a function that gives the text to show; ``more_help``: their help for
     ``?``.
     """
 
     def __init__(
-        self, board: Board, keys: Keys, more: dict[str, Callable[[], str]] | None = None, told: str = ""
+        self, board: Board, keys: Keys, more: dict[str, Callable[[], str]] | None = None, more_help: str = ""
     ) -> None:
         if board.arm is None:
             raise InputError("no arm is set", "set it with home(arm) or configure(arm)")
@@ -108,7 +108,7 @@ class JogScreen:
         self._board = board
         self._keys = keys
         self._more = more or {}
-        self._more_told = told
+        self._more_help = more_help
         self._said = ""
         self._ended_by = ""
 
@@ -130,7 +130,7 @@ class JogScreen:
     def _act(self, key: str) -> None:
         try:
             if key == "?":
-                click.echo(f"{_CLEAR_LINE}{KEYS}\n{self._more_told}".rstrip())
+                click.echo(f"{_CLEAR_LINE}{KEYS}\n{self._more_help}".rstrip())
             elif key in self._more:
                 self._said = self._more[key]()
             elif key in (*_FORWARD, *_BACKWARD):

@@ -13,7 +13,7 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
 from armtempo.cli import results
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.link.board_messages import Sample
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report.live_plot import LivePlot

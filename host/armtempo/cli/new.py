@@ -19,7 +19,7 @@ from armtempo.new_arm.questions import Answers
 
 
 @click.command("new")
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=options.PATH)
 @click.option("--like", metavar="ARM", help="Copy a shipped arm, such as ar4.")
 @click.option(
     "--urdf",

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 FC = TypeVar("FC", bound=Callable[..., Any] | click.Command)
 
+PATH = click.Path(path_type=Path)
+FILE = click.Path(dir_okay=False, path_type=Path)
+FOLDER = click.Path(file_okay=False, path_type=Path)
+
 
 class TakesNumbers(click.Command):
     """A command whose arguments may begin with a minus sign: "-10,20" is a posture, not an option; "--speed" is one."""
@@ -32,6 +36,16 @@ class TakesNumbers(click.Command):
         return rest
 
 
+def file(*names: str, **settings: Any) -> Callable[[FC], FC]:
+    """An option that takes a FILE."""
+    return click.option(*names, type=FILE, metavar="FILE", **settings)
+
+
+def folder(*names: str, **settings: Any) -> Callable[[FC], FC]:
+    """An option that takes a FOLDER."""
+    return click.option(*names, type=FOLDER, metavar="FOLDER", **settings)
+
+
 _ELSE = "Default: variable ARMTEMPO_{}, else the project folder's armtempo.toml"
 _ARM = "Arm file (TOML), or the name of a shipped arm, such as ar4"
 
@@ -41,10 +55,8 @@ port = click.option(
     help="Serial device or URL of the board; 'sim': a virtual board for this command; 'sim:FOLDER': the same with "
     f"its flash in FOLDER. {_ELSE.format('PORT')}, else the only board that is plugged in.",
 )
-log_traffic = click.option(
+log_traffic = file(
     "--log-traffic",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
     help="Write every byte to and from the board to FILE ('armtempo monitor FILE' shows it). An existing FILE is "
     "only replaced if it is such a log.",
 )
@@ -68,8 +80,7 @@ def _arms(ctx: click.Context, param: click.Parameter, begun: str) -> list[Comple
 
 
 def _arm_option(text: str) -> Callable[[FC], FC]:
-    kind = click.Path(path_type=Path)
-    return click.option("--arm", "arm_path", type=kind, metavar="ARM", help=text, shell_complete=_arms)
+    return click.option("--arm", "arm_path", type=PATH, metavar="ARM", help=text, shell_complete=_arms)
 
 
 arm = _arm_option(f"{_ARM}. {_ELSE.format('ARM')}.")
@@ -93,14 +104,12 @@ holds = click.option(
 job = click.option(
     "--job",
     "job_path",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE",
     help=f"Job file (TOML). {_ELSE.format('JOB')}.",
 )
-out = click.option(
+out = folder(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="FOLDER",
     help=f"Folder for run folders; each run makes a new one. {_ELSE.format('RUNS')}, else 'runs'.",
 )
 altered = click.option(

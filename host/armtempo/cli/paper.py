@@ -9,19 +9,17 @@ import click
 
 from armtempo.basics.atomic_file import replace_text
 from armtempo.cli import options, results
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.paper import experiment, motions, postures, searches, sheet
 from armtempo.paper.printed import Claim
 
 
 @click.command("paper")
 @click.option("--quick", is_flag=True, help="Small populations, few seeds, two replays: under a minute.")
-@click.option(
+@options.folder(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
     default=Path("paper"),
     show_default=True,
-    metavar="FOLDER",
     help="Where page and run folders go.",
 )
 @options.as_json

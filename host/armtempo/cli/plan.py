@@ -12,7 +12,7 @@ from armtempo import pipeline
 from armtempo.basics.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.cli import chosen, options, results, sequences
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -33,14 +33,12 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
 
 
 @click.command("plan")
-@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.argument("file", type=options.PATH, required=False)
 @options.job
 @options.arm
-@click.option(
+@options.file(
     "-o",
     "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
     help="Trajectory file to write; default: the job's name with .json. An existing FILE is only replaced if it "
     "is an earlier plan of the same job for the same arm, by name.",
 )

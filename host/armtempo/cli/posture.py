@@ -12,7 +12,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results, state
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan

@@ -23,7 +23,7 @@ from armtempo.robot.run import Run
 )
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=options.FILE,
     help="Page to write when comparing; default: comparison.html next to the first run. An existing file is only "
     "replaced if it is such a page.",
 )
@@ -64,9 +64,9 @@ def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool)
 
 def _values(run: Path, page: Path) -> dict[str, Any]:
     """The verdict (``good``, ``bad`` or ``open``) and the findings of a page."""
-    told = sequence_report.verdict_of(run) if is_sequence_run(run) else verdict.of(evaluation.evaluate(run))
-    findings = [asdict(finding) for finding in told.findings]
-    return {"folder": str(run), "page": str(page), "verdict": told.state, "findings": findings}
+    result = sequence_report.verdict_of(run) if is_sequence_run(run) else verdict.of(evaluation.evaluate(run))
+    findings = [asdict(finding) for finding in result.findings]
+    return {"folder": str(run), "page": str(page), "verdict": result.state, "findings": findings}
 
 
 def _is_comparison(page: Path) -> bool:

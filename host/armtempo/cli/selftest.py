@@ -10,18 +10,16 @@ import click
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.diagnosis.selftest.result import Measurement, SelfTest
 from armtempo.report import selftest_page as page
 from armtempo.robot.motor_test import ARM_FILE
 
 
 @click.command("selftest")
-@click.option(
+@options.folder(
     "--out",
     "-o",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="FOLDER",
     help="Write selftest.json and a page with figures, selftest.html, to FOLDER.",
 )
 @options.force("files of an earlier self-test in FOLDER")

@@ -16,7 +16,7 @@ from armtempo.basics.atomic_file import check_not_input
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError
 from armtempo.basics.text import aligned
 from armtempo.cli import chosen, results
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.cli.state import counted
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.sequence import Sequence, arm_named

@@ -80,4 +80,4 @@ def pause(given: BoardOptions) -> None:
 @options.board()
 def resume(given: BoardOptions) -> None:
     """Continue a paused motion at the speed before the pause."""
-    _change(given, _Asked("resume", lambda board: board.resume(), "going on"))
+    _change(given, _Asked("resume", lambda board: board.resume(), "resumed"))

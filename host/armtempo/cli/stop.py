@@ -34,19 +34,19 @@ def stop(now: bool, given: BoardOptions) -> None:
     answer = quick_stop.take_answer(given.port or "", now)
     if answer is not None:
         _tell(given, answer, now)
-    _show(_stopped(given, now, told=answer is not None), given.as_json)
+    _show(_stopped(given, now, asked=answer is not None), given.as_json)
 
 
-def _stopped(given: BoardOptions, now: bool, told: bool) -> BoardState:
-    """The state after the arm has come to rest; ``told``: the program that has the port was already told."""
+def _stopped(given: BoardOptions, now: bool, asked: bool) -> BoardState:
+    """The state after the arm has come to rest; ``asked``: the program that has the port was already asked to stop."""
     limit_s = time.monotonic() + _PORT_FREE_S
     while True:
         shared = shared_board.find(given.port or "")
         if shared is not None:
             with shared:
-                if not told:
+                if not asked:
                     _tell(given, StopAnswer(shared.stop(now, quick_stop.BY), shared.program), now)
-                    told = True
+                    asked = True
                 found = _rest(shared)
             if found is not None:
                 return found

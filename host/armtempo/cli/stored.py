@@ -12,7 +12,7 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
 from armtempo.cli import chosen, options, posture, results
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.progress import ProgressBar
+from armtempo.cli.results import ProgressBar
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import is_sequence_plan
@@ -23,7 +23,7 @@ from armtempo.robot.board_state import record_crc
 
 
 @click.command("upload")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=options.PATH)
 @click.option("--name", metavar="NAME", help="Name on the board; default: the job's name.")
 @click.option("--default", "as_default", is_flag=True, help="Let the board's button start it.")
 @options.force("another motion of this name on the board")

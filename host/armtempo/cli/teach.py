@@ -20,9 +20,7 @@ from armtempo.robot.board import Board
 
 
 @click.command("teach")
-@click.argument(
-    "job_file", required=False, metavar="[JOB.toml]", type=click.Path(dir_okay=False, path_type=Path)
-)
+@click.argument("job_file", required=False, metavar="[JOB.toml]", type=options.FILE)
 @click.option(
     "--posture", "name", metavar="NAME", help="Write the position as [posture.NAME] into the arm file."
 )
@@ -110,7 +108,7 @@ def _write_job(board: Board, file: Path, by_hand: bool, gamepad: bool) -> None:
             if by_hand:
                 _guide(board, pressed, points)
             else:
-                jog.screen(board, pressed, more=points.keys, told=_MORE).loop()
+                jog.screen(board, pressed, more=points.keys, more_help=_MORE).loop()
         points.save(file)
     except BaseException:
         points.tell()

@@ -17,13 +17,13 @@ _LOOK_S = 0.5
 @click.command("virtual-board")
 @click.option(
     "--flash",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=options.FOLDER,
     help="Folder used as the board's flash; created if missing. Default: a temporary one.",
 )
 @click.option("--real-time", is_flag=True, help="Run motions in real time instead of as fast as possible.")
 @click.option(
     "--edge-log",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=options.FILE,
     help="Write every pin edge with its time to this file.",
 )
 @click.option("--interpreter", help="MicroPython or Python that runs it. Default: micropython if found.")

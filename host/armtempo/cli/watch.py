@@ -76,7 +76,7 @@ Say = Callable[[float, str, list[str]], None]
 
 
 @click.command("monitor")
-@click.argument("file", required=False, type=click.Path(path_type=Path))
+@click.argument("file", required=False, type=options.PATH)
 @options.board()
 def monitor(file: Path | None, given: BoardOptions) -> None:
     """Show decoded traffic.

@@ -42,19 +42,24 @@ def output(name: str | None, value: str | None, given: BoardOptions) -> None:
             for entry, raw in zip(board.arm.outputs, levels, strict=True)
             if name in (None, entry.name)
         ]
+    _print(
+        given, board.arm, "output", name, [_output_values(*entry) for entry in found], _output_lines(found)
+    )
+
+
+def _print(
+    given: BoardOptions, arm: Arm, kind: str, name: str | None, values: list[dict[str, Any]], lines: list[str]
+) -> None:
+    """Print the arm's outputs or inputs, or the one of that ``name``."""
     if given.as_json:
-        _print_json([_output_values(*entry) for entry in found], name)
+        results.show_json(values if name is None else values[0])
         return
-    if not found:
+    if not lines:
         results.remark(
-            f"arm {chosen.describe_arm(board.arm)} has no outputs: write [output.NAME] tables in its file"
+            f"arm {chosen.describe_arm(arm)} has no {kind}s: write [{kind}.NAME] tables in its file"
         )
-    for line in _output_lines(found):
+    for line in lines:
         click.echo(line)
-
-
-def _print_json(values: list[dict[str, Any]], name: str | None) -> None:
-    results.show_json(values if name is None else values[0])
 
 
 def _output_values(output: Output, raw: int) -> dict[str, Any]:
@@ -102,20 +107,8 @@ def read_inputs(name: str | None, given: BoardOptions) -> None:
             for number, entry in enumerate(board.arm.inputs)
             if name in (None, entry.name)
         ]
-    if given.as_json:
-        values = [_input_values(*entry) for entry in found]
-        results.show_json(values if name is None else values[0])
-        return
-    if not found:
-        results.remark(
-            f"arm {chosen.describe_arm(board.arm)} has no inputs: write [input.NAME] tables in its file"
-        )
-    for line in _input_lines(found):
-        click.echo(line)
-
-
-def _input_values(entry: Input, active: bool) -> dict[str, Any]:
-    return {"name": entry.name, "pin": entry.pin, "active": active}
+    values = [{"name": entry.name, "pin": entry.pin, "active": active} for entry, active in found]
+    _print(given, board.arm, "input", name, values, _input_lines(found))
 
 
 def _input_lines(found: list[tuple[Input, bool]]) -> list[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.diagnosis import drives, encoders, geometry, resolution, torque, units, wiring
+from armtempo.diagnosis import drives, figures, geometry, torque, units, wiring
 from armtempo.diagnosis.finding import Finding, Level, error, note
 from armtempo.model.arm import STILL_DEG, Arm
 from armtempo.model.posture import HOME
@@ -36,8 +36,11 @@ def check_arm(arm: Arm) -> list[Finding]:
     """All findings about an arm, errors first; it may have no motors (``Arm.read``)."""
     found = [*units.findings(arm), *geometry.findings(arm), *_motors(arm)]
     if arm.driven:
-        for part in (drives, resolution, encoders, torque, wiring):
-            found += part.findings(arm)
+        found += drives.findings(arm)
+        found += figures.findings(arm)
+        found += drives.encoder_findings(arm)
+        found += torque.findings(arm)
+        found += wiring.findings(arm)
         if not any(finding.level is Level.ERROR for finding in found):
             found += drives.record_findings(arm)
             found += _postures(arm)

@@ -1,11 +1,11 @@
-"""Motors and gears: step rates against the board and the drivers, steps against the ranges."""
+"""Motors, gears and encoders: step rates against the board and the drivers, steps against the ranges."""
 
 from __future__ import annotations
 
 from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.basics.errors import ArmtempoError
-from armtempo.diagnosis.finding import Finding, error, warning
+from armtempo.diagnosis.finding import Finding, error, note, warning
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Driver
 from armtempo.planning.checks import ESTIMATED, rate_words
@@ -19,6 +19,8 @@ _FEWEST_STEPS = 10
 _SLOW_STEPS_S = 10.0
 _SUDDEN_S = 0.01
 """An acceleration limit that allows full speed in less time is probably wrong."""
+_FASTEST_COUNTS_S = 1e6
+"""Largest rate: fewer than 32 768 counts between two readings (board/docs/hardware.md)."""
 
 
 def top_rate_steps_s(joint: DrivenJoint) -> float:
@@ -118,3 +120,49 @@ def _range(joint: DrivenJoint) -> list[Finding]:
         return []
     text = f"its whole range, {low:g} to {high:g} deg, is {steps:.2g} steps"
     return [error(joint.name, text, "check range_deg, steps_per_rev, microsteps and gear_ratio")]
+
+
+def encoder_findings(arm: Arm) -> list[Finding]:
+    """Findings about the encoders: resolution, rate, following error."""
+    found = [finding for joint in arm.driven if joint.encoder for finding in _encoder(joint)]
+    without = [joint.name for joint in arm.driven if joint.encoder is None]
+    if without:
+        text = f"no encoder: {', '.join(without)}; lost steps there are not seen"
+        found.append(
+            note("encoders", text, "nothing to do; with an encoder the board would stop on a lost step")
+        )
+    return found
+
+
+def _encoder(joint: DrivenJoint) -> list[Finding]:
+    assert joint.encoder is not None
+    limit_deg, count_deg = joint.encoder.following_error_deg, 1.0 / joint.counts_per_deg
+    found = []
+    if joint.limits.speed_deg_s / count_deg > _FASTEST_COUNTS_S:
+        text = f"at its speed limit the encoder gives {joint.limits.speed_deg_s / count_deg:.3g} counts/s"
+        found.append(
+            warning(joint.name, text, "lower speed_deg_s: above a million counts/s they may be miscounted")
+        )
+    if limit_deg == 0.0:
+        text = "its encoder is recorded, but following_error_deg = 0 lets nobody watch it"
+        found.append(
+            note(joint.name, text, "give following_error_deg, such as 2.0, to stop when steps are lost")
+        )
+    elif limit_deg < count_deg:
+        text = (
+            f"following_error_deg = {limit_deg:g} is less than one count of its encoder, {count_deg:.3g} deg"
+        )
+        found.append(error(joint.name, text, "raise following_error_deg, or check counts_per_rev and 'on'"))
+    elif limit_deg < _ordinary_deg(joint, count_deg):
+        text = (
+            f"following_error_deg = {limit_deg:g} is less than what a healthy joint may show: a full step of lag, "
+            f"two counts and the backlash, {_ordinary_deg(joint, count_deg):.3g} deg"
+        )
+        found.append(warning(joint.name, text, "raise it above that, else it trips in ordinary motion"))
+    return found
+
+
+def _ordinary_deg(joint: DrivenJoint, count_deg: float) -> float:
+    """Largest following error of a joint without a lost step, degrees."""
+    full_step_deg = 360.0 / joint.motor.steps_per_rev / joint.motor.gear_ratio
+    return full_step_deg + 2 * count_deg + joint.model.backlash_deg

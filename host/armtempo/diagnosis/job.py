@@ -28,8 +28,8 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
     except ArmtempoError as refused:
         text = "correct that; the rest of the job was not checked"
         return [*suspected, error("job", str(refused), text)]
-    told = [note("job", text, "change the pose, or accept it") for text in notes]
-    return [*suspected, *told, *_steps(arm, via_deg), *_room(arm.holding(job.holds), via_deg)]
+    poses = [note("job", text, "change the pose, or accept it") for text in notes]
+    return [*suspected, *poses, *_steps(arm, via_deg), *_room(arm.holding(job.holds), via_deg)]
 
 
 def _room(arm: Arm, via_deg: Array) -> list[Finding]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from armtempo.kinematics.branches import BRANCHES, Branch, branch_of
 from armtempo.kinematics.choice import Candidate, Choice, choose
 from armtempo.kinematics.forward import all_frames, forward, postures
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse, inverse_of_pose
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.shape import refusals
-from armtempo.kinematics.solutions import PoseSolutions, Solutions
+from armtempo.kinematics.solutions import BRANCHES, Branch, PoseSolutions, Solutions, branch_of
 from armtempo.kinematics.solver import Answer, Nearest, PoseSolver
 
 __all__ = [

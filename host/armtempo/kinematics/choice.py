@@ -11,16 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
-from armtempo.kinematics.branches import BRANCHES, Branch
-from armtempo.kinematics.folding import folded, spread
 from armtempo.kinematics.formulas import wrist_centre
 from armtempo.kinematics.geometry import Geometry
-from armtempo.kinematics.inverse import inverse_of_pose
+from armtempo.kinematics.inverse import folded, inverse_of_pose, spread
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.regions import Regions, classify
 from armtempo.kinematics.rejection import Rejection, WristCentre, reasons
 from armtempo.kinematics.shape import Shape
-from armtempo.kinematics.solutions import OK, OUT_OF_REACH, PoseSolutions
+from armtempo.kinematics.solutions import BRANCHES, OK, OUT_OF_REACH, Branch, PoseSolutions
 
 _SAME_RAD = 0.1
 """Postures nearer than this, in joint space, lead to the same one."""

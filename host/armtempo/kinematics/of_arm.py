@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
@@ -18,20 +19,25 @@ from armtempo.kinematics.constraint import Constraint
 from armtempo.kinematics.descent import most_swing
 from armtempo.kinematics.forward import forward as forward_rad
 from armtempo.kinematics.geometry import Geometry
+from armtempo.kinematics.inverse import inverse as inverse_rad
 from armtempo.kinematics.numerical import NumericalSolution, descents
+from armtempo.kinematics.ranges import TOLERANCE_RAD, Ranges
+from armtempo.kinematics.shape import refusals
+from armtempo.kinematics.solutions import OK
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.pose import checked_rows
+from armtempo.model.pose import checked_all, checked_rows
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 
 _MARGIN_DEG, _MARGIN_TOLERANCES = 5.0, 50.0
 """Largest excess over a range, degrees and in tolerances, for which a posture in range is searched."""
 _SWINGS = 3.0
 """A joint out of range by more than this times its first-order change within the tolerance is rejected."""
-_BEHIND_RAD = 1e6
+_UNUSABLE_RAD = 1e6
 """Larger than the distance of any usable posture."""
 _COST = 2.0
 """Cost (as in ``descent``) of a posture at the limit of both tolerances."""
+_kept: tuple[Arm, PoseSolver] | None = None
 
 
 class Solution:
@@ -129,10 +135,7 @@ def _order(one: Candidate | NumericalSolution) -> float:
     distance = one.distance_rad
     if one.usable:
         return distance
-    return math.inf if math.isnan(distance) else _BEHIND_RAD + distance
-
-
-_kept: tuple[Arm, PoseSolver] | None = None
+    return math.inf if math.isnan(distance) else _UNUSABLE_RAD + distance
 
 
 def _solver(arm: Arm | Path | str) -> PoseSolver:
@@ -184,3 +187,57 @@ def _posture(arm: Arm, near_deg: ArrayLike) -> Array:
     if near.ndim != 1:
         raise InputError("near_deg must be one posture", "give an angle for each joint")
     return np.radians(spread_deg(arm, near, "near_deg: "))
+
+
+@dataclass(frozen=True, eq=False)
+class ManySolutions:
+    """Joint angles for each of N tool poses."""
+
+    angles_deg: Array
+    """(N, 8, joints): whole turns added to lie in the ranges, nearest to the posture to stay near to; NaN if out of
+    reach."""
+    usable: NDArray[np.bool_]
+    """(N, 8): within reach and all ranges, and not equal to an earlier one."""
+    nearest_deg: Array
+    """(N, joints): the usable solution nearest to that posture; NaN if there is none."""
+
+
+@checked
+def inverse_many(arm: Arm | Path | str, poses: ArrayLike, near_deg: ArrayLike | None = None) -> ManySolutions:
+    """The eight solutions of each of many poses, some hundred thousand per second; ``inverse`` gives reasons
+    for rejection.
+
+    ``poses``: (N, 4, 4) or (N, 3, 4), lengths in mm; ``near_deg``, (joints,) or (J,): the posture to stay near to;
+    None: home. Raises InputError for what is not a pose, and for an arm without a closed form.
+    """
+    arm = Arm.shape(arm)
+    geometry, ranges = Geometry.of(arm), Ranges.of(arm)
+    if reasons := refusals(geometry):
+        raise InputError(
+            f"arm {arm.name!r} has no closed-form inverse: {'; '.join(reasons)}",
+            "use armtempo.inverse for each pose",
+        )
+    near = np.array(arm.all_home_deg) if near_deg is None else np.asarray(near_deg, dtype=float)
+    if near.ndim != 1:
+        raise InputError("near_deg must be one posture", "give an angle for each joint")
+    near = np.radians(spread_deg(arm, near, "near_deg: "))
+    found = inverse_rad(geometry, checked_all(poses), near)
+    angles, inside = _placed(ranges, found.angles_rad, near)
+    usable = inside & (found.outcome == OK)
+    distance = np.where(usable, np.linalg.norm(angles - near, axis=2), np.inf)
+    best = angles[np.arange(len(angles)), distance.argmin(axis=1)]
+    nearest = np.where(usable.any(axis=1)[:, None], best, np.nan)
+    return ManySolutions(np.degrees(angles), usable, np.degrees(nearest))
+
+
+def _placed(ranges: Ranges, angles: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """``ranges.placed`` for angles (N, 8, joints), and whether all joints lie in their ranges then: (N, 8)."""
+    low, high = ranges.low, ranges.high
+    least = np.ceil((low - TOLERANCE_RAD - angles) / math.tau)
+    most = np.floor((high + TOLERANCE_RAD - angles) / math.tau)
+    turns = np.clip(np.round((near - angles) / math.tau), least, most)
+    within = np.clip(angles + math.tau * turns, low, high)
+    below, above = angles + math.tau * (least - 1.0), angles + math.tau * least
+    nearest = np.where(low - below < above - high, below, above)
+    fits = least <= most
+    return np.where(fits, within, nearest), np.all(fits, axis=2)

@@ -191,7 +191,7 @@ class RowBegun:
     passed: int
     """Number of rows begun since its start, including this one."""
     run: int
-    """Run number of the last motion that it started (of this row, where it moves)."""
+    """Run number of the last motion that it started (of this row, if it moves)."""
     row: int
     step: int
     cycle: int

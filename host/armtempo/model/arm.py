@@ -175,7 +175,7 @@ class Arm:
         return self._number("input", name, [entry.name for entry in self.inputs])
 
     def holding(self, load: str | None) -> Arm:
-        """The arm with a load of its file in its tool; "nothing": with none, "" or None: as it is.
+        """The arm with a load of its file in its tool; "nothing": with none, "" or None: unchanged.
 
         InputError if it has no such load.
         """

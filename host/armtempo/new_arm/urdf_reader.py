@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,7 +16,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.model.parts_file import MAX_ANGLE_DEG
-from armtempo.new_arm import urdf_bodies, urdf_tip
+from armtempo.new_arm import urdf_bodies
 from armtempo.new_arm.urdf_bodies import Body
 
 MM = 1000.0
@@ -31,6 +32,8 @@ _REASONS = {
     "floating": "it is free in all directions, and a motor turns about one axis",
     "planar": "it moves in a plane, and a motor turns about one axis",
 }
+_MOST = 8
+"""Largest number of candidates in a message."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ class Chain:
 
 
 def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
-    """The chain from link ``base`` (None: the root) to link ``tip`` (None: see ``urdf_tip.choose``).
+    """The chain from link ``base`` (None: the root) to link ``tip`` (None: see ``_tip``).
 
     Raises MissingPackageError without yourdfpy, InputError if the file is not a URDF, there is no such chain,
     or an arm file cannot describe one of its joints (with all reasons).
@@ -149,7 +152,7 @@ def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any
             )
     above = {joint.child: joint for joint in model.robot.joints}
     first = base or model.base_link
-    last = tip or urdf_tip.choose(path, model.robot.joints, first, _reason)
+    last = tip or _tip(path, model.robot.joints, first)
     joints: list[Any] = []
     link = last
     while link != first:
@@ -223,3 +226,67 @@ def _transform(model: Any, link: str, base: str) -> Array:
     pose: Array = np.array(model.get_transform(link, base), dtype=np.float64)
     pose[:3, 3] *= MM
     return pose
+
+
+class _Candidate(NamedTuple):
+    """A possible tool link."""
+
+    link: str
+    turning: tuple[str, ...]
+    """The revolute joints before it."""
+    joints: int
+    """Number of joints before it."""
+
+
+def _tip(path: Path, joints: Sequence[Any], first: str) -> str:
+    """The parent link of the fingers, or the only leaf below ``first``.
+
+    Raises InputError if the tool is ambiguous, with the candidates and the revolute joints before them, best first.
+    """
+    below = [*_below(joints, first)]
+    fingers = _fingers(joints)
+    flanges = {
+        way[-1].parent
+        for way in below
+        if [joint.name for joint in way if joint.name in fingers] == [way[-1].name]
+    }
+    candidates = [*_candidates(below)]
+    if len(flanges) == 1 and flanges & {candidate.link for candidate in candidates}:
+        return str(flanges.pop())
+    parents = {joint.parent for joint in joints}
+    ends = [way[-1].child for way in below if way[-1].child not in parents]
+    if len(ends) == 1:
+        return str(ends[0])
+    candidates.sort(key=lambda candidate: (-len(candidate.turning), candidate.joints))
+    words = [f"{candidate.link} ({', '.join(candidate.turning)})" for candidate in candidates[:_MOST]]
+    more = f", and {len(candidates) - _MOST} more" if len(candidates) > _MOST else ""
+    raise InputError(
+        f"{path}: which link of the robot is the tool is not clear",
+        f"choose with --tip, the joints that turn on the way in brackets: {', '.join(words) or 'none'}{more}",
+    )
+
+
+def _below(joints: Sequence[Any], first: str) -> Iterator[list[Any]]:
+    """The way to each link below ``first``, in the order of the file."""
+    above = {joint.child: joint for joint in joints}
+    for joint in joints:
+        way = [joint]
+        while way[0].parent != first and way[0].parent in above and len(way) <= len(above):
+            way.insert(0, above[way[0].parent])
+        if way[0].parent == first:
+            yield way
+
+
+def _fingers(joints: Sequence[Any]) -> set[str]:
+    """Names of the joints that slide, mimic another one, or are mimicked: of grippers."""
+    mimicked = {joint.mimic.joint for joint in joints if joint.mimic is not None}
+    slide_or_mimic = {joint.name for joint in joints if joint.type == "prismatic" or joint.mimic is not None}
+    return mimicked | slide_or_mimic
+
+
+def _candidates(ways: Sequence[list[Any]]) -> Iterator[_Candidate]:
+    """Links on whose way something turns, and nothing is there that an arm file cannot describe."""
+    for way in ways:
+        turning = tuple(joint.name for joint in way if joint.type != "fixed")
+        if turning and not any(map(_reason, way)):
+            yield _Candidate(way[-1].child, turning, len(way))

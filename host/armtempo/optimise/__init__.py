@@ -1,9 +1,9 @@
-"""Population searches with one interface: ``minimise``. Nothing in here knows of robots or time.
+"""Population searches with one interface, ``minimise``, for any function.
 
 Each algorithm is a module of this package with
 
-- ``PARAMETERS``: its own parameters by name, each with its default and what it may be, and
-- ``search(task, *, ...) -> Result``, which takes the ``Task`` and a value for each of them.
+- ``PARAMETERS``: its own parameters by name, with their defaults and ranges, and
+- ``search(task, *, ...) -> Result``, with the ``Task`` and a value for each of them.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ ALGORITHMS = {
     "pso": "armtempo.optimise.pso",
     "hpso": "armtempo.optimise.hpso",
 }
-"""Name of an algorithm (Table 4): the module that holds it."""
+"""The module of each algorithm (Table 4) by name."""
 
 
 @checked_fields
 @dataclass(frozen=True)
 class Settings:
-    """Which search looks for the smallest value, and how long."""
+    """The algorithm, its parameters, population and iterations."""
 
     algorithm: str = "acs"
     """A key of ALGORITHMS."""
     population: int = 10
     iterations: int = 500
     parameters: Mapping[str, Value] = field(default_factory=dict)
-    """The algorithm's own parameters that are not to have their defaults."""
+    """Values of the algorithm's own parameters that differ from the defaults."""
 
 
 @checked
@@ -63,13 +63,12 @@ def minimise(
     settings: Settings | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    """Smallest value of ``function`` found inside ``bounds``.
+    """Search the minimum of ``function`` within ``bounds``.
 
-    ``function`` takes points (N, d) and returns their values (N,), one call for a whole population;
-    a value that is not a number counts as infinitely bad. ``bounds`` is (d, 2): lowest and highest
-    value of each variable. ``progress`` counts iterations. The same ``rng`` state gives the same result. Raises
-    InputError for an unknown algorithm or parameter, a value out of its range, a population below 4, no
-    iterations, or bounds that are not pairs (lowest, highest).
+    ``function``: values (N,) of points (N, d), called once for a whole population; NaN counts as infinity.
+    ``bounds`` (d, 2): lowest and highest value of each variable. ``progress`` counts iterations. The same state of
+    ``rng`` gives the same result. Raises InputError for an unknown algorithm or parameter, a value out of its
+    range, a population below 4, no iterations, or bounds that are not pairs (lowest, highest).
     """
     wanted = settings or Settings()
     known = parameters(wanted.algorithm)
@@ -108,7 +107,7 @@ def _checked_bounds(bounds: ArrayLike) -> Array:
 def _checked(
     algorithm: str, known: Mapping[str, Parameter], given: Mapping[str, Value]
 ) -> Mapping[str, Value]:
-    """``given``, each a known parameter with a value that it admits."""
+    """``given``, if each is a known parameter with an allowed value; raises InputError otherwise."""
     for name, value in given.items():
         if name not in known:
             raise InputError(

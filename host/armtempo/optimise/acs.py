@@ -1,13 +1,13 @@
-"""Adaptive cuckoo search, section 3.2 of the paper, Eqs. (22) to (25), and a form of it that adapts more.
+"""Adaptive cuckoo search, section 3.2 of the paper, Eqs. (22) to (25), and a variant that adapts more.
 
-Choices that the paper leaves open, measured in host/docs/acs.md:
+The two variants (reasons: host/docs/optimisers.md):
 
 ===================  ==================================  ===================================================
 choice               ``variant = "paper"``               ``variant = "differences"`` (default)
 ===================  ==================================  ===================================================
 length of a flight   alpha_A of Eq. (25), each variable  ``a`` times one Lévy number for the whole nest
-its scale            the variables' own unit             difference of two other nests, so that it shrinks,
-                                                         and turns, with the population; F_m has no part
+its scale            the variables' own unit             difference of two other nests, which adapts size and
+                                                         direction to the population; F_m is not used
 abandoned            the worst ``pa`` of the nests,      each variable of each nest with probability ``pa``,
                      for a flight from where they were   for a move along the difference of two nests
 evaluations          at most (1 + pa) N an iteration     at most 2 N an iteration
@@ -41,7 +41,7 @@ class Nests:
         self.tracker.iteration_done()
 
     def iterate(self, part: float) -> None:
-        """One iteration (steps 2 and 3 of the paper); ``part`` of all of them is then done."""
+        """One iteration (steps 2 and 3 of the paper); ``part``: fraction of all iterations then done."""
         raise NotImplementedError
 
     def levy(self, shape: tuple[int, ...]) -> Array:
@@ -50,7 +50,7 @@ class Nests:
         return np.asarray(self.rng.standard_normal(shape) * self.gamma / tail)
 
     def settle(self, trial: Array, which: NDArray[np.intp] | slice = slice(None)) -> None:
-        """Evaluate ``trial`` (K, d), clipped to the bounds, for the nests ``which`` (K,), and keep what is better."""
+        """Evaluate ``trial`` (K, d), clipped to the bounds; better ones replace their nests ``which`` (K,)."""
         trial = np.minimum(np.maximum(trial, self.low), self.high)
         values = self.tracker.evaluate(trial)
         better = values < self.values[which]
@@ -62,7 +62,7 @@ class Paper(Nests):
     """The search of the paper."""
 
     def iterate(self, part: float) -> None:
-        """Flights of all nests, then of the worst ones again, alpha_A from Eq. (25)."""
+        """Flights of all nests, then of the worst ones again; alpha_A from Eq. (25)."""
         alpha = self.a * self.size**self.b * math.exp(-part * min(float(self.values.mean()), 700.0))
         self.settle(self.x + alpha * self.levy(self.x.shape))
         worst = np.argsort(self.values)[self.size - math.floor(self.pa * self.size) :]
@@ -79,7 +79,7 @@ class Differences(Nests):
         self.settle(self.x + self.a * self.levy((self.size, 1)) * self.difference())
         abandoned = self.rng.random(self.x.shape) < self.pa
         moved = self.x + abandoned * self.rng.random((self.size, 1)) * self.difference()
-        if part < 1:  # the evaluations left out here pay for the first population
+        if part < 1:  # omitted in the last iteration, for the evaluations of the first population
             self.settle(moved)
         self.tracker.iteration_done()
 
@@ -94,17 +94,17 @@ VARIANTS: dict[str, type[Nests]] = {"differences": Differences, "paper": Paper}
 PARAMETERS: dict[str, Parameter] = {
     "a": Number(0.7, 0.0, 100.0, "of Eq. (25)"),
     "b": Number(0.5, -5.0, 5.0, "of Eq. (25)"),
-    "pa": Number(0.25, 0.001, 1.0, "part of the nests, or chance of a variable, to be abandoned"),
+    "pa": Number(0.25, 0.001, 1.0, "fraction of the nests, or probability of a variable, to be abandoned"),
     "beta": BETA,
-    "variant": OneOf("differences", tuple(VARIANTS), "see [adaptive cuckoo search](acs.md)"),
+    "variant": OneOf("differences", tuple(VARIANTS), "see [below](#choices-in-the-adaptive-cuckoo-search)"),
 }
 
 
 def search(task: Task, *, a: float, b: float, pa: float, beta: float, variant: str) -> Result:
-    """Minimises in as many evaluations as the table above says, and N for the first population.
+    """Minimise with the evaluations of the table above, and N for the first population.
 
-    ``a``, ``b`` of Eq. (25), ``pa`` the part abandoned, ``beta`` of Eq. (23). The variant "differences" has its
-    first population paid for by its last iteration: 2 N evaluations for each iteration in all.
+    ``a``, ``b`` of Eq. (25), ``pa`` the fraction abandoned, ``beta`` of Eq. (23). The variant "differences" saves
+    the evaluations of its first population in the last iteration: 2 N for each iteration in total.
     """
     nests = VARIANTS[variant](task, a, b, pa, beta)
     for iteration in range(1, task.iterations + 1):

@@ -1,8 +1,8 @@
 """Cuckoo search: X.-S. Yang and S. Deb, "Cuckoo search via Lévy flights", NaBIC 2009, pp. 210-214.
 
-Details as in the program its first author published with "Nature-Inspired Metaheuristic Algorithms"
-(2nd edition, Luniver 2010): steps are scaled by the distance to the best nest, a new egg competes
-with the nest it came from, and abandoned coordinates move along the difference of two other nests.
+Details as in the first author's program in "Nature-Inspired Metaheuristic Algorithms" (2nd edition, Luniver
+2010): steps are scaled by the distance to the best nest, a new egg competes with the nest it came from, and
+abandoned coordinates move along the difference of two other nests.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from armtempo.basics.arrays import Array
 from armtempo.optimise.task import Number, Parameter, Result, Task, Tracker
 
 BETA = Number(1.5, 0.3, 1.99, "index of the Lévy distribution, Eq. (23)")
-"""The index of the distribution, in the range that Mantegna gives for his method (Physical Review E 49 (5),
+"""The range is Mantegna's for his method (Physical Review E 49 (5),
 1994, pp. 4677-4683)."""
 
 PARAMETERS: dict[str, Parameter] = {
     "alpha": Number(0.01, 0.0, 100.0, "scale of the flights"),
-    "pa": Number(0.25, 0.0, 1.0, "chance of a variable to be abandoned"),
+    "pa": Number(0.25, 0.0, 1.0, "probability of a variable to be abandoned"),
     "beta": BETA,
 }
 
 
 def search(task: Task, *, alpha: float, pa: float, beta: float) -> Result:
-    """Minimises by N evaluations of Lévy flights and at most N of new nests an iteration.
+    """Minimise with N evaluations of Lévy flights and at most N of new nests per iteration.
 
-    ``alpha`` scales the flights, ``pa`` is the chance that a coordinate is abandoned, ``beta`` the
-    index of the Lévy distribution. A nest without an abandoned coordinate is not evaluated again.
+    ``alpha`` scales the flights, ``pa`` is the probability that a coordinate is abandoned, ``beta`` the index of
+    the Lévy distribution. A nest without an abandoned coordinate is not evaluated again.
     """
     rng, tracker = task.rng, Tracker(task)
     low, high = task.bounds.T
@@ -49,7 +49,7 @@ def search(task: Task, *, alpha: float, pa: float, beta: float) -> Result:
 
 
 def _new_nests(nests: Array, rng: np.random.Generator, pa: float) -> tuple[Array, np.ndarray]:
-    """New places for the nests that lose a coordinate (K, d), and their indices (K,)."""
+    """New nests (K, d) for those with an abandoned coordinate, and their indices (K,)."""
     abandoned = rng.random(nests.shape) < pa
     difference = nests[rng.permutation(len(nests))] - nests[rng.permutation(len(nests))]
     eggs = nests + rng.random() * difference * abandoned
@@ -58,7 +58,7 @@ def _new_nests(nests: Array, rng: np.random.Generator, pa: float) -> tuple[Array
 
 
 def _keep_better(nests: Array, values: Array, eggs: Array, egg_values: Array, index: np.ndarray) -> None:
-    """Puts each egg (K, d) into nest ``index[k]`` if it is better, in place."""
+    """Replace nest ``index[k]`` by egg ``k`` of (K, d) if it is better, in place."""
     better = egg_values < values[index]
     nests[index[better]] = eggs[better]
     values[index[better]] = egg_values[better]
@@ -72,7 +72,7 @@ def levy_steps(rng: np.random.Generator, shape: tuple[int, ...], beta: float) ->
 
 
 def levy_scale(beta: float) -> float:
-    """The factor of Gamma functions in Eq. (23), with its brackets set as in its source (Mantegna)."""
+    """The factor of Gamma functions in Eq. (23), with the brackets of its source (Mantegna)."""
     top = math.gamma(1.0 + beta) * math.sin(math.pi * beta / 2.0)
     bottom = math.gamma((1.0 + beta) / 2.0) * beta * 2.0 ** ((beta - 1.0) / 2.0)
     return float((top / bottom) ** (1.0 / beta))

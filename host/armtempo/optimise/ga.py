@@ -1,7 +1,7 @@
 """The standard genetic algorithm: J. H. Holland, "Adaptation in Natural and Artificial Systems",
 University of Michigan Press 1975, in the form D. E. Goldberg gave it ("Genetic Algorithms in Search,
 Optimization and Machine Learning", Addison-Wesley 1989, chapter 3): bit strings, roulette wheel (by rank),
-one-point crossover, bit mutation, children replace their parents; nobody survives by privilege.
+one-point crossover, bit mutation; children replace their parents, without elitism.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from armtempo.basics.arrays import Array
 from armtempo.optimise.task import Number, Parameter, Result, Task, Tracker
 
 Bits = NDArray[np.bool_]
-"""A population: individuals × variables × bits, the first bit of a variable counting most."""
+"""A population (individuals, variables, bits), most significant bit first."""
 
 BITS = Number(16, 2, 52, "bits that code a variable")
-"""Bits that code a variable; a double has 52 after its point."""
+"""At most the 52 bits of a double's fraction."""
 PARAMETERS: dict[str, Parameter] = {
     "bits": BITS,
-    "crossover_rate": Number(0.6, 0.0, 1.0, "chance of a pair to be crossed"),
-    "mutation_rate": Number(0.01, 0.0, 1.0, "chance of a bit to flip"),
+    "crossover_rate": Number(0.6, 0.0, 1.0, "probability of a pair to be crossed"),
+    "mutation_rate": Number(0.01, 0.0, 1.0, "probability of a bit to flip"),
 }
 
 
@@ -30,7 +30,7 @@ def random_bits(rng: np.random.Generator, population: int, variables: int, bits:
 
 
 def decode(genes: Bits, bounds: Array) -> Array:
-    """The points (N, d) of ``genes`` (N, d, bits), evenly spread over ``bounds`` (d, 2)."""
+    """Points (N, d) of ``genes`` (N, d, bits), on a uniform grid over ``bounds`` (d, 2)."""
     weights = 0.5 ** np.arange(1, genes.shape[2] + 1)
     fraction = (genes @ weights) / weights.sum()
     low, high = bounds.T
@@ -39,10 +39,10 @@ def decode(genes: Bits, bounds: Array) -> Array:
 
 
 def merits(values: Array) -> Array:
-    """What selection maximises: 2 for the smallest of the values (N,), falling by rank to 0 for the largest.
+    """The merit that selection uses: from 2 for the smallest of the values (N,), by rank, to 0 for the largest.
 
-    Linear ranking (J. E. Baker, "Adaptive selection methods for genetic algorithms", ICGA 1985, pp. 101-111),
-    as a few individuals far outside the limits would otherwise make all the others look alike.
+    Linear ranking (J. E. Baker, "Adaptive selection methods for genetic algorithms", ICGA 1985, pp. 101-111):
+    otherwise a few individuals far outside the limits would make the others indistinguishable.
     """
     rank = np.empty(len(values))
     rank[np.argsort(values)] = np.arange(len(values))
@@ -50,12 +50,12 @@ def merits(values: Array) -> Array:
 
 
 def roulette(merit: Array, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Indices (N,) of parents, drawn with chances in proportion to ``merit`` (N,)."""
+    """Indices (N,) of parents, drawn with probabilities proportional to ``merit`` (N,)."""
     return rng.choice(len(merit), size=len(merit), p=merit / merit.sum())
 
 
 def crossover(parents: Bits, rng: np.random.Generator, probability: float | Array) -> Bits:
-    """One-point crossover of parents 0 and 1, 2 and 3, …, each pair with its ``probability`` (N // 2,)."""
+    """One-point crossover of parents 0 and 1, 2 and 3, …; ``probability``: a number or (N // 2,)."""
     count = len(parents) // 2
     children = parents.reshape(len(parents), -1).copy()
     first, second = children[0 : 2 * count : 2], children[1 : 2 * count : 2]
@@ -68,17 +68,17 @@ def crossover(parents: Bits, rng: np.random.Generator, probability: float | Arra
 
 
 def mutate(genes: Bits, rng: np.random.Generator, probability: float | Array) -> Bits:
-    """Flips each bit of an individual with that individual's ``probability``, a number or (N,)."""
+    """Flip each bit of an individual with its ``probability``, a number or (N,)."""
     chance = np.asarray(probability, dtype=float).reshape(-1, 1, 1)
     flipped: Bits = genes ^ (rng.random(genes.shape) < chance)
     return flipped
 
 
 def search(task: Task, *, bits: int, crossover_rate: float, mutation_rate: float) -> Result:
-    """Minimises by N evaluations an iteration.
+    """Minimise with N evaluations per iteration.
 
-    ``bits`` code a variable, ``crossover_rate`` is the chance of a pair to be crossed,
-    ``mutation_rate`` that of a bit to flip.
+    ``bits`` per variable; ``crossover_rate``: probability of a pair to be crossed; ``mutation_rate``: of a bit to
+    flip.
     """
     rng, tracker = task.rng, Tracker(task)
     genes = random_bits(rng, task.population, len(task.bounds), bits)

@@ -1,11 +1,11 @@
-"""A feasible primal-dual interior-point method for smooth programs whose matrices have a narrow band.
+"""A feasible primal-dual interior-point method for smooth programs with banded matrices.
 
     minimise f(x)    with    A x = b,    g(x) > 0
 
-Every iterate keeps the inequalities; the barrier -mu sum(log g) holds it off them, and mu falls. The matrix of
-Newton's step is the Hessian of f plus J' diag(multipliers / g) J, which is never indefinite, and with the second
-derivatives of g if they help. If the straight step runs into a curved boundary, a second one from the same
-matrix follows the curve. (Nocedal and Wright, Numerical Optimization, 2nd ed., chapters 18.3 and 19.)
+Every iterate is strictly feasible by the barrier -mu sum(log g), with mu decreasing to 0. The matrix of Newton's
+step is the Hessian of f plus J' diag(multipliers / g) J, which is positive semidefinite, minus the second
+derivatives of g if they help. If a step ends early at a curved boundary, a second-order correction from the same
+matrix follows it. (Nocedal and Wright, Numerical Optimization, 2nd ed., chapters 18.3 and 19.)
 """
 
 from __future__ import annotations
@@ -24,36 +24,36 @@ class Linearised(Protocol):
     """First and second derivatives of a program at one point."""
 
     gradient: Array
-    """Of f: (n,)."""
+    """Gradient of f: (n,)."""
 
     def forward(self, step: Array) -> Array:
-        """Change of g by a step (n,), to first order: (M,)."""
+        """J times a step (n,): (M,)."""
 
     def backward(self, weights: Array) -> Array:
-        """Sum of the gradients of g with ``weights`` (M,): (n,)."""
+        """J' times ``weights`` (M,): (n,)."""
 
     def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
         """Entries, at the positions of the program's matrix, of the Hessian of f + J' diag(weights) J.
 
-        Minus the second derivatives of g times ``multipliers`` (M,) too, if ``exact``, else what of them is never
-        indefinite.
+        Minus the second derivatives of g times ``multipliers`` (M,): all of them if ``exact``, else a positive
+        semidefinite part.
         """
 
 
 class Factorised(Protocol):
-    """A factorised matrix of Newton's equations; see ``kkt.Factor``."""
+    """See ``kkt.Factor``."""
 
     def solve(self, gradient: Array, residual: Array) -> Array: ...
 
 
 class Kkt(Protocol):
-    """Newton's equations; see ``kkt.BandedKkt``."""
+    """See ``kkt.BandedKkt``."""
 
     def factor(self, entries: Array) -> Factorised: ...
 
 
 class Program(Protocol):
-    """What is minimised."""
+    """The program to solve."""
 
     @property
     def kkt(self) -> Kkt: ...
@@ -64,15 +64,15 @@ class Program(Protocol):
         """f."""
 
     def inequalities(self, x: Array) -> Array:
-        """g: (M,), scaled to about 1; entries not above 0, or no numbers, if x is not allowed."""
+        """g: (M,), of order 1; entries that are not positive, or NaN, if x is infeasible."""
 
     def linearise(self, x: Array) -> Linearised:
-        """Derivatives at an allowed x."""
+        """Derivatives at a feasible x."""
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """How far to go. Barriers are sums over all inequalities: about the distance from the optimum."""
+    """Barriers and iterations. A barrier is the sum over all inequalities, about the distance of f from its optimum."""
 
     first_barrier: float = 1e-2
     last_barrier: float = 1e-6
@@ -83,47 +83,47 @@ class Schedule:
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where the method ended."""
+    """Result of ``minimise``."""
 
     x: Array
     value: float
     multipliers: Array
-    """Of the inequalities: (M,)."""
+    """Multipliers of the inequalities: (M,)."""
     iterations: int
     converged: bool
-    """The last barrier was reached and the step there had become small."""
+    """Whether it converged at the last barrier."""
 
 
 _SHRINK = 0.25
 _SUPERLINEAR = 1.3
-"""The barrier falls by the first, or to this power of it."""
+"""The barrier is multiplied by the first, or raised to the second power if that is smaller."""
 _TO_BOUNDARY = 0.99
 _KEEP = 1e-3
-"""Least part of an inequality that a step leaves."""
+"""Smallest fraction of an inequality's value that remains after a step."""
 _ARMIJO = 1e-4
 _NEAR_CENTRE, _DONE = 5.0, 0.1
-"""The barrier falls, and the method ends, if Newton's decrement is below this many barriers times the root of
-their number."""
+"""The barrier is reduced, and the method ends, if Newton's decrement is below this times the barrier times the
+square root of their number."""
 _SPREAD = 1e4
 """Multipliers stay within this factor of barrier / g."""
 _LEAST_STEP = 1e-10
 _BENT = 0.5
-"""Steps that must be shorter than this are tried along the curve of the inequalities too."""
+"""Steps shorter than this are also tried with a second-order correction."""
 _MOST_VIOLATED = -0.5
-"""How far beyond the inequalities their curve is still measured."""
+"""Violation up to which the second-order correction is computed."""
 
 
 def minimise(program: Program, x: Array, settings: Schedule | None = None) -> Minimum:
-    """The local optimum near ``x``; none of the iterates breaks an inequality.
+    """Find the local optimum near ``x`` with feasible iterates.
 
-    If ``x`` itself breaks one it is returned unchanged, not converged.
+    An infeasible ``x`` is returned unchanged, not converged.
     """
     return _Solver(program, x, settings or Schedule()).run()
 
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """Where a step led: its length (0: nowhere), x, g there, and the decrement that Newton's model promised."""
+    """A step: its length (0: none found), the new x and g, and the decrement of Newton's model."""
 
     length: float
     x: Array
@@ -141,9 +141,9 @@ class _Solver:
         with np.errstate(divide="ignore", invalid="ignore"):
             self.multipliers = self.barrier / self.g
         self.exact = settings.curvature
-        """Whether the next step tries the second derivatives of g first."""
+        """Whether the next step first tries all second derivatives of g."""
         self.whole = False
-        """Whether the last step was as long as Newton's method asked."""
+        """Whether the last step had its full length."""
 
     def run(self) -> Minimum:
         if not np.all(self.g > 0.0):
@@ -182,8 +182,8 @@ class _Solver:
         return _Step(0.0, self.x, self.g)
 
     def _line_search(self, at: Linearised, factor: Factorised, gradient: Array, step: Array) -> _Step:
-        """The better of a straight and, if that is short, a bent step."""
-        # Not by @, for which BLAS starts threads from 10 000 elements on
+        """The better of the straight step and, if that is short, the corrected one."""
+        # not with @: BLAS starts threads for it from 10 000 elements on
         slope = float(np.sum(gradient * step))
         if not np.all(np.isfinite(step)) or slope >= 0.0:
             return _Step(0.0, self.x, self.g)
@@ -201,7 +201,7 @@ class _Solver:
         return bent if bent.length > straight.length else straight
 
     def _second_order_correction(self, step: Array, change: Array) -> Array | None:
-        """What the inequalities have left of their linear change by a whole step: (M,)."""
+        """Second-order change of the inequalities by a full step: (M,)."""
         length = 1.0
         while length > _KEEP:
             g = self.program.inequalities(self.x + length * step)
@@ -227,7 +227,7 @@ class _Solver:
         return self.program.objective(x) - self.barrier * float(np.log(g).sum())
 
     def _move(self, found: _Step, change: Array) -> None:
-        """Take a step, and that of the multipliers that goes with it."""
+        """Take a step, with the corresponding step of the multipliers."""
         old = self.multipliers
         move = self.barrier / self.g - old - old / self.g * change
         falling = move < 0

@@ -1,7 +1,7 @@
-"""Newton's equations of a program with few, short equalities, solved as one banded matrix.
+"""Newton's equations of a program with sparse equalities, solved as one banded matrix.
 
-Variables and equalities have places on a line, and only neighbours have to do with each other. Sorted by
-place, the matrix [[H, A'], [A, 0]] has a narrow band, and a solve costs time in proportion to its length.
+Each variable and equality has a place on a line, and is coupled only to neighbours. Sorted by place, the matrix
+[[H, A'], [A, 0]] is banded, and the time of a solve is proportional to its size.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Equalities:
-    """Rows of A x = b, m of them, by their entries.
+    """The m rows of A x = b by their entries.
 
-    ``row``, ``column``, ``value``: (E,); ``right``: (m,); ``places``: (m,), where each row belongs on the line.
+    ``row``, ``column``, ``value``: (E,); ``right``: (m,); ``places``: (m,) of the rows.
     """
 
     row: Index
@@ -48,10 +48,10 @@ class Equalities:
 
 
 class BandedKkt:
-    """Solves Newton's equations with entries of H at fixed positions.
+    """Solves Newton's equations for entries of H at fixed positions.
 
-    ``places``: (n,) of the variables; ``rows`` and ``columns``: (H,) positions of the entries of H, which may
-    repeat and then add up.
+    ``places``: (n,) of the variables; ``rows`` and ``columns``: (H,) positions of the entries of H; entries at the
+    same position are added.
     """
 
     def __init__(self, places: Array, rows: Index, columns: Index, equalities: Equalities) -> None:
@@ -67,8 +67,8 @@ class BandedKkt:
         self._flat = (2 * self._width + row - column) + (3 * self._width + 1) * column
 
     def factor(self, entries: Array) -> Factor:
-        """The matrix with these entries of H (H,), factorised. Raises numpy's LinAlgError if it is singular."""
-        from scipy.linalg import lapack  # here, because loading it takes longer than most commands
+        """Factorise the matrix with these entries of H (H,); raises numpy's LinAlgError if it is singular."""
+        from scipy.linalg import lapack  # imported here, because it takes longer than most commands
 
         width, count = self._width, len(self._position)
         value = self._equalities.value

@@ -1,4 +1,4 @@
-"""What all searches share: the task, parameters by name, counted evaluations, the best point so far, the history."""
+"""Common parts of the searches: task, parameters, result; counting evaluations and tracking the best point."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Function = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Number:
-    """A number from ``least`` to ``most``, a whole one if the default is an int."""
+    """A parameter from ``least`` to ``most``; an integer if the default is an int."""
 
     default: float
     least: float
@@ -26,12 +26,12 @@ class Number:
 
     @property
     def allowed(self) -> str:
-        """The range in words."""
+        """Text: the range."""
         kind = "a whole number" if isinstance(self.default, int) else "a number"
         return f"{kind} from {self.least:g} to {self.most:g}"
 
     def admits(self, value: object) -> bool:
-        """Whether ``value`` is of the kind and in the range."""
+        """Whether ``value`` has the right type and is in the range."""
         if isinstance(value, bool) or not isinstance(
             value, int if isinstance(self.default, int) else int | float
         ):
@@ -41,7 +41,7 @@ class Number:
 
 @dataclass(frozen=True)
 class OneOf:
-    """One of several words."""
+    """A parameter with one of several words."""
 
     default: str
     words: tuple[str, ...]
@@ -49,7 +49,7 @@ class OneOf:
 
     @property
     def allowed(self) -> str:
-        """The words."""
+        """Text: the words."""
         return "one of " + ", ".join(repr(word) for word in self.words)
 
     def admits(self, value: object) -> bool:
@@ -62,7 +62,7 @@ Parameter = Number | OneOf
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What a search has to do, whatever the algorithm."""
+    """A task for a search: function, bounds, population, iterations."""
 
     function: Function
     bounds: Array
@@ -75,9 +75,9 @@ class Task:
 
 @dataclass(frozen=True)
 class Result:
-    """Outcome of a search: best point ``x`` (d,), its ``value``, and what it took.
+    """Result of a search: best point ``x`` (d,), its ``value``, number of evaluations.
 
-    ``history`` (iterations + 1,) is the best value of the first population and after each iteration.
+    ``history`` (iterations + 1,): the best value after the first population and after each iteration.
     """
 
     x: Array
@@ -87,10 +87,10 @@ class Result:
 
 
 class Tracker:
-    """Evaluates points for a search, counts them, and remembers the best.
+    """Evaluates points for a search, counts them, and stores the best.
 
-    Use: ``evaluate`` for every population, ``iteration_done`` after the first population and after
-    each iteration, ``result`` at the end.
+    A search calls ``evaluate`` for every population, ``iteration_done`` after the first population and after each
+    iteration, and ``result`` at the end.
     """
 
     def __init__(self, task: Task) -> None:
@@ -107,7 +107,7 @@ class Tracker:
         return self._x
 
     def evaluate(self, points: Array) -> Array:
-        """Values (N,) of ``points`` (N, d); not-a-number comes back as infinity."""
+        """Values (N,) of ``points`` (N, d); infinity instead of NaN."""
         values = self._task.function(points)
         self.evaluations += len(points)
         if np.isnan(values.min(initial=np.inf)):
@@ -119,11 +119,11 @@ class Tracker:
         return values
 
     def iteration_done(self) -> None:
-        """Closes the first population (first call) or an iteration (later calls)."""
+        """End the first population (first call) or an iteration (later calls)."""
         self._history.append(self.value)
         if self._task.progress is not None and len(self._history) > 1:
             self._task.progress(len(self._history) - 1, self._task.iterations)
 
     def result(self) -> Result:
-        """The best point found, with the history so far."""
+        """The best point, with the history."""
         return Result(self._x, self.value, self.evaluations, np.array(self._history))

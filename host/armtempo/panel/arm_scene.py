@@ -174,7 +174,7 @@ class ArmScene:
 
     @property
     def parts(self) -> str:
-        """What the page's script draws: the scene, its links and its ghost, the joints' ranges in rad, as JSON."""
+        """The scene for the page's script, as JSON: its links and its ghost, the joints' ranges in rad."""
         ranges = [np.radians(joint.range_deg).round(4).tolist() for joint in self._shape.arm.driven]
         return json.dumps(
             {"scene": self.scene.id, "links": self._links, "ghost": self._ghost, "ranges": ranges}

@@ -1,4 +1,4 @@
-"""The board: its state, its stored motions, its program, what goes over its port, the log."""
+"""The board: its state, stored motions, program, messages and log."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class BoardTab:
             if rows != self._state.rows:
                 self._state.rows = rows
             if self._stored_of != (now := (state.board_id, self._operator.ended)) and not self._operator.busy:
-                self._stored_of = now  # what has ended may have stored something
+                self._stored_of = now  # the command may have stored something
                 background_tasks.create(self._read())
         tested = self._operator.tested
         if tested is not None and tested is not self._tested:
@@ -108,9 +108,9 @@ class BoardTab:
     # stored motions
 
     async def _read(self) -> None:
-        with suppress(LinkError):  # its state says so as well
+        with suppress(LinkError):  # the state shows that too
             motions = await run.io_bound(lambda: self._operator.board.list())
-            if motions is None or self._stored.is_deleted:  # the panel ends, or its page has gone
+            if motions is None or self._stored.is_deleted:  # the panel ends, or its page is closed
                 return
             self._stored.clear()
             with self._stored:
@@ -196,7 +196,7 @@ class _Shown:
         self._lines, self._count = lines, 0
 
     def look(self) -> None:
-        """Show those that are new."""
+        """Show new lines."""
         count = self._lines.count
         new = min(count - self._count, self.log.max_lines or 0)
         for line in list(self._lines.last)[-new:] if new else ():

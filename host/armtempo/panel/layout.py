@@ -185,7 +185,7 @@ def state_line(operator: Operator) -> str:
     if operator.busy and operator.progress:
         doing += f" {operator.progress:.0%}"
     state = operator.live.state
-    if state is None:  # its program is put on it
+    if state is None:  # its program is being deployed
         return f"{operator.port}{doing}"
     kind = f" ({words.VIRTUAL})" if state.virtual else ""
     if state.moving and state.speed_percent != 100:

@@ -120,7 +120,7 @@ class Operator:
         self._board, self.trouble = board, ""
 
     def _tell(self, text: str) -> None:
-        """Note a message about the connection as ``trouble``, until the board reports its state again."""
+        """Store a message about the connection as ``trouble``, until the board reports its state again."""
         self.trouble = text
         self.say(text)
 
@@ -129,7 +129,7 @@ class Operator:
         board, self._board = self._board, None
         if board is not None:
             board.close()
-        self.live.state = None  # once nobody reads it any more
+        self.live.state = None  # after the last reader
         try:
             call()
         finally:
@@ -148,7 +148,7 @@ class Operator:
         if self._board is not None:
             self._board.close()
 
-    # who is in control
+    # control
 
     def take_control(self, client: str) -> None:
         """Give ``client`` control; a motion of the previous client continues, its held jog ends."""
@@ -211,7 +211,7 @@ class Operator:
             self.say(words.STOPPED.format(what=what, why=stopped))
         except ArmtempoError as error:
             self.say(f"{what}: {error}")
-        except Exception as error:  # a fault of ours: said, and the panel continues
+        except Exception as error:  # a bug: reported, and the panel continues
             _LOG.exception("panel: %s", what)
             self.say(f"{what}: {type(error).__name__}: {error}")
         finally:
@@ -233,7 +233,7 @@ class Operator:
         self.tested = self.board.selftest(self.part)
 
     def part(self, done: float, whole: float) -> None:
-        """Note the progress of the running command."""
+        """Store the progress of the running command."""
         self.progress = done / whole if whole else 0.0
 
     def stop(self, by: str = words.PANEL) -> None:
@@ -251,7 +251,7 @@ class Operator:
         """Append a line to the log."""
         self.log.add([f"{time.strftime('%H:%M:%S')}  {text}"])
 
-    # what the board says
+    # messages of the board
 
     def _take_traffic(self, chunk: Chunk, frames: list[str]) -> None:
         if self.monitors:
@@ -272,5 +272,5 @@ class Operator:
             except ArmtempoError as error:
                 if board is self._board:
                     self.trouble = str(error)
-            except Exception:  # a fault of ours: logged, and states go on
+            except Exception:  # a bug: logged, and states continue
                 _LOG.exception("panel: the board's state")

@@ -1,4 +1,4 @@
-"""One browser's page: what its tabs share, and when each of its controls can be used."""
+"""A browser's page: common parts of its tabs, and when each of its controls can be used."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ class _Control:
 
 @dataclass
 class PanelPage:
-    """One browser's page: what its tabs share."""
+    """A browser's page: common parts of its tabs."""
 
     operator: Operator
     hold: ButtonHold
     shape: ArmShape
     client: str
     controls: list[_Control] = field(default_factory=list)
-    """What can be pressed."""
+    """The controls that need something."""
     shown: str = ""
     """The tab that is shown."""
     listeners: list[tuple[str, Callable[[], None]]] = field(default_factory=list)
@@ -66,11 +66,11 @@ class PanelPage:
     """Moves of the hold buttons, by number."""
     jog_percent: float = 25.0
     picture: Element = field(init=False)
-    """Where the scene is."""
+    """The place of the scene."""
 
     @cached_property
     def scene(self) -> ArmScene:
-        """The arm in 3-D, made when it is first needed: the first view does not wait for what draws it."""
+        """The arm in 3-D, made when it is first needed, so that the first view does not wait for it."""
         with self.picture:
             scene = ArmScene(self.shape)
             ui.run_javascript(f"armtempo.show({scene.parts})")
@@ -99,7 +99,7 @@ class PanelPage:
         return element
 
     def on_look(self, listener: Callable[[], None]) -> None:
-        """Let what is built now, in the tab that is shown, look at what has changed."""
+        """Call ``listener`` every LOOK_S while the tab that is being built is shown."""
         self.listeners.append((self.shown, listener))
 
     def do(self, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
@@ -142,7 +142,7 @@ class PanelPage:
         """Disable controls that cannot be used now, with the reason."""
         self.controls = [control for control in self.controls if not control.element.is_deleted]
         for control in self.controls:
-            # what is held keeps the keyboard's focus
+            # a held button keeps the keyboard's focus
             if not (control.is_held and self.hold.held_by(self.client)):
                 control.grey(control.why_not())
         for tab, listener in self.listeners:

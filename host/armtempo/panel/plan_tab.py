@@ -14,7 +14,7 @@ from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.chain import chains_mm
-from armtempo.kinematics.moved_tool import moved_tool_deg
+from armtempo.kinematics.solver import moved_tool_deg
 from armtempo.model import via_table
 from armtempo.model.job import DEGREES, PATHS, TIMINGS
 from armtempo.panel import words
@@ -68,7 +68,7 @@ class PlanTab:
             for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
         ]
         page.on_look(self._look)
-        # What was typed while the connection broke has not arrived
+        # Texts typed while the connection was broken have not arrived
         ui.context.client.on_connect(self._changed)
 
     def _option(self, key: str, label: str) -> ui.select | ui.input:
@@ -80,7 +80,7 @@ class PlanTab:
         return ui.select(named, value=value, label=label).props("dense outlined").classes("armtempo-option")
 
     def _given(self) -> dict[str, str]:
-        """The options as they are in their fields."""
+        """The options in the fields."""
         return {key: str(one.value or "").strip() for key, one in self._options.items()}
 
     # the table
@@ -150,7 +150,7 @@ class PlanTab:
     # in 3-D
 
     def _tool_mm(self, number: int) -> Array:
-        """Where the tool is at a via point, (3,)."""
+        """Position of the tool at a via point, (3,)."""
         place: Array = chains_mm(self._operator.arm, np.array(self._rows[number]))[-1]
         return place
 
@@ -227,7 +227,7 @@ class PlanTab:
         self._page.attempt(save)
 
     def _look(self) -> None:
-        """Show a plan that is new, whichever page made it."""
+        """Show a new plan, also one from another page."""
         plan = self._operator.desk.plan
         if plan is None or plan is self._played:
             return

@@ -51,7 +51,7 @@ class RunTab:
         page.on_look(self._look)
 
     def _do(self, text: str, call: Callable[[Plan], object], needs: Needs) -> None:
-        """Do something with the plan, in its turn."""
+        """Start a command with the plan."""
         if (plan := self._operator.desk.plan) is not None:
             self._page.do(text, lambda: call(plan), needs)
 
@@ -60,7 +60,7 @@ class RunTab:
 
     def _look(self) -> None:
         operator = self._operator
-        if self._ended != operator.ended:  # perhaps a run, which has its report then
+        if self._ended != operator.ended:  # perhaps a run, with a new report
             self._ended = operator.ended
             self._past.refresh()
         curves = operator.live.curves
@@ -101,7 +101,7 @@ def _choose(chosen: list[Path], folder: Path, wanted: bool) -> None:
 
 
 def _address(file: Path) -> str:
-    """Where the panel serves a file of a run folder."""
+    """The panel's path of a file of a run folder."""
     return f"/runs/{quote(file.parent.name)}/{quote(file.name)}"
 
 

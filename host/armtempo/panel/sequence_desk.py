@@ -1,4 +1,4 @@
-"""The sequence that the panel edits, step by step, and its file, in which comments are kept."""
+"""The sequence that the panel edits, and its file; comments are kept."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ KINDS: dict[str, tuple[str, ...]] = {
     "end": (),
     "call": (),
 }
-"""What a step does, and what else can be said of it."""
+"""Kinds of steps, with their further keys."""
 _FIRST = {"goto": "home", "holds": NOTHING, "wait_s": "1", "repeat": "for ever", "end": "repeat"}
 
 
 class SequenceDesk:
-    """The steps of one file; ``folder``: no other is written to."""
+    """The steps of a file; ``folder``: the only folder that is written to."""
 
     def __init__(self, arm: Arm, folder: Path) -> None:
         self.arm, self.folder = arm, folder
         self.file: Path | None = None
         self.plan: SequencePlan | None = None
-        """Of the steps as they were when it was planned."""
+        """The last plan, of the steps at that time."""
         self.version = 0
-        """Grows with each change."""
+        """Incremented at each change."""
         self._content = tomlkit.document()
 
     def files(self) -> list[str]:
@@ -56,7 +56,7 @@ class SequenceDesk:
         return found
 
     def open(self, name: str) -> None:
-        """Edit a file of the folder; InputError if it is none of a sequence, or its steps cannot be edited here."""
+        """Edit a file of the folder; raises InputError if it is not a sequence, or its steps cannot be edited here."""
         if name not in self.files():
             raise InputError(f"{name}: there is no such sequence in the project folder", "choose another")
         file = self.folder / name
@@ -79,7 +79,7 @@ class SequenceDesk:
         return list(steps.body) if isinstance(steps, AoT) else []
 
     def set(self, index: int, key: str, text: str) -> None:
-        """Change what a step says under a key; "" takes the key out."""
+        """Set the value of a step's key; "" removes the key."""
         table = self._tables[index]
         if text:
             table[key] = toml_table.typed(text)
@@ -88,7 +88,7 @@ class SequenceDesk:
         self._changed()
 
     def set_kind(self, index: int, kind: str) -> None:
-        """Let a step do something else; its comments stay."""
+        """Change the kind of a step; its comments are kept."""
         table = self._tables[index]
         for key in list(table):
             del table[key]
@@ -96,7 +96,7 @@ class SequenceDesk:
         self._changed()
 
     def add(self, index: int) -> None:
-        """Put a step before the one of this index."""
+        """Insert a step before ``index``."""
         table = tomlkit.table()
         table["goto"] = "home"
         table.add(tomlkit.nl())
@@ -104,7 +104,7 @@ class SequenceDesk:
         self._put([*tables[:index], table, *tables[index:]])
 
     def delete(self, index: int) -> None:
-        """Take a step out, with its comments."""
+        """Remove a step, with its comments."""
         tables = self._tables
         del tables[index]
         self._put(tables)
@@ -117,13 +117,13 @@ class SequenceDesk:
             self._put(tables)
 
     def sequence(self) -> Sequence:
-        """The steps as they are; InputError, naming step and key, if they are none."""
+        """The sequence of the steps; raises InputError, with step and key, if it is invalid."""
         if self.file is None:
             raise InputError("no sequence is open", "choose a file")
         return Sequence.of_table(toml_table.parse(tomlkit.dumps(self._content), str(self.file)), self.arm)
 
     def save(self) -> Path:
-        """Write the file; InputError, and nothing written, if the steps are no sequence."""
+        """Write the file; raises InputError, without writing, if the sequence is invalid."""
         sequence = self.sequence()
         file = Path(sequence.source)
         replace_text(file, tomlkit.dumps(self._content))
@@ -142,12 +142,12 @@ class SequenceDesk:
 
 
 def kind_of(step: dict[str, str]) -> str:
-    """What a step does."""
+    """The kind of a step."""
     return next((kind for kind in KINDS if kind in step), "goto")
 
 
 def _text(value: Any) -> str:
-    """A value as it is typed: a text without its quotes."""
+    """A value as text, without the quotes of a string."""
     if isinstance(value, str):
         return value
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""Sequences: their steps in a table, saved to their file, planned and run with the current step lit."""
+"""Sequences: a table of the steps; save, plan and run, with the current step highlighted."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SequenceTab:
         ui.context.client.on_connect(self._connected)
 
     def _connected(self) -> None:
-        """Show the steps again as they are: what was typed while the connection broke has not arrived."""
+        """Show the steps again, as texts typed while the connection was broken have not arrived."""
         self._shown = -1
 
     def _why_not(self) -> str:
@@ -89,7 +89,7 @@ class SequenceTab:
         return row
 
     def _set(self, index: int, key: str, text: str) -> None:
-        """Take what was typed; the table stays unchanged, for a user who types on in the next box."""
+        """Set a value; the table is not rebuilt, as the user may already type in the next field."""
         others = self._desk.version - self._shown
         self._desk.set(index, key, text)
         self._shown = self._desk.version - others
@@ -108,7 +108,7 @@ class SequenceTab:
         self._look_for_files()
         if self._desk.version != self._shown:
             self._shown = self._desk.version
-            self._files.set_value(self._opened)  # which another page may have opened
+            self._files.set_value(self._opened)  # another page may have opened it
             self._table.refresh()
             self._lit = 0
         state = self._operator.live.sequence
@@ -127,7 +127,7 @@ class SequenceTab:
         name = getattr(event, "value", None)
         if name not in (None, self._opened):
             self._attempt(lambda: self._desk.open(str(name)))
-            self._files.set_value(self._opened)  # another one, if that was refused
+            self._files.set_value(self._opened)  # the previous one, if it was refused
 
     @property
     def _opened(self) -> str | None:
@@ -142,7 +142,7 @@ class SequenceTab:
             self._page.attempt(call)
 
     def _planned(self) -> SequencePlan:
-        """The plan of the steps as they are now."""
+        """The plan of the present steps."""
         if self._desk.plan is None:
             self._desk.plan = pipeline.plan_sequence(
                 self._desk.arm, self._desk.sequence(), self._operator.part

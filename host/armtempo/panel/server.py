@@ -1,4 +1,4 @@
-"""The panel served: pages, run folders to read, and a message to all pages ten times a second."""
+"""The panel's server: pages, files of run folders, and a message to all pages ten times per second."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from armtempo.panel.operator import Operator
 _RECONNECT_S = 60.0
 """Time for which a page is kept after its connection breaks (a busy browser, a sleeping tablet)."""
 _KEPT_MESSAGES = 2000
-"""For such a page; some 15 come each second, and it takes up to 132 s until it is given up."""
+"""Messages kept for such a page: about 15 per second, for up to 132 s until it is dropped."""
 _NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
 """Files of run folders may come from anybody and must not run scripts."""
 _LOG = logging.getLogger("armtempo")
@@ -55,7 +55,7 @@ class Panel:
         )
 
     def serve(self, listening: socket.socket, token: str) -> None:
-        """Answer on a socket that is bound; a client needs the ``token``, unless that is ""."""
+        """Serve on a bound socket; a client needs the ``token``, unless that is ""."""
         host = str(listening.getsockname()[0])
         hosts = _names(host) if token else {"127.0.0.1", "localhost", "::1"}
         guarded = Access(self._api, hosts, token)
@@ -93,10 +93,8 @@ class Panel:
                 continue
             try:
                 code = f"armtempo.hear({json.dumps(layout.message(self._operator, self._shape))})"
-            except (
-                Exception
-            ):  # a fault of ours: logged, and the next is told; the pages cover themselves meanwhile
-                _LOG.exception("panel: what the pages are told")
+            except Exception:  # a bug: logged; the next message is sent; meanwhile the pages show an overlay
+                _LOG.exception("panel: the message to the pages")
                 continue
             for client in list(Client.instances.values()):
                 if client.has_socket_connection:
@@ -127,7 +125,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def _names(host: str) -> set[str]:
-    """Names by which this machine may be called."""
+    """Host names of this machine."""
     name = socket.gethostname()
     found = {host, name, name.split(".")[0], f"{name.split('.')[0]}.local", "127.0.0.1", "localhost"}
     with suppress(OSError):

@@ -1,1 +1,1 @@
-"""The paper repeated: every printed number next to the one found here."""
+"""The paper's results repeated: each printed number compared with armtempo's."""

@@ -1,4 +1,4 @@
-"""Section 4: the motions replayed ten times on the virtual arm, and compared with Figs. 11 and 12."""
+"""Section 4: the motions replayed ten times on the virtual arm, compared with Figs. 11 and 12."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class Series:
 
 
 def run(made: motions.Plans, folder: Path, quick: bool, progress: Progress | None) -> list[Series]:
-    """Replay the three motions at the same time, on a virtual board each; run folders go below ``folder``.
+    """Replay the three motions in parallel, each on its own virtual board; run folders are made in ``folder``.
 
-    Ctrl-C makes all of them brake, and raises Stopped then; so does one that fails, with its error.
+    All of them brake after Ctrl-C, which raises Stopped, or after an error in one of them, which is raised.
     """
     plans = {QUINTIC: made.quintic, CUBIC: made.cubic, UNOPTIMISED: _unoptimised(made)}
     times = QUICK_REPETITIONS if quick else REPETITIONS
@@ -63,7 +63,7 @@ def run(made: motions.Plans, folder: Path, quick: bool, progress: Progress | Non
 
 
 def claims(series: list[Series]) -> list[Claim]:
-    """The three comparisons of section 4.2, in numbers."""
+    """The three comparisons of section 4.2 in numbers."""
     by_name = {one.name: one.found for one in series}
     return [
         *_coincide(by_name[QUINTIC]),
@@ -86,7 +86,7 @@ def _unoptimised(made: motions.Plans) -> Plan:
 
 
 def _replayed(plan: Plan, folder: Path, times: int, stop: StopRequest, tell: Callable[[float], None]) -> Path:
-    """The run folder of one motion; ``tell`` is called with the fraction of the work that is done."""
+    """The run folder of one motion; ``tell`` is called with the finished fraction of the work."""
     with connect(SIM, plan.arm) as board:
         return board.run(plan, times, folder, lambda done, whole: tell(done / whole), stop=stop).path
 
@@ -122,7 +122,7 @@ def _limits_kept(found: Evaluation) -> list[Claim]:
                     "satisfied",
                     f"{check.peak:.2f} ± {check.sigma:.2f}, {check.verdict}",
                     SAME if kept else DIFFERS,
-                    "" if kept else "the motor's ringing adds to the commanded motion",
+                    "" if kept else "the motor's ringing adds to the command",
                 )
             )
     return claims
@@ -136,7 +136,7 @@ def _unoptimised_peaks(found: Evaluation) -> list[Claim]:
         ("speed", "acceleration"), ("°/s", "°/s²"), printed.UNOPTIMISED_PEAKS, checks, strict=True
     ):
         same = abs(check.peak - value) <= 3.0 * check.sigma
-        because = "" if same else "the highest of many noisy values, and the motor's own swinging"
+        because = "" if same else "largest of many noisy values, and the motor's ringing"
         what = f"joint 1 before optimisation, peak {quantity} measured ({unit})"
         text = f"{check.peak:.2f} ± {check.sigma:.2f}"
         claims.append(Claim("section 2.3", what, f"{value:.2f}", text, SAME if same else DIFFERS, because))
@@ -144,7 +144,7 @@ def _unoptimised_peaks(found: Evaluation) -> list[Claim]:
 
 
 def _rougher_ends(quintic: Evaluation, cubic: Evaluation) -> list[Claim]:
-    """Joint 1 at start and end: how much worse the cubic's speed and acceleration are than the quintic's."""
+    """Joint 1 at start and end: deviation of speed and acceleration, cubic compared with quintic."""
     claims = []
     for order, unit, said in (
         (1, "°/s", "cubic lags evidently, quintic does not"),
@@ -158,10 +158,7 @@ def _rougher_ends(quintic: Evaluation, cubic: Evaluation) -> list[Claim]:
 
 
 def _end_error(found: Evaluation, order: int) -> float:
-    """RMS deviation of joint 1's mean curve from theory near start and end.
-
-    From theory as the same differentiation shows it: so only what the motor and the arm add.
-    """
+    """RMS deviation of joint 1's mean curve from ``Curves.shown`` near start and end."""
     end = found.trajectory.joints[0].duration_s
     times = found.curves.times_s
     near = (times <= _END_S) | ((times >= end - _END_S) & (times <= end + _END_S))

@@ -1,4 +1,4 @@
-"""The paper's motions: before optimisation, with its own intervals, and as armtempo plans them."""
+"""The paper's motions: before optimisation, with the printed intervals, and planned by armtempo."""
 
 from __future__ import annotations
 
@@ -87,20 +87,20 @@ def _total(what: str, total: float, ours: float) -> Claim:
     verdict = SAME if abs(ours - total) <= 0.0015 else BETTER if ours < total else DIFFERS
     because = {
         SAME: "",
-        BETTER: "the search continues to a better optimum under the same limits",
-        DIFFERS: "another seed of a random search, and every limit is kept exactly, not to three digits",
+        BETTER: "the search finds a better optimum with the same limits",
+        DIFFERS: "another seed of a random search; all limits are kept exactly, not to three digits",
     }[verdict]
     return Claim("Table 6", what, f"{total:.3f}", f"{ours:.4f}", verdict, because)
 
 
 def _printed_intervals(made: Plans, joint: int) -> Claim:
-    """Do the printed intervals keep the limits?"""
+    """Whether the printed intervals keep the limits."""
     limits = made.arm.driven[joint].limits
     reached = extremes.of_joint(motion(_via(made.job, joint), printed.INTERVALS_S[joint], 5)).values
     share = float(np.max(reached / np.array(limits.values)))
     because = "" if share <= 1.0 else "rounding of the printed intervals"
     if joint == 2:
-        because = "with P5 = −20°, for −15° in Table 3 is a misprint (it gives 51.6 °/s² and 246 °/s³)"
+        because = "with P5 = −20°, as −15° in Table 3 is a misprint (it gives 51.6 °/s² and 246 °/s³)"
     verdict = SAME if share < 1.006 else DIFFERS
     what = f"joint {joint + 1}, the printed intervals keep the limits (largest share)"
     return Claim("Table 6", what, "≤ 100 %", f"{100 * share:.2f} %", verdict, because)
@@ -125,5 +125,5 @@ def _cubic_gain(made: Plans) -> Claim:
         printed.CUBIC_GAIN,
         1 - cubic / quintic,
         3,
-        "both searches end within a few thousandths of their optima; the optima differ by 6.95 %",
+        "both searches end within a few tenths of a percent of their optima, which differ by 6.95 %",
     )

@@ -1,4 +1,4 @@
-"""Table 2: the eight postures of the pose in Eq. (16)."""
+"""Table 2: the eight solutions for the pose in Eq. (16)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armtempo.paper import printed
 from armtempo.paper.printed import DIFFERS, SAME, Claim
 
 _ROUNDING_DEG = 0.1
-"""The table prints one decimal; sums of such angles differ by up to this."""
+"""The table has one decimal; sums of its angles are accurate to this."""
 
 
 def claims(arm: Arm) -> list[Claim]:
@@ -31,7 +31,7 @@ def _claim(ours: Array, row: int) -> Claim:
     because = ""
     if row == wrong:
         wanted[column] = 180.0
-        because = "misprint: θ6 must be 180, as printed the pose comes out turned by half a turn"
+        because = "misprint: θ6 must be 180; with the printed value the pose is turned by 180°"
     nearest, away = _nearest(ours, wanted)
     verdict = SAME if away <= _ROUNDING_DEG and not because else DIFFERS
     if away > _ROUNDING_DEG:
@@ -40,7 +40,7 @@ def _claim(ours: Array, row: int) -> Claim:
 
 
 def _nearest(ours: Array, wanted: Array) -> tuple[Array, float]:
-    """Our solution nearest to a printed one, shifted by whole turns towards it, and the largest difference.
+    """Our solution closest to a printed one, modulo 360 degrees, and the largest difference.
 
     At theta5 = 0 only theta4 + theta6 is defined, so there the sum is compared.
     """

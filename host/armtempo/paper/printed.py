@@ -1,5 +1,4 @@
-"""What the paper prints: tables and figures as data, misprints included (they are named where they show), and a printed
-value next to ours, with a verdict."""
+"""The paper's tables and figures as data, with their misprints; a printed value compared with ours."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ POSE = (
 )
 """Eq. (16), lengths in cm of the full-size arm."""
 SCALE_MM = 2.0
-"""Millimetres of the 1:5 arm for a centimetre of the full-size arm."""
+"""Millimetres of the 1:5 arm per centimetre of the full-size arm."""
 SOLUTIONS = (
     (180.0, -38.0, -52.0, 0.0, 0.0, 0.0),
     (180.0, -38.0, -52.0, 180.0, 0.0, 180.0),
@@ -39,9 +38,9 @@ INTERVALS_S = (
 TOTALS_S = (6.033, 6.460, 6.818)
 """Table 6, sums."""
 REDUCTION = 0.464
-"""Share of the unoptimised 3 x 12 s saved; section 3.3."""
+"""Fraction of the unoptimised 3 x 12 s saved; section 3.3."""
 CUBIC_GAIN = 0.069
-"""Share by which the cubic motion of joint 1 is shorter than the quintic; section 4.2."""
+"""Fraction by which the cubic motion of joint 1 is shorter than the quintic; section 4.2."""
 SEARCHES_S = {
     "ga": {10: 10.491, 50: 8.498, 100: 6.766, 500: 6.161},
     "iaga": {10: 10.550, 50: 7.411, 100: 6.416, 500: 6.304},
@@ -50,12 +49,12 @@ SEARCHES_S = {
     "cs": {10: 6.047, 50: 6.069, 100: 6.064, 500: 6.058},
     "acs": {10: 6.034, 50: 6.045, 100: 6.047, 500: 6.054},
 }
-"""Table 4: fitness that each algorithm reached, by population, for joint 1."""
+"""Table 4: fitness of joint 1 by algorithm and population."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One value of the paper next to the one found here."""
+    """A value of the paper compared with ours."""
 
     where: str
     """Table, figure or section."""
@@ -65,11 +64,11 @@ class Claim:
     verdict: str
     """SAME, BETTER or DIFFERS."""
     because: str = ""
-    """Why it differs, with the misprint if there is one; else a remark."""
+    """Reason of a difference, such as a misprint; otherwise a remark."""
 
 
 def compared(where: str, what: str, printed: float, found: float, digits: int, because: str = "") -> Claim:
-    """A number printed with ``digits`` decimals: SAME if ours is within one unit of the last."""
+    """Compare a number printed with ``digits`` decimals: SAME if ours is within one unit of the last."""
     verdict = SAME if abs(found - printed) <= 1.01 * 10.0**-digits else DIFFERS
     text = f"{found:.{digits + 1}f}"
     return Claim(where, what, f"{printed:.{digits}f}", text, verdict, "" if verdict == SAME else because)

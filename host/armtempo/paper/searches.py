@@ -1,4 +1,4 @@
-"""Table 4 and Fig. 6: six searches, four populations, the paper's own fitness, Eq. (21)."""
+"""Table 4 and Fig. 6: six algorithms, four populations, the paper's fitness, Eq. (21)."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ QUICK_POPULATIONS = (10, 50)
 SEEDS, QUICK_SEEDS = 10, 3
 QUANTILES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _SAME_S = 0.02
-"""Best values of one run of a random search: this near counts as the same."""
+"""Difference up to which the best values of single runs of a random search count as equal."""
 _BECAUSE = {
     SAME: "",
-    BETTER: "the paper does not say how its operators are tuned; ours are in docs/optimisers.md",
-    DIFFERS: "printed is one run of a random search, here is the median over seeds",
+    BETTER: "the paper does not give its parameters; ours are in docs/optimisers.md",
+    DIFFERS: "printed: one run of a random search; ours: the median over seeds",
 }
 _HEADROOM = 1.5
-"""Top of Fig. 6's time axis, as a multiple of the best time of all."""
+"""Top of Fig. 6's time axis, as a multiple of the best time."""
 
 Case = tuple[str, int, int]
 """Algorithm, population, seed."""
@@ -47,7 +47,7 @@ Case = tuple[str, int, int]
 
 @dataclass(frozen=True)
 class Row:
-    """All seeds of one algorithm and population."""
+    """The results of one algorithm and population over all seeds."""
 
     algorithm: str
     population: int
@@ -57,23 +57,23 @@ class Row:
 
     @property
     def best_s(self) -> float:
-        """Of all seeds, after the last iteration."""
+        """The best of all seeds after the last iteration."""
         return float(self.curves[0, -1])
 
     @property
     def median_s(self) -> float:
-        """Over the seeds, after the last iteration."""
+        """The median over the seeds after the last iteration."""
         return float(self.curves[2, -1])
 
     @property
     def worst_s(self) -> float:
-        """Of all seeds, after the last iteration."""
+        """The worst of all seeds after the last iteration."""
         return float(self.curves[-1, -1])
 
 
 @dataclass(frozen=True)
 class _Search:
-    """The search for the intervals of joint 1, judged by Eq. (21); called in processes of their own."""
+    """The search for the intervals of joint 1 with the fitness of Eq. (21); called in other processes."""
 
     points: Array
     job: Job
@@ -98,10 +98,10 @@ class _Search:
 
 
 def run(arm: Arm, job: Job, quick: bool, progress: Progress) -> list[Row]:
-    """Search for the intervals of joint 1 of the shipped job, on all cores; Ctrl-C ends it at once."""
+    """Run all searches for the intervals of joint 1 of the shipped job, on all cores; Ctrl-C ends them at once."""
     seeds = range(1, (QUICK_SEEDS if quick else SEEDS) + 1)
     cases = list(product(SEARCHES_S, QUICK_POPULATIONS if quick else POPULATIONS, seeds))
-    cases.sort(key=lambda case: -case[1])  # the longest first, so that all processes end together
+    cases.sort(key=lambda case: -case[1])  # longest first, so that all processes end at about the same time
     found = []
     with multiprocessing.get_context("spawn").Pool(initializer=_ignore_interrupt) as pool:
         for number, done in enumerate(pool.imap_unordered(_Search.of(arm, job), cases), 1):
@@ -111,12 +111,12 @@ def run(arm: Arm, job: Job, quick: bool, progress: Progress) -> list[Row]:
 
 
 def _ignore_interrupt() -> None:
-    """Ctrl-C reaches every process of the terminal; the main one ends the others."""
+    """Ignore Ctrl-C, which reaches every process of the terminal; the main one ends the others."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def rows(found: Iterable[tuple[Case, Array]]) -> list[Row]:
-    """One row for each algorithm and population, in the order of Table 4, of histories (iterations + 1,)."""
+    """The rows in the order of Table 4, from histories (iterations + 1,)."""
     groups: dict[tuple[str, int], list[Array]] = {}
     for (algorithm, population, _), history in found:
         groups.setdefault((algorithm, population), []).append(history)
@@ -128,7 +128,7 @@ def rows(found: Iterable[tuple[Case, Array]]) -> list[Row]:
 
 
 def claims(found: Sequence[Row]) -> list[Claim]:
-    """Our median next to the printed value, with the range over the seeds."""
+    """The printed values compared with our median and range over the seeds."""
     return [_claim(row) for row in found]
 
 
@@ -144,7 +144,7 @@ def _claim(row: Row) -> Claim:
 
 
 def figure(found: Sequence[Row]) -> Figure:
-    """Fig. 6, a field for each population: median over the seeds, the middle half and best to worst as bands."""
+    """Fig. 6, with axes for each population: median over the seeds, quartiles and range as bands."""
     populations = sorted({row.population for row in found})
     columns = min(2, len(populations))
     lines = -(-len(populations) // columns)

@@ -12,7 +12,7 @@ from armtempo.paper import motions, searches
 from armtempo.paper.experiment import CUBIC, QUINTIC, Series
 from armtempo.paper.printed import DIFFERS, Claim
 from armtempo.paper.searches import Row
-from armtempo.report import arm_picture, drawing, html_page, plan_section, plots, run_report
+from armtempo.report import arm_picture, drawing, html_page, plots, run_report, sections
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _TITLE = "The paper, repeated"
 _LEAD = (
     "Every number of “Time-optimal trajectory planning of serial manipulator based on adaptive cuckoo search "
-    "algorithm” beside the one that armtempo finds. Written by: armtempo paper"
+    "algorithm” and the one that armtempo finds. Written by: armtempo paper"
 )
 
 
@@ -41,12 +41,12 @@ def render(
         sheet.figure(drawing.inline_svg(figure, name, caption), caption)
     sheet.heading("How to repeat it")
     sheet.code("armtempo paper")
-    plan_section.origin(sheet, made.quintic, _extent(searched, series))
+    sections.plan_origin(sheet, made.quintic, _extent(searched, series))
     return sheet.render()
 
 
 def _extent(searched: Sequence[Row], series: Sequence[Series]) -> list[tuple[str, object]]:
-    """How much was computed: ``--quick`` does less."""
+    """The amount of computation; ``--quick`` reduces it."""
     populations = ", ".join(str(population) for population in sorted({row.population for row in searched}))
     return [
         ("populations searched with", populations),

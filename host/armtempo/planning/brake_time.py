@@ -1,9 +1,9 @@
-"""The time for braking to rest, or for another change of speed, as a function of the time at which it begins.
+"""The time for braking to rest, or for another change of speed, as a function of its start.
 
-The board lets the motion's own time run at another rate, so the arm stays on its path: in the brake time the
-rate goes from r0 to r1, by the law in ``armtempo_board/stepgen/time_law.py``. Braking and pauses have r1 = 0,
-and those of RAMP_SHAPES that make them shortest from where they begin; other changes of speed have separate
-times, and one fixed shape.
+The board changes the rate of the motion's own time, so the arm stays on its path: in the brake time the rate
+changes from r0 to r1, by the law in ``armtempo_board/stepgen/time_law.py``. Braking and pauses have r1 = 0, and of
+RAMP_SHAPES the one with the shortest time from their start; other changes of speed have separate times, and a
+fixed shape.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ OTHERS: Rates = (
     (0.9, 0.2),
     (0.2, 0.9),
 )
-"""Rates before and after for which the times are computed; all others need less. The first of TO_REST and the
-first two of OTHERS need the most; from 0.5 to rest does where the motion ends within a ramp from 1."""
+"""Rates before and after for which the times are computed; all others need less time. The first of TO_REST and the
+first two of OTHERS need most, except if the motion ends within a ramp from 1: then from 0.5 to rest."""
 _WORST_TO_REST = TO_REST[:3:2]
 _WORST_OTHERS = OTHERS[:2]
 
@@ -69,10 +69,10 @@ _SHAPES, _WAYS = np.frombuffer(RAMP_SHAPES, np.uint8), np.frombuffer(RAMP_WAYS, 
 
 @dataclass(frozen=True, eq=False)
 class BrakeTimes:
-    """How long changes take that begin at equal steps of a motion's time, in 2**``unit_bits`` ticks; linear in between.
+    """Durations of changes at equidistant starts in a motion's time, in 2**``unit_bits`` ticks; interpolated linearly.
 
-    ``to_rest``: (REST_ENTRIES,), ``others``: (OTHER_ENTRIES,), whole numbers. ``shapes``: (REST_ENTRIES - 1,), of ramps
-    to rest from each entry to the next (``armtempo_shared.motion``).
+    ``to_rest``: (REST_ENTRIES,), ``others``: (OTHER_ENTRIES,), integers. ``shapes``: (REST_ENTRIES - 1,), of ramps to
+    rest that start between two entries (``armtempo_shared.motion``).
     """
 
     duration_s: float
@@ -95,7 +95,7 @@ class BrakeTimes:
         )
 
     def rest_shapes(self, time_s: Array) -> Shapes:
-        """The shapes of ramps to rest from times of the motion on."""
+        """Shapes of ramps to rest that start at given times of the motion."""
         place = (np.asarray(time_s) * (len(self.shapes) / self.duration_s)).astype(int)
         return np.asarray(self.shapes[np.clip(place, 0, len(self.shapes) - 1)])
 
@@ -138,7 +138,7 @@ def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
 
 
 def _best_shapes(ramps: _Ramps) -> Shapes:
-    """(REST_ENTRIES - 1,): those whose ramps to rest from ends and middle of a part are shortest in the mean."""
+    """(REST_ENTRIES - 1,): the shapes with the shortest mean time to rest from ends and middle of each part."""
     starts = np.linspace(0.0, 1.0, 2 * REST_ENTRIES - 1)
     even_s = ramps.shortest_s(starts, _WORST_TO_REST, np.full(len(starts), _SHORTEST_S), EVEN_RAMP)
     lengths = np.array(
@@ -148,9 +148,9 @@ def _best_shapes(ramps: _Ramps) -> Shapes:
 
 
 class _Kind:
-    """Changes between ``rates``, of which ``worst`` need most, with a shape in each part of their table.
+    """Changes between ``rates``, of which ``worst`` need most time, with a shape for each part of their table.
 
-    ``needed_s``: (parts, starts + 1), how long those take that begin at equal steps from one end of a part to another.
+    ``needed_s``: (parts, starts + 1), durations at equidistant starts from one end of a part to the other.
     """
 
     def __init__(self, ramps: _Ramps, rates: Rates, worst: Rates, shapes: Shapes, starts: int) -> None:
@@ -161,13 +161,13 @@ class _Kind:
         self.needed_s = ramps.shortest_s(at.ravel(), worst, least_s, shape.ravel()).reshape(at.shape)
 
     def _places(self, starts: int) -> tuple[Array, Shapes]:
-        """Parts of the motion's time, and the shapes from there on."""
+        """Starts as fractions of the motion's time, and their shapes."""
         parts = len(self._shapes)
         at = (np.arange(parts)[:, None] + np.linspace(0.0, 1.0, starts + 1)) / parts
         return at, np.repeat(self._shapes, starts + 1).reshape(at.shape)
 
     def table(self, unit_s: float) -> Array:
-        """The entries, in units; RAMP_LENGTH: perhaps too short."""
+        """The entries, in units; one of RAMP_LENGTH may be too short."""
         needed = self.needed_s / unit_s
         table: Array = np.append(needed[:, 0], 0.0)
         table[1:] = np.maximum(table[1:], needed[:, -1])
@@ -189,13 +189,13 @@ class _Kind:
 
 
 def _between(table: Array, starts: int) -> Array:
-    """(parts, starts + 1): a table at equal steps from each entry to the next."""
+    """(parts, starts + 1): a table, interpolated between its entries."""
     weight = np.linspace(0.0, 1.0, starts + 1)
     return np.asarray((1.0 - weight) * table[:-1, None] + weight * table[1:, None])
 
 
 def _lift(table: Array, needed: Array) -> None:
-    """Lengthen the entries where the table between them is less than ``needed``, by as little as will do."""
+    """Lengthen the entries around values of the table that are less than ``needed``, by as little as possible."""
     starts = needed.shape[1] - 1
     while True:
         missing = needed - _between(table, starts)
@@ -221,13 +221,13 @@ class _Ramps:
         self.worst_of_motion = float(np.max(np.abs(self._motion[1:]) / allowed.T[1:, :, None]))
 
     def with_few_phases(self) -> _Ramps:
-        """The same, looked at in fewer places of each ramp."""
+        """The same, evaluated at fewer points of each ramp."""
         found = copy(self)
         found._phases = _FEW_PHASES
         return found
 
     def shortest_s(self, starts: Array, rates: Rates, least_s: Array, shapes: Shapes | int) -> Array:
-        """From ``least_s`` on, to 1 %, for each of ``starts``, parts of the motion's time; ``shapes``: theirs."""
+        """Shortest durations from ``least_s`` on, to 1 %; ``starts``: fractions of the motion, with ``shapes``."""
         shapes = np.broadcast_to(shapes, starts.shape)
         low, high = least_s.copy(), least_s.copy()
         left = np.arange(len(starts))
@@ -237,14 +237,14 @@ class _Ramps:
         return self._halved(starts, rates, low, high, shapes)
 
     def shorter_s(self, starts: Array, rates: Rates, most_s: Array, shape: int) -> Array:
-        """As ``shortest_s``, but from half of ``most_s`` on, and twice that where it is not enough."""
+        """As ``shortest_s``, but between half of ``most_s`` and ``most_s``; twice ``most_s`` if that is not enough."""
         shapes = np.full(len(starts), shape)
         enough = self.excess(starts, most_s, rates, shapes) <= EXCESS
         low = np.where(enough, 0.5 * most_s, most_s)
         return np.where(enough, self._halved(starts, rates, low, most_s, shapes), 2.0 * most_s)
 
     def _halved(self, starts: Array, rates: Rates, low: Array, high: Array, shapes: Shapes) -> Array:
-        """Of times between ``low``, which is not enough, and ``high``, which is."""
+        """Bisect between ``low``, which is too short, and ``high``, which is long enough."""
         low, high = low.copy(), high.copy()
         left = np.flatnonzero(high > low)
         for _ in range(_HALVINGS):
@@ -255,7 +255,7 @@ class _Ramps:
         return high
 
     def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Shapes | int) -> Array:
-        """The largest acceleration or jerk over its limit in changes between ``rates``, for each start."""
+        """Largest ratio of acceleration or jerk to its limit in changes between ``rates``, for each start."""
         worst = np.zeros(len(starts))
         if not len(starts):
             return worst

@@ -110,7 +110,7 @@ def _reachable(angle: Array, time: Array, limits: Array) -> list[Array]:
     found[0][(angle[0, points, fastest] < 0.0).astype(np.intp), points, fastest] = True
     for kind in (1, 2):
         # t'' or t''' changes the ratios of all joints in proportion to their effect, until the joint with the
-        # largest # effect reaches its limit
+        # largest effect reaches its limit
         effect = angle[0] / limits[:, kind]
         largest = points, np.abs(effect).argmax(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -44,8 +44,8 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
         from armtempo.planning.line import line_plan  # here, because most jobs need no kinematics
 
         way = line_plan.motion
-    with watched(progress) as told:
-        planned = way(arm, job, via, told)
+    with watched(progress) as watch:
+        planned = way(arm, job, via, watch)
     trajectory = planned.trajectory
     checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)

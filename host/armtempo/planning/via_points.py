@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.kinematics.branches import Branch, branch_of
 from armtempo.kinematics.choice import Choice, choose
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.forward import frames
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.rejection import table
+from armtempo.kinematics.solutions import Branch, branch_of
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

@@ -1,1 +1,1 @@
-"""Arm record and motion record: arm and motion in the units of the board, and back."""
+"""Arm and motion records: conversion to the board's units and back."""

@@ -1,4 +1,4 @@
-"""From a motion record back to a trajectory in degrees and seconds: the inverse of ``encode``."""
+"""From a motion record to a trajectory in degrees and seconds; the inverse of ``encode``."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class StepScale(Protocol):
 
 
 def trajectory(data: bytes, joints: Sequence[StepScale], name: str, arm: str = "the arm") -> Trajectory:
-    """The motion that a record holds, to the rounding of its integers; ``joints`` are the driven ones.
+    """The motion in a record, to the rounding of its integers; ``joints``: the driven ones.
 
-    Raises InputError if the record is damaged or has another number of joints; ``name`` and ``arm``: names of
-    motion and arm for the message.
+    ``name`` and ``arm`` are used in messages. Raises InputError if the record is damaged or has another number of
+    joints.
     """
     try:
         motion = Motion(data)

@@ -24,15 +24,12 @@ from armtempo.planning.brake_time import BrakeTimes
 from armtempo.splines.trajectory import Trajectory
 
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
-"""Fields of a joint that may change without changing its position. (Driver and safety have their own.)"""
+"""Fields of a joint that do not affect its position in steps."""
 _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 
 def arm_record(arm: Arm) -> bytes:
-    """The arm record (layout: ``armtempo_shared.armrecord``).
-
-    Raises InputError if a value does not fit the board.
-    """
+    """The arm record (layout: ``armtempo_shared.armrecord``); raises InputError if a value does not fit the board."""
     joints = [_joint(joint) for joint in arm.driven]
     return armrecord.pack(_head(arm), joints, outputs(arm), inputs(arm))
 
@@ -43,11 +40,11 @@ def step_rates(arm: Arm) -> list[int]:
 
 
 def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = None) -> bytes:
-    """The motion record (layout: ``armtempo_shared.motion``), tied to the arm by the checksum of its record.
+    """The motion record (layout: ``armtempo_shared.motion``), with the checksum of the arm's record.
 
     ``brakes``: its times for braking and changes of speed; None: neither is possible. Raises InputError if
-    trajectory and arm do not fit each other or the record's number range, PlanError if the numbers are too
-    large for the board.
+    trajectory and arm do not fit together or exceed the record's ranges, PlanError if the numbers are too large for
+    the board.
     """
     if len(trajectory.joints) != len(arm.driven):
         raise InputError(
@@ -70,7 +67,7 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
-    """Entries for ramps to rest and others, and the bits of their unit, as whole numbers."""
+    """Ramp entries, to rest and others, as integers, and the bits of their unit."""
     if brakes is None:
         return motion.NO_RAMPS
     shapes = (motion.RAMP_LENGTH + 1) * np.append(brakes.shapes, motion.EVEN_RAMP)
@@ -113,7 +110,7 @@ def _head(arm: Arm) -> dict[str, Any]:
 
 
 def _identity(arm: Arm) -> int:
-    """A hash of everything that maps joint angles to the arm's position: all but names, limits and models."""
+    """A hash of everything that maps joint angles to the arm's position: all except names, limits and models."""
     joints = [{k: v for k, v in asdict(joint).items() if k not in _NOT_IDENTITY} for joint in arm.joints]
     for joint in joints:
         if joint["encoder"]:
@@ -123,7 +120,7 @@ def _identity(arm: Arm) -> int:
 
 
 def _as_floats(value: Any) -> Any:
-    """The value with every number as a float: 20 and 20.0 are the same gear ratio."""
+    """The value with all numbers as floats, as 20 and 20.0 are the same gear ratio."""
     if isinstance(value, dict):
         return {key: _as_floats(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
@@ -188,7 +185,7 @@ def _max_rate(joint: DrivenJoint) -> int:
 
 
 def outputs(arm: Arm) -> list[dict[str, Any]]:
-    """Rows of ``armrecord.OUTPUT``, of an arm without problems (``pin_use``)."""
+    """Rows of ``armrecord.OUTPUT``, of an arm whose pins were checked by ``pin_use``."""
     places = pin_use.timer_outputs(arm) if arm.outputs else {}
     return [_output(output, places.get(output.name)) for output in arm.outputs]
 

@@ -1,4 +1,4 @@
-"""A motion for the board: its record, and the trajectory that the record holds."""
+"""A motion for the board: its record, and the trajectory in it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class MotionKey:
 
 @dataclass(frozen=True, eq=False)
 class EncodedMotion:
-    """A motion as the board stores and replays it, with the host's data about it."""
+    """A motion that the board stores and replays, with the host's data about it."""
 
     name: str
     """Name on the board."""
@@ -36,7 +36,7 @@ class EncodedMotion:
     data: bytes
     """The motion record (layout: ``armtempo_shared.motion``)."""
     plan: Plan | None = None
-    """Its plan, if known."""
+    """The plan, if known."""
 
     @property
     def key(self) -> MotionKey:
@@ -50,16 +50,16 @@ class EncodedMotion:
 
 
 def of_trajectory(trajectory: Trajectory, arm: Arm) -> EncodedMotion:
-    """A trajectory of ``arm`` with its times for braking and changes of speed.
+    """Encode a trajectory of ``arm`` with its times for braking and changes of speed.
 
-    Raises InputError or PlanError if the board could not replay it.
+    Raises InputError or PlanError if the board cannot replay it.
     """
     brakes = brake_time.of_motion(trajectory, [joint.limits for joint in arm.driven])
     return EncodedMotion(trajectory.name, arm, trajectory, encode.motion_record(trajectory, arm, brakes))
 
 
 def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
-    """The motion of a plan; ``name``: default from the job's name.
+    """Encode the motion of a plan; ``name``: default from the job's name.
 
     Raises InputError for an invalid name, and as ``of_trajectory``.
     """

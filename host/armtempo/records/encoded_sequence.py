@@ -1,4 +1,4 @@
-"""A sequence for the board: its motions' records and its own."""
+"""A sequence for the board: its record, and those of its motions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armtempo.records.encoded_motion import EncodedMotion, MotionKey
 
 @dataclass(frozen=True, eq=False)
 class EncodedSequence:
-    """A sequence as the board stores and runs it."""
+    """A sequence that the board stores and runs."""
 
     plan: SequencePlan
     motions: tuple[EncodedMotion, ...]
@@ -34,7 +34,7 @@ class EncodedSequence:
 
 
 def of_plan(plan: SequencePlan) -> EncodedSequence:
-    """The records of a sequence; raises InputError or PlanError if the board could not run it."""
+    """Encode a sequence; raises InputError or PlanError if the board cannot run it."""
     motions = tuple(encoded_motion.of_trajectory(leg, plan.arm) for leg in plan.legs)
     keys = [(motion.name, motion.key.crc) for motion in motions]
     data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys, plan.counters)

@@ -1,1 +1,1 @@
-"""Recorded runs: the folder of a run, reading it, and the curves, tables and pages made of it and of plans."""
+"""Run folders: writing and reading them; curves, tables and pages of runs and plans."""

@@ -1,4 +1,4 @@
-"""What the samples of a run say: mean and scatter over repetitions, deviation from theory, lag."""
+"""Analysis of a run's samples: mean and scatter over repetitions, deviation from theory, lag."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ EDGE_S = 1.0
 class Curves:
     """Angle, speed and acceleration on the common time grid.
 
-    ``times_s`` (K,); ``each`` (R, 3, K, J) for every repetition, NaN if samples are missing; ``mean``,
-    ``sem`` (standard error of the mean; NaN with one repetition), ``theory``, and ``shown``, what the same
-    differentiation shows of theory's angles, each (3, K, J). Deviations are taken from ``shown``, so that
-    they show the arm's errors and not those of the differentiation. ``measured`` (J,): whether the joint has an
-    encoder; the curves of one without are those of the step pulses that the board made.
+    ``times_s`` (K,); ``each`` (R, 3, K, J): each repetition, NaN if samples are missing; each of (3, K, J):
+    ``mean``, ``sem`` (standard error of the mean; NaN with one repetition), ``theory``, and ``shown``, the numerical
+    derivatives of theory's angles. Deviations are from ``shown``, so that they do not contain the error of the
+    differentiation. ``measured`` (J,): whether the joint has an encoder; otherwise its curves are those of the
+    step pulses.
     """
 
     times_s: Array
@@ -42,13 +42,13 @@ class Curves:
     theory: Array
     shown: Array
     path_s: Array
-    """(K,), the motion's own time; less than ``times_s`` if the speed was below 100 %."""
+    """(K,): the motion's own time; less than ``times_s`` if the speed was below 100 %."""
     measured: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """Mean curve against theory as differentiation shows it, for one joint and one of ORDERS."""
+    """Deviation of the mean curve from ``Curves.shown``, of one joint and one of ORDERS."""
 
     rms: float
     largest: float
@@ -57,8 +57,8 @@ class Deviation:
 def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Curves:
     """Mean, scatter and theory of the repetitions of one trajectory.
 
-    Those that ran at another speed than the one that went furthest are left out; theory is the plan at that speed.
-    Raises ValueError if there is no sample at all.
+    Theory is the plan at the speed of the repetition that went furthest; those at another speed are left out.
+    Raises ValueError if there is no sample.
     """
     count = max((_grid_size(repetition) for repetition in repetitions), default=0)
     if count == 0:
@@ -85,7 +85,7 @@ def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Cur
 
 
 def deviations(found: Curves) -> list[list[Deviation]]:
-    """``[order][joint]``: how far the mean curve is from theory."""
+    """``[order][joint]``: the deviation of the mean curve from theory."""
     error = found.mean - found.shown
     return [[_deviation(error[order, :, joint]) for joint in range(error.shape[2])] for order in range(3)]
 
@@ -97,9 +97,9 @@ def final_errors(repetition: RepetitionData, trajectory: Trajectory) -> Array:
 
 
 def lags_s(found: Curves, trajectory: Trajectory) -> Array:
-    """How far the mean speed lags behind theory, in seconds: (2, J), over the first and the last EDGE_S.
+    """Lag of the mean speed, seconds: (2, J), over the first and the last EDGE_S.
 
-    The shift that fits best in the sense of least squares, to first order: positive is late.
+    The least-squares time shift to first order; positive: the arm is late.
     """
     ends = np.array([spline.duration_s for spline in trajectory.joints])
     lags = np.full((2, len(ends)), np.nan)
@@ -114,7 +114,7 @@ def lags_s(found: Curves, trajectory: Trajectory) -> Array:
 
 
 def _same_speed(repetition: RepetitionData, path_s: Array, reference_s: Array) -> bool:
-    """Whether a repetition's own time goes as that of another, as far as it has samples."""
+    """Whether a repetition has the speed of another, for as long as it has samples."""
     known = _indices(repetition)
     known = known[known >= 0]
     return bool(np.all(np.abs(path_s[known] - reference_s[known]) < _SAME_S))
@@ -128,7 +128,7 @@ def _deviation(error: Array) -> Deviation:
 
 
 def _indices(repetition: RepetitionData) -> NDArray[np.int64]:
-    """Index of each sample on the 0.1 s grid; -1 for the one at the end, which falls between."""
+    """Index of each sample on the 0.1 s grid; -1 for the last one, which is not on it."""
     place = repetition.time_s / SAMPLE_S
     index = np.rint(place).astype(np.int64)
     return np.where(np.abs(place - index) < 1e-3, index, -1)
@@ -139,7 +139,7 @@ def _grid_size(repetition: RepetitionData) -> int:
 
 
 def _on_grid(repetition: RepetitionData, count: int, measured: NDArray[np.bool_]) -> Array:
-    """Angles (count, J), measured or else as commanded; NaN if a sample is missing."""
+    """Angles (count, J), measured or else commanded; NaN if a sample is missing."""
     index = _indices(repetition)
     angles = np.where(measured, repetition.angle_deg, repetition.commanded_deg)
     grid = np.full((count, angles.shape[1]), np.nan)

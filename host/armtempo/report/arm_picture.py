@@ -1,4 +1,4 @@
-"""Pictures of an arm: its home posture and each driven joint at the ends of its range; along its path, in 3-D."""
+"""Pictures of an arm: its home posture, the range of each driven joint, and its path in 3-D."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 
 _ZOOM = 0.9
 _LOWEST_DEG, _HIGHEST_DEG = 15.0, 65.0
-"""Elevations of the view: not along the floor, where heights overlap, nor from above, where they are lost."""
+"""Range of the view's elevation: near 0 heights overlap, near 90 degrees they vanish."""
 HOME, LOW, HIGH, GROUND = "#333333", "#1f77b4", "#d95f02", "#9a9a9a"
 _MOST_COLUMNS = 4
 _ARC_POINTS = 60
 _CAPSULE_ALPHA = 0.15
 _TICK = 0.08
-"""Length of the tool's x axis, as a share of the arm's height and width."""
+"""Length of the tool's x axis, as a fraction of the arm's height and width."""
 
 
 def postures(chains_mm: Array, tool_path_mm: Array) -> Figure:
-    """The arm along its path (Fig. 10): chains (P, joints + 1, 3) of joint origins, tool path (K, 3)."""
+    """The arm along its path (Fig. 10): joint origins (P, joints + 1, 3), tool path (K, 3)."""
     figure, _ = new_figure(1, 1, 4.8, 4.4)
     figure.clear()
     axis: Any = figure.add_subplot(projection="3d")
@@ -49,7 +49,7 @@ def postures(chains_mm: Array, tool_path_mm: Array) -> Figure:
 
 
 def view_deg(points: Array) -> tuple[float, float]:
-    """Elevation and azimuth from which points (N, 3) are spread most: along the direction of their least scatter."""
+    """Elevation and azimuth of the view on points (N, 3) along the direction of their least scatter."""
     _, _, directions = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     least = directions[-1] * (1.0 if directions[-1][2] >= 0.0 else -1.0)
     flat = np.hypot(least[0], least[1])
@@ -59,7 +59,7 @@ def view_deg(points: Array) -> tuple[float, float]:
 
 
 def _equal_scales(axis: Any, points: Array) -> None:
-    """A millimetre is as long along all three axes; no side of the box is less than a third of the longest."""
+    """Give the three axes the same scale; no side of the box is shorter than a third of the longest."""
     middle = (points.max(axis=0) + points.min(axis=0)) / 2
     sides = np.ptp(points, axis=0)
     sides = 1.1 * np.maximum(sides, max(sides.max(), 1.0) / 3)
@@ -88,8 +88,8 @@ if TYPE_CHECKING:
 def arm_picture(arm: Arm) -> Figure:
     """One field for the home posture from the side and from above, one for each driven joint.
 
-    A joint is seen along its axis, from the side where x, or else y, grows to the right. Raises
-    MissingPackageError if matplotlib is not installed.
+    Each joint is viewed along its axis, with x, or else y, to the right. Raises MissingPackageError without
+    matplotlib.
     """
     count = 2 + len(arm.driven)
     columns = min(_MOST_COLUMNS, (count + 1) // 2 if count > 3 else count)
@@ -109,7 +109,7 @@ def arm_picture(arm: Arm) -> Figure:
 
 
 def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) -> None:
-    """The home posture; ``seen``: which of x, y, z go to the right and up."""
+    """The home posture; ``seen``: which of x, y, z point to the right and up."""
     _draw(axis, arm, np.array(arm.all_home_deg), np.eye(3)[list(seen)], HOME, size)
     _draw_room(axis, arm, seen)
     _draw_capsules(axis, arm, seen)
@@ -121,7 +121,7 @@ def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) 
 
 
 def _draw_room(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
-    """The boxes to keep out of, and the walls as lines."""
+    """The boxes, and the walls as lines."""
     from matplotlib.patches import Rectangle
 
     room = arm.room or ArmRoom()
@@ -137,7 +137,7 @@ def _draw_room(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
 
 
 def _draw_capsules(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
-    """The capsules of the home posture's links, which are seen as segments with round ends."""
+    """The links' capsules at the home posture, as segments with round ends."""
     bodies = Bodies(arm)
     half = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ARC_POINTS)
     for radius, start, end in zip(bodies.radius_mm, *bodies.ends(np.array([arm.home_deg])), strict=True):
@@ -168,7 +168,7 @@ def _joint(axis: Axes, arm: Arm, index: int, size: float) -> None:
 
 
 def _view(direction: Array) -> Array:
-    """Right and up, (2, 3), of one who looks along ``direction``, or against it; up is the base's z axis, or y."""
+    """Right and up, (2, 3), of a view along ``direction``, or against it; up is the base's z axis, or y."""
     up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
     up = up - (up @ direction) * direction
     up /= np.linalg.norm(up)

@@ -30,9 +30,9 @@ _COLUMNS = {
 
 
 def write(folders: Sequence[Path], path: Path) -> Path:
-    """Compare run folders on one page at ``path``; a folder that cannot be read is named there.
+    """Write the comparison of run folders to ``path``; it names folders that cannot be read.
 
-    Raises RunFolderError if fewer than two can be read.
+    Raises RunFolderError if fewer than two are readable.
     """
     readable, complaints = _read(folders)
     if len(readable) < 2:
@@ -102,7 +102,7 @@ def _table(sheet: html_page.Page, found: dict[str, Evaluation]) -> None:
 
 
 def _of_joint(found: dict[str, Evaluation], joint: int) -> dict[str, tuple[Array, Array, Array]]:
-    """By run: times (K,), mean (3, K) and error of the angle (K,)."""
+    """By run: times (K,), mean (3, K) and angle error (K,)."""
     return {
         name: (
             evaluation.curves.times_s,

@@ -1,8 +1,8 @@
-"""Derivatives of sampled angles: local least-squares polynomials, with their noise and bias stated.
+"""Derivatives of sampled angles by local least-squares polynomials, and their noise.
 
-Each sample's derivative is that of the polynomial of degree ``DEGREE`` fitted to the ``WINDOW`` samples
-around it (Savitzky and Golay, Anal. Chem. 36 (1964) 1627); at the ends the window is one-sided. Inside, the
-window is symmetric, so there is no lag: polynomials up to ``DEGREE`` come out exactly, everywhere.
+The derivative at a sample is that of the polynomial of degree ``DEGREE`` fitted to the ``WINDOW`` samples
+around it (Savitzky and Golay, Anal. Chem. 36 (1964) 1627). It is exact for polynomials up to ``DEGREE``. The
+window is symmetric, so there is no lag, except at the ends, where it is one-sided.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ DEGREE = 3
 
 
 def weights(order: int, at: int, window: int = WINDOW, degree: int = DEGREE) -> Array:
-    """Weights (window,) of the samples for the derivative at sample ``at`` of the window, unit spacing."""
+    """Weights (window,) of the samples for the derivative at sample ``at`` of the window, for unit spacing."""
     offsets = np.arange(window) - at
     powers = np.vander(offsets, degree + 1, increasing=True).astype(float)
     fit: Array = np.linalg.pinv(powers)[order] * math.factorial(order)
@@ -26,9 +26,9 @@ def weights(order: int, at: int, window: int = WINDOW, degree: int = DEGREE) -> 
 
 
 def derivative(values: Array, step_s: float, order: int, window: int = WINDOW) -> Array:
-    """Derivative of the given order (0: the fit itself) of values (M, ...) sampled every ``step_s``; same shape.
+    """Derivative of the given order (0: smoothing) of values (M, ...) sampled every ``step_s``; same shape.
 
-    With fewer than ``window`` samples, it shrinks to what exists; NaN if even DEGREE does not fit.
+    With fewer than ``window`` samples the window shrinks; NaN if there are too few for DEGREE.
     """
     count = len(values)
     window = min(window, count)
@@ -49,10 +49,10 @@ def derivative(values: Array, step_s: float, order: int, window: int = WINDOW) -
 
 
 def of_curves(angles: Array, step_s: float, ended: bool, window: int = 0) -> Array:
-    """(3, K, J): angle, speed, acceleration of angles (K, J), each interval without a gap (NaN) by itself.
+    """Angle, speed, acceleration (3, K, J) of angles (K, J); intervals between gaps (NaN) are separate.
 
-    ``window`` 0: the angle as it is, its derivatives over WINDOW; else all three smoothed over that many samples.
-    The arm rests before a motion and after one that ``ended``, so there the window is filled with the angle at rest.
+    ``window`` 0: the angle unchanged, its derivatives over WINDOW; otherwise all three smoothed over ``window``
+    samples. Beyond the start, and the end of a motion that ``ended``, the window is filled with the angle at rest.
     """
     result = np.full((3, *angles.shape), np.nan)
     if not window:
@@ -72,10 +72,10 @@ def of_curves(angles: Array, step_s: float, ended: bool, window: int = 0) -> Arr
 
 
 def noise(order: int, step_s: float, sigma: float, window: int = WINDOW) -> float:
-    """Standard deviation of the derivative inside, for white noise ``sigma`` on the samples."""
+    """Standard deviation of the derivative (not near the ends), for white noise ``sigma`` on the samples."""
     return float(sigma * np.linalg.norm(weights(order, window // 2, window)) / step_s**order)
 
 
 def quantisation_sigma(resolution: float) -> float:
-    """Standard deviation of the rounding to steps of ``resolution``: resolution / sqrt(12)."""
+    """Standard deviation of rounding to multiples of ``resolution``: resolution / sqrt(12)."""
     return resolution / math.sqrt(12.0)

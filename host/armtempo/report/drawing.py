@@ -1,4 +1,4 @@
-"""Figures as files and as parts of a page, where axes and text take the colour of the page's text."""
+"""Figures as files, and as SVG in a page, where axes and text have the colour of the page's text."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE_COLOUR = "#010203"
-"""Stands for the page's text colour until ``inline_svg`` replaces it."""
+"""Placeholder for the page's text colour; ``inline_svg`` replaces it."""
 _HIDDEN = '<svg class="sheet" aria-hidden="true" '
 _LARGEST = 1.4
-"""How much larger than drawn a figure may become on a page."""
+"""Largest magnification of a figure on a page."""
 _MARGIN_PT = 10.0
-"""To the right of axes, for the half of a label that extends there."""
+"""Space to the right of the axes, for the half of a label."""
 _QUICK = 3
-"""Of zlib's levels: a third of the time of the usual 6, files a tenth larger."""
+"""zlib's level: a third of the time of the default 6, files 10 % larger."""
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write the figure as its suffix says: PNG on white, SVG without a background."""
+    """Write the figure in the format of the suffix: PNG on white, SVG without a background."""
     _lay_out(figure)
     if path.suffix == ".svg":
         path.write_text(_svg(figure).replace(PAGE_COLOUR, "#222222"), encoding="utf-8")
@@ -37,8 +37,8 @@ def save(figure: Figure, path: Path) -> None:
 def inline_svg(figure: Figure, name: str, description: str) -> str:
     """The figure as ``<svg>`` elements in the page's colour, with a description for screen readers.
 
-    One of several columns is cut into them, so that a page can set them side by side or below each other: the first
-    element has the drawing and is not shown, each other one shows a column of it.
+    A figure of several columns becomes several elements, so that a page can put them side by side or below each
+    other: the first, hidden one has the drawing, each other one shows one column of it.
     """
     text = _svg(figure)
     text = text[text.index("<svg") :].replace(PAGE_COLOUR, "currentColor")
@@ -59,13 +59,13 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
 
 
 def _shown(description: str, width_pt: float) -> str:
-    """Attributes of an element that is shown, at most _LARGEST times as large as drawn."""
+    """Attributes of a visible element, magnified at most _LARGEST times."""
     most = f"{_LARGEST * width_pt * 4 / 3:.0f}px"
     return f'role="img" aria-label="{escape(visible(description))}" style="max-width: {most}"'
 
 
 def _columns(figure: Figure) -> list[tuple[str, float, float]]:
-    """Title, left and right end in points of each column of axes, with the labels to the left of it."""
+    """Title, left and right end in points of each column of axes, with the labels on its left."""
     _lay_out(figure)
     width = 72 * float(figure.get_figwidth())
     found: dict[int, tuple[str, float]] = {}
@@ -79,10 +79,9 @@ def _columns(figure: Figure) -> list[tuple[str, float, float]]:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Fix the layout: with a layout engine left, each file would be drawn twice.
+    """Compute the layout once; with its layout engine each file would be drawn twice.
 
-    Before it, names of joints and runs become plain text: a ``$`` in one begins no formula, and what would steer a
-    terminal is spelt out.
+    Names of joints and runs become plain text before: without formulas (``$``), control characters escaped.
     """
     from matplotlib.text import Text
 
@@ -107,5 +106,5 @@ def _svg(figure: Figure) -> str:
 
 
 def _rounded(path: re.Match[str]) -> str:
-    """Coordinates to a hundredth of a point: half the size, no visible difference."""
+    """Round coordinates to 0.01 points: half the size, no visible difference."""
     return re.sub(r"(\.\d\d)\d+", r"\1", path.group())

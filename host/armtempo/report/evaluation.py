@@ -1,4 +1,4 @@
-"""A run folder read and analysed: what was to move, what moved, and what is missing."""
+"""The evaluation of a run folder: its motion, the measured curves, and what is missing."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from armtempo.splines.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A run with its motion, its curves and what is wrong with its files.
+    """A run with its motion, its curves and the problems of its files.
 
-    ``plan`` is None for a motion that only the board had; ``arm`` too if the folder does not say.
+    ``plan`` is None if only the board had the motion; then ``arm`` may be None too.
     """
 
     run: run_reader.RunData
@@ -38,7 +38,7 @@ class Evaluation:
 
     @property
     def limits(self) -> list[Limits]:
-        """Their limits; empty if the arm is not known."""
+        """The limits of the driven joints; empty if the arm is not known."""
         return [joint.limits for joint in self.arm.driven] if self.arm else []
 
     @property
@@ -62,9 +62,9 @@ class Evaluation:
 
 
 def evaluate(folder: Path) -> Evaluation:
-    """Read and analyse a run folder; what is incomplete is listed in ``complaints``.
+    """Read and analyse a run folder; ``complaints`` lists what is incomplete.
 
-    Raises RunFolderError if it is not known what was to move, or there is not one sample.
+    Raises RunFolderError if the motion is not known, or there is no sample.
     """
     run = run_reader.load(folder)
     plan = replayed.plan_of(run)
@@ -83,7 +83,7 @@ def evaluate(folder: Path) -> Evaluation:
 
 
 def _arm(run: run_reader.RunData, complaints: list[str]) -> Arm | None:
-    """The arm of a motion without a plan, if it is there and fits; else one more complaint."""
+    """The arm of a motion without a plan, if the folder has it and it fits; otherwise adds a complaint."""
     try:
         arm = replayed.arm_of(run)
     except InputError as error:
@@ -93,7 +93,7 @@ def _arm(run: run_reader.RunData, complaints: list[str]) -> Arm | None:
 
 
 def complaints(run: run_reader.RunData) -> list[str]:
-    """What is missing or broken in each repetition, one sentence each."""
+    """Problems of the repetitions, one sentence each."""
     found = []
     for repetition, entry in zip(run.repetitions, run.entries, strict=True):
         steps = np.diff(repetition.index)

@@ -1,4 +1,4 @@
-"""One self-contained HTML page: headings, notes, tables and figures, for screen, phone and paper."""
+"""A self-contained HTML page of headings, notes, tables and figures, for screen, phone and print."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from armtempo.basics.text import visible
 _STYLE = Path(__file__).with_name("page.css")
 
 GOOD, BAD, OPEN = "good", "bad", "open"
-"""Kinds of text by what it says: as it should be, not so, cannot be told."""
+"""Kinds of text: as it should be, not so, undecided."""
 _MARKS = {GOOD: "✓", BAD: "✗", OPEN: "?"}
 _FEW_COLUMNS = 2
-"""A table of that many columns fits on a phone unchanged; the rows of a wider one become blocks there."""
+"""Columns of a table that fit on a phone; each row of a wider one becomes a block there."""
 
 
 class Page:
-    """Collects the parts of a page in order; ``render`` gives the whole document."""
+    """Collects the parts of a page in order; ``render`` returns the document."""
 
     def __init__(self, title: str, lead: str = "") -> None:
         self._title = title
@@ -28,11 +28,11 @@ class Page:
             self._parts.append(f'<p class="lead">{escape(lead)}</p>')
 
     def heading(self, text: str) -> None:
-        """A section begins."""
+        """Begin a section."""
         self._parts.append(f"<h2>{escape(text)}</h2>")
 
     def verdict(self, kind: str, summary: str, findings: Sequence[tuple[str, str]]) -> None:
-        """The verdict of the whole page with what it rests on: (kind, sentence) each."""
+        """The verdict of the page, with its findings: (kind, sentence) each."""
         lines = "".join(
             f'<li class="{of}"><span class="mark">{_MARKS[of]}</span> {escape(text)}</li>'
             for of, text in findings
@@ -57,9 +57,9 @@ class Page:
         caption: str = "",
         explained: Mapping[str, str] | None = None,
     ) -> None:
-        """A table; columns of numbers are set flush right, a cell ``(text, kind)`` is coloured.
+        """A table; columns of numbers are aligned right, a cell ``(text, kind)`` is coloured.
 
-        ``explained``: what a column means, by its header, below the table; "" for one that needs no words.
+        ``explained``: the meaning of each column by its header, printed below the table; "" for none.
         """
         numeric = [bool(rows) and all(_is_number(row[index]) for row in rows) for index in range(len(header))]
         heads = "".join(
@@ -93,12 +93,12 @@ class Page:
 
 
 def escape(text: str) -> str:
-    """Text for a page: nothing in it is markup, and characters that do not show are spelt out."""
+    """Text for a page, with markup and invisible characters escaped."""
     return html.escape(visible(text))
 
 
 def number(value: float, form: str) -> str:
-    """A value as ``form`` has it; a dash if there is none (NaN), no sign if it rounds to 0."""
+    """A value in the format ``form``; a dash for NaN, no sign if it rounds to 0."""
     if math.isnan(value):
         return "–"
     text = f"{value:{form}}"

@@ -1,4 +1,4 @@
-"""A window that follows a run: measured angles over the planned ones, as the samples come."""
+"""A window that plots the measured angles during a run, over the planned ones."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 class LivePlot:
     """A window with one plot for each joint.
 
-    Raises MissingPackageError without matplotlib, ArmtempoError if there is no display to open a window on.
+    Raises MissingPackageError without matplotlib, ArmtempoError without a display.
     """
 
     def __init__(self, trajectory: Trajectory, names: Sequence[str]) -> None:
@@ -46,7 +46,7 @@ class LivePlot:
         self._figure.show()
 
     def add(self, time_s: float, angles_deg: Array) -> None:
-        """Draw one more sample, angles (J,); a time before the last one begins a new repetition."""
+        """Draw a sample, angles (J,); if its time is before the last one, it begins a new repetition."""
         if self._times and time_s < self._times[-1]:
             self._times, self._angles = [], []
         self._times.append(time_s)

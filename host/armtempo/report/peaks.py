@@ -1,4 +1,4 @@
-"""Peaks of speed and acceleration as measured, and what can be said of the limits."""
+"""Measured peaks of speed and acceleration, compared with the limits."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from armtempo.splines.trajectory import Trajectory
 PEAK_WINDOW = 11
 """Samples over which the deviation from theory is smoothed when peaks are estimated: 1.1 s."""
 TOLERANCE = 0.05
-"""A peak counts as within its limit up to this fraction above it: a time-optimal motion reaches its limits."""
+"""Tolerance above a limit, as a fraction of it: a time-optimal motion reaches its limits."""
 KEPT, WITHIN = "kept", f"kept within {TOLERANCE:.0%}"
-EXCEEDED, UNDECIDED, NOT_MEASURED = "exceeded", "cannot be told at this resolution", "not measured"
+EXCEEDED, UNDECIDED, NOT_MEASURED = "exceeded", "cannot be decided at this resolution", "not measured"
 _PEAK_STEP_S = 0.01
 
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """A measured peak next to its limit; ``sigma`` is the peak's standard uncertainty.
+    """A measured peak and its limit; ``sigma`` is the peak's standard uncertainty.
 
     NaN for a joint without an encoder.
     """
@@ -36,7 +36,7 @@ class LimitCheck:
 
     @property
     def verdict(self) -> str:
-        """KEPT, WITHIN or EXCEEDED only if 3 sigma more or less change nothing, else UNDECIDED; NOT_MEASURED."""
+        """KEPT, WITHIN or EXCEEDED if that holds within 3 sigma, else UNDECIDED; or NOT_MEASURED."""
         if np.isnan(self.peak):
             return NOT_MEASURED
         lowest, highest = self.peak - 3.0 * self.sigma, self.peak + 3.0 * self.sigma
@@ -50,12 +50,12 @@ class LimitCheck:
 def limit_checks(
     found: Curves, trajectory: Trajectory, limits: Sequence[Limits], resolutions_deg: Sequence[float]
 ) -> list[list[LimitCheck]]:
-    """``[joint]``: speed and acceleration peaks of the mean curve next to the limits.
+    """``[joint]``: speed and acceleration peaks of the mean curve, with the limits.
 
-    The peak of a noisy derivative is too high. So theory, which is known exactly, gives the fast part, and only
-    the deviation from it, which is slow, is differentiated, over PEAK_WINDOW samples: their sum has its peak where
-    the arm had, with a fraction of the noise. The noise is what the smoothing takes away, and at least the rounding
-    to ``resolutions_deg``, degrees per encoder count, averaged over the repetitions.
+    The peak of a noisy derivative is too high. So only the deviation from theory, which is slow, is differentiated,
+    over PEAK_WINDOW samples, and theory, which is exact, is added: the sum has the arm's peak with a fraction of the
+    noise. The noise is estimated from the residual of the smoothing, and is at least the rounding to
+    ``resolutions_deg``, degrees per encoder count; both are averaged over the repetitions.
     """
     error = np.where(found.measured, found.mean[0] - found.theory[0], np.nan)
     ended = bool(found.path_s[-1] > trajectory.duration_s - SAMPLE_S)
@@ -81,14 +81,14 @@ def limit_checks(
 
 
 def _scatter(residual: Array) -> Array:
-    """Standard deviation (J,) of the noise whose part that does not fit the smoothing polynomials is (K, J)."""
+    """Standard deviation (J,) of the noise from the residual (K, J) of the smoothing polynomials."""
     kept = 1.0 - weights(0, PEAK_WINDOW // 2, PEAK_WINDOW)[PEAK_WINDOW // 2]
     known = np.maximum(np.sum(~np.isnan(residual), axis=0), 1)
     return np.asarray(np.sqrt(np.nansum(residual**2, axis=0) / known / kept))
 
 
 def _interpolated(values: Array, times_s: Array) -> Array:
-    """Values (K,) of the sample grid at other times (T,); NaN next to a gap, where a one-sided window is noisier."""
+    """Values (K,) of the sample grid at other times (T,); NaN next to gaps, where a one-sided window has more noise."""
     missing = np.isnan(values)
     if missing.all():
         return np.full(len(times_s), np.nan)

@@ -1,6 +1,6 @@
 """Figures of plans and runs, drawn with matplotlib (the optional extra ``plot``).
 
-Every function returns a matplotlib Figure, which ``drawing`` writes. Colours are legible on white and on black.
+Every function returns a matplotlib Figure; ``drawing`` writes it. The colours are legible on white and on black.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ LIMIT_COLOUR = "#c0392b"
 _LABELS = ("angle (°)", "speed (°/s)", "acceleration (°/s²)", "jerk (°/s³)")
 _POINTS = 600
 _LEFT, _RIGHT, _BOTTOM, _TOP, _BETWEEN = 0.85, 0.15, 0.5, 0.3, 0.35
-"""Inches next to a joint's axes, for labels of up to six digits, and between two rows."""
+"""Inches around a joint's axes, for labels of up to six digits, and between two rows."""
 
 
 def new_figure(
     rows: int, columns: int, width: float, height: float, share: bool = False
 ) -> tuple[Figure, Any]:
-    """A figure and its axes, an array (rows, columns); ``share``: one time axis below each column, half the work.
+    """A figure and its axes (rows, columns); ``share``: one time axis for each column, which is twice as fast.
 
-    Raises MissingPackageError if matplotlib is not installed.
+    Raises MissingPackageError without matplotlib.
     """
     try:
         from matplotlib.figure import Figure
@@ -49,7 +49,7 @@ def new_figure(
 
 
 def _joint_figure(rows: int, names: Sequence[str], height: float) -> tuple[Figure, Any]:
-    """A figure with a column for each joint, laid out by fixed margins: measuring all labels takes a second."""
+    """A figure with a column for each joint and fixed margins, as measuring all labels takes a second."""
     columns, width = len(names), 3.4 * len(names) + 0.6
     figure, axes = new_figure(rows, columns, width, height, share=True)
     figure.set_layout_engine(None)
@@ -66,7 +66,7 @@ def _joint_figure(rows: int, names: Sequence[str], height: float) -> tuple[Figur
 
 
 def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
-    """Angle, speed, acceleration and jerk of every joint, with ``limits`` if there are any (Figs. 5 and 7)."""
+    """Angle, speed, acceleration and jerk of every joint, with ``limits`` unless empty (Figs. 5 and 7)."""
     figure, axes = _joint_figure(4, names, 8.0)
     times = np.linspace(0.0, trajectory.duration_s, _POINTS)
     for order in range(4):
@@ -80,9 +80,9 @@ def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str
 
 
 def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
-    """Measured mean with its standard error as a band, against theory (Figs. 11 and 12), and the jerk of the plan.
+    """Measured mean and its standard error as a band, with theory (Figs. 11 and 12), and the planned jerk.
 
-    Of a joint without an encoder the command; ``limits`` may be empty.
+    For a joint without an encoder the command; ``limits`` may be empty.
     """
     figure, axes = _joint_figure(4, names, 8.0)
     times: Array = np.linspace(0.0, max(trajectory.duration_s, found.times_s[-1]), _POINTS)
@@ -114,7 +114,7 @@ def _draw_mean(axis: Axes, found: Curves, order: int, joint: int) -> None:
 
 
 def errors(found: Curves, names: Sequence[str]) -> Figure:
-    """Measured, or else commanded, minus planned angle of every repetition and their mean, over time."""
+    """Measured, or else commanded, minus planned angle of every repetition, and their mean."""
     figure, axes = _joint_figure(1, names, 2.6)
     for joint, axis in enumerate(axes[0]):
         colour = COLOURS[joint % len(COLOURS)]
@@ -126,7 +126,7 @@ def errors(found: Curves, names: Sequence[str]) -> Figure:
 
 
 def torque(found: MotorTorques, enough: float) -> Figure:
-    """Torque that each motor holds of what it needs, over time; dashed if it loses steps and where it is prudent."""
+    """Ratio of the torque that each motor can hold to the one it needs; dashed at 1 (steps are lost) and ``enough``."""
     figure, ((axis,),) = new_figure(1, 1, 6.8, 2.8)
     for joint, name in enumerate(found.joints):
         colour = COLOURS[joint % len(COLOURS)]
@@ -144,7 +144,7 @@ def torque(found: MotorTorques, enough: float) -> Figure:
 
 
 def overlay(runs: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
-    """One joint of several runs: times (K,), mean angle, speed, acceleration (3, K), angle error (K,)."""
+    """One joint of several runs: times (K,), mean angle, speed and acceleration (3, K), angle error (K,)."""
     figure, axes = new_figure(4, 1, 4.8, 8.0, share=True)
     for index, (name, (times, mean, error)) in enumerate(runs.items()):
         for axis, values in zip(axes[:, 0], (*mean, error), strict=True):
@@ -169,12 +169,12 @@ def convergence(histories: Mapping[str, Array]) -> Figure:
 
 
 def _shown(name: str) -> str:
-    """A name for a legend, which leaves out what begins with an underscore."""
+    """A name for a legend; matplotlib omits names that begin with an underscore."""
     return f" {name}" if name.startswith("_") else name
 
 
 def _mark_limits(axis: Axes, limits: Limits, order: int) -> None:
-    """Dashed lines at plus and minus the limit of this order; none for the angle."""
+    """Dashed lines at plus and minus the limit of this order (not of the angle)."""
     if order == 0:
         return
     limit = (limits.speed_deg_s, limits.acceleration_deg_s2, limits.jerk_deg_s3)[order - 1]
@@ -190,7 +190,7 @@ def _label(axes: Any, labels: Sequence[str]) -> None:
 
 
 def theme(axis: Axes) -> None:
-    """Give grid, ticks, labels, title and legend of a finished drawing the page's colour."""
+    """Give grid, ticks, labels, title and legend of a finished plot the page's colour."""
     axis.grid(alpha=0.25)
     axis.tick_params(colors=PAGE_COLOUR)
     for label in (axis.title, axis.xaxis.label, axis.yaxis.label):
@@ -214,7 +214,7 @@ def corridor_lines(points: Sequence[CorridorTime], unit: str) -> list[str]:
 
 
 def corridor_csv(points: Sequence[CorridorTime], unit: str) -> str:
-    """The same as CSV, a line for each corridor; that of the free path is empty."""
+    """The same as CSV, a line for each corridor; empty for the free path."""
     head = f"corridor_{unit},time_s\n"
     return head + "".join(
         f"{'' if point.corridor is None else repr(point.corridor)},{point.total_s!r}\n" for point in points
@@ -222,7 +222,7 @@ def corridor_csv(points: Sequence[CorridorTime], unit: str) -> str:
 
 
 def corridors(points: Sequence[CorridorTime], unit: str, name: str) -> Figure:
-    """The curve; lines for the spline itself and for the free path. MissingPackageError without matplotlib."""
+    """The curve, and lines for the spline itself and the free path. Raises MissingPackageError without matplotlib."""
     drawn, grid = new_figure(1, 1, 6.4, 4.0)
     axes = grid[0][0]
     inner = [(point.corridor, point.total_s) for point in points if point.corridor]

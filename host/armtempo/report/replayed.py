@@ -1,5 +1,4 @@
-"""What a run folder says was replayed: the plan, else the motion that the board had; the arm; how each joint ended;
-and the theory for a run at another speed than planned, by the motion's own time of the samples."""
+"""The motion that a run replayed, its arm and results, and the theory for a run at another speed than planned."""
 
 from __future__ import annotations
 
@@ -22,18 +21,18 @@ _EQUAL_S = 1e-6
 """Times that differ by less are the same: a tick is 12 ns."""
 _SHORT_S = 0.01
 SPEED_NOTE = "of the planned speed"
-"""In every text of ``speed_note``."""
+"""Part of every text of ``speed_note``."""
 
 
 def plan_of(run: RunData) -> Plan | None:
-    """The plan; None if only the board had the motion. InputError if its file is damaged."""
+    """The plan; None if only the board had the motion. Raises InputError if its file is damaged."""
     return Plan.load(run.trajectory_path) if run.trajectory_path else None
 
 
 def trajectory_of(run: RunData) -> Trajectory:
-    """The motion as the board's record has it, to the rounding of its integers.
+    """The motion from the board's record, to the rounding of its integers.
 
-    Raises RunFolderError if that is not there or not whole.
+    Raises RunFolderError if the record is missing or damaged.
     """
     path = run.path / MOTION
     try:
@@ -48,26 +47,26 @@ def trajectory_of(run: RunData) -> Trajectory:
 
 
 def arm_of(run: RunData) -> Arm | None:
-    """The arm of a motion without a plan; None if the folder does not say. InputError if it is damaged."""
+    """The arm of a motion without a plan; None if it is not known. Raises InputError if its file is damaged."""
     path = run.path / ARM
     return arm_json.load(path) if path.is_file() else None
 
 
 @dataclass(frozen=True)
 class JointResult:
-    """How one joint ended."""
+    """The final state of a joint."""
 
     name: str
     steps_sent: int
     """Step pulses from start to end, signed."""
     angle_deg: float
-    """Where it ended: by its encoder, without one by the steps."""
+    """Final angle from the encoder; without one, from the steps."""
     error_deg: float
-    """That less where the trajectory ends."""
+    """``angle_deg`` minus the end of the trajectory."""
 
 
 def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
-    """The joints of the last repetition; empty if run.json does not say how that ended."""
+    """The joints at the end of the last repetition; empty if run.json does not have it."""
     last = run.entries[-1] if run.entries else None
     steps, counts = (last.commanded_steps, last.counts) if last else ((), ())
     start_deg, end_deg = trajectory(0.0), trajectory(trajectory.duration_s)
@@ -82,12 +81,12 @@ def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
 
 
 def is_stretched(repetition: RepetitionData) -> bool:
-    """Whether the motion's own time ever was slower than the clock."""
+    """Whether the speed was ever below 100 %."""
     return bool(np.any(np.abs(repetition.time_s - repetition.path_s) > _EQUAL_S))
 
 
 def path_times(repetition: RepetitionData, times_s: Array) -> Array:
-    """The motion's own time (K,) at real times (K,); between samples and after the last by straight lines."""
+    """The motion's own time (K,) at real times (K,), interpolated and extrapolated linearly."""
     if len(repetition.time_s) < 2 or not is_stretched(repetition):
         return times_s
     inside = np.interp(times_s, repetition.time_s, repetition.path_s)
@@ -97,8 +96,8 @@ def path_times(repetition: RepetitionData, times_s: Array) -> Array:
 def theory(trajectory: Trajectory, times_s: Array, path_s: Array) -> Array:
     """Angle, speed and acceleration of a trajectory over real time, (3, K, J).
 
-    ``path_s`` (K,): the motion's own time at the evenly spaced ``times_s`` (K,). By the chain rule; its rate and
-    the change of that by differences.
+    ``path_s`` (K,): the motion's own time at the evenly spaced ``times_s`` (K,). By the chain rule, with finite
+    differences of ``path_s``.
     """
     orders = [trajectory(path_s, order) for order in range(3)]
     if len(times_s) > 1 and np.any(np.abs(path_s - times_s) > _EQUAL_S):
@@ -109,11 +108,11 @@ def theory(trajectory: Trajectory, times_s: Array, path_s: Array) -> Array:
 
 
 def speed_note(repetition: RepetitionData) -> str:
-    """At what speed a repetition ran, in words; "" for the planned one."""
+    """Text on the speed of a repetition; "" for the planned speed."""
     if not is_stretched(repetition):
         return ""
     passed_s = np.diff(repetition.time_s)
-    whole = passed_s > _SHORT_S  # the last sample may come right after another
+    whole = passed_s > _SHORT_S  # the last sample may come shortly after another
     rates = 100 * np.diff(repetition.path_s)[whole] / passed_s[whole]
     low, high = round(float(rates.min()), 1), round(float(rates.max()), 1)
     speed = f"at {high:g} %" if high - low < 1.0 else f"between {low:g} and {high:g} %"

@@ -1,15 +1,15 @@
-"""The run folder: what was run and what was measured, readable at any moment of the run.
+"""The run folder: what was run and what was measured; readable at any time during the run.
 
 ::
 
-    run.json          what ran, when, on which board; how each repetition ended; the columns' meaning
-    trajectory.json   the plan, if it is known
-    arm.json          else the arm
-    motion.bin        what the board replayed
-    samples-01.csv    one file a repetition, one line a sample (columns: see ``columns``)
+    run.json          what ran, when, on which board; how each repetition ended; meaning of the columns
+    trajectory.json   the plan, if known
+    arm.json          without a plan: the arm
+    motion.bin        the record that the board replayed
+    samples-01.csv    one file per repetition, one line per sample (see ``columns``)
 
-``run.json`` is replaced as a whole; sample lines are appended and flushed one by one. An interrupted run
-is thus readable up to its last whole line.
+``run.json`` is replaced as a whole; sample lines are flushed one by one, so that an interrupted run is readable
+up to its last complete line.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrup
 
 @dataclass(frozen=True)
 class JointScale:
-    """Scales of one joint's steps and counts; ``counts_per_deg`` 0: it has no encoder."""
+    """Scales of a joint's steps and counts; ``counts_per_deg`` 0: no encoder."""
 
     name: str
     steps_per_deg: float
@@ -57,7 +57,7 @@ def scales(arm: Arm) -> tuple[JointScale, ...]:
 
 
 def columns(joints: Sequence[JointScale]) -> dict[str, str]:
-    """Column names of a sample file with their meaning and unit, in order."""
+    """Columns of a sample file in order: meaning and unit by name."""
     found = {
         "index": "number of the sample in its repetition, from 0",
         "ticks": f"motion clock of the board, ticks of 1/{limits.TICK_HZ} s",
@@ -92,13 +92,13 @@ def row(sample: Sample, joints: Sequence[JointScale]) -> list[str]:
 
 @dataclass
 class Repetition:
-    """How one repetition went, as run.json tells it."""
+    """A repetition in run.json."""
 
     file: str
     state: str = RUNNING
     samples: int = 0
     lost: tuple[Gap, ...] = ()
-    """Samples that never arrived."""
+    """Lost samples."""
     duration_s: float = 0.0
     fault: str = ""
     commanded_steps: tuple[int, ...] = ()
@@ -107,7 +107,7 @@ class Repetition:
     """Texts from the board."""
 
     def end(self, state: str, fault: str, ticks: int, positions: Positions, lost: tuple[Gap, ...]) -> None:
-        """Note the end of the motion."""
+        """Store the end of the motion."""
         self.state, self.fault, self.lost = state, fault, lost
         self.duration_s = ticks / limits.TICK_HZ
         self.commanded_steps, self.counts = positions.commanded_steps, positions.counts
@@ -115,18 +115,18 @@ class Repetition:
 
 @dataclass
 class RunFolder:
-    """A run folder being written."""
+    """A run folder that is being written."""
 
     path: Path
     name: str
     joints: tuple[JointScale, ...]
     origin: dict[str, Any] = field(default_factory=dict)
-    """Further entries of run.json: port, board, arm, checksum of the motion."""
+    """More entries of run.json: port, board, arm, checksum of the motion."""
     started: str = field(default_factory=lambda: now())
     repetitions: list[Repetition] = field(default_factory=list)
 
     def write(self) -> None:
-        """Write run.json anew with what is known now."""
+        """Write run.json again."""
         meta = {
             "format": FORMAT,
             "version": VERSION,
@@ -139,12 +139,12 @@ class RunFolder:
         write_meta(self.path, meta)
 
     def write_motion(self, data: bytes) -> None:
-        """Keep the record that the board replays; RunFolderError if it cannot be written."""
+        """Write the record that the board replays; raises RunFolderError if that fails."""
         with writing(self.path / MOTION):
             (self.path / MOTION).write_bytes(data)
 
     def begin_repetition(self) -> SampleFile:
-        """A new sample file; it must be used as a context."""
+        """A new sample file, to be used as a context."""
         repetition = Repetition(f"samples-{len(self.repetitions) + 1:02d}.csv")
         self.repetitions.append(repetition)
         self.write()
@@ -152,7 +152,7 @@ class RunFolder:
 
 
 class SampleFile:
-    """The sample file of a repetition under way; leaving it notes how the repetition ended."""
+    """The sample file of a running repetition; leaving the context stores how it ended."""
 
     def __init__(self, folder: RunFolder, repetition: Repetition) -> None:
         self.repetition = repetition
@@ -164,7 +164,7 @@ class SampleFile:
         self._line(list(columns(folder.joints)))
 
     def append(self, sample: Sample) -> None:
-        """Add one sample; RunFolderError if it cannot be written."""
+        """Add a sample; raises RunFolderError if it cannot be written."""
         self._line(row(sample, self._folder.joints))
         self.repetition.samples += 1
 
@@ -179,7 +179,7 @@ class SampleFile:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(OSError):  # what could not be written has been said
+        with suppress(OSError):  # the error was reported by append
             self._file.close()
         if self.repetition.state == RUNNING:
             self.repetition.state = INTERRUPTED if kind is KeyboardInterrupt else BROKEN
@@ -188,11 +188,11 @@ class SampleFile:
 
 
 def new_folder(parent: Path, name: str) -> Path:
-    """A fresh folder ``parent/name-001`` (or the next free number); InputError if none can be made."""
+    """A new folder ``parent/name-001`` (or the next free number); raises InputError if it cannot be made."""
     try:
         for number in range(1, 10_000):
             path = parent / f"{name}-{number:03d}"
-            with suppress(FileExistsError):  # another run may be making it at this moment
+            with suppress(FileExistsError):  # another run may make it at this moment
                 path.mkdir(parents=True)
                 return path
     except OSError as error:
@@ -205,7 +205,7 @@ def new_folder(parent: Path, name: str) -> Path:
 
 @contextmanager
 def unless(error: BaseException | None) -> Iterator[None]:
-    """Let an InputError pass, unless there was an error before: that says more."""
+    """Suppress an InputError after an earlier ``error``, which says more."""
     try:
         yield
     except InputError:
@@ -215,7 +215,7 @@ def unless(error: BaseException | None) -> Iterator[None]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """RunFolderError if what is done cannot write ``path``."""
+    """Convert OSError of writing ``path`` to RunFolderError."""
     try:
         yield
     except OSError as error:
@@ -226,12 +226,12 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def written_head(name: str, started: str) -> dict[str, Any]:
-    """What run.json says of any run, after its format: by which version, of what, when."""
+    """The entries of any run.json after its format: version, name, start."""
     return {"armtempo": installed_version(), "name": name, "started": started, "written": now()}
 
 
 def write_meta(folder: Path, meta: dict[str, Any]) -> None:
-    """Write run.json into a run folder, whole or not at all."""
+    """Write run.json into a run folder, atomically."""
     replace_text(folder / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
 
 

@@ -1,4 +1,4 @@
-"""Reading run folders back."""
+"""Reading run folders."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from armtempo.report.sequence_folder import FORMAT as SEQUENCE_FORMAT
 _LARGEST = 2.0**53
 """Integers beyond this are not exact as doubles."""
 _LONGEST_S = 86_400.0
-"""A day; no motion lasts that long on the board."""
+"""A day; longer than any motion on the board."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class RepetitionData:
 
     file: str
     state: str
-    """How it ended: a state of ``run_folder``."""
+    """How it ended, see ``run_folder``."""
     index: NDArray[np.int64]
-    """(N,), from 0; a jump is a gap."""
+    """(N,), from 0; a jump means lost samples."""
     time_s: Array
     """(N,)"""
     path_s: Array
@@ -44,7 +44,7 @@ class RepetitionData:
     angle_deg: Array
     """(N, J), from the encoders; NaN for a joint without one."""
     problem: str = ""
-    """Why there are no samples, if the file cannot be read."""
+    """Why the file could not be read."""
 
 
 @dataclass(frozen=True)
@@ -56,19 +56,19 @@ class RunData:
     joints: tuple[JointScale, ...]
     repetitions: tuple[RepetitionData, ...]
     entries: tuple[Repetition, ...]
-    """What run.json says of each repetition."""
+    """The repetitions in run.json."""
 
     @property
     def trajectory_path(self) -> Path | None:
-        """The plan that was run, if it is known."""
+        """The file of the plan, if there is one."""
         path = self.path / TRAJECTORY
         return path if path.is_file() else None
 
 
 def load(path: Path) -> RunData:
-    """A run folder, whole or cut short; RunFolderError if it is none or contradicts itself.
+    """Read a run folder, also of an interrupted run; raises RunFolderError if it is none or inconsistent.
 
-    A repetition whose file is missing or damaged is there without samples and says why in ``problem``.
+    A repetition whose file is missing or damaged has no samples; ``problem`` says why.
     """
     meta = _meta(path / META)
     try:
@@ -85,12 +85,12 @@ def load(path: Path) -> RunData:
 
 
 def scale(name: str, steps_per_deg: float, counts_per_deg: float) -> JointScale:
-    """A joint's scales as run.json has them."""
+    """A joint's scales from run.json."""
     return JointScale(visible(str(name)), float(steps_per_deg), float(counts_per_deg))
 
 
 def _entry(values: dict[str, Any]) -> Repetition:
-    """A repetition of run.json; keys that an older or newer program wrote otherwise are left out."""
+    """A repetition of run.json; keys of another version that do not fit are ignored."""
     known = {key.name: values[key.name] for key in fields(Repetition) if key.name in values}
     known |= {key: visible(str(values[key])) for key in ("file", "state")}
     known["lost"] = tuple(Gap(int(first), int(number)) for first, number in known.get("lost", ()))
@@ -141,7 +141,7 @@ def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> Repetiti
 def parsed(
     path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]
 ) -> RepetitionData:
-    """The samples in the rows of a file; ValueError if a value is missing, no number, or impossible."""
+    """The samples in the rows of a file; raises ValueError for a value that is missing, not a number, or impossible."""
     table = {name: [row[name] or "" for row in rows] for name in (rows[0] if rows else ())}
 
     def column(name: str, largest: float) -> Array:
@@ -173,7 +173,7 @@ def parsed(
 
 
 def whole_lines(path: Path) -> list[dict[str, str]]:
-    """The whole lines of a sample file; an incomplete last line is dropped."""
+    """The complete lines of a sample file, without an incomplete last one."""
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     return list(csv.DictReader(whole.splitlines()))

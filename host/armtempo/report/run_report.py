@@ -1,4 +1,4 @@
-"""The report of a run: one page and its figures, from a run folder."""
+"""The report of a run folder: a page and its figures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armtempo.basics.atomic_file import replace_text
 from armtempo.kinematics import chain
 from armtempo.model.arm import Arm
 from armtempo.planning import torque
-from armtempo.report import arm_picture, drawing, html_page, plan_section, plots, result_section
+from armtempo.report import arm_picture, drawing, html_page, plots, sections
 from armtempo.report.evaluation import Evaluation, evaluate
 from armtempo.report.run_folder import COMPLETE
 from armtempo.splines.trajectory import Trajectory
@@ -33,7 +33,7 @@ _PATH_POINTS = 300
 def write(folder: Path) -> Path:
     """Write report.html and its figures (SVG) into the run folder; returns the page's path.
 
-    Raises RunFolderError if it is not known what was to move, or there is not one sample.
+    Raises RunFolderError if the motion is not known, or there is no sample.
     """
     found = evaluate(folder)
     drawn = figures(found)
@@ -68,7 +68,7 @@ def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
 
 
 def _of_arm(arm: Arm, trajectory: Trajectory) -> dict[str, tuple[Figure, str]]:
-    """What the motion asks of the motors, and where it leads the arm."""
+    """Figures of the motors' torque and of the arm along its path."""
     drawn = {}
     torques = torque.of_motion(arm, trajectory)
     if torques and (least := torques.least):
@@ -88,7 +88,7 @@ def _of_arm(arm: Arm, trajectory: Trajectory) -> dict[str, tuple[Figure, str]]:
 
 
 def _what_is_seen(found: Evaluation) -> str:
-    """What the curves are of."""
+    """What the curves show."""
     measured = found.curves.measured
     if measured.all():
         return "Measured mean"
@@ -98,7 +98,7 @@ def _what_is_seen(found: Evaluation) -> str:
 
 
 def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
-    """The whole page as HTML text."""
+    """The page as HTML."""
     meta = found.run.meta
     done = sum(repetition.state == COMPLETE for repetition in found.run.repetitions)
     arm = found.arm.name if found.arm else meta.get("arm", "not known")
@@ -106,7 +106,7 @@ def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
         f"Run of {meta['name']!r}",
         f"{meta['started']}, arm {arm}, {done} of {len(found.run.repetitions)} repetitions complete",
     )
-    result_section.write(sheet, found)
+    sections.result(sheet, found)
     for name, (figure, caption) in drawn.items():
         if name in _HEADINGS:
             sheet.heading(_HEADINGS[name])
@@ -120,8 +120,8 @@ def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
 def _planned(sheet: html_page.Page, found: Evaluation) -> None:
     sheet.heading("The plan")
     if found.plan:
-        plan_section.extremes(sheet, found.plan)
-        plan_section.timing(sheet, found.plan)
+        sections.plan_extremes(sheet, found.plan)
+        sections.plan_timing(sheet, found.plan)
         return
     sheet.note(
         f"How this motion was planned is not known: it was on the board, and is read back from its record. It lasts "
@@ -138,13 +138,13 @@ def _origin(sheet: html_page.Page, found: Evaluation) -> None:
     if "virtual" in meta:
         known.append(("virtual board", "yes" if meta["virtual"] else "no"))
     if plan:
-        plan_section.origin(sheet, plan, known)
+        sections.plan_origin(sheet, plan, known)
     else:
         sheet.table(("what", "value"), known)
 
 
 def _flat(value: object) -> str:
-    """A value of run.json as text; a table as name and value pairs."""
+    """A value of run.json as text; a table as pairs of name and value."""
     if isinstance(value, dict):
         return ", ".join(f"{name.replace('_', ' ')} {item}" for name, item in value.items())
     return str(value)

@@ -1,4 +1,4 @@
-"""A self-test as files: ``selftest.json``, and a page with its lines and figures."""
+"""The files of a self-test: ``selftest.json``, and a page with its lines and figures."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _KINDS = {Level.GOOD: GOOD, Level.ERROR: BAD, Level.NOTE: OPEN}
 
 
 def check_free(folder: Path, force: bool) -> None:
-    """InputError if ``folder`` has a self-test already, unless ``force``, or if it cannot be made."""
+    """Make ``folder``; raises InputError if that fails, or it has a self-test already (unless ``force``)."""
     there = [name for name in (JSON, HTML) if (folder / name).exists()]
     if there and not force:
         raise InputError(
@@ -34,13 +34,13 @@ def check_free(folder: Path, force: bool) -> None:
 
 
 def write(found: SelfTest, folder: Path) -> None:
-    """Both files."""
+    """Write both files."""
     replace_text(folder / JSON, json.dumps(found.to_json(), indent=1) + "\n")
     replace_text(folder / HTML, render(found))
 
 
 def render(found: SelfTest) -> str:
-    """The page."""
+    """The page as HTML."""
     kind = "; a virtual board, its figures are simulated" if found.simulated else ""
     page = Page("Self-test", f"board {found.board_id}, program {found.program_crc:08x}{kind}")
     wrong = [(BAD, f"{line.what}: {line.measured}. {line.cure}") for line in found.failed]

@@ -1,15 +1,15 @@
-"""The run folder of a sequence: what ran, each row as it passed, each sample with its row.
+"""The run folder of a sequence: what ran, its rows, and its samples.
 
 ::
 
-    run.json        what ran, when, on which board; its rows in words; how it ended; the columns' meaning
-    sequence.json   the plan, if it is known
-    arm.json        else the arm
-    leg-01.bin      what the board replayed, a file a motion
-    rows.csv        one line a row when it began
-    samples.csv     one line a sample
+    run.json        what ran, when, on which board; description of the rows; how it ended; meaning of the columns
+    sequence.json   the plan, if known
+    arm.json        without a plan: the arm
+    leg-01.bin      the records that the board replayed, one per motion
+    rows.csv        one line per row, written when it begins
+    samples.csv     one line per sample
 
-As in ``run_folder`` lines are flushed one by one: after a power failure they say where the sequence stood.
+As in ``run_folder`` lines are flushed one by one: after a power failure they show how far the sequence was.
 """
 
 from __future__ import annotations
@@ -31,27 +31,27 @@ VERSION = 1
 SEQUENCE = "sequence.json"
 ROWS, SAMPLES = "rows.csv", "samples.csv"
 ROW_COLUMNS = {
-    "passed": "how many rows had begun since the start, with this one; a jump is a gap",
-    "time_s": "when it was heard of, by the host's clock, seconds since the start",
-    "run": "the board's number of the motion that ran last; of this row, where it moves",
+    "passed": "number of rows begun since the start, including this one; a jump means lost rows",
+    "time_s": "when it was reported, by the host's clock, seconds since the start",
+    "run": "the board's run number of the last motion; of this row's, if it moves",
     "row": "number of the row in run.json, from 0",
     "step": "number of the step in the sequence file, from 1",
     "cycle": "finished passes of the outermost repeats",
-    "value": "of the counter, where the row counts",
+    "value": "value of the counter, if the row counts",
     "words": "what it does",
 }
 
 
 def leg_file(number: int) -> str:
-    """Name of the file of a motion, by its number from 1."""
+    """File name of a motion; ``number`` from 1."""
     return f"leg-{number:02d}.bin"
 
 
 def sample_columns(joints: Sequence[JointScale]) -> dict[str, str]:
-    """Column names of the sample file with their meaning and unit, in order."""
+    """Columns of the sample file in order: meaning and unit by name."""
     return {
         "run": "the board's number of the motion's run",
-        "row": "number of its row in run.json; empty where the row was not heard of",
+        "row": "number of its row in run.json; empty if the row was not reported",
         **run_folder.columns(joints),
         "index": "number of the sample in its motion, from 0",
     }
@@ -59,25 +59,25 @@ def sample_columns(joints: Sequence[JointScale]) -> dict[str, str]:
 
 @dataclass
 class SequenceFolder:
-    """The folder of a sequence that runs; a context, whose end notes how it ended."""
+    """The folder of a running sequence; the end of the context stores how it ended."""
 
     path: Path
     name: str
     joints: tuple[JointScale, ...]
     words: tuple[str, ...]
-    """What each row does."""
+    """Description of each row."""
     steps: tuple[int, ...]
-    """The step of the sequence file that each row comes from."""
+    """The step of the sequence file of each row."""
     motions: tuple[int, ...]
-    """Of each row that moves the number of its motion, from 1; 0 of the others."""
+    """Number of each row's motion, from 1; 0 for rows without motion."""
     origin: dict[str, Any] = field(default_factory=dict)
-    """Further entries of run.json: port, board, arm, names of the motions."""
+    """More entries of run.json: port, board, arm, names of the motions."""
     started: str = field(default_factory=run_folder.now)
     state: str = RUNNING
     ended: dict[str, Any] = field(default_factory=dict)
 
     def __enter__(self) -> Self:
-        """Files with their heads."""
+        """Open the files and write their headers."""
         self.write()
         self._files = ExitStack()
         self._rows = self._begun(ROWS, list(ROW_COLUMNS))
@@ -91,23 +91,23 @@ class SequenceFolder:
         return lines
 
     def add_row(self, row: RowBegun, time_s: float) -> None:
-        """A row has begun; RunFolderError if that cannot be written."""
+        """A row has begun; raises RunFolderError if it cannot be written."""
         words = self.words[row.row] if row.row < len(self.words) else ""
         numbers = (row.run, row.row, row.step, row.cycle, row.value)
         self._rows.add([str(row.passed), f"{time_s:.3f}", *map(str, numbers), words])
 
     def add_sample(self, sample: Sample, row: int | None) -> None:
-        """A sample has come; RunFolderError if it cannot be written."""
+        """A sample has arrived; raises RunFolderError if it cannot be written."""
         cells = ["" if row is None else str(row), *run_folder.row(sample, self.joints)]
         self._samples.add([str(sample.run), *cells])
 
     def end(self, state: SequenceState, fault: str, counters: dict[str, int]) -> None:
-        """Note how it ended."""
+        """Store how it ended."""
         self.state = state.ending
         self.ended = {"step": state.step, "cycle": state.cycle, "code": fault, "counters": counters}
 
     def write(self) -> None:
-        """Write run.json anew with what is known now."""
+        """Write run.json again."""
         meta = {
             "format": FORMAT,
             "version": VERSION,
@@ -136,7 +136,7 @@ class SequenceFolder:
 
 
 class _Lines:
-    """A file of comma separated values, flushed line by line."""
+    """A CSV file, flushed line by line."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -1,4 +1,4 @@
-"""Reading back the run folder of a sequence."""
+"""Reading the run folder of a sequence."""
 
 from __future__ import annotations
 
@@ -28,43 +28,43 @@ _UNKNOWN = -1
 
 @dataclass(frozen=True)
 class RowPassed:
-    """A row of the sequence that began."""
+    """A row of the sequence that has begun."""
 
     passed: int
-    """How many had, with this one; a jump is a gap."""
+    """Number of rows begun, including this one; a jump means lost rows."""
     time_s: float
-    """By the host's clock, since the start."""
+    """Seconds since the start, by the host's clock."""
     run: int
     row: int
     """From 0."""
     step: int
-    """Of the sequence file, from 1."""
+    """Step of the sequence file, from 1."""
     cycle: int
     value: int
-    """Of the counter, if the row counts."""
+    """Value of the counter, if the row counts."""
     words: str
 
 
 @checked
 @dataclass(frozen=True, eq=False)
 class SequenceRun:
-    """A sequence that was recorded, whole or cut short."""
+    """A recorded sequence, also an interrupted one."""
 
     path: Path
     meta: Mapping[str, Any]
-    """What run.json says."""
+    """Content of run.json."""
     joints: tuple[JointScale, ...]
     rows: tuple[RowPassed, ...]
     samples: RepetitionData
-    """All samples in the order in which they came; ``index`` counts from 0 in each run of a motion."""
+    """All samples in the order of arrival; ``index`` counts from 0 in each run of a motion."""
     run: NDArray[np.int64]
-    """(N,): the board's number of the motion's run that each sample belongs to."""
+    """(N,): the board's run number of each sample."""
     row: NDArray[np.int64]
-    """(N,): the row that each sample belongs to; -1 if it was not heard of."""
+    """(N,): the row of each sample; -1 if that was not reported."""
 
     @classmethod
     def load(cls, path: Path | str) -> SequenceRun:
-        """The folder of a recorded sequence; RunFolderError if it is none or contradicts itself."""
+        """Read the folder of a recorded sequence; raises RunFolderError if it is none or inconsistent."""
         folder = Path(path)
         meta = _meta(folder / META)
         try:
@@ -90,26 +90,26 @@ class SequenceRun:
 
     @property
     def state(self) -> str:
-        """How it ended, as the board says it; or interrupted, or broken, if the host did not learn that."""
+        """How it ended, by the board; ``interrupted`` or ``broken`` if the host did not receive that."""
         return visible(str(self.meta["state"]))
 
     @property
     def last(self) -> RowPassed | None:
-        """The last row that was heard of: where it stood at a power failure, or shortly before."""
+        """The last reported row, which shows how far it was at a power failure; None if there is none."""
         return self.rows[-1] if self.rows else None
 
     @property
     def rows_lost(self) -> int:
-        """How many rows were not reported to the host, before the last one that was."""
+        """Number of rows before the last reported one that were not reported."""
         return self.rows[-1].passed - len(self.rows) if self.rows else 0
 
     def motion_of(self, row: int) -> int:
-        """The number of the motion of a row, from 1; 0 if it moves nothing."""
+        """Number of a row's motion, from 1; 0 without motion."""
         return int(self.meta["rows"][row]["motion"])
 
     @cached_property
     def legs(self) -> tuple[Trajectory, ...]:
-        """Its motions, as the board's records have them; RunFolderError if one cannot be read."""
+        """Its motions, from the board's records; raises RunFolderError if one cannot be read."""
         count = max((int(entry["motion"]) for entry in self.meta["rows"]), default=0)
         found = []
         for number in range(1, count + 1):
@@ -124,7 +124,7 @@ class SequenceRun:
 
 
 def is_sequence_run(folder: Path) -> bool:
-    """Whether a folder is that of a recorded sequence; False for what cannot be read."""
+    """Whether a folder is that of a recorded sequence; False if it cannot be read."""
     try:
         return bool(json.loads((folder / META).read_text(encoding="utf-8"))["format"] == FORMAT)
     except (OSError, ValueError, LookupError, TypeError):

@@ -1,4 +1,4 @@
-"""The report of a recorded sequence: one page, with how it ended and how well each of its motions was followed."""
+"""The report of a recorded sequence: a page on how it ended and how well each motion was followed."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from armtempo.report.sequence_reader import SequenceRun
 from armtempo.report.verdict import BAD, GOOD, OPEN, STEPS_OFF, Verdict, VerdictItem
 
 END_S = 1e-3
-"""A sample as near as this to the end of the motion is its last."""
+"""A sample this close to the end of the motion is its last."""
 _LEGS = {
     "motion": "its number, as in the file NAME-1, NAME-2 … on the board",
     "what": "",
     "planned (s)": "how long it takes at 100 % speed",
-    "runs": "how often it was run, as far as the host heard",
-    "whole": "runs of which every sample came, to their end",
+    "runs": "number of reported runs",
+    "whole": "runs of which every sample arrived, to their end",
     "joint": "",
     "command off plan (steps)": "largest difference of the commanded from the planned angle at a sample: half a step "
     "is rounding",
@@ -35,28 +35,28 @@ _LEGS = {
 
 @dataclass(frozen=True, eq=False)
 class LegResult:
-    """A motion of the sequence: its runs that were heard of, checked against its plan."""
+    """A motion of the sequence: its reported runs, checked against its plan."""
 
     number: int
-    """From 1."""
+    """Number from 1."""
     words: str
-    """Of the first row that runs it."""
+    """Description of the first row that runs it."""
     duration_s: float
     runs: int
     whole: int
-    """Runs of which every sample came, to the end of the motion."""
+    """Number of complete runs: every sample arrived, to the end of the motion."""
     command_off_steps: Array
-    """(J,): largest difference of commanded from planned, in steps; half a step is rounding."""
+    """(J,): largest difference of the commanded from the planned angle, in steps; half a step is rounding."""
     end_off_steps: Array
-    """(J,): the same at the ends of the whole runs; NaN without one."""
+    """(J,): the same at the ends of complete runs; NaN without one."""
     measured_off_deg: Array
-    """(J,): largest difference of measured from planned; NaN for a joint without an encoder."""
+    """(J,): largest difference of the measured from the planned angle; NaN for a joint without an encoder."""
     measured_rms_deg: Array
     """(J,): the root mean square of these differences."""
 
 
 def results(found: SequenceRun) -> tuple[LegResult, ...]:
-    """Each motion that ran, in the order of their numbers."""
+    """The motions that ran, in the order of their numbers."""
     return tuple(_results(found))
 
 
@@ -99,7 +99,7 @@ def _is_whole(index: NDArray[np.int64], at_end: NDArray[np.bool_]) -> bool:
 
 
 def write(folder: Path) -> Path:
-    """Write report.html into the folder of a recorded sequence; gives the page. RunFolderError if it is none."""
+    """Write report.html into the folder of a recorded sequence; returns its path. RunFolderError if it is none."""
     found = SequenceRun.load(folder)
     path = folder / PAGE
     replace_text(path, render(found))
@@ -107,27 +107,27 @@ def write(folder: Path) -> Path:
 
 
 def verdict_of(folder: Path) -> Verdict:
-    """The verdict on a recorded sequence in its folder; RunFolderError if it is none."""
+    """The verdict on the recorded sequence in a folder; raises RunFolderError if it is none."""
     found = SequenceRun.load(folder)
     return verdict(found, results(found))
 
 
 def verdict(found: SequenceRun, legs: tuple[LegResult, ...]) -> Verdict:
-    """What can be told: how it ended, whether everything came, whether the arm was where it was to be."""
+    """The verdict: how it ended, whether everything arrived, whether the arm followed."""
     items = [_ending(found), *_losses(found, legs), *_followed(found, legs)]
     order = (BAD, OPEN, GOOD)
     return Verdict(tuple(sorted(items, key=lambda item: order.index(item.state))))
 
 
 def render(found: SequenceRun) -> str:
-    """The page as HTML text."""
+    """The page as HTML."""
     legs = results(found)
-    told = verdict(found, legs)
+    result = verdict(found, legs)
     meta = found.meta
     sheet = html_page.Page(
         f"Run of sequence {found.name!r}", f"{meta['started']}, arm {meta.get('arm', 'not known')}"
     )
-    sheet.verdict(told.state, told.summary, [(item.state, item.text) for item in told.findings])
+    sheet.verdict(result.state, result.summary, [(item.state, item.text) for item in result.findings])
     sheet.heading("Its motions")
     if legs:
         sheet.table(tuple(_LEGS), [row for leg in legs for row in _rows(found, leg)], explained=_LEGS)
@@ -153,24 +153,22 @@ def _ending(found: SequenceRun) -> VerdictItem:
 def _last(found: SequenceRun) -> str:
     last = found.last
     if last is None:
-        return "before its first row was heard of"
-    return f"after row {last.row} ({last.words}), step {last.step}, {last.cycle} whole cycles, was heard of"
+        return "before its first row was reported"
+    return f"after row {last.row} ({last.words}), step {last.step}, {last.cycle} whole cycles, was reported"
 
 
 def _losses(found: SequenceRun, legs: tuple[LegResult, ...]) -> Iterator[VerdictItem]:
     if found.rows_lost:
-        yield VerdictItem(OPEN, f"{found.rows_lost} rows passed without the host hearing of them")
+        yield VerdictItem(OPEN, f"{found.rows_lost} rows were not reported to the host")
     cut = sum(leg.runs - leg.whole for leg in legs)
     if cut:
-        yield VerdictItem(
-            OPEN, f"of {cut} runs of motions not every sample came, or they did not reach their end"
-        )
+        yield VerdictItem(OPEN, f"{cut} runs of motions lack samples, or did not reach their end")
 
 
 def _followed(found: SequenceRun, legs: tuple[LegResult, ...]) -> Iterator[VerdictItem]:
     ends = [np.nanmax(leg.end_off_steps) for leg in legs if leg.whole]
     if ends and max(ends) > STEPS_OFF + 0.5:
-        yield VerdictItem(BAD, f"a motion ended {max(ends):.1f} steps from where it was to end")
+        yield VerdictItem(BAD, f"a motion ended {max(ends):.1f} steps from its planned end")
     elif ends:
         yield VerdictItem(
             GOOD, f"each of {sum(leg.whole for leg in legs)} whole motions ended on its planned step"
@@ -178,7 +176,7 @@ def _followed(found: SequenceRun, legs: tuple[LegResult, ...]) -> Iterator[Verdi
     measured = np.array([leg.measured_off_deg for leg in legs])
     for joint, column in zip(found.joints, measured.T if legs else (), strict=False):
         if not np.isfinite(column).any():
-            yield VerdictItem(OPEN, f"{joint.name} has no encoder: where it really was is not known")
+            yield VerdictItem(OPEN, f"{joint.name} has no encoder: its true position is not known")
         else:
             yield VerdictItem(
                 GOOD, f"{joint.name} was measured at most {np.nanmax(column):.3f}° from the plan"
@@ -209,7 +207,7 @@ def _course(found: SequenceRun) -> Iterator[tuple[str, str]]:
             yield key, str(ended[key])
     for name, value in (ended.get("counters") or {}).items():
         yield f"counter {name}", str(value)
-    yield "rows that passed", str(found.last.passed if found.last else 0)
+    yield "reported rows", str(found.last.passed if found.last else 0)
     if (cycle_s := _cycle_s(found)) is not None:
         yield "time of a cycle, by the host's clock, median", f"{cycle_s:.3f} s"
     for key in ("port", "virtual"):
@@ -218,7 +216,7 @@ def _course(found: SequenceRun) -> Iterator[tuple[str, str]]:
 
 
 def _cycle_s(found: SequenceRun) -> float | None:
-    """From the first row that was heard of in a cycle to that of the next; None if there are less than three."""
+    """Median time from the first reported row of a cycle to that of the next; None for fewer than three cycles."""
     begins: dict[int, float] = {}
     for row in found.rows:
         begins.setdefault(row.cycle, row.time_s)

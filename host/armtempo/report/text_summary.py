@@ -1,4 +1,4 @@
-"""Plans and runs in a few lines of text; plans as JSON values too, with units in the keys."""
+"""Summaries of plans and runs as lines of text, and of plans as JSON values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
 from armtempo.basics.text import aligned
-from armtempo.diagnosis.resolution import findings as coarse_steps
+from armtempo.diagnosis.figures import findings as coarse_steps
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
@@ -30,16 +30,13 @@ _FLOORS = {
     "together": "through the via points under the speed, acceleration and jerk limits of all joints, whatever the path",
     "vias": "through the via angles of a joint under its speed, acceleration and jerk limits, whatever the path",
 }
-"""What ``Search.floor_kind`` means."""
+"""Meaning of ``Search.floor_kind``."""
 _WORTH_SAYING = 0.03
-"""A free path is named if it might save more than this part of the motion time."""
+"""A free path is mentioned if it might save more than this fraction of the motion time."""
 
 
 def lines(plan: Plan) -> list[str]:
-    """A plan: motion times next to their lower bounds, extremes next to their limits; one string a line.
-
-    Then what the user should know: notes on the poses, joints whose steps are coarse.
-    """
+    """Lines on a plan: motion times with lower bounds, extremes with limits, notes, joints with coarse steps."""
     job = plan.job
     text = [f"{job.name}: {plan.trajectory.duration_s:.4f} s, {', '.join(_settings(plan))}"]
     text.extend(aligned([*_HEAD, *(_row(plan, joint) for joint in range(len(plan.extremes)))], _WIDTHS))
@@ -61,7 +58,7 @@ def lines(plan: Plan) -> list[str]:
 
 
 def torque_lines(motions: Iterable[tuple[Arm, Trajectory]]) -> list[str]:
-    """Which motor has the least to spare in these motions, each with the arm as it is loaded there."""
+    """The motor with the least torque to spare in these motions, each with the arm and its load there."""
     found = [least for arm, motion in motions if (least := torque.least_margin(arm, motion))]
     if not found:
         return []
@@ -72,7 +69,7 @@ def torque_lines(motions: Iterable[tuple[Arm, Trajectory]]) -> list[str]:
 
 
 def result_lines(results: Iterable[JointResult]) -> list[str]:
-    """A run: per joint the steps sent, the angle at the end and its error; one string a line."""
+    """Lines on a run: each joint's steps, final angle and its error."""
     rows = [["joint", "steps sent", "angle", "error"], ["", "net", "deg", "deg"]]
     rows += [
         [joint.name, str(joint.steps_sent), f"{joint.angle_deg:.3f}", f"{joint.error_deg:+.4f}"]
@@ -89,7 +86,7 @@ def record_bytes(plan: Plan) -> int:
 
 
 def _settings(plan: Plan) -> list[str]:
-    """How the plan was made, a phrase each."""
+    """Phrases on how the plan was made."""
     job, first = plan.job, plan.trajectory.joints[0]
     auto = " (auto)" if job.refine == AUTO else ""
     timing = f"{job.timing} timing"
@@ -106,13 +103,13 @@ def _settings(plan: Plan) -> list[str]:
 
 
 def _started(search: Search) -> str:
-    """What the starts of a gradient search led to."""
+    """The results of a gradient search's starts."""
     joints = ", ".join(str(joint + 1) for joint in search.joints)
     times = search.starts_s
     spread = 100.0 * (times.max() / times.min() - 1.0)
     return (
         f"{len(times)} starts, driven joint {joints}: {times.min():.4f} to {times.max():.4f} s, spread {spread:.3f} %; "
-        f"the best went on to {search.total_s:.4f} s"
+        f"the best continued to {search.total_s:.4f} s"
     )
 
 
@@ -138,7 +135,7 @@ def _polished(search: Search) -> str:
 
 
 def _free_path(plan: Plan) -> list[str]:
-    """What a free path could save at most; nothing if that is little or the job gives the path."""
+    """The most that a free path could save; nothing if that is little or the path is given."""
     job, total_s = plan.job, plan.trajectory.duration_s
     if job.path != "through" or checks.leads_tool(job):
         return []
@@ -152,7 +149,7 @@ def _free_path(plan: Plan) -> list[str]:
 
 
 def _separation(plan: Plan) -> list[str]:
-    """How far per-joint timing lets the joints pass the via points apart, and the tool leave the path."""
+    """For per-joint timing: differences of the joints' times at the via points, and the tool's deviation."""
     spread = ", ".join(f"{value:.2f}" for value in path_deviation.via_spread_s(plan.trajectory))
     apart = f"joints pass the via points apart by {spread} s"
     if checks.is_free(plan.job):
@@ -168,7 +165,7 @@ _QUANTITIES = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 
 
 def values(plan: Plan) -> dict[str, Any]:
-    """Motion time, and of each driven joint its time, lower bound, extremes and limits."""
+    """Motion time, and each driven joint's time, lower bound, extremes and limits, with units in the keys."""
     return {
         "name": plan.job.name,
         "arm": plan.arm.name,

@@ -1,4 +1,4 @@
-"""The verdict on a run: OK, or what is not, or what could not be told."""
+"""The verdict on a run: OK, or what is wrong or undecided."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from armtempo.report.evaluation import Evaluation
 from armtempo.report.run_folder import COMPLETE
 
 GOOD, BAD, OPEN = "good", "bad", "open"
-"""What a finding is: as it should be, not so, or not to be told from what was recorded."""
+"""States of a finding: as it should be, not so, undecided by what was recorded."""
 STEPS_OFF = 1
-"""Step pulses at the end that may differ: an angle halfway between two steps rounds either way."""
+"""Allowed difference of step pulses at the end: an angle halfway between two steps rounds either way."""
 ROUNDED = 1e-3
-"""Fraction above a limit that the rounding of a record may make."""
+"""Fraction above a limit that may be rounding of the record."""
 _SUMMARIES = {GOOD: "OK", BAD: "Not OK", OPEN: "OK as far as it was measured"}
 
 
 @dataclass(frozen=True)
 class VerdictItem:
-    """One sentence of the verdict; ``state`` is GOOD, BAD or OPEN."""
+    """A sentence of the verdict; ``state`` is GOOD, BAD or OPEN."""
 
     state: str
     text: str
@@ -31,13 +31,13 @@ class VerdictItem:
 
 @dataclass(frozen=True)
 class Verdict:
-    """All findings on a run, the bad ones first."""
+    """All findings on a run, bad ones first."""
 
     findings: tuple[VerdictItem, ...]
 
     @property
     def state(self) -> str:
-        """BAD if one finding is, else OPEN if one is, else GOOD."""
+        """The worst state of the findings."""
         states = {finding.state for finding in self.findings}
         return BAD if BAD in states else OPEN if OPEN in states else GOOD
 
@@ -48,7 +48,7 @@ class Verdict:
 
     @property
     def line(self) -> str:
-        """The verdict on one line: if it is not plainly OK, with the findings that make it so."""
+        """The verdict on one line, with the findings that are not GOOD."""
         reasons = [finding.text for finding in self.findings if finding.state == self.state != GOOD]
         return ": ".join([self.summary, "; ".join(reasons)]) if reasons else self.summary
 
@@ -76,7 +76,7 @@ def _repetitions(found: Evaluation) -> Iterator[VerdictItem]:
 
 
 def _samples(found: Evaluation) -> Iterator[VerdictItem]:
-    """Cut-short repetitions are told by their number; here is what is missing or damaged of the record."""
+    """Missing or damaged samples; interrupted repetitions are only counted."""
     missing = [
         text for text in found.complaints if "cut short" not in text and replayed.SPEED_NOTE not in text
     ]
@@ -86,7 +86,7 @@ def _samples(found: Evaluation) -> Iterator[VerdictItem]:
 
 
 def _steps(found: Evaluation) -> Iterator[VerdictItem]:
-    """Whether every complete repetition ended at the step where the motion ends."""
+    """Whether every complete repetition ended at the motion's last step."""
     ends = [entry.commanded_steps for entry in found.run.entries if entry.state == COMPLETE]
     ends = [steps for steps in ends if len(steps) == len(found.names)]
     if not ends:
@@ -95,20 +95,20 @@ def _steps(found: Evaluation) -> Iterator[VerdictItem]:
     names = [name for name, off in zip(found.names, wrong, strict=True) if off > STEPS_OFF]
     if names:
         text = f"{_listed(names)} ended up to {wrong.max()} steps from where the motion ends"
-        yield VerdictItem(BAD, f"{text}: report it, the board should have made them all")
+        yield VerdictItem(BAD, f"{text}: please report it, as the board should make all steps")
     else:
         yield VerdictItem(GOOD, "the board made every step pulse of the motion")
 
 
 def planned_steps(found: Evaluation) -> NDArray[np.int64]:
-    """Steps (2, J) at which the motion begins and ends."""
+    """Steps (2, J) at the motion's start and end."""
     scale = np.array([joint.steps_per_deg for joint in found.run.joints])
     ends = np.stack([found.trajectory(0.0), found.trajectory(found.trajectory.duration_s)])
     return np.asarray(np.rint(ends * scale), dtype=np.int64)
 
 
 def _commanded(found: Evaluation) -> Iterator[VerdictItem]:
-    """Whether joints without an encoder were asked for more than their limits."""
+    """Whether the command keeps the limits, of joints without an encoder."""
     blind = zip(found.names, found.extremes, found.limits, found.curves.measured, strict=False)
     asked = [
         (name, np.array(most.values[:2]), np.array(limit.values[:2]))
@@ -125,7 +125,7 @@ def _commanded(found: Evaluation) -> Iterator[VerdictItem]:
 
 
 def _following(found: Evaluation) -> Iterator[VerdictItem]:
-    """Whether the arm followed, by its encoders; joints without one are named."""
+    """Whether the arm followed, by its encoders; lists joints without one."""
     measured = found.curves.measured
     blind = [name for name, known in zip(found.names, measured, strict=True) if not known]
     if blind:
@@ -149,10 +149,10 @@ def _following(found: Evaluation) -> Iterator[VerdictItem]:
 
 
 def without_encoder(names: Sequence[str]) -> str:
-    """What is not known of joints without an encoder, and what one would add."""
+    """Text on joints without an encoder."""
     have = "has" if len(names) == 1 else "have"
     return (
-        f"{_listed(names)} {have} no encoder: that the steps were sent is known, not that the arm made them; "
+        f"{_listed(names)} {have} no encoder, so whether the arm made the steps is not known; "
         "an encoder would show lost steps, lag and overshoot, and stop a motion that goes wrong"
     )
 

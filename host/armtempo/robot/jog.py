@@ -35,10 +35,10 @@ _ANSWER_S = 1.0
 _FIRST = 2  # holds sent at the start: a virtual board keeps to real time from then on
 
 
-def rest_s(motion: JogMotion, told: bool = False) -> float:
-    """Longest time until a held jog is at rest, after the last hold (``told``: after the stop) reached the
+def rest_s(motion: JogMotion, stopped: bool = False) -> float:
+    """Longest time until a held jog is at rest, after the last hold (``stopped``: after the stop) reached the
     board, seconds."""
-    silence_s = 0.0 if told else HOLD_TIMEOUT_MS / 1000.0
+    silence_s = 0.0 if stopped else HOLD_TIMEOUT_MS / 1000.0
     return silence_s + BEFORE_BRAKING_S + motion.brakes.longest_rest_s
 
 
@@ -169,7 +169,7 @@ class HeldJog:
     def _rest(self) -> None:
         client = self._client
         stored_motion.send_stop(client)
-        limit_s = client.session.clock() + rest_s(self.motion, told=True) + stored_motion.BRAKE_S
+        limit_s = client.session.clock() + rest_s(self.motion, stopped=True) + stored_motion.BRAKE_S
         while (status := client.status()).moving:
             if client.session.clock() > limit_s:
                 stored_motion.stop(client, now=True)

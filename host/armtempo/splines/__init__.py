@@ -1,1 +1,1 @@
-"""Splines: B-spline and Bernstein form, the time axis, trajectories, proven bounds of their extremes."""
+"""B-splines, Bernstein form, the time axis, trajectories, and rigorous bounds of their extremes."""

@@ -1,7 +1,7 @@
-"""Polynomials on [0, 1] in scaled Bernstein form: a product is a convolution, and coefficients give bounds.
+"""Polynomials on [0, 1] in scaled Bernstein form: products are convolutions, and coefficients are bounds.
 
-A polynomial of degree k is stored as b_i * C(k, i), i = 0..k, with b its Bernstein coefficients, in the
-last axis of an array; all functions work on any number of leading axes.
+A polynomial of degree k is stored in the last axis of an array as b_i * C(k, i), i = 0..k, with its Bernstein
+coefficients b; functions accept any number of leading axes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def multiply(first: Array, second: Array) -> Array:
 
 
 def elevate(polynomial: Array, degree: int) -> Array:
-    """The same polynomial as one of a higher ``degree``."""
+    """The same polynomial with a higher ``degree``."""
     return np.asarray(polynomial @ _elevation(polynomial.shape[-1] - 1, degree))
 
 
@@ -67,14 +67,14 @@ def _binomials(degree: int) -> Array:
 
 
 def halves(plain: Array) -> Array:
-    """Plain coefficients of both halves, each over [0, 1] again: (..., 2, k + 1)."""
+    """Plain coefficients of both halves, each over [0, 1]: (..., 2, k + 1)."""
     degree = plain.shape[-1] - 1
     return np.asarray((plain @ _halving(degree)).reshape(*plain.shape[:-1], 2, degree + 1))
 
 
 @cache
 def _halving(degree: int) -> Array:
-    """De Casteljau's midpoint rule as a matrix (k + 1, 2 k + 2)."""
+    """De Casteljau's subdivision at the midpoint as a matrix (k + 1, 2 k + 2)."""
     matrix = np.zeros((degree + 1, 2, degree + 1))
     for row in range(degree + 1):
         for column in range(row + 1):

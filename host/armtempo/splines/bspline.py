@@ -1,8 +1,9 @@
-"""Uniform B-splines: fit through points (Eqs. 13 and 14) and their polynomials (Eq. 15)."""
+"""Uniform B-splines: interpolation of points (Eqs. 13 and 14), polynomials (Eq. 15), and a spline as an object."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from math import comb
 
@@ -10,6 +11,7 @@ import numpy as np
 from armtempo_shared.basis import BASIS, FACTORIAL
 from numpy.typing import ArrayLike, NDArray
 
+from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array as Array
 from armtempo.basics.errors import InputError
 
@@ -17,13 +19,13 @@ _REST_ROWS: dict[int, tuple[tuple[float, ...], ...]] = {
     3: ((-1, 0, 1),),
     5: ((1, 2, -6, 2, 1), (-1, -10, 0, 10, 1)),
 }
-"""Derivatives at a point that vanish at rest, highest order first; the first derivative of the cubic,
-the second and first of the quintic."""
+"""Rows of the derivatives that are 0 at rest: the first of the cubic; the second and the first of the quintic."""
+DEGREES = (3, 5)
 
 
 @cache
 def basis(degree: int) -> Array:
-    """The matrix of Eq. (15): (degree + 1, degree + 1), rows: powers of u, columns: control points.
+    """The matrix of Eq. (15), (degree + 1, degree + 1); rows: powers of u, columns: control points.
 
     Raises InputError for a degree other than 3 or 5.
     """
@@ -37,12 +39,12 @@ def basis(degree: int) -> Array:
 def fit(points_deg: ArrayLike, degree: int, rests: Sequence[int] = ()) -> Array:
     """Control points of the spline through ``points_deg`` that starts and ends at rest.
 
-    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J): Eq. (13) or (14), solved
-    with a full matrix, as importing scipy's banded solver takes longer than most commands. The cubic rests in
-    speed, the quintic also in acceleration. A quintic also rests at the points ``rests``, and may leave them
-    in any direction; it does not pass exactly through the two points before and after each. They must be at
-    least ``degree`` points apart, and from the ends. Raises InputError for fewer than two points or values
-    that are not finite.
+    ``points_deg``: (n + 1,) or (n + 1, J). Returns (n + degree,) or (n + degree, J) by Eq. (13) or (14), solved
+    with a full matrix, as importing scipy's banded solver takes longer than most commands. At rest the speed is 0,
+    of the quintic also the acceleration. A quintic is also at rest at the points ``rests``, with any direction
+    afterwards, and then only passes near the two points before and after each; ``rests`` must be at least
+    ``degree`` points apart and from the ends. Raises InputError for fewer than two points or values that are not
+    finite.
     """
     points = np.asarray(points_deg, dtype=float)
     row = basis(degree)[0, :-1]
@@ -81,12 +83,12 @@ def polynomials(control_points: Array, degree: int) -> Array:
     windows = np.lib.stride_tricks.sliding_window_view(control_points, degree + 1, axis=0)
     middle = windows[..., degree // 2]
     pieces = np.einsum("pc,s...c->sp...", basis(degree), windows - middle[..., None])
-    pieces[:, 0] += middle  # subtracted first, so that a small motion far from zero keeps its digits
+    pieces[:, 0] += middle  # subtracted before, so that a small motion far from 0 keeps its precision
     return np.asarray(pieces)
 
 
 def refined(control_points: Array, parts: int, degree: int) -> Array:
-    """Control points of the same spline with each segment cut into ``parts``.
+    """Control points of the same spline with each segment divided into ``parts``.
 
     ``control_points``: (n + degree, ...). Returns (n * parts + degree, ...). Method: ``degree`` + 1 moving
     sums over ``parts`` neighbours.
@@ -103,7 +105,7 @@ def refined(control_points: Array, parts: int, degree: int) -> Array:
 
 
 def subdivide(coefficients: Array, parts: int) -> Array:
-    """The same curve with each segment cut into ``parts`` equal ones, each over [0, 1] again.
+    """The same curve with each segment divided into ``parts`` equal ones, each over [0, 1].
 
     ``coefficients``: (n, k + 1, ...), power basis. Returns (n * parts, k + 1, ...).
     """
@@ -138,3 +140,68 @@ def evaluate(coefficients: Array, segment: NDArray[np.intp], u: Array) -> Array:
     for power in range(coefficients.shape[1] - 2, -1, -1):
         value = value * u + coefficients[segment, power]
     return np.asarray(value)
+
+
+@checked
+@checked_fields
+@dataclass(frozen=True, eq=False)
+class Spline:
+    """A uniform B-spline of degree 3 or 5 over u from 0 to n, with n segments.
+
+    ``control_points`` has the shape (n + degree,) or (n + degree, J).
+    """
+
+    control_points: Array
+    degree: int = 5
+
+    def __post_init__(self) -> None:
+        """Raise InputError if the control points do not make a spline."""
+        object.__setattr__(self, "control_points", np.asarray(self.control_points, dtype=float))
+        if self.degree not in DEGREES or self.control_points.ndim not in (1, 2) or self.segments < 1:
+            raise InputError(
+                f"control points of shape {self.control_points.shape} do not make a spline of degree {self.degree}",
+                "give more of them than the degree, which is 3 or 5; Spline.through takes points to pass",
+            )
+
+    @classmethod
+    def through(cls, points: ArrayLike, degree: int = 5) -> Spline:
+        """The spline through ``points``, (n + 1,) or (n + 1, J), at u = 0, 1, … n, at rest at both ends.
+
+        At the ends the first derivative is 0, of the quintic also the second (Eqs. 13 and 14). Raises InputError for
+        another degree, fewer than two points or values that are not finite.
+        """
+        if degree not in DEGREES or np.ndim(points) not in (1, 2):
+            raise InputError(
+                f"no spline of degree {degree} through an array of {np.ndim(points)} dimensions",
+                "give degree 3 or 5, and points (n + 1,) or (n + 1, J)",
+            )
+        return cls(fit(points, degree), degree)
+
+    @property
+    def segments(self) -> int:
+        """Number of polynomial pieces."""
+        return len(self.control_points) - self.degree
+
+    def __call__(self, u: ArrayLike, order: int = 0) -> Array:
+        """Value at ``u``, or its derivative of the given ``order`` with respect to u.
+
+        Returns the shape of ``u``, and (..., J) if the points have joints. Raises InputError for a u outside of
+        0 to n.
+        """
+        if not 0 <= order <= self.degree:
+            raise InputError(
+                f"there is no derivative of order {order}",
+                f"give 0 for the value, 1 for the slope, up to {self.degree}",
+            )
+        at = np.asarray(u, dtype=float)
+        if not np.all((at >= 0.0) & (at <= self.segments)):
+            raise InputError(
+                "u is outside of the spline",
+                f"a spline of {self.segments} segments is defined for u from 0 to {self.segments}",
+            )
+        segment = np.minimum(at.astype(np.intp), self.segments - 1)
+        pieces = derivative(polynomials(self.control_points, self.degree), order)
+        powers = (at - segment)[..., None] ** np.arange(pieces.shape[1])
+        return np.asarray(
+            np.einsum("...p,...p->..." if pieces.ndim == 2 else "...p,...pj->...j", powers, pieces[segment])
+        )

@@ -1,8 +1,8 @@
-"""Largest speed, acceleration and jerk of a motion, as proven bounds instead of samples.
+"""Rigorous bounds of the largest speed, acceleration and jerk of a motion.
 
-All three are quotients of polynomials in u whose denominator is a power of t' > 0 (Eqs. 17 to 19). With
-both in Bernstein form of one degree, each quotient of coefficients bounds the quotient on the segment;
-halving the pieces that could still hold the maximum closes the gap quadratically.
+All three are quotients of polynomials in u whose denominator is a power of t' > 0 (Eqs. 17 to 19). With both in
+Bernstein form of the same degree, the quotients of their coefficients bound the quotient on the segment. Pieces
+that may contain the maximum are halved (branch and bound), which reduces the gap quadratically.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline
 
 GAP = 1e-11
-"""Largest relative distance of a returned bound above the true maximum."""
+"""Largest relative difference of a bound from the true maximum."""
 
 _DEPTH = 48
 """Halvings after which a piece is narrower than the resolution of a double."""
@@ -26,7 +26,7 @@ _DEPTH = 48
 
 @dataclass(frozen=True)
 class Extremes:
-    """Upper bounds of one joint's motion, at most GAP (relative) above the true maxima."""
+    """Upper bounds of a joint's motion, within GAP."""
 
     speed_deg_s: float
     acceleration_deg_s2: float
@@ -104,7 +104,7 @@ def largest_quotients(top: Array, bottom: Array, group: NDArray[np.intp], groups
 
 
 def range_of(polynomials: Array) -> tuple[Array, Array]:
-    """Lowest and highest angle of each joint, within GAP of its span: two arrays (J,).
+    """Lowest and highest angle of each joint, within GAP of its range: two arrays (J,).
 
     ``polynomials``: (J, m, k + 1), power coefficients.
     """

@@ -1,7 +1,7 @@
-"""The time axis: time over u as a uniform B-spline with increasing control points, so time increases.
+"""The time axis: time over u as a uniform B-spline with increasing control points.
 
-Its control points are 0, X1, X1 + X2, ... of the intervals X, mirrored at both ends; then t = 0 at the
-start, t = sum of X at the end, and t' is a B-spline of the positive X, hence positive everywhere.
+The control points are the sums 0, X1, X1 + X2, ... of the intervals X, mirrored at both ends. So t = 0 at the
+start, t = sum(X) at the end, and t' is a B-spline of the positive X, hence positive.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from armtempo.splines import bspline
 from armtempo.splines.bspline import Array
 
 _NEWTON_STEPS = 60
-"""Bound: each step at least halves the bracket, and Newton's method doubles the digits."""
+"""Bound on iterations: each at least halves the bracket, and Newton's method doubles the digits."""
 
 
 def control_points(intervals_s: ArrayLike, degree: int) -> Array:
@@ -29,15 +29,15 @@ def control_points(intervals_s: ArrayLike, degree: int) -> Array:
 
 
 def mirrored(count: int, edge: int) -> NDArray[np.intp]:
-    """Indices 0..count-1 with ``edge`` more on each side, mirrored: 1 0 0 1 2 ... for edge 2."""
+    """Indices 0..count-1 with ``edge`` mirrored ones on each side: 1 0 0 1 2 ... for edge 2."""
     return np.pad(np.arange(count), edge, mode="symmetric")
 
 
 @cache
 def free_map(count: int, degree: int) -> Array:
-    """The linear map from all differences of control points to control points, with t = 0 at the start.
+    """The linear map from differences of control points to control points, with t = 0 at the start.
 
-    Unlike ``step_map`` it has free ends. Shape (count + degree - 1, count + degree).
+    The ends are free, unlike in ``step_map``. Shape (count + degree - 1, count + degree).
     """
     differences = count + degree - 1
     points = np.zeros((differences, count + degree))
@@ -49,7 +49,7 @@ def free_map(count: int, degree: int) -> Array:
 
 
 def refined(differences_s: Array, parts: int, degree: int) -> Array:
-    """Differences of the control points of the same axis with each segment cut into ``parts``.
+    """Differences of the control points of the same axis with each segment divided into ``parts``.
 
     ``differences_s``: (m + degree - 1,). Returns (m * parts + degree - 1,). They are the control points of t',
     a spline of degree - 1.
@@ -66,9 +66,9 @@ def step_map(count: int, degree: int) -> Array:
 
 
 def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Array]:
-    """Segment and u in [0, 1] at which the time axis passes ``time_s`` (any shape, clamped to its range).
+    """Segment and u in [0, 1] at the times ``time_s`` (any shape, clamped to the range).
 
-    ``coefficients``: (m, degree + 1), seconds in power basis. Newton within a bracket.
+    ``coefficients``: (m, degree + 1), seconds in power basis. By Newton's method within a bracket.
     """
     starts = coefficients[:, 0]
     segment = np.clip(np.searchsorted(starts, time_s, side="right") - 1, 0, len(starts) - 1)
@@ -76,7 +76,7 @@ def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Arr
     wanted, at = np.ravel(time_s), np.ravel(segment)
     found, now = np.full(wanted.shape, 0.5), np.full(wanted.shape, 0.5)
     low, high = np.zeros(wanted.shape), np.ones(wanted.shape)
-    moving = np.arange(len(wanted))  # the others have converged
+    moving = np.arange(len(wanted))  # indices of those that have not converged
     for _ in range(_NEWTON_STEPS):
         error = bspline.evaluate(coefficients, at, now) - wanted
         low, high = np.where(error <= 0, now, low), np.where(error >= 0, now, high)
@@ -91,7 +91,7 @@ def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Arr
 
 
 def cut(differences_s: Array, before: int, refine: int, degree: int) -> Array:
-    """The axis with ``refine`` instead of ``before`` segments; equal if that is a multiple, else an approximation."""
+    """The axis with ``refine`` instead of ``before`` segments; exact for a multiple, else approximate."""
     if refine % before == 0:
         return refined(differences_s, refine // before, degree)
     fine = refined(differences_s, refine, degree)

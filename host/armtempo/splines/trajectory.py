@@ -1,4 +1,4 @@
-"""A planned motion as splines over time: angle and its derivatives at any time."""
+"""A planned motion: splines of angle and time, and the angle's derivatives at any time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from armtempo.splines.bspline import Array
 
 @dataclass(frozen=True, eq=False)
 class JointSpline:
-    """One joint: angle over u and time over u, both uniform B-splines of the same degree.
+    """A joint's angle over u and time over u, uniform B-splines of the same degree.
 
     With n path segments and refinement R, ``angle_points_deg`` has shape (n + degree,) and
     ``time_points_s`` shape (n * R + degree,).
@@ -28,7 +28,7 @@ class JointSpline:
     angle_points_deg: Array
     time_points_s: Array
     via_segments: tuple[int, ...] | None = field(default=None, metadata=json_codec.ADDED)
-    """Path segments before each via point; None: each path segment ends at one."""
+    """Number of path segments before each via point; None: each path segment ends at one."""
 
     @cached_property
     def angle_polynomials(self) -> Array:
@@ -54,8 +54,8 @@ class JointSpline:
     def __call__(self, time_s: ArrayLike, order: int = 0) -> Array:
         """Angle (order 0), speed, acceleration or jerk (order 3) in deg, deg/s, deg/s², deg/s³.
 
-        ``time_s`` of any shape gives an array of that shape. Outside [0, duration] the joint rests:
-        first or last angle, derivatives 0. Eqs. (17) to (19), the last one as differentiation gives it.
+        Returns the shape of ``time_s``. Outside of [0, duration] the joint rests: first or last angle, derivatives 0.
+        Eqs. (17) to (19); jerk by differentiation, as Eq. (19) has a misprint.
         """
         time = np.asarray(time_s, dtype=float)
         segment, u = time_axis.parameter(self.time_polynomials, time)
@@ -87,7 +87,7 @@ def derivatives(angle: Array, time: Array, segment: NDArray[np.intp], u: Array, 
 @checked
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
-    """All joints of a motion; with shared timing all joints hold the same ``time_points_s``."""
+    """All joints of a motion; with shared timing all have the same ``time_points_s``."""
 
     name: str
     joints: tuple[JointSpline, ...]

@@ -1,1 +1,1 @@
-"""The board's self-test: code is sent to MicroPython's prompt, measures, and is removed again."""
+"""The board's self-test: code that is sent to MicroPython's REPL, measures, and is removed."""

@@ -1,4 +1,4 @@
-"""What the board is, and what work takes on it."""
+"""Identity of the board: firmware, clocks, memory, flash; cost of the program's work."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armtempo.diagnosis.selftest.result import Measurement, judged
 BOARD, CYCLES, MEMORY = "board", "cycles", "memory"
 _CORE_HZ = 2 * TICK_HZ
 _TOLERANCE = 0.002
-"""Of ratios of clocks that come from one crystal: reading both takes some microseconds of 50 ms."""
+"""Tolerance of the ratio of two clocks from one crystal: reading both takes some microseconds of 50 ms."""
 EMITTED = {2: 700, 512: 8770}
 """Instructions of the ring interrupt's ``emit`` by edges, as ``on_board/cycles.py`` calls it; counted in the tests."""
 TURN = {"byte_code": 252, "machine_code": 22}
@@ -22,7 +22,7 @@ TURN = {"byte_code": 252, "machine_code": 22}
 Counted by ``python -m tests.benchmark.selftest_heap``.
 """
 EVALUATED = 2_590_000
-"""Instructions of the evaluator, byte code and machine code, in ``motion.evaluated``. Counted there too."""
+"""Instructions of the evaluator, byte code and machine code, for ``motion.evaluated``; counted there too."""
 _WAIT_STATES = 5
 _CACHES = 0x700  # FLASH_ACR: prefetch, instruction cache, data cache (RM0090 3.9.1)
 _SLOWEST_WRITE_MS = 4000

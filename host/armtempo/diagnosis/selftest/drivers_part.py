@@ -1,4 +1,4 @@
-"""Whether the drivers are off: by the level of ENABLE, and by encoders that stand still while STEP toggles."""
+"""Whether the drivers are off: from the level of ENABLE, and from encoders that do not turn while STEP toggles."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def judge(found: dict[str, Any]) -> Iterator[Measurement]:
 
 
 def off_line(what: str, active: int, state: Sequence[int]) -> Measurement:
-    """``state`` of ENABLE: is an output, is driven to, is at; ``active``: the level at which drivers are on."""
+    """``state`` of ENABLE: is an output, output level, level of the pin; ``active``: level with drivers on."""
     level = "high" if state[2] else "low"
     return judged(
         DRIVERS,
@@ -44,7 +44,7 @@ def is_on(found: dict[str, Any]) -> bool:
 
 
 def is_off(found: dict[str, Any]) -> bool:
-    """Whether ENABLE is driven to its inactive level, and is at it."""
+    """Whether ENABLE is driven to its inactive level, and has it."""
     return found["active"] is not None and _off(found["active"], _state(found))
 
 
@@ -57,7 +57,7 @@ def _off(active: int, state: Sequence[int]) -> bool:
 
 
 def judge_encoders(found: dict[str, Any]) -> Iterator[Measurement]:
-    """Lines about ``found`` of ``on_board/encoders.py``; the first one decides whether more pulses are made."""
+    """Lines about ``found`` of ``on_board/encoders.py``; the first determines whether more pulses are made."""
     turned = {number: counts for number, counts in enumerate(found["turned"], 1) if counts is not None}
     moved = [
         f"joint {number} turned {counts} counts" for number, counts in turned.items() if abs(counts) > _STILL

@@ -1,4 +1,4 @@
-"""The link: round trips, damaged messages, bytes a second both ways."""
+"""The link: round trips, damaged messages, bytes per second in both directions."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _CABLE = "try another cable and another USB socket, without a hub"
 
 
 def trips(client: Client) -> dict[str, Any]:
-    """Milliseconds of round trips of ``status``, in the second half with a damaged message before each.
+    """Round-trip times of ``status``, ms; in the second half each is preceded by a damaged message.
 
-    The board ignores those: each command must be answered, and the answers must not lose one either.
+    The board must ignore those, and answer each command.
     """
     took_ms = []
     bad_before = client.status().frames_bad
@@ -47,14 +47,14 @@ def trips(client: Client) -> dict[str, Any]:
 
 
 def _damaged(random: np.random.Generator) -> bytes:
-    """A whole frame of ``status`` with one byte after its length changed, so that its checksum fails."""
+    """A frame of ``status`` with a changed byte after its length, so that its checksum is wrong."""
     frame = bytearray(wire.frame(200, wire.COMMAND["status"][1], b""))
     frame[int(random.integers(3, len(frame)))] ^= 0x10
     return bytes(frame)
 
 
 def judge(found: dict[str, Any], simulated: bool) -> Iterator[Measurement]:
-    """``found`` of ``trips`` and of ``Prompt.rates``. What a loaded host does to a virtual board is no failure."""
+    """Lines about ``found`` of ``trips`` and ``Prompt.rates``; times of a virtual board depend on the host's load."""
     yield judged(
         PART,
         "round trip of a command",

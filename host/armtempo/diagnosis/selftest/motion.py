@@ -1,4 +1,4 @@
-"""The motions of the self-test: joints of the board's arm, a few steps from rest to rest."""
+"""The motions of the self-test: a few steps of the arm's joints, from rest to rest."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from armtempo.splines.trajectory import JointSpline
 _DEGREE = 5
 _MOST_STEPS = 200
 _FEWER = 15
-"""Steps by which each joint makes fewer than the one before it, so that they step at different times."""
+"""Each joint makes this many steps fewer than the previous one, so that they step at different times."""
 DURATION_S = 0.06
 _PEAK = 1.875
 """Peak speed of 10 u³ - 15 u⁴ + 6 u⁵ over u in 0..1."""
 _ABOVE = 1.01
-"""A joint's limit is this much above the rate that is wanted, so that rounding does not exceed it."""
+"""Ratio of a joint's limit to its rate, so that rounding does not exceed it."""
 _GENTLE = 0.5
 _LONG_RATE = 5000
 _SLOT = _DEGREE + 1
-"""Segments for each joint that moves alone: as many as one control point acts on, and one at rest."""
+"""Segments for each joint that moves alone: those of a control point, and one at rest."""
 _LOOKS = 1000
-"""Moments of a motion at which its speed is looked at."""
+"""Number of times at which the speed of a motion is computed."""
 _COUNTS, _LEAST_STEPS = 8, 20
-"""A gentle motion turns an encoder by this much, or a joint by this many steps."""
+"""Counts of an encoder, or steps of a joint without one, in a gentle motion."""
 
 
 @dataclass(frozen=True)
 class TestMotion:
-    """Where it begins, in steps; its record; when each joint steps, seconds; the step rates that it needs."""
+    """Start in steps; record; times of each joint's steps, seconds; highest step rates."""
 
     start_steps: list[int]
     record: bytes
@@ -47,29 +47,29 @@ class TestMotion:
 
 
 def limit(rate: float) -> int:
-    """The joint's limit in the arm record for a motion that reaches ``rate``."""
+    """The limit in the arm record of a joint that reaches ``rate``."""
     return math.ceil(rate * _ABOVE)
 
 
 def make(joints: Sequence[dict[str, Any]]) -> TestMotion:
-    """Quick, for drivers that are off: faster than the joints may be. ``joints``: rows of the arm record."""
+    """A fast motion for disabled drivers, above the joints' limits. ``joints``: rows of the arm record."""
     ends = _about_middle(joints, _quick(joints))
     return _of(joints, [bspline.fit(end, _DEGREE) for end in ends], ends, [DURATION_S])
 
 
 def back_in_turn(joints: Sequence[dict[str, Any]]) -> TestMotion:
-    """Back, so that each channel is alone on its pin: a joint rests while another one moves."""
+    """Back, one joint after the other, so that only one channel steps."""
     ends = [(end, start) for start, end in _about_middle(joints, _quick(joints))]
     size = _SLOT * len(joints) + _DEGREE
     points = []
     for number, (start, end) in enumerate(ends):
-        before = _SLOT * number + _DEGREE  # control points: it moves in the segments that have some of both
+        before = _SLOT * number + _DEGREE  # control points; the joint moves in the segments with some of both
         points.append(np.array([start] * before + [end] * (size - before), dtype=float))
     return _of(joints, points, ends, [DURATION_S / _SLOT] * (_SLOT * len(joints)))
 
 
 def gentle(joints: Sequence[dict[str, Any]]) -> TestMotion:
-    """So slow and small that no harm is done if the drivers are on: towards more steps, in the joints' ranges."""
+    """A motion so slow and small that it does no harm if the drivers are on: upwards, within the joints' ranges."""
     counts = [min(_steps_to_see(joint), joint["max_steps"] - joint["min_steps"]) for joint in joints]
     slowest = min(joint["max_rate"] / max(count, 1) for joint, count in zip(joints, counts, strict=True))
     ends = _about_middle(joints, counts)
@@ -86,13 +86,13 @@ def _quick(joints: Sequence[dict[str, Any]]) -> list[int]:
 
 
 def _steps_to_see(joint: dict[str, Any]) -> int:
-    """Steps by which an encoder turns enough to be seen."""
+    """Steps that turn the encoder noticeably."""
     needed = _COUNTS * joint["counts_den"] // max(abs(joint["counts_num"]), 1)
     return int(min(max(needed, _LEAST_STEPS), _MOST_STEPS))
 
 
 def _about_middle(joints: Sequence[dict[str, Any]], counts: Sequence[int]) -> list[tuple[int, int]]:
-    """Start and end of each joint, that many steps apart, about the middle of its range."""
+    """Start and end of each joint, ``counts`` steps apart, around the middle of its range."""
     lows = [
         (joint["max_steps"] + joint["min_steps"] - count) // 2
         for joint, count in zip(joints, counts, strict=True)
@@ -123,7 +123,7 @@ def _of(
 
 
 def at_rates(rates: Sequence[int], duration_s: float) -> bytes:
-    """The record of a motion from step 0 in which joints reach these rates, steps/s, in its middle, all together."""
+    """The record of a motion from step 0 in which all joints reach these rates, steps/s, in the middle."""
     times = time_axis.control_points([duration_s], _DEGREE)
     ends = [rate * duration_s / _PEAK for rate in rates]
     angles = [_fixed(bspline.fit((0.0, end), _DEGREE), STEP_FRACTION_BITS) for end in ends]
@@ -137,14 +137,14 @@ def evaluated() -> bytes:
 
 
 def long(joints: Sequence[dict[str, Any]], duration_s: float) -> TestMotion:
-    """From step 0, slowly enough that a capture can follow all of it; when it steps is not computed."""
+    """From step 0, slow enough to capture all steps; their times are not computed."""
     rates = [_LONG_RATE] * len(joints)
     limits = [max(joint["max_rate"], limit(_LONG_RATE)) for joint in joints]
     return TestMotion([0] * len(joints), at_rates(rates, duration_s), [], limits)
 
 
 def long_steps(duration_s: float) -> int:
-    """How many steps each joint makes in it."""
+    """Number of steps of each joint in ``long``."""
     return int(_LONG_RATE * duration_s / _PEAK + 0.5)
 
 
@@ -153,7 +153,7 @@ def _fixed(points: Array, bits: int) -> list[int]:
 
 
 def _crossings_s(spline: JointSpline, start: int, end: int, duration_s: float) -> Array:
-    """When the spline crosses each half step, by bisection: (|end - start|,)."""
+    """Times at which the spline crosses each half step, by bisection: (|end - start|,)."""
     sign = 1 if end > start else -1
     halves = start + sign * (np.arange(abs(end - start)) + 0.5)
     low, high = np.zeros(len(halves)), np.full(len(halves), duration_s)

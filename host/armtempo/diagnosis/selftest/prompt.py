@@ -1,4 +1,4 @@
-"""MicroPython's prompt of a board, through mpremote: code goes there, what it measured comes back as JSON."""
+"""A board's REPL, through mpremote: runs code there, and reads its results as JSON."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from armtempo.basics.errors import LinkError
 
 _FOLDER = Path(__file__).with_name("on_board")
 _SILENCE_S = 20.0
-"""Longest time without a byte from code that runs: longer than the board's watchdog takes."""
+"""Longest time without a byte from running code; longer than the board's watchdog."""
 _READ_S = 5.0
 _ENTER_S = 30.0
 _BULK = b"#"
 _BLOCKS, _BLOCK = 32, 512
-"""What is sent to measure the rates: 16 KB each way. To the board it is a comment, which takes no heap."""
+"""Data to measure the rates: 16 KB in each direction. To the board it is a comment, which needs no heap."""
 CONTINUE = "import armtempo_board\narmtempo_board.start()"
-"""The board program continues as it was before it was left; only before a soft reset."""
+"""Continue the board program in its state before it was left; not after a soft reset."""
 RESET = "import machine\nmachine.reset()"
-"""As the reset button: the program starts anew, and nothing is left of what was done at the prompt."""
+"""As the reset button: the program starts again, and nothing of the REPL remains."""
 WATCHDOG_RESET = f"""import machine, time
 from armtempo_board.app.watchdog import _kept
 if _kept: _kept.deinit()
 machine.WDT(timeout=100)
 time.sleep(2)
 {RESET}"""
-"""The same by the watchdog, which nobody feeds; by ``RESET`` if it does not come."""
+"""The same by the watchdog, which is not fed; by ``RESET`` if that fails."""
 _DROP = " [globals().pop(name) for name in [name for name in globals() if name not in before]]\n"
-"""What a part defined goes, ``before`` included: a program that continues has its heap back."""
+"""Delete the names that a part defined, and ``before``, so that a program that continues has its heap."""
 PARTS = ("drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep")
-"""By their numbers, from 1 on, the board remembers over a reset which one it is in."""
+"""The board stores the number of the running one, from 1, over a reset."""
 
 
 class PartError(LinkError):
@@ -55,22 +55,22 @@ class SilentError(LinkError):
 
 @dataclass(frozen=True)
 class Measured:
-    """What a part gave: its values, and its bulk data."""
+    """Result of a part: values, and bulk data."""
 
     values: dict[str, Any]
     bulk: bytes
 
 
 class Prompt:
-    """The raw prompt at a port; raises LinkError, which names the part, if it does not answer."""
+    """The raw REPL at a port; raises LinkError, with the part, if it does not answer."""
 
     def __init__(self, port: Any) -> None:
         self._port = port
         self.at_end = CONTINUE
-        """Code that is run when the prompt is left, however."""
+        """Code that is run whenever the REPL is left."""
 
     def enter(self, soft_reset: bool) -> None:
-        """Get in; ``soft_reset``: with an empty heap, and without the board program."""
+        """Enter the raw REPL; ``soft_reset``: with an empty heap, and without the board program."""
         with _as_link_error("start"):
             self._port.enter_raw_repl(soft_reset, timeout_overall=_ENTER_S)
 
@@ -83,7 +83,7 @@ class Prompt:
         return self._run(part, f"before = list(globals())\n{text}\n{call}")
 
     def rates(self) -> dict[str, float]:
-        """Kilobytes a second, from the board and to it."""
+        """Kilobytes per second, from the board and to it."""
         with _as_link_error("link"):
             self._port.exec_raw_no_follow(f"for _ in range({_BLOCKS}): print(end='x' * {_BLOCK})")
             begin_s = time.perf_counter()
@@ -112,7 +112,7 @@ class Prompt:
 
 @contextmanager
 def at_prompt(device: str) -> Iterator[Prompt]:
-    """The prompt of the board on ``device``, whose program was left; whatever ends it, the program runs again."""
+    """The REPL of the board on ``device``, whose program was left; at the end the program runs again."""
     from mpremote.transport import TransportError  # here, as few commands need it
     from mpremote.transport_serial import SerialTransport
 
@@ -137,7 +137,7 @@ def _as_link_error(part: str) -> Iterator[None]:
     from mpremote.transport import TransportError
 
     try:
-        with redirect_stdout(StringIO()):  # mpremote prints what it got instead of an answer
+        with redirect_stdout(StringIO()):  # mpremote prints unexpected answers
             yield
     except (TransportError, serial.SerialException, OSError) as error:
         raise SilentError(

@@ -1,4 +1,4 @@
-"""Pulses and E-stop: what was captured on the pins, against the motion's step times."""
+"""Pulses and E-stop: captured edges compared with the motion's step times."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from armtempo.diagnosis.selftest.result import Measurement, judged, left_out
 
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0
-"""A sample each microsecond, the two ports half of one apart, and the rounding of a step time."""
+"""One sample per microsecond, half a sample between the two ports, and the rounding of a step time."""
 _LONGEST_TURN_US = 4000
 """The capture keeps 4096 samples; after a longer turn some are lost."""
 _SLOWEST_STOP_US = 30.0
 STOPS = tuple(f"{pin} by {way}" for pin in ("E-stop", "limit switch") for way in ("software", "an edge"))
-"""As ``on_board/estop.py`` has them."""
+"""The stops of ``on_board/estop.py``."""
 CYCLES_PER_US = 168
 _SHORTED = "look for a short between the two pins, and take what is connected off one after the other"
 
 
 def rises_us(measured: Measured) -> dict[str, Array]:
-    """Microseconds of the rising edges on each pin of the capture, by its name."""
+    """Times of the rising edges in microseconds, by the pin's name."""
     found: dict[str, Array] = {}
     words = np.frombuffer(measured.bulk, "<i4")
     begin = 0
@@ -42,7 +42,7 @@ def rises_us(measured: Measured) -> dict[str, Array]:
 
 
 def errors_us(measured: Measured, motion: TestMotion) -> dict[str, Any]:
-    """By pin the times of its steps, ms, and how much later each was captured, us; pins with all steps only."""
+    """By pin the times of its steps, ms, and the delays of the captured ones, us; only pins with all steps."""
     found = rises_us(measured)
     wanted = {pin: 1e6 * steps for pin, steps in zip(measured.values["steps"], motion.steps_s, strict=True)}
     offset = _offset_us(found, wanted)
@@ -86,7 +86,7 @@ def judge(
 
 
 def _offset_us(found: dict[str, Array], wanted: dict[str, Array]) -> float:
-    """The capture begins before the motion's time 0: by how much, as most joints have it."""
+    """Time from the start of the capture to the motion's time 0, by the median of the joints."""
     apart = [
         float(np.median(found[pin] - steps))
         for pin, steps in wanted.items()
@@ -103,7 +103,7 @@ def _channel(
     wanted: dict[str, Array],
     way: str,
 ) -> Measurement:
-    """One joint's STEP pin."""
+    """The line about a joint's STEP pin."""
     rises, steps = times
     what = f"channel {channel}, STEP on P{pin}, {way}"
     expected = f"{len(steps)} steps, within {_RESOLUTION_US:g} us"
@@ -130,7 +130,7 @@ def _channel(
 
 
 def judge_long(values: dict[str, Any], steps: int, duration_s: float) -> Measurement:
-    """The line about a motion in which each joint makes ``steps``: the edges that were counted, by port."""
+    """The line about a motion of ``steps`` of each joint: counted edges by port."""
     what = f"steps of a longer motion, {duration_s:g} s"
     if values["longest_turn_cycles"] / CYCLES_PER_US > _LONGEST_TURN_US:
         return left_out(PULSES, f"{what}: a turn of the loop took too long to capture all", "run it again")
@@ -147,7 +147,7 @@ def judge_long(values: dict[str, Any], steps: int, duration_s: float) -> Measure
 
 
 def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
-    """Figures of the loop while all joints move, and of the heap."""
+    """Lines on the loop while all joints move, and on the heap."""
     mean, longest = (values[name] / CYCLES_PER_US for name in ("turn_cycles", "longest_turn_cycles"))
     yield Measurement(
         TURNS,
@@ -159,7 +159,7 @@ def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
 
 
 def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
-    """Lines about what ``on_board/estop.py`` measured."""
+    """Lines about ``values`` of ``on_board/estop.py``."""
     for way in STOPS:
         if took := values["cycles"].get(way):
             yield _stops(way, took)

@@ -1,4 +1,4 @@
-"""The highest step rates at which the board keeps up, and what it states of itself from then on."""
+"""The highest step rates of the board, and those that it states afterwards."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ JOINTS = (1, 2, 3, 6)
 DURATION_S = 0.4
 SIMULATED_DURATION_S = 0.05
 _LEAD_US, WATCHED_US = 20_000, 4096
-"""Between start and the motion's time 0 (``engine.LEAD_TICKS``); what a capture keeps."""
+"""Time from start to the motion's time 0 (``engine.LEAD_TICKS``); length of a capture."""
 _RESOLUTION_US = 1.5
 _SLOWER = 0.03
-"""Steps may be so much further apart than at the rate: a capture ends when a turn of the loop does."""
+"""Tolerance of the time between steps: a capture ends with a turn of the loop."""
 KEPT = 0.8
-"""Part of the rate that was found which the board states; it never states more than one that was not measured."""
+"""Fraction of the measured rate that the board states, at most the default rate."""
 _ROUNDS = 5
 _SHORTEST_S = 0.01
 """A shorter motion is not halved again."""
 
 
 def frames() -> list[str]:
-    """hello, then two commands as they come while an arm moves, in hex."""
+    """``hello``, then two commands as during a motion, in hex."""
     said = (("hello", (wire.PROTOCOL_VERSION, 1)), ("status", ()), ("samples", (0, 0)))
     return [
         wire.frame(sequence, wire.COMMAND[name][1], wire.encode(wire.COMMAND[name], values)).hex()
@@ -39,12 +39,12 @@ def frames() -> list[str]:
 
 
 def stated(count: int) -> int:
-    """What a board that was not measured allows each of ``count`` joints."""
+    """Default rate of each of ``count`` joints."""
     return min(MAX_STEP_RATE, MAX_STEP_RATE_SUM // count)
 
 
 def highest(keeps_up: Callable[[int], bool | None], count: int) -> int | None:
-    """By bisection up to what is stated with the margin, to about 3 % of it; None if one could not be tried."""
+    """The highest rate by bisection, to about 3 %, up to the default with its margin; None if one was not tried."""
     good, bad = 0, round(stated(count) / KEPT)
     answer = keeps_up(bad)
     if answer:
@@ -59,7 +59,7 @@ def highest(keeps_up: Callable[[int], bool | None], count: int) -> int | None:
 
 
 def shortest_s(keeps_up: Callable[[float], bool | None], duration_s: float) -> tuple[float, bool]:
-    """The shortest motion of ``duration_s`` halved again and again that ends well; whether it is the shortest tried."""
+    """The shortest successful motion of repeatedly halved ``duration_s``; and whether it is the shortest tried."""
     while duration_s > _SHORTEST_S:
         if not keeps_up(duration_s / 2):
             return duration_s, False
@@ -68,7 +68,7 @@ def shortest_s(keeps_up: Callable[[float], bool | None], duration_s: float) -> t
 
 
 def to_state(found: Mapping[int, int | None]) -> tuple[int, int] | None:
-    """Steps/s of one joint and of all together, from the rates found by number of joints; None if one is missing."""
+    """Rates to state, steps/s, of one joint and of all, from the rates by number of joints; None if one is missing."""
     rates = {count: KEPT * rate for count, rate in found.items() if rate is not None}
     if len(rates) != len(found) or 1 not in rates:
         return None
@@ -77,7 +77,7 @@ def to_state(found: Mapping[int, int | None]) -> tuple[int, int] | None:
 
 
 def judge(rate: int | None, count: int) -> Iterator[Measurement]:
-    """The line about the rate that was found for that many joints; a slower board is none that is wrong."""
+    """The line about the rate of ``count`` joints; a lower rate is not an error."""
     if rate is None:
         return
     expected = stated(count)
@@ -93,7 +93,7 @@ def judge(rate: int | None, count: int) -> Iterator[Measurement]:
 
 
 def judge_ramp(found: tuple[float, bool], rate: int, count: int) -> Measurement:
-    """The line about ``shortest_s``: a motion speeds up in its first half."""
+    """The line about ``shortest_s``; a motion accelerates in its first half."""
     duration_s, is_least = found
     return Measurement(
         PART,
@@ -103,12 +103,12 @@ def judge_ramp(found: tuple[float, bool], rate: int, count: int) -> Measurement:
 
 
 def watch_us(duration_s: float) -> int:
-    """When a capture has the middle of a motion."""
+    """Start of a capture of the middle of a motion."""
     return int(_LEAD_US + 5e5 * duration_s + WATCHED_US / 2)
 
 
 def judge_steps(values: Mapping[str, Any], port: str, rate: int, count: int) -> Measurement:
-    """The line about the steps in the middle of a motion of that many joints at ``rate``, on the pins of a port."""
+    """The line about the steps on a port's pins in the middle of a motion of ``count`` joints at ``rate``."""
     apart_us = 1e6 / rate
     said = [
         f"P{pin} {steps}, {least} to {most} us apart" for pin, (steps, least, most) in values["steps"].items()
@@ -130,7 +130,7 @@ def judge_steps(values: Mapping[str, Any], port: str, rate: int, count: int) -> 
 
 
 def judge_load(longest_cycles: int) -> Measurement:
-    """The line about the longest turn of the loop in all motions that ended well."""
+    """The line about the longest turn of the loop in all successful motions."""
     took = f"{longest_cycles / CYCLES_PER_US:.0f} us"
     return Measurement(PART, "worst turn of the program's loop under load, with commands and samples", took)
 
@@ -140,7 +140,7 @@ def _joints(count: int) -> str:
 
 
 def judge_stated(found: Mapping[str, Any] | None, info: Hello) -> Iterator[Measurement]:
-    """What the board states when it has started again, against what was found to be stated."""
+    """The line about the rates that the board states after its restart, compared with the measured ones."""
     if found is None or found["states"] is None:
         return
     one, together = found["states"]

@@ -11,7 +11,7 @@ from armtempo.diagnosis.finding import Level
 
 @dataclass(frozen=True)
 class Measurement:
-    """One measurement. ``verdict`` NOTE: nothing to compare with, or left out."""
+    """A measurement. ``verdict`` NOTE: without an expected value, or left out."""
 
     part: str
     what: str
@@ -28,7 +28,7 @@ def judged(part: str, what: str, measured: str, expected: str, is_good: bool, cu
 
 
 def left_out(part: str, reason: str, cure: str) -> Measurement:
-    """A line about a part that was left out, with the reason."""
+    """A line about a part that was not run."""
     return Measurement(part, "left out", reason, "", Level.NOTE, cure)
 
 

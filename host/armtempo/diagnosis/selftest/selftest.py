@@ -33,25 +33,25 @@ from armtempo.link.board_messages import Hello
 from armtempo.model import engine_pins
 
 _FEATURE = "sequences"
-"""Of the program in the firmware, with the modules that the parts import; as files it is without both."""
+"""A feature that only the program in the firmware has, as the modules that the parts import."""
 UNIQUE_ID_DIGITS = 24
 _ROOT = "/flash/armtempo"
 _ARM_RECORD = f"{_ROOT}/arm.ata"
 _BACK_S = 60.0
 _SIMULATED_TURN_US = 1000
-"""What a turn of the loop takes on a virtual board, about as on the chip."""
+"""Duration of a turn of the loop on a virtual board, about that of the chip."""
 _SEED = 5
 _STOPS, _BATCH, _SIMULATED_STOPS = 1000, 50, 4
-"""E-stop and limit switch, by software and by an edge, take turns. A batch is one call of the part."""
+"""Numbers of stops, by E-stop and limit switch, software and edge, in turn. A batch is one call of the part."""
 _WAITS_US = (22_000, 78_000)
-"""E-stops at random moments of ``motion.make``, which begins 20 ms after its start."""
+"""Range of the random times of stops in ``motion.make``, which begins 20 ms after its start."""
 _STARVED_S = 0.06
 _LONG_S, _SIMULATED_LONG_S = 4.0, 0.3
 _MOST_EDGES = 2000
-"""On one port, of the motions of which each edge is looked at."""
+"""Largest number of captured edges of a port."""
 _LOOK_S = 0.3
 SILENT = "silence"
-"""In the data: the part in which the board fell silent."""
+"""Key in the data: the part in which the board became silent."""
 
 
 def run(client: Client, progress: Progress | None = None) -> SelfTest:
@@ -87,7 +87,7 @@ def _same_room(before: int, after: int) -> Measurement:
 
 
 def _largest_motion(info: Hello) -> Measurement:
-    """It stays in the flash and is read from there in pieces."""
+    """The line about the largest motion, which is read from the flash in pieces."""
     size = min(info.free_flash, MAX_MOTION_BYTES)
     is_full = size < MAX_MOTION_BYTES
     return Measurement(
@@ -97,7 +97,7 @@ def _largest_motion(info: Hello) -> Measurement:
 
 
 def _watchdog(client: Client, found: SelfTest) -> Iterator[Measurement]:
-    """What the program says of the reset, after a self-test that came to its end; its fault is cleared."""
+    """The line about the reset by the watchdog, after a complete self-test; its fault is cleared."""
     if SILENT in found.data:
         return
     fault = client.status().fault
@@ -129,7 +129,7 @@ def _check_rest(client: Client) -> None:
 
 
 def _leave(client: Client, found: SelfTest, work: Callable[[Prompt], None]) -> None:
-    """Do ``work`` at the prompt of the board, then wait for its program."""
+    """Do ``work`` at the board's REPL, then wait for its program."""
     session = client.session
     with session.turns:
         client.leave()
@@ -143,9 +143,9 @@ def _leave(client: Client, found: SelfTest, work: Callable[[Prompt], None]) -> N
 
 
 def _check_drivers(prompt: Prompt, found: SelfTest) -> None:
-    """LinkError, and the program continues as it was, unless ENABLE is inactive or the board has no arm.
+    """Raise LinkError, and let the program continue, unless ENABLE is inactive or the board has no arm.
 
-    From here on the end of the prompt is a reset, which switches drivers off that are on.
+    Afterwards the end of the REPL is a reset, which switches drivers off.
     """
     prompt.enter(soft_reset=False)
     drivers = _drivers(prompt)
@@ -189,7 +189,7 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         found.add(link_part.judge(found.data[link_part.PART], found.simulated))
         if drivers_part.is_off(drivers) and _is_still(prompt, found):
             _move(prompt, found, work)
-            # Else no rate tells anything
+            # otherwise rates have no meaning
             if not any(line.part == pulse_part.PULSES for line in found.failed):
                 _rates(prompt, found, work)
         prompt.at_end = WATCHDOG_RESET
@@ -227,7 +227,7 @@ def _is_still(prompt: Prompt, found: SelfTest) -> bool:
 
 
 def _still_off(values: dict[str, Any], found: SelfTest) -> Measurement:
-    """After a part that made steps."""
+    """The line about ENABLE after a part that made steps."""
     return drivers_part.off_line("ENABLE after that", found.data[DRIVERS]["active"], values["enable"])
 
 
@@ -252,7 +252,7 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
 
 
 def _move_long(prompt: Prompt, found: SelfTest) -> None:
-    """Run a motion of some seconds, whose edges are only counted."""
+    """Run a motion of some seconds, and count its edges."""
     duration_s = _SIMULATED_LONG_S if found.simulated else _LONG_S
     moved = motion.long(found.data[DRIVERS]["joints"], duration_s)
     arguments = {**_arguments(moved, found), "rates": moved.rates, "most": 0}
@@ -285,15 +285,15 @@ def _stop(prompt: Prompt, found: SelfTest, arguments: dict[str, Any], work: Prog
 
 
 def _own(joints: Sequence[dict[str, Any]]) -> list[int]:
-    """The joints' own highest rates, as far as the board makes them together: their rings last shortest then."""
+    """The joints' highest rates that the board can make together, with the shortest rings."""
     rates = [joint["max_rate"] for joint in joints]
     return [round(rate * min(1.0, MAX_STEP_RATE_SUM / sum(rates)) / 1.1) for rate in rates]
 
 
 def _rates(prompt: Prompt, found: SelfTest, work: Progress) -> None:
-    """The highest step rate of the arm's first 1, 2, … joints; on a virtual board of one and of all of them.
+    """The highest step rate of the arm's first 1, 2, … joints; on a virtual board of one and of all joints.
 
-    Then, for each, the steps in the middle of a motion at four fifths of it; and the shortest ramp of all joints.
+    Then for each the steps in the middle of a motion at four fifths of it, and the shortest ramp of all joints.
     """
     joints = found.data[DRIVERS]["joints"]
     most = len(joints)
@@ -333,14 +333,14 @@ class _Trials:
         return True
 
     def watched(self, joints: Sequence[dict[str, Any]], rate: int) -> Iterator[Measurement]:
-        """The steps on the pins in the middle of a motion, port by port, as the heap has room for one capture."""
+        """The steps on the pins in the middle of a motion, by port, as the heap has room for one capture."""
         for port in sorted({engine_pins.table()["STEP"][joint["channel"]][0][0] for joint in joints}):
             values = self._tried([rate] * len(joints), self._duration_s, port)
             if values is not None:
                 yield rate_part.judge_steps(values, port, rate, len(joints))
 
     def ramp(self, rate: int, count: int) -> Measurement:
-        """The shortest one to a rate."""
+        """The shortest ramp to a rate."""
         shortest = rate_part.shortest_s(
             lambda size_s: self.keeps_up([rate] * count, size_s), self._duration_s
         )

@@ -12,10 +12,10 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
-from armtempo.kinematics.branches import branch_of
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.shape import refusals
+from armtempo.kinematics.solutions import branch_of
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import APPROACH, WHOLE
 from armtempo.planning.line.tool_path import ToolPath, rotation_vectors

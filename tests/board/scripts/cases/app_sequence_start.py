@@ -7,9 +7,25 @@ from binascii import crc32
 
 import cases
 import stand_in
-from app_rig import App, flash, state
-from armtempo_shared import sequence, wire
-from sequence_rig import ARM_CRC, COUNT, END, INPUT, LEGS, MOVE, OUTPUT, REPEAT, WAIT, begin, put, ready, runs
+from app_rig import App, connected, flash, state
+from armtempo_shared import codes, sequence, wire
+from sequence_rig import (
+    ARM_CRC,
+    COUNT,
+    END,
+    INPUT,
+    LEGS,
+    MOVE,
+    OUTPUT,
+    REPEAT,
+    WAIT,
+    arrive,
+    begin,
+    put,
+    ready,
+    runs,
+    stands,
+)
 
 
 def case_refused_before_anything_moves():
@@ -151,6 +167,29 @@ def case_a_power_cut_before_the_rename_loses_nothing():
         file.write(data[:-1])
     App(host.port, flash())
     assert "seq.atm.new" not in os.listdir(flash())
+
+
+def case_a_motion_that_is_unfit_is_refused_before_anything_moves():
+    app, host = ready([(OUTPUT, 0, 7, 0), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
+    app.controller.board.engine.unfit = (codes.TOO_FAST, 1, 5)
+    begin(host)
+    assert stands(host) == ("refused", codes.TOO_FAST, 3, 2, 0), stands(host)
+    assert runs(app) == 0 and app.controller.board.outputs.log == [] and state(host) == "idle"
+
+
+def case_before_any_the_command_is_unknown():
+    _, host = connected()
+    assert host.ask("sequence")[:2] == ("error", "unknown_command")
+
+
+def case_the_button_starts_it_as_the_default():
+    app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
+    assert host.ask("set_default", (), "seq")[0] == "ok"
+    app.controller.begin(app.controller.board.store().default(), 0)
+    host.turn(6)
+    arrive(app, host, 10)
+    arrive(app, host, 0)
+    assert stands(host)[0] == "finished"
 
 
 cases.run(globals())

@@ -255,14 +255,6 @@ def case_behind_a_stop_nothing_is_prepared():
     assert stands(host)[0] == "stopped" and runs(app) == 1
 
 
-def case_a_motion_that_is_unfit_is_refused_before_anything_moves():
-    app, host = ready([(OUTPUT, 0, 7, 0), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
-    app.controller.board.engine.unfit = (codes.TOO_FAST, 1, 5)
-    begin(host)
-    assert stands(host) == ("refused", codes.TOO_FAST, 3, 2, 0), stands(host)
-    assert runs(app) == 0 and app.controller.board.outputs.log == [] and state(host) == "idle"
-
-
 def case_a_record_that_is_another_now_is_refused_though_it_was_checked():
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
     begin(host)
@@ -313,61 +305,39 @@ def case_an_input_lets_it_go_on():
     assert app.controller.board.outputs.log == [(0, 1), (0, 0)]
 
 
-def _waited_in_vain(then):
-    app, host = ready([(INPUT, 0, 1 | then, 5000), (OUTPUT, 0, 1, 0)])
-    begin(host)
-    stand_in.Clock.now_ms += 4800
-    assert stands(host)[0] == "running"
-    stand_in.Clock.now_ms += 300
-    host.turn(5)
-    return app, host
-
-
-def case_an_input_that_never_comes_stops_it():
-    app, host = _waited_in_vain(sequence.STOP_THEN)
-    assert stands(host) == ("timed_out", 0, 1, 0, 0)
-    assert state(host) == "idle" and app.controller.board.outputs.log == []
-
-
-def case_an_input_that_never_comes_is_a_fault():
-    app, host = _waited_in_vain(sequence.FAULT_THEN)
-    assert stands(host) == ("fault", codes.INPUT_TIMEOUT, 1, 0, 0)
-    assert state(host) == "fault" and app.controller.board.outputs.log == []
+def case_an_input_that_never_comes_stops_it_or_is_a_fault_or_is_passed_over():
+    for then, ends, log in (
+        (sequence.STOP_THEN, ("timed_out", 0, 1, 0, 0), []),
+        (sequence.NEXT_THEN, ("finished", 0, 2, 1, 0), [(0, 1)]),
+        (sequence.FAULT_THEN, ("fault", codes.INPUT_TIMEOUT, 1, 0, 0), []),
+    ):
+        app, host = ready([(INPUT, 0, 1 | then, 5000), (OUTPUT, 0, 1, 0)])
+        begin(host)
+        stand_in.Clock.now_ms += 4800
+        assert stands(host)[0] == "running"
+        stand_in.Clock.now_ms += 300
+        host.turn(5)
+        assert stands(host) == ends and app.controller.board.outputs.log == log
+        assert state(host) == ("fault" if ends[0] == "fault" else "idle")
     assert begin(host)[:2] == ("error", "fault_pending")
     assert host.ask("clear") == ("ok", (), b"")
     assert begin(host)[0] == "ok"
 
 
-def case_an_input_that_never_comes_is_passed_over():
-    app, host = _waited_in_vain(sequence.NEXT_THEN)
-    assert stands(host)[0] == "finished" and app.controller.board.outputs.log == [(0, 1)]
-
-
-def case_a_fault_ends_it_and_says_where():
-    app, host = ready([(MOVE, "there", 0, 0), (OUTPUT, 0, 1, 0), (MOVE, "back", 0, 0)])
-    begin(host)
-    engine = app.controller.board.engine
-    engine.fault = codes.LIMIT_SWITCH
-    engine.moving = False
-    host.turn(5)
-    assert stands(host) == ("fault", codes.LIMIT_SWITCH, 1, 0, 0)
-    assert app.controller.board.outputs.log == [] and state(host) == "fault"
-
-
-def case_a_fault_in_a_wait_ends_it():
-    app, host = ready([(WAIT, 0, 0, 100000), (OUTPUT, 0, 1, 0)])
-    begin(host)
-    app.controller.board.engine.fault = codes.ESTOP
-    assert stands(host) == ("fault", codes.ESTOP, 1, 0, 0)
-    assert app.controller.board.outputs.log == []
-
-
-def case_a_mistake_of_the_program_ends_it():
-    app, host = ready([(WAIT, 0, 0, 100000), (OUTPUT, 0, 1, 0)])
-    begin(host)
-    app.controller.board.engine.explode = ValueError("x")
-    assert stands(host) == ("fault", codes.INTERNAL, 1, 0, 0)
-    assert app.controller.board.outputs.log == []
+def case_a_fault_or_a_mistake_of_the_program_ends_it_and_says_where():
+    wait, move = (WAIT, 0, 0, 100000), (MOVE, "there", 0, 0)
+    for row, name, value, code in (
+        (move, "fault", codes.LIMIT_SWITCH, codes.LIMIT_SWITCH),
+        (wait, "fault", codes.ESTOP, codes.ESTOP),
+        (wait, "explode", ValueError("x"), codes.INTERNAL),
+    ):
+        app, host = ready([row, (OUTPUT, 0, 1, 0)])
+        begin(host)
+        setattr(app.controller.board.engine, name, value)
+        app.controller.board.engine.moving = False
+        host.turn(5)
+        assert stands(host) == ("fault", code, 1, 0, 0)
+        assert app.controller.board.outputs.log == [] and state(host) == "fault"
 
 
 def case_what_cannot_go_on_is_named():
@@ -393,11 +363,6 @@ def case_nothing_else_is_taken_meanwhile():
         assert host.ask(name, values, tail)[:2] == ("error", "busy"), name
     assert host.ask("status")[0] == host.ask("hello", (wire.PROTOCOL_VERSION, 9))[0] == "ok"
     assert stands(host)[0] == "running"
-
-
-def case_before_any_the_command_is_unknown():
-    _, host = connected()
-    assert host.ask("sequence")[:2] == ("error", "unknown_command")
 
 
 def case_while_a_motion_runs_the_last_one_is_told():
@@ -457,16 +422,6 @@ def case_speed_between_motions_is_that_of_the_next():
     stand_in.Clock.now_ms += 5000
     host.turn(5)
     assert app.controller.board.engine.rates.wanted == 200
-
-
-def case_the_button_starts_it_as_the_default():
-    app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
-    assert host.ask("set_default", (), "seq")[0] == "ok"
-    app.controller.begin(app.controller.board.store().default(), 0)
-    host.turn(6)
-    arrive(app, host, 10)
-    arrive(app, host, 0)
-    assert stands(host)[0] == "finished"
 
 
 def case_code_stays_from_the_first_motion_to_the_end_where_memory_is_not_short():  # emulated

@@ -1,6 +1,6 @@
-"""Starts with records in the flash that cannot be used: the program starts, names them, and all else works."""
+"""How the program starts, though records of its flash are damaged, and is left for MicroPython's prompt."""
 
-# all cases: slow on CPython, not emulated
+# all cases: slow on CPython
 
 import struct
 import sys
@@ -8,11 +8,12 @@ import sys
 import cases
 import stand_in
 
-from app_rig import ROOT  # isort: skip  it puts the stand-ins into place
+from app_rig import ROOT, App, connected, start  # isort: skip  it puts the stand-ins into place
 
+from armtempo_board import prompt
 from armtempo_board.app import board
-from armtempo_board.app.app import App
 from armtempo_shared import armrecord, engine_memory, wire
+from stand_in import Clock, Port
 
 NUMBER = [0]
 ARM_CRC, PROBLEM, VALUE = 9, -2, -1
@@ -55,24 +56,24 @@ def with_crc(data):
     return data + struct.pack("<I", armrecord.crc32(data))
 
 
-def case_no_record_is_no_problem():
+def case_no_record_is_no_problem():  # not emulated
     assert started(folder_with(stand_in.arm()))[2][PROBLEM] == 0
     assert started(ROOT + "-none")[2][PROBLEM] == 0
 
 
-def case_damaged_records_are_named():
+def case_damaged_records_are_named():  # not emulated
     arm = stand_in.arm()
     for broken in (b"", arm[:7], arm[:-1], arm[:-4] + b"abcd", b"x" * 300):
         names_it(broken, "bad_record")
 
 
-def case_another_version_is_named():
+def case_another_version_is_named():  # not emulated
     arm = bytearray(stand_in.arm()[:-4])
     arm[4] = armrecord.VERSION_WITH_OUTPUTS + 1
     names_it(with_crc(bytes(arm)), "bad_record")
 
 
-def case_what_the_board_has_not_is_named():
+def case_what_the_board_has_not_is_named():  # not emulated
     head, joints, _ = armrecord.unpack(stand_in.arm())
     for name, value in (
         ("channel", 6),
@@ -95,7 +96,7 @@ class Cramped:
     is_short = True
 
 
-def case_a_record_that_no_longer_fits_is_named():
+def case_a_record_that_no_longer_fits_is_named():  # not emulated
     arm = stand_in.arm()
     root = folder_with(arm)
     room = sys.modules["armtempo_board.app.room"]
@@ -114,7 +115,7 @@ def case_a_record_that_no_longer_fits_is_named():
         assert file.read() == small, "what does not fit does not take the old one's place"
 
 
-def case_an_engine_that_cannot_be_made_is_named():
+def case_an_engine_that_cannot_be_made_is_named():  # not emulated
     root = folder_with(stand_in.arm())
     engine = board.Engine
     for error, problem in ((MemoryError, "no_memory"), (ValueError, "failed")):
@@ -130,7 +131,7 @@ def case_an_engine_that_cannot_be_made_is_named():
         assert (hello[1], wire.ERRORS[hello[PROBLEM]][0]) == (0, problem)
 
 
-def case_a_damaged_motion_is_listed_and_refused():
+def case_a_damaged_motion_is_listed_and_refused():  # not emulated
     arm = stand_in.arm()
     root = folder_with(arm)
     for name, data in (("cut", b"ATM4"), ("empty", b""), ("noise", bytes(20000))):
@@ -144,6 +145,120 @@ def case_a_damaged_motion_is_listed_and_refused():
         assert host.ask("start", (0, 1), name.encode())[:2] == ("error", "bad_record")
     assert host.ask("remove", (), "noise") == ("ok", (), b"")
     assert host.ask("list", (0,))[1][0] == 2
+
+
+CTRL_C = b"\r\x03\r\x01"
+"""What mpremote begins with."""
+
+
+def leaves_by_ctrl_c(app, host):
+    """Within a few turns; what comes after is left to the prompt."""
+    host.port.inbox.extend(CTRL_C)
+    for _ in range(10):
+        if not app.left():
+            host.turn(1)
+    assert app.left()
+    assert bytes(host.port.inbox) == b"\x01"
+
+
+def case_repl_is_reached_by_ctrl_c_when_idle_only():  # not emulated
+    app, host = connected()
+    start(host)
+    host.turn(1000)
+    host.port.inbox.extend(CTRL_C)
+    host.turn(1000)
+    assert not app.left()
+    app.controller.board.engine.finish()
+    host.turn(1000)
+    assert not app.left()
+    leaves_by_ctrl_c(app, host)
+
+
+def case_noise_does_not_open_the_repl():  # not emulated
+    app, host = connected()
+    host.turn(1000)
+    for noise in (b"\r\r\r\r", b"x\x03\x03\r", b"\x03", b"\xa5\x03\x00\x03\x03\x03\x03", b"\n\r\x03"):
+        host.port.inbox.extend(noise)
+        host.turn(40)
+        host.port.inbox.extend(wire.frame(1, 2, b""))
+        host.turn(1000)
+        assert not app.left(), noise
+
+
+def case_line_ends_alone_do_not_open_the_repl():  # not emulated
+    """A terminal's Enter, before the first frame and after one."""
+    for clear in (False, True):
+        request = prompt.PromptRequest()
+        if clear:
+            request.clear()
+        assert not any([request.comes(byte, 1000) for byte in b"\r\r\r\r"]), clear
+        assert request.comes(3, 1000)
+
+
+def case_repl_is_reached_right_behind_a_frame():  # not emulated
+    """A host program that starts mpremote; the port's buffer may hold both."""
+    app, host = connected()
+    host.turn(1000)
+    host.send("status")
+    leaves_by_ctrl_c(app, host)
+
+
+def case_leave_answers_first():  # not emulated
+    app, host = connected()
+    assert host.ask("leave") == ("ok", (), b"")
+    assert app.left()
+
+
+class Here:
+    """In the place of ``os`` and ``time``."""
+
+    terminals = []
+
+    def dupterm(self, port, index):
+        self.terminals.append(port)
+
+    def ticks_ms(self):
+        Clock.now_ms += 1
+        return Clock.now_ms
+
+    def ticks_diff(self, end, start):
+        return end - start
+
+    def sleep_ms(self, wait_ms):
+        """Time continues by itself."""
+
+
+def case_a_program_that_ended_by_itself_lets_no_frame_reach_the_prompt():  # not emulated
+    port = Port()
+    frames = b"".join([wire.frame(number, 4, bytes((3, 3, 13, 4))) for number in range(200)])
+    assert b"\x04" in frames and b"\x03" in frames
+    port.inbox.extend(frames + bytes(16))
+    sys.modules["pyb"].USB_VCP = lambda: port
+    prompt.os = prompt.time = Here()
+    asked = []
+    read = port.readinto
+
+    def readinto(buffer, count):
+        if not port.inbox and not asked:  # all frames are gone; now mpremote comes, after quiet
+            Clock.now_ms += 100
+            asked.append(1)
+            port.inbox.extend(CTRL_C)
+        return read(buffer, count)
+
+    port.readinto = readinto
+    prompt.wait()
+    assert asked and bytes(port.inbox) == b"\x01", port.inbox
+    assert Here.terminals == [None, port]
+
+
+def case_begun_again_it_waits_for_a_greeting():  # not emulated
+    app, host = connected()
+    host.ask("leave")
+    app.enter()
+    assert not app.left()
+    assert host.ask("status")[:2] == ("error", "no_session")
+    assert host.hello()[0] == "ok"
+    assert host.ask("status")[0] == "ok"
 
 
 cases.run(globals())

@@ -13,6 +13,7 @@ import sys
 
 import cases
 from armtempo_board.errors import Refused
+from armtempo_board.hardware import isr
 from armtempo_shared import codes
 from armtempo_shared.limits import LONGEST_RUN_TICKS
 from armtempo_shared.messages import NO_JOINT, RESUME
@@ -23,8 +24,8 @@ from engine_rig import FEWER, TICK_HZ, Rig, arm
 SEED = 20263
 CHANGES = 6
 BRAKE = -1  # instead of a rate
-LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 13)
-"""A change that has just been asked for begins 75 ms later, and the stop 75 ms after its end."""
+LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 19)
+"""A change that has just been asked for begins 50 ms later, and the stop 50 ms after its end."""
 MOTIONS = int(([word for word in sys.argv[1:] if word.isdigit()] or [4 // FEWER])[0])
 
 
@@ -317,6 +318,18 @@ def case_wrong_steps():  # not emulated, slow
             found = rig.engine.fault, rig.engine.fault_joint, rig.engine.known
             assert found == ((codes.WRONG_STEPS, 1, 5) if wrong else (0, NO_JOINT, 7)), (rates, wrong, found)
             assert rig.engine.clear() and rig.engine.fault == 0
+
+
+def case_rings_are_fed():  # not emulated
+    """A joint gets another law while its ring is filled: a short ring does not last as long as that takes."""
+    rig, _ = begin(record())
+    rig.run_to(TICK_HZ // 2)
+    before, meanwhile = [], []
+    for joint in rig.engine.drives:
+        before.append(joint.ring.state[isr.FED])
+        joint.generator.finish = lambda last, joint=joint: meanwhile.append(joint.ring.state[isr.FED])
+    rig.engine.change_rate(500)
+    assert meanwhile == before and 1 in before, (before, meanwhile)
 
 
 def case_long_pause():  # not emulated

@@ -94,9 +94,8 @@ def after_failure(operation, fail_at, error, undone):
     if error is None:
         return restarted(chip)
     ended = chip.changes < fail_at
-    assert refused == (0 if ended else codes.FLASH_FULL if error == flash.ENOSPC else codes.FLASH_ERROR), (
-        refused
-    )
+    failed = codes.FLASH_FULL if error == flash.ENOSPC else codes.FLASH_ERROR
+    assert refused == (0 if ended else failed), refused
     return place
 
 
@@ -151,35 +150,20 @@ def case_a_flash_with_too_few_blocks_refuses_before_it_writes():
         assert taken == needed, (name, taken)
 
 
-def case_put_a_new_one():
+def case_put():
     run(lambda place: put(place, "other", NEW))
-
-
-def case_put_over_an_old_one():
     run(lambda place: put(place, "feed", NEW))
-
-
-def case_put_the_arm_record():
     run(lambda place: put(place, wire.ARM_RECORD_NAME, NEW_ARM))
 
 
-def case_remove():
+def case_remove_and_rename():
     run(lambda place: place.remove("feed"))
-
-
-def case_rename_the_default():
     run(lambda place: place.rename("feed", "food"))
-
-
-def case_rename_another():
     run(lambda place: place.rename("spare", "food"))
 
 
-def case_set_the_default():
+def case_set_the_default_and_none():
     run(lambda place: place.set_default("spare"))
-
-
-def case_no_default():
     run(lambda place: place.set_default(""))
 
 

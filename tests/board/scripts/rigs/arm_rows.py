@@ -1,30 +1,10 @@
 """Arm records for tests of the engine."""
 
-HEAD = {
-    "flags": 0,
-    "identity": 0,
-    "pulse_ticks": 168,
-    "low_ticks": 168,
-    "dir_setup_ticks": 420,
-    "dir_hold_ticks": 420,
-    "link_timeout_ms": 1000,
-}
-JOINT = {
-    "channel": 0,
-    "dir_inverted": 0,
-    "encoder": 255,
-    "encoder_inverted": 0,
-    "counts_num": 5,
-    "counts_den": 16,
-    "min_steps": -1000000,
-    "max_steps": 1000000,
-    "max_rate": 333000,
-    "following_counts": 20,
-    "limit_low": 255,
-    "limit_high": 255,
-    "limit_active_high": 0,
-    "spare": 0,
-}
+HEAD = {"flags": 0, "identity": 0, "pulse_ticks": 168, "low_ticks": 168, "dir_setup_ticks": 420}
+HEAD.update(dir_hold_ticks=420, link_timeout_ms=1000)
+JOINT = {"channel": 0, "dir_inverted": 0, "encoder": 255, "encoder_inverted": 0, "counts_num": 5}
+JOINT.update(counts_den=16, min_steps=-1000000, max_steps=1000000, max_rate=333000, following_counts=20)
+JOINT.update(limit_low=255, limit_high=255, limit_active_high=0, spare=0)
 
 
 def row(**values):

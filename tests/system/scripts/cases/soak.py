@@ -2,7 +2,7 @@
 
 Pauses, speeds, stops, questions, hosts that die, an E-stop and a loop that is away, at seeded random moments, above all
 close to the ends of motions and to rows. Of each motion the edges on the pins are compared with the steps that
-``tests/system/soak.py`` found in its record. Arguments: FLASH PROGRAM HOME as ``whole_board.places`` has them;
+``tests/system/sequences.py`` found in its record. Arguments: FLASH PROGRAM HOME as ``whole_board.places`` has them;
 ``legs=N``: how many motions at least; ``seed=N``.
 """
 

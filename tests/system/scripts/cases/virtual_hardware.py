@@ -1,28 +1,20 @@
-"""The simulated hardware, case by case; each asserts by itself and prints its name.
+"""The simulated timers, DMA, pins and interrupts, case by case; each asserts by itself and prints its name.
 
 Argument: a scratch folder.
 """
 
 import sys
 
-import bare_board
+import bare_board  # replaces time, os, uctypes, micropython; so before everything else
 import cases
-import injected_faults  # replaces time, os, uctypes, micropython; so before everything else
 import machine_state
-import pace
-import power_cycles
-from chip import memory, timers
+from chip import timers
 from chip.flash import real_open
 from chip.processor import TICKS_PER_US
-from firmware import repl, usb_serial
 from firmware.external_interrupts import set_level
-from machine_state import Reset
 
 # isort: split
-import io
-import os
 import struct
-import time
 from array import array
 
 import machine
@@ -428,91 +420,6 @@ def case_interrupts_wait_while_off():
     assert len(seen) == 1
 
 
-def case_usb_buffers():
-    bare_board.start()
-    port, line = pyb.USB_VCP(), machine_state.serial
-    line.received.extend(b"hello")
-    assert port.any() and port.recv(3, timeout=0) == b"hel"
-    buffer = bytearray(8)
-    assert port.readinto(buffer, 1) == 1 and buffer[:2] == b"l\0"
-    assert port.readinto(buffer) == 1 and buffer[:2] == b"o\0"
-    assert port.read(5) is None and port.recv(2, timeout=3) == b""
-    assert port.send(b"abc") == 3 and bytes(line.sending) == b"abc"
-    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)
-    assert port.write(bytes(2000)) == 1021
-    assert port.write(b"x") is None
-    assert line.rts and line.cts
-    port.init(flow=0)
-    assert not line.rts and not line.cts
-
-
-def case_a_program_that_receives_waits_for_what_comes():
-    board = bare_board.start()
-    line = machine_state.serial
-    board.at(board.now + 20 * 84_000, lambda: line.received.extend(b"late"))
-    assert pyb.USB_VCP().recv(4, timeout=1000) == b"late"
-
-
-def case_a_program_that_sends_waits_for_room():
-    board = bare_board.start()
-    line = machine_state.serial
-    port = pyb.USB_VCP()
-    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)
-
-    def take():
-        line.sending = bytearray()
-
-    board.at(board.now + 20 * 84_000, take)
-    assert port.send(bytes(1500), timeout=1000) == 1500
-
-
-class Written(usb_serial.Serial):
-    """The line to a host that has written this already."""
-
-    def __init__(self, data):
-        usb_serial.SilentPort.__init__(self)
-        self._in = io.BytesIO(data)
-        self._chunk = memoryview(bytearray(64))
-
-
-def case_what_the_program_does_not_read_is_lost_unless_the_host_is_held_back():
-    for is_held_back in (0, 1):
-        bare_board.start()
-        line = Written(bytes(3000))
-        line.rts = bool(is_held_back)
-        line.pump()
-        taken = line._in.tell()
-        if is_held_back:
-            assert 1023 - 65 < taken == len(line.received) < 1024
-        else:
-            assert taken == 3000 and len(line.received) == 1023
-
-
-def case_a_silenced_board_speaks_again():
-    board = bare_board.start()
-    injected_faults._silence(board, {"ms": 2})
-    assert machine_state.serial.silent
-    board.spend(3 * 84_000)
-    assert not machine_state.serial.silent
-
-
-def case_watchdog_bites():
-    pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
-    board = bare_board.start()
-    watchdog = machine.WDT(timeout=100)
-    assert mem32[0x40003008] == 100 // 8  # IWDG_RLR, in units of 8 ms
-    for _ in range(5):
-        board.spend(90 * 84_000)
-        watchdog.feed()
-    try:
-        board.spend(101 * 84_000)
-        raise AssertionError("no bite")
-    except Reset as reset:
-        assert reset.cause == machine.WDT_RESET
-    bare_board.start(cause=machine.WDT_RESET)
-    assert machine.reset_cause() == machine.WDT_RESET
-
-
 def case_a_timer_that_was_given_up_calls_nobody():
     board = bare_board.start()
     called = []
@@ -522,67 +429,6 @@ def case_a_timer_that_was_given_up_calls_nobody():
     timer.init(freq=1000)
     board.spend(5 * 84_000)
     assert called == []
-
-
-def case_a_soft_reset_starts_python_again():
-    bare_board.start()
-    try:
-        machine.soft_reset()
-        raise AssertionError("it went on")
-    except Reset as reset:
-        assert reset.cause == machine.SOFT_RESET
-
-
-def case_after_a_soft_reset_the_prompt_has_the_port_again():
-    bare_board.start()
-    os.dupterm(None, 1)
-    assert not machine_state.serial.attached
-    power_cycles._soft_reset()
-    assert machine_state.serial.attached
-
-
-def case_ctrl_c_interrupts_only_what_the_prompt_runs():
-    """As micropython.kbd_intr(3) and, at the prompt, kbd_intr(-1)."""
-    bare_board.start()
-    line = machine_state.serial
-    assert line.interrupt_char == -1
-    seen = []
-    repl.Repl()._run(lambda: seen.append(line.interrupt_char))
-    assert (seen, line.interrupt_char) == ([3], -1)
-
-
-class Terminal(usb_serial.SilentPort):
-    """A host that has typed all it will, and keeps what the board says."""
-
-    def __init__(self):
-        self.shown = b""
-        super().__init__()
-
-    def put(self, data):
-        self.shown += bytes(data)
-        assert len(self.shown) < 2000, "the prompt continues without end"
-        return len(data)
-
-
-def case_the_prompt_echoes_and_answers():
-    terminal = Terminal()
-    bare_board.start(line=terminal)
-    terminal.received.extend(b"6 * 7\r\x04")
-    repl.Repl().run()
-    assert terminal.shown.endswith(
-        b">>> 6 * 7\r\n42\r\n>>> \r\nMPY: sync filesystems\r\nMPY: soft reboot\r\n"
-    ), terminal.shown
-
-
-def case_the_backup_sram_has_4_kb():
-    bare_board.start()
-    mem32[stm.RCC + stm.RCC_AHB1ENR] |= 1 << 18
-    assert mem32[0x40024000 + 4092]
-    try:
-        assert mem32[0x40024000 + 4096] is None
-    except ValueError:
-        return
-    raise AssertionError("there is more")
 
 
 def case_timers_of_the_faster_bus_count_twice_as_fast():
@@ -598,87 +444,6 @@ def case_timers_of_the_faster_bus_count_twice_as_fast():
 def case_a_new_timer_has_nothing_to_do():
     timer = timers.TimerUnit(bare_board.start(), 2, 32)
     assert (timer.next_match(), timer.next_interrupt()) == (timers.NEVER, timers.NEVER)
-
-
-def case_each_timer_is_clocked_by_its_bit():
-    """RM0090 6.3.13 and 6.3.14."""
-    bare_board.start()
-    for enable, first_bit, numbers in (
-        (stm.RCC_APB1ENR, 0, (2, 3, 4, 5, 6, 7, 12, 13, 14)),
-        (stm.RCC_APB2ENR, 0, (1, 8)),
-        (stm.RCC_APB2ENR, 16, (9, 10, 11)),
-    ):
-        for place, number in enumerate(numbers):
-            before = mem32[stm.RCC + enable]
-            pyb.Timer(number, prescaler=0, period=0xFFFF)
-            assert mem32[stm.RCC + enable] ^ before == 1 << first_bit + place, number
-
-
-def case_peripherals_of_a_bus_are_1_kb_apart():
-    """RM0090 table 1."""
-    for first, names in (
-        (0x40000000, "TIM2 TIM3 TIM4 TIM5 TIM6 TIM7 TIM12 TIM13 TIM14"),
-        (0x40010000, "TIM1 TIM8"),
-        (0x40013800, "SYSCFG EXTI"),
-        (0x40014000, "TIM9 TIM10 TIM11"),
-        (0x40020000, "GPIOA GPIOB GPIOC GPIOD GPIOE"),
-        (0x40023800, "RCC FLASH"),
-        (0x40026000, "DMA1 DMA2"),
-    ):
-        for number, name in enumerate(names.split()):
-            assert memory.word_at(first + 0x400 * number) == memory.index(name), name
-
-
-def case_kinds_of_memory_have_micropythons_numbers():
-    """extmod/moductypes.c, of version 1.28: also if CPython has a stand-in."""
-    assert (uctypes.ARRAY, uctypes.INT32) == (-1 << 30, 5 << 27)
-
-
-def case_registers_by_the_chips_addresses():
-    bare_board.start()
-    mem32[0x40000000 + 0x2C] = -1
-    assert mem32[stm.TIM2 + stm.TIM_ARR] == -1
-    assert machine.mem8[stm.TIM2 + stm.TIM_ARR] == machine.mem8[stm.TIM2 + stm.TIM_ARR + 3] == 0xFF
-    assert machine.mem16[stm.TIM2 + stm.TIM_ARR] == 0xFFFF
-    machine.mem8[stm.TIM2 + stm.TIM_CCR1 + 1] = 0xAB
-    machine.mem16[stm.TIM2 + stm.TIM_CCR1 + 2] = 0x1234
-    assert mem32[stm.TIM2 + stm.TIM_CCR1] == 0x1234AB00
-    assert machine.freq() == (168_000_000, 168_000_000, 42_000_000, 84_000_000)
-    try:
-        mem32[0x50000000] = 1
-        raise AssertionError("no such register")
-    except ValueError:
-        pass
-
-
-def case_backup_sram_needs_its_clock_and_write_access():
-    """RM0090 5.1.2: a clock for the power interface, DBP, a clock of its own."""
-    rcc, power, memory = stm.RCC, stm.PWR, stm.BKPSRAM
-    last = memory + 4092
-    mem32[last] = 5
-    assert mem32[last] == 0, "without a clock it reads as 0"
-    mem32[rcc + stm.RCC_AHB1ENR] |= 1 << 18
-    before = mem32[last]
-    mem32[last] = before ^ 5
-    assert before and mem32[last] == before, "without write access it keeps what it had"
-    mem32[power + stm.PWR_CR] |= 1 << 8
-    mem32[last] = before ^ 5
-    assert mem32[last] == before, "without a clock the power interface takes nothing"
-    mem32[rcc + stm.RCC_APB1ENR] |= 1 << 28
-    mem32[power + stm.PWR_CR] |= 1 << 8
-    mem32[last] = -5
-    put(memory, 0, 7)
-    assert mem32[last] == mem32[0x40024000 + 4092] == -5 and mem32[memory] == 7
-    mem32[rcc + stm.RCC_AHB1ENR] &= ~(1 << 18)
-    assert mem32[last] == 0
-    mem32[rcc + stm.RCC_AHB1ENR] |= 1 << 18
-    assert mem32[last] == -5 and mem32[memory] == 7, "its content waits for the clock"
-    mem32[power + stm.PWR_CR] &= ~(1 << 8)
-    put(memory, 0, 8)
-    time.sleep_us(1)
-    assert mem32[memory] == 7
-    words = uctypes.struct(last, (uctypes.ARRAY, 1 | uctypes.INT32))
-    assert words[0] == -5 and uctypes.addressof(words) == last
 
 
 for name in cases.wanted(globals()):

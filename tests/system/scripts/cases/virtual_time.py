@@ -1,21 +1,26 @@
-"""How the simulated board's time passes: in calls, in waits, while the firmware starts, and against real time.
+"""How the simulated board's time passes, in calls and against real time; its serial port, prompt and watchdog.
 
 Each case asserts by itself and prints its name.
 """
 
 import bare_board
 import cases
-import machine_state  # replaces time, os, uctypes, micropython; so before everything else
+import injected_faults  # replaces time, os, uctypes, micropython; so before everything else
+import machine_state
 import pace
+import power_cycles
 from chip.processor import CALL_TICKS, TICKS_PER_MS
-from firmware import boot, usb_serial
+from firmware import boot, repl, usb_serial
+from machine_state import Reset
 
 # isort: split
+import io
 import os
 import time
 
 import machine
 import pyb
+from machine import mem32
 
 
 def case_time_passes_in_calls():
@@ -148,6 +153,141 @@ def case_the_leds_tell_the_mode_with_the_firmwares_times():
     assert green.changes_ms == [0, 600]
     flashes = [920 + 50 * number for number in range(12)]
     assert orange.changes_ms == [600] + flashes + [920 + 600 + 400], orange.changes_ms
+
+
+def case_usb_buffers():
+    bare_board.start()
+    port, line = pyb.USB_VCP(), machine_state.serial
+    line.received.extend(b"hello")
+    assert port.any() and port.recv(3, timeout=0) == b"hel"
+    buffer = bytearray(8)
+    assert port.readinto(buffer, 1) == 1 and buffer[:2] == b"l\0"
+    assert port.readinto(buffer) == 1 and buffer[:2] == b"o\0"
+    assert port.read(5) is None and port.recv(2, timeout=3) == b""
+    assert port.send(b"abc") == 3 and bytes(line.sending) == b"abc"
+    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)
+    assert port.write(bytes(2000)) == 1021
+    assert port.write(b"x") is None
+    assert line.rts and line.cts
+    port.init(flow=0)
+    assert not line.rts and not line.cts
+
+
+def case_a_program_that_receives_waits_for_what_comes():
+    board = bare_board.start()
+    line = machine_state.serial
+    board.at(board.now + 20 * 84_000, lambda: line.received.extend(b"late"))
+    assert pyb.USB_VCP().recv(4, timeout=1000) == b"late"
+
+
+def case_a_program_that_sends_waits_for_room():
+    board = bare_board.start()
+    line = machine_state.serial
+    port = pyb.USB_VCP()
+    port.init(flow=pyb.USB_VCP.RTS | pyb.USB_VCP.CTS)
+
+    def take():
+        line.sending = bytearray()
+
+    board.at(board.now + 20 * 84_000, take)
+    assert port.send(bytes(1500), timeout=1000) == 1500
+
+
+class Written(usb_serial.Serial):
+    """The line to a host that has written this already."""
+
+    def __init__(self, data):
+        usb_serial.SilentPort.__init__(self)
+        self._in = io.BytesIO(data)
+        self._chunk = memoryview(bytearray(64))
+
+
+def case_what_the_program_does_not_read_is_lost_unless_the_host_is_held_back():
+    for is_held_back in (0, 1):
+        bare_board.start()
+        line = Written(bytes(3000))
+        line.rts = bool(is_held_back)
+        line.pump()
+        taken = line._in.tell()
+        if is_held_back:
+            assert 1023 - 65 < taken == len(line.received) < 1024
+        else:
+            assert taken == 3000 and len(line.received) == 1023
+
+
+def case_a_silenced_board_speaks_again():
+    board = bare_board.start()
+    injected_faults._silence(board, {"ms": 2})
+    assert machine_state.serial.silent
+    board.spend(3 * 84_000)
+    assert not machine_state.serial.silent
+
+
+def case_watchdog_bites():
+    pace.Pace._elapsed_us = lambda self: 0  # no real time comes in
+    board = bare_board.start()
+    watchdog = machine.WDT(timeout=100)
+    assert mem32[0x40003008] == 100 // 8  # IWDG_RLR, in units of 8 ms
+    for _ in range(5):
+        board.spend(90 * 84_000)
+        watchdog.feed()
+    try:
+        board.spend(101 * 84_000)
+        raise AssertionError("no bite")
+    except Reset as reset:
+        assert reset.cause == machine.WDT_RESET
+    bare_board.start(cause=machine.WDT_RESET)
+    assert machine.reset_cause() == machine.WDT_RESET
+
+
+def case_a_soft_reset_starts_python_again():
+    bare_board.start()
+    try:
+        machine.soft_reset()
+        raise AssertionError("it went on")
+    except Reset as reset:
+        assert reset.cause == machine.SOFT_RESET
+
+
+def case_after_a_soft_reset_the_prompt_has_the_port_again():
+    bare_board.start()
+    os.dupterm(None, 1)
+    assert not machine_state.serial.attached
+    power_cycles._soft_reset()
+    assert machine_state.serial.attached
+
+
+def case_ctrl_c_interrupts_only_what_the_prompt_runs():
+    """As micropython.kbd_intr(3) and, at the prompt, kbd_intr(-1)."""
+    bare_board.start()
+    line = machine_state.serial
+    assert line.interrupt_char == -1
+    seen = []
+    repl.Repl()._run(lambda: seen.append(line.interrupt_char))
+    assert (seen, line.interrupt_char) == ([3], -1)
+
+
+class Terminal(usb_serial.SilentPort):
+    """A host that has typed all it will, and keeps what the board says."""
+
+    def __init__(self):
+        self.shown = b""
+        super().__init__()
+
+    def put(self, data):
+        self.shown += bytes(data)
+        assert len(self.shown) < 2000, "the prompt continues without end"
+        return len(data)
+
+
+def case_the_prompt_echoes_and_answers():
+    terminal = Terminal()
+    bare_board.start(line=terminal)
+    terminal.received.extend(b"6 * 7\r\x04")
+    repl.Repl().run()
+    assert terminal.shown.endswith(
+        b">>> 6 * 7\r\n42\r\n>>> \r\nMPY: sync filesystems\r\nMPY: soft reboot\r\n"
+    ), terminal.shown
 
 
 for name in cases.wanted(globals()):

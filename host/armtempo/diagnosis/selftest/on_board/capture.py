@@ -1,28 +1,28 @@
-"""Goes in front of parts that capture STEP pins: DMA2 copies ports A, B at 1 MHz, by TIM1 (RM0090 10.3.3, table 43)."""
+"""Prefix of parts that capture STEP pins: DMA2 copies ports A, B at 1 MHz, by TIM1 (RM0090 10.3.3, table 43)."""
 
 from array import array
 
 import micropython
 import uctypes
 
-_SAMPLES = 4096  # 4 ms; the loop comes round in less
+_SAMPLES = 4096  # 4 ms, more than a turn of the loop
 _PERIOD = 167  # of TIM1 at 168 MHz: 1 us
 _DMA2EN, _TIM1EN = 1 << 22, 1
 _TIM1 = stm.TIM1
 # Very high priority, memory incremented, circular
 _HALF_WORDS = 3 << 16 | 1 << 13 | 1 << 11 | 1 << 10 | 1 << 8
 _CHANNEL = 6 << 25
-_STREAMS = (("A", 5), ("B", 1))  # TIM1's update asks stream 5, its compare channel 1 stream 1
+_STREAMS = (("A", 5), ("B", 1))  # stream 5 by TIM1's update, stream 1 by its compare channel 1
 _REQUESTS = 1 << 8 | 1 << 9
 _MASK, _LAST, _COUNT, _TIME = 0, 1, 2, 3
 
 
 @micropython.viper
 def scan(samples: ptr16, begin: int, end: int, state: ptr32, edges: ptr32, most: int):
-    """Note the edges between two places: (microsecond << 8) + (pin << 1) + level.
+    """Store the edges between two indices: (microsecond << 8) + (pin << 1) + level.
 
-    Eight samples without an edge take a quarter of what they take one by one, else two ports leave the loop no time.
-    Every second one is enough: pulses last two samples or more.
+    Eight samples without an edge are skipped together, in a quarter of the time, which two ports need. Every second
+    sample is enough, as pulses last two samples or more.
     """
     mask = state[0]
     last = state[1]
@@ -57,7 +57,7 @@ def scan(samples: ptr16, begin: int, end: int, state: ptr32, edges: ptr32, most:
 
 @micropython.viper
 def measure_rises(samples: ptr16, begin: int, end: int, state: ptr32):
-    """Between two places: count the rising edges of one pin, find the least and the greatest time between two."""
+    """Between two indices: number of rising edges of a pin, shortest and longest time between two."""
     mask = state[0]
     last = state[1]
     count = state[2]
@@ -82,7 +82,7 @@ def measure_rises(samples: ptr16, begin: int, end: int, state: ptr32):
 
 
 class Capture:
-    """The samples of one port; edges of the pins in ``mask``, ``most`` at most."""
+    """The samples of a port; at most ``most`` edges of the pins in ``mask``."""
 
     def __init__(self, port, stream, mask, most):
         self.name = port
@@ -94,7 +94,7 @@ class Capture:
         self.place = 0
 
     def arm(self):
-        """Point the stream at port and memory, and switch it on."""
+        """Set up the stream for port and memory, and enable it."""
         mem32[self.at] = 0
         mem32[self.at + 4] = _SAMPLES
         mem32[self.at + 8] = self.port + stm.GPIO_IDR
@@ -105,7 +105,7 @@ class Capture:
         mem32[self.at] = _CHANNEL | _HALF_WORDS | 1
 
     def look(self):
-        """Take what has come since the last call."""
+        """Process the samples since the last call."""
         place = (_SAMPLES - mem32[self.at + 4]) % _SAMPLES
         if place < self.place:
             scan(self.samples, self.place, _SAMPLES, self.state, self.edges, len(self.edges))
@@ -127,7 +127,7 @@ class Capture:
 
 
 def begin(captures):
-    """TIM1 asks for a sample each microsecond."""
+    """Start TIM1's requests, one per microsecond."""
     mem32[stm.RCC + stm.RCC_AHB1ENR] = mem32[stm.RCC + stm.RCC_AHB1ENR] | _DMA2EN
     mem32[stm.RCC + stm.RCC_APB2ENR] = mem32[stm.RCC + stm.RCC_APB2ENR] | _TIM1EN
     for register in (stm.TIM_CR1, stm.TIM_DIER, stm.TIM_SMCR, stm.TIM_CCER, stm.TIM_CCMR1, stm.TIM_PSC):
@@ -145,7 +145,7 @@ def begin(captures):
 
 
 def end(captures):
-    """It asks no more."""
+    """Stop the requests."""
     mem32[_TIM1 + stm.TIM_CR1] = 0
     mem32[_TIM1 + stm.TIM_DIER] = 0
     for capture in captures:
@@ -155,9 +155,9 @@ def end(captures):
 
 
 def captured(record, joints, most, wanted="AB"):
-    """A capture for each of the ``wanted`` ports that has a STEP pin of the arm's first joints; those pins.
+    """A capture for each of the ``wanted`` ports with a STEP pin of the arm's first joints; and those pins.
 
-    Before the engine is made, which leaves no room in one piece for it.
+    Call it before the engine is made, which leaves no large free block.
     """
     from armtempo_board.hardware import pins
 

@@ -1,4 +1,4 @@
-"""Goes in front of each part: cycles by DWT's counter (PM0214 does not have it; ARMv7-M C1.8), and the answer."""
+"""Prefix of all parts: cycles by DWT's counter (ARMv7-M C1.8, not in PM0214), and the answer."""
 
 import gc
 import json
@@ -8,13 +8,13 @@ import stm
 from machine import mem32
 
 _DEMCR = 0xE000EDFC  # bit 24: DWT is on
-_DWT_CTRL = 0xE0001000  # bit 0: it counts
+_DWT_CTRL = 0xE0001000  # bit 0: it is enabled
 _CYCCNT = 0xE0001004
 _NOTED = 0x05E1F000
 
 
 def count_cycles():
-    """Let the counter run."""
+    """Enable the cycle counter."""
     mem32[_DEMCR] = mem32[_DEMCR] | 1 << 24
     mem32[_CYCCNT] = 0
     mem32[_DWT_CTRL] = mem32[_DWT_CTRL] | 1
@@ -26,7 +26,7 @@ def cycles():
 
 
 def cost(function, *arguments, times=5):
-    """The fewest cycles that a call takes, reading the counter included."""
+    """The fewest cycles of a call, including the reading of the counter."""
     fewest = 1 << 32
     for _ in range(times):
         before = cycles()
@@ -36,7 +36,7 @@ def cost(function, *arguments, times=5):
 
 
 def feed():
-    """Take the watchdog over from the timer that feeds it at the prompt: a part that hangs ends in a reset then."""
+    """Stop the timer that feeds the watchdog at the REPL, and feed it: a part that hangs ends in a reset."""
     import machine
     from armtempo_board.app import watchdog
 
@@ -47,7 +47,7 @@ def feed():
 
 
 def note(number):
-    """Keep which part runs (0: none) in the RTC's last backup register, which outlives a reset; what it had."""
+    """Store the running part (0: none) in the RTC's last backup register, which a reset keeps; returns the old one."""
     rcc, power = stm.RCC + stm.RCC_APB1ENR, stm.PWR + stm.PWR_CR
     mem32[rcc] = mem32[rcc] | 1 << 28  # PWREN
     mem32[power] = mem32[power] | 1 << 8  # DBP: the backup domain may be written
@@ -59,7 +59,7 @@ def note(number):
 
 
 def enable():
-    """(pin is an output, its output register, the level on the pin) of ENABLE."""
+    """(is an output, output level, level of the pin) of ENABLE."""
     from armtempo_board.hardware import pins
 
     line = pins.line(pins.ENABLE)
@@ -93,5 +93,5 @@ def free():
 
 
 def tell(values):
-    """Answer the host."""
+    """Send the answer."""
     print(json.dumps(values))

@@ -1,4 +1,4 @@
-"""What work takes, in cycles of the processor."""
+"""Cost of work in cycles of the processor."""
 
 import micropython
 
@@ -13,7 +13,7 @@ def counting(turns: int) -> int:
 
 
 def plain(turns):
-    """The same as byte code."""
+    """The same in byte code."""
     total = 0
     for turn in range(turns):
         total += turn
@@ -21,7 +21,7 @@ def plain(turns):
 
 
 def emitted(entries):
-    """Cycles in which the ring interrupt's ``emit`` writes that many edges of a long cubic to a ring."""
+    """Cycles of the ring interrupt's ``emit`` for ``entries`` edges of a long cubic."""
     from array import array
 
     from armtempo_board.hardware import isr
@@ -40,7 +40,7 @@ def emitted(entries):
 
 
 def evaluated(motion):
-    """(cycles, edges): the evaluator finds all steps of a motion from step 0 on, and a ring takes them."""
+    """(cycles, edges) of the evaluator for all steps of a motion from step 0, with a ring."""
     from array import array
 
     from armtempo_board.hardware import isr
@@ -65,11 +65,11 @@ def evaluated(motion):
 
 
 def nothing():
-    """What reading the counter costs."""
+    """For the cost of reading the counter."""
 
 
 def measure(motion):
-    """Cycles of each; the reading of the counter is taken off."""
+    """Cycles of each, without the reading of the counter."""
     from binascii import unhexlify
 
     feed()

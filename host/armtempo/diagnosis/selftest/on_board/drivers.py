@@ -2,7 +2,7 @@
 
 
 def measure(record):
-    """``record``: file of the arm record. ``noted``: what the part before this one left."""
+    """``record``: file of the arm record. ``noted``: what the previous part stored."""
     active = None
     joints = []
     try:

@@ -1,10 +1,10 @@
-"""Whether the encoders stand still while the arm's pins step: if one turns, its driver is on in spite of ENABLE."""
+"""Whether the encoders do not turn while the arm's pins step: otherwise a driver is on in spite of ENABLE."""
 
-_STILL = 2  # counts by which an encoder between two marks may jump
+_STILL = 2  # counts by which an encoder at an edge may change
 
 
 def measure(record, motion, start_steps, idle_us):
-    """How far each encoder turned, in counts (None: there is none), and by how much it had to for its joint's steps.
+    """Counts of each encoder (None: there is none), and the counts due for its joint's steps.
 
     The motion ends as soon as one turns.
     """

@@ -1,26 +1,26 @@
-"""Goes in front of parts that make steps: the engine for the board's own arm, without its drivers."""
+"""Prefix of parts that make steps: the engine for the board's arm, without its drivers."""
 
 from armtempo_shared import armrecord
 
 
 class NoPin:
-    """In the place of ENABLE: the engine cannot switch the drivers on."""
+    """Replaces ENABLE, so that the engine cannot switch the drivers on."""
 
     def value(self, level=None):
         """Nothing."""
         return 0
 
 
-_SEEN_TICKS = 168  # 2 us: a capture at 1 MHz has each pulse twice
+_SEEN_TICKS = 168  # 2 us: two samples of a capture at 1 MHz
 _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 
 
 def make_engine(record, switches=False, rates=None, encoders=False, workspace=None):
-    """(engine, rows of its joints); it steps the pins of this arm and no others, and the arm's E-stop stops it.
+    """(engine, rows of its joints); it only steps the pins of this arm, and the arm's E-stop stops it.
 
-    ``switches``: E-stop and a limit switch 1 for the first joint are fitted, whatever the arm has. ``rates``: of that
-    many joints, instead of the arm's; they can go anywhere then.
-    ``encoders``: they are read, but no joint is checked against them. ``workspace``: of a program that has one already.
+    ``switches``: with E-stop and limit switch 1 for the first joint, whatever the arm has. ``rates``: of this number of
+    joints, instead of the arm's, without ranges. ``encoders``: read them, without a check of the following error.
+    ``workspace``: that of a running program.
     """
     from armtempo_board.app import room
     from armtempo_board.motion.engine import Engine
@@ -54,7 +54,7 @@ def make_engine(record, switches=False, rates=None, encoders=False, workspace=No
 
 
 def pulls(pin, level):
-    """(register, its value to draw an input to a level, to the other one) of its pull resistor."""
+    """(register, value to pull an input to a level, value for the other level) of its pull resistor."""
     from armtempo_board.hardware import pins
 
     at = getattr(stm, "GPIO" + pins.port(pin)) + stm.GPIO_PUPDR
@@ -65,30 +65,30 @@ def pulls(pin, level):
 
 
 def pull_inactive(engine):
-    """An E-stop that is not wired would be tripped: draw it to the other level. A switch is stronger.
+    """Pull the E-stop's input to its inactive level, in case it is not wired; a switch is stronger.
 
-    ValueError if one is pressed.
+    Raises ValueError if it is pressed.
     """
     from armtempo_board.hardware import pins
 
     at, _, rest = pulls(pins.ESTOP, engine.inputs._estop_level)
     mem32[at] = rest
     time.sleep_ms(1)
-    engine.service()  # notes what tripped until now
+    engine.service()  # takes earlier trips
     if not engine.clear():
         engine.close()
         raise ValueError("the E-stop is pressed, or wired for the other level")
 
 
 def serve(engine, idle_us):
-    """A turn of the loop. ``idle_us``: what it takes in simulated time, which the chip needs by itself."""
+    """A turn of the loop. ``idle_us``: its duration in simulated time."""
     engine.service()
     if idle_us:
         time.sleep_us(idle_us)
 
 
 def load(engine, motion, start_steps):
-    """Put the joints at its start and load it; the motion. ValueError if the drivers are not off."""
+    """Declare the joints at the motion's start and load it; returns it. ValueError if the drivers are not off."""
     from armtempo_shared.motion import Motion
 
     output, driven, level = enable()

@@ -1,8 +1,8 @@
-"""Stores the step rates that were measured: the program states them from its next start on."""
+"""Stores the measured step rates, which the program states after its next start."""
 
 
 def measure(root, program_crc, rates):
-    """``rates``: of one joint, of all together, of how many joints they were measured."""
+    """``rates``: of one joint, of all together, and the number of joints with which they were measured."""
     import os
 
     from armtempo_board.app.board import board_id
@@ -10,5 +10,5 @@ def measure(root, program_crc, rates):
 
     measured_rates.write(root, board_id(), program_crc, rates)
     if hasattr(os, "sync"):
-        os.sync()  # a reset comes
+        os.sync()  # a reset follows
     return {}

@@ -1,10 +1,10 @@
-"""One motion, captured on the STEP pins: when each edge came."""
+"""The times of the edges on the STEP pins in a motion."""
 
 from binascii import hexlify
 
 
 def directions(joints):
-    """Level of each joint's DIR pin."""
+    """Levels of the joints' DIR pins."""
     from armtempo_board.hardware import pins
 
     found = []
@@ -15,7 +15,7 @@ def directions(joints):
 
 
 def measure(record, motion, start_steps, rates, idle_us, most):
-    """Run the motion (a record in hex) once; ``most`` edges go out as bulk data, 4 bytes each, port by port."""
+    """Run the motion (a record in hex) once; up to ``most`` edges are sent as bulk data, 4 bytes each, by port."""
     from binascii import unhexlify
 
     feed()

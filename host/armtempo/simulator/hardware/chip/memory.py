@@ -1,4 +1,4 @@
-"""The peripheral registers, in real memory, so that viper code can access them as on the chip.
+"""The peripheral registers and the backup SRAM, in real memory, so that viper code can access them as on the chip.
 
 ``words`` are the registers; ``seen`` are their values when the models last read or wrote them: a difference
 means that the program has written a register since.
@@ -29,6 +29,9 @@ SIZE = BLOCK_BYTES * len(BLOCKS)
 MASK = 0xFFFFFFFF
 BACKUP_WORDS = 1024
 _BACKUP_ON_CHIP = 0x40024000
+_AHB1ENR, _APB1ENR = 12, 16  # words of RCC
+_BKPSRAMEN, _PWREN, _DBP = 18, 28, 8  # bits
+_RTC_BYTES = BLOCK_BYTES
 
 
 def _memory(size):
@@ -119,3 +122,39 @@ def clear():
             words[at] = 0
             seen[at] = 0
     objects.clear()
+
+
+class BackupSram:
+    """The backup domain (RM0090 5.1.2): without write access its SRAM and RTC keep their values.
+
+    Without a clock the SRAM reads as 0. ``is_open``: it is writable; otherwise ``undo`` restores it after a write.
+    """
+
+    def __init__(self):
+        for word in range(BACKUP_WORDS):
+            backup[word] = (word + 1) * 0x9E3779B1 & MASK  # arbitrary at power-up
+        self.is_open = True
+        self._kept = b""
+        self.sync()
+
+    def sync(self):
+        """RCC or PWR were written."""
+        if self.is_open:
+            self._kept = bytes(raw_backup)
+        rcc, power = index("RCC"), index("PWR")
+        if not words[rcc + _APB1ENR] >> _PWREN & 1:  # without a clock writes have no effect
+            poke(power, seen[power])
+        clocked = words[rcc + _AHB1ENR] >> _BKPSRAMEN & 1
+        self._shown = self._kept if clocked else bytes(len(self._kept))
+        self.is_open = clocked and words[power] >> _DBP & 1
+        self.undo()
+
+    def sync_rtc(self):
+        """The RTC was written."""
+        if not words[index("PWR")] >> _DBP & 1:
+            at = 4 * index("RTC")
+            raw[at : at + _RTC_BYTES] = raw_seen[at : at + _RTC_BYTES]
+
+    def undo(self):
+        """Restore its values."""
+        raw_backup[0 : len(self._shown)] = self._shown

@@ -7,7 +7,7 @@ the chip's latency.
 
 import sys
 
-from chip import backup_sram, capture, dma, gpio, memory, timers
+from chip import capture, dma, gpio, memory, timers
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
@@ -73,7 +73,7 @@ class Chip:
         self.dma_preload = dma_preload
         self.dma = dma.Controller()
         self.pins = gpio.Pins()
-        self.backup = backup_sram.BackupSram()
+        self.backup = memory.BackupSram()
         self.cycles = CycleCounter(self)
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),

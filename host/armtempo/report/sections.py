@@ -1,4 +1,4 @@
-"""What a report says of the result: the verdict, measured against planned, steps, peaks next to limits."""
+"""The sections of a report: the result with its tables; the plan, its settings and versions."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from armtempo.model.plan import Plan
+from armtempo.planning import checks, path_deviation
 from armtempo.report import analysis, html_page, peaks, verdict
 from armtempo.report.evaluation import Evaluation
 
@@ -38,19 +40,29 @@ _PEAKS = {
     "kept exactly",
 }
 _MEASURED_PEAKS = ("measured", "verdict")
-"""Columns that a table has only if something was measured."""
+"""Columns that are omitted if nothing was measured."""
 _COLOURS = {
     peaks.EXCEEDED: html_page.BAD,
     peaks.KEPT: html_page.GOOD,
     peaks.WITHIN: html_page.GOOD,
     peaks.UNDECIDED: html_page.OPEN,
 }
+_EXTREMES = {
+    "joint": "",
+    "motion time (s)": "when the joint arrives",
+    "floor (s)": "no motion of this joint along its path keeps the limits in less time",
+    "speed (°/s)": "the largest magnitude in the plan, exact, of what the arm file allows",
+    "acceleration (°/s²)": "the same",
+    "jerk (°/s³)": "the same",
+}
 
 
-def write(sheet: html_page.Page, found: Evaluation) -> None:
-    """The verdict and the tables that it rests on."""
-    told = verdict.of(found)
-    sheet.verdict(told.state, told.summary, [(finding.state, finding.text) for finding in told.findings])
+def result(sheet: html_page.Page, found: Evaluation) -> None:
+    """The verdict and its tables."""
+    judged = verdict.of(found)
+    sheet.verdict(
+        judged.state, judged.summary, [(finding.state, finding.text) for finding in judged.findings]
+    )
     for text in found.complaints:
         if "cut short" in text:
             sheet.note(text, html_page.BAD)
@@ -99,9 +111,9 @@ def _steps(sheet: html_page.Page, found: Evaluation) -> None:
 def _peaks(sheet: html_page.Page, found: Evaluation) -> None:
     seen = bool(found.curves.measured.any())
     rows: list[Sequence[object]] = []
-    for name, most, checks in zip(found.names, found.extremes, found.limit_checks, strict=True):
+    for name, most, checked in zip(found.names, found.extremes, found.limit_checks, strict=True):
         for quantity, unit, value, check in zip(
-            ("speed", "acceleration"), ("°/s", "°/s²"), most.values, checks, strict=False
+            ("speed", "acceleration"), ("°/s", "°/s²"), most.values, checked, strict=False
         ):
             cells = (name, quantity, f"{value:.2f}", f"{check.limit:g} {unit}")
             rows.append((*cells, *_measured_peak(check)) if seen else cells)
@@ -113,3 +125,57 @@ def _measured_peak(check: peaks.LimitCheck) -> tuple[object, object]:
     """The cells of _MEASURED_PEAKS."""
     measured = "–" if np.isnan(check.peak) else f"{check.peak:.2f} ± {check.sigma:.2f}"
     return measured, (check.verdict, _COLOURS.get(check.verdict, ""))
+
+
+def plan_extremes(sheet: html_page.Page, plan: Plan) -> None:
+    """Motion times with their lower bounds, exact extremes with the limits, and the planner's notes."""
+    rows = [_extremes_row(plan, joint) for joint in range(len(plan.extremes))]
+    sheet.table(tuple(_EXTREMES), rows, "Motion time, and largest magnitudes with their limits", _EXTREMES)
+    for note in plan.notes:
+        sheet.note(f"Note: {note}")
+
+
+def plan_timing(sheet: html_page.Page, plan: Plan) -> None:
+    """For per-joint timing: differences of the joints' times at the via points, and the tool's deviation."""
+    if plan.job.timing != "per-joint" or len(plan.searches) < 2:
+        return
+    sheet.heading("Per-joint timing")
+    rows: list[list[str]] = []
+    times = [joint.via_times_s for joint in plan.trajectory.joints]
+    for via, spread in enumerate(path_deviation.via_spread_s(plan.trajectory)):
+        rows.append([f"P{via}", *(f"{joint[via]:.3f}" for joint in times), f"{spread:.3f}"])
+    header = ("via point", *(f"{joint.name} (s)" for joint in plan.arm.driven), "apart by (s)")
+    sheet.table(header, rows, "When each joint passes the via points")
+    if checks.is_free(plan.job):
+        return
+    stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
+    sheet.note(
+        f"The joints do not pass a via point together, so the tool strays up to {stray:.1f} mm from the path "
+        'that they would follow with timing = "shared".'
+    )
+
+
+def plan_origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, object]]) -> None:
+    """Settings and versions of the plan, and ``others`` of the run."""
+    job = plan.job
+    rows: list[tuple[str, object]] = [
+        ("path", job.path),
+        ("optimiser", f"{job.optimiser}, population {job.population}, {job.iterations} iterations"),
+        ("seed", job.seed),
+        ("degree, timing, refine", f"{job.degree}, {job.timing}, {job.refine}"),
+        *((f"version of {name}", value) for name, value in plan.versions.items()),
+        *others,
+    ]
+    sheet.table(("what", "value"), [(name, str(value)) for name, value in rows])
+
+
+def _extremes_row(plan: Plan, joint: int) -> list[str]:
+    limits = plan.arm.driven[joint].limits
+    floors = [search.floor_s for search in plan.searches if joint in search.joints]
+    largest = zip(plan.extremes[joint].values, limits.values, strict=True)
+    return [
+        plan.arm.driven[joint].name,
+        f"{plan.trajectory.joints[joint].duration_s:.4f}",
+        f"{floors[0]:.4f}" if floors else "–",
+        *(f"{value:.3f} of {most:g}" for value, most in largest),
+    ]
