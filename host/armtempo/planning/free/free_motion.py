@@ -31,21 +31,25 @@ _PARTS = 4
 _CORRIDOR_PARTS = 4
 """Points per segment at which the tool's corridor is enforced."""
 _PEAK_GRID_FACTOR = 4
-_PEAK_THRESHOLD = 0.95
-_AWAY = 1.01
-"""Factor on time before each solve, for a start within the limits."""
+_PEAK_THRESHOLDS = 0.95, 0.999
+"""Peaks that become points after the first solve, and after a later one."""
+_AWAY, _LEAST_AWAY = 0.01, 1e-5
+"""Fraction by which time is stretched before each solve, for a start within the limits: twice what the last one was
+stretched by, within these."""
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
 """Weight of steps between time differences in the first solve, per segment and via point; fraction of it later."""
 _LEAST_STEP = 1e-3
 """Least difference of time control points, as a fraction of their mean: rounding errors of angles are divided
 by its cube."""
-_FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-4, curvature=False)
-_AGAIN = Schedule(first_barrier=1e-3, last_barrier=1e-4, curvature=False)
+_FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-3, iterations=60, curvature=False)
+"""Mostly 20 to 40 iterations; what needs more is a bad start."""
+_AGAIN = Schedule(first_barrier=1e-3, last_barrier=3e-4, curvature=False)
+"""Begins with a barrier as large as the last excess, if that is between these."""
 _ROUNDED = 1e-10
 """Relative excess over a bound that is only rounding."""
 _AT_END = 1e-6
 """A via point this close to the end of a range (fraction of the joint's motion) counts as at the end."""
-_NEAR = 1e-5
+_NEAR = 1e-4
 """Solves end if the limits at their points are exceeded by at most this fraction."""
 
 
@@ -146,7 +150,7 @@ class FreeMotion:
         for knot, dwell_s in self.layout.dwells.items():
             own = knot + DEGREE - 1
             lasts_s = float(weights @ differences[knot : knot + len(weights)])
-            differences[own] = max(differences[own] + dwell_s - lasts_s, _LEAST_STEP * differences[own])
+            differences[own] = max(differences[own] + dwell_s - lasts_s, _LEAST_STEP * dwell_s)
         return replace(self, differences_s=differences)
 
 
@@ -242,11 +246,13 @@ class Improver:
         ``motion``."""
         points = collocation.grid(self.layout.segments, _PARTS, ends=False)
         best = here = motion.stretched(self.demand.limits)
+        stretch = np.inf
         for number in range(rounds):
-            here = self._inside(self._solve(here, points, first=number == 0), best)
+            here = self._inside(self._solve(here, points, stretch), best)
             curve = here.curve(self.demand.limits)
             stretch = curve.stretch()
-            points += collocation.peaks(curve, _PEAK_GRID_FACTOR * _PARTS, _PEAK_THRESHOLD)
+            least = _PEAK_THRESHOLDS[min(number, 1)]
+            points += collocation.peaks(curve, _PEAK_GRID_FACTOR * _PARTS, least)
             here = here.slower(stretch)
             best = min(best, here, key=lambda candidate: candidate.total_s)
             if stretch < 1.0 + _NEAR:
@@ -282,18 +288,23 @@ class Improver:
             self.variables
         )
 
-    def _solve(self, motion: FreeMotion, points: Points, first: bool) -> FreeMotion:
+    def _solve(self, motion: FreeMotion, points: Points, stretch: float) -> FreeMotion:
+        """``stretch``: how much the solve before exceeded the limits, as a factor on time; inf for the first."""
         unit_s = motion.total_s / self.layout.segments
         limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
         blocks: list[Block] = [LimitRows(self.variables, points, limits), self.angle_rows()]
         if self._targets is not None and self.demand.tool is not None:
             blocks.append(ToolRows(self.variables, self.demand.tool, self._targets, self._size))
+        first, excess = stretch == np.inf, stretch - 1.0
         smoothing = self._smoothing() * (1.0 if first else _SMOOTHED)
-        steps = motion.differences_s / unit_s * _AWAY
+        steps = motion.differences_s / unit_s * (1.0 + min(2.0 * excess + _LEAST_AWAY, _AWAY))
         least = min(_LEAST_STEP, 0.5 * float(steps.min()))
         program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least)
         start = self.variables.pack(motion.angle_points_deg / self._size, steps)
-        x = interior_point.minimise(program, start, _FIRST if first else _AGAIN).x
+        barrier = min(max(excess, _AGAIN.last_barrier), _AGAIN.first_barrier)
+        x = interior_point.minimise(
+            program, start, _FIRST if first else replace(_AGAIN, first_barrier=barrier)
+        ).x
         x = met(self.variables, program.equalities, x)
         return replace(
             motion,

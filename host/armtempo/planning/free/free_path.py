@@ -18,13 +18,12 @@ from armtempo.planning.free.layout import DEGREE, LEAST_PIECES, Layout
 from armtempo.splines import bspline
 
 _COARSE_PIECES = 8
-_PIECES, _LEAST, _MOST = 28, 56, 224
-"""Segments of an automatic layout: per stretch between via points, least and largest total."""
-_FEW = 5
-"""Segments per stretch if _MOST is exceeded."""
+_PIECES, _LEAST = 32, 96
+"""Segments of an automatic layout: per stretch between via points, and least total."""
 _EVEN_PIECES = 24
 """Segments per stretch if all have the same number."""
-_ROUNDS = 3
+_ROUNDS = 6
+"""Solves on the final segments, each with the peaks of the one before; fewer if the limits hold between points."""
 _SPREAD = 0.5
 """Standard deviation of the logarithm of the random factors on the stretches' times."""
 _INSIDE = 0.998
