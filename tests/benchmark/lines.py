@@ -1,6 +1,6 @@
 """Random lines, arcs, cut corners, waits and speeds of the tool, planned and looked at by code of its own.
 
-    python -m tests.benchmark.lines [--first 0] [--count 100] [--minutes M]
+    python -m tests.benchmark.lines [--first 0] [--count 100] [--minutes M] [--arcs]
 
 For arms that ship: forward kinematics by plain matrix products, scipy's B-splines and rotations, 40 samples a segment.
 Looks for places beyond the tolerance of a line, tools that are too fast, limits exceeded, rests missing. A job that is
@@ -319,15 +319,17 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=np.inf, help="begin no further job after these")
+    parser.add_argument("--arcs", action="store_true", help="only jobs with arcs")
     options = parser.parse_args()
     end = time.monotonic() + 60.0 * options.minutes
-    counts = {"planned": 0, "refused": 0, "refused wrongly": 0, "faulty": 0}
+    counts = {"planned": 0, "refused": 0, "refused wrongly": 0, "faulty": 0, "arcs in those planned": 0}
     seconds, over = [], []
     for seed in range(options.first, options.first + options.count):
         if time.monotonic() > end:
             break
         arm, job = random_lines(seed)
-        if not job.ways:
+        arcs = sum(way.arc_through_mm is not None for way in job.ways)
+        if not job.ways or (options.arcs and not arcs):
             continue
         start = time.process_time()
         try:
@@ -340,6 +342,7 @@ def main() -> int:
         seconds.append(time.process_time() - start)
         over.append(100.0 * (plan.total_s / plan.searches[0].floor_s - 1.0))
         counts["planned"] += 1
+        counts["arcs in those planned"] += arcs
         found = faults(plan, 1e9) + line_faults(plan)
         counts["faulty"] += bool(found)
         for fault in found:
