@@ -37,7 +37,6 @@ _IMPORTED_LATER = (
     "armtempo_board.storage.store",
     "armtempo_board.app.room",
     "armtempo_board.app.arm_setup",
-    "armtempo_board.app.run_start",
     "armtempo_board.app.store_commands",
 )
 _FOR_LATER = (*_IMPORTED_LATER, "gc", "os")
@@ -128,7 +127,7 @@ class Pipe:
         """Power up: a new program on the same flash."""
         with board_modules():
             # the program imports these when it needs them
-            from armtempo_board.app import arm_setup, run_start, store_commands  # noqa: F401
+            from armtempo_board.app import arm_setup, store_commands  # noqa: F401
             from armtempo_board.app.app import App
             from armtempo_board.motion import arm_check  # noqa: F401
             from armtempo_board.storage import store  # noqa: F401  the program imports them when it needs them
@@ -252,7 +251,7 @@ ARM = stand_in.arm(3)
 def random_motion(numbers: random.Random, segments: int = 6, joints: int = 3) -> bytes:
     """A motion record for ``ARM``; its numbers mean nothing."""
     points = [[numbers.randrange(2**40) for _ in range(segments + 5)] for _ in range(joints)]
-    return motion.pack(5, points, points, 1, motion.NO_RAMPS, wire.record_crc(ARM))
+    return motion.pack(5, points, points, 1, motion.no_ramps(), wire.record_crc(ARM))
 
 
 def ready(pipe: Pipe) -> tuple[Client, bytes]:

@@ -20,9 +20,13 @@ if TYPE_CHECKING:
 
 def load_program() -> "Any":
     """Import the program, which takes most of the chip's heap; prints a traceback if that fails."""
+    import sys
+
     from armtempo_board import heap
 
     heap.collect_often()
+    if "armtempo_sectors" in sys.modules:
+        sys.modules["armtempo_sectors"].load()
     from armtempo_board.app import program
 
     return program
@@ -50,6 +54,11 @@ def keep_watchdog_fed() -> None:
 
 def replay(name: str = "") -> None:
     """Run a stored motion (default: the default motion) without a host; see ``app/standalone.py``."""
+    load_program()
+    try:
+        import armtempo_sectors  # noqa: F401  finds more modules
+    except ImportError:  # they are elsewhere
+        pass
     from armtempo_board.app import standalone
 
     standalone.replay(name)

@@ -6,7 +6,7 @@ pyb.Pin("A15", pyb.Pin.OUT_PP, value=0)  # STEP 1 low at once: a reset pulls the
 pyb.usb_mode("VCP")
 
 try:
-    import armtempo_archive  # noqa: F401  where the program is not in the firmware
+    import armtempo_sectors  # noqa: F401  where the program is not in the firmware
 except Exception:
     pass
 try:

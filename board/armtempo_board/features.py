@@ -1,7 +1,7 @@
 """Features of the program beyond one motion at a time.
 
-The program in the firmware has all of them. In files on MicroPython's own firmware there is not enough heap,
-so they are left out (``deploy/program_files.py`` on the host), and their commands are refused.
+The program in the firmware has all of them. On MicroPython's own firmware they are left out, to save heap
+(``deploy/program_files.py`` on the host), and their commands are refused.
 """
 
 SEQUENCES = True

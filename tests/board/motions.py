@@ -37,7 +37,7 @@ def record(via_steps: list[Array], intervals_s: list[Array], degree: int, refine
         _fixed(time_axis.control_points(row, degree) * limits.TICK_HZ, limits.TICK_FRACTION_BITS)
         for row in intervals_s
     ]
-    return motion.pack(degree, angles, times, refine, motion.NO_RAMPS, 0)
+    return motion.pack(degree, angles, times, refine, motion.no_ramps(), 0)
 
 
 def feeding(degree: int = 5, slower: float = 1.0, finer: float = 1.0, refine: int = 1) -> bytes:
@@ -69,7 +69,7 @@ def steady(rate: float) -> bytes:
     places = np.arange(15) - 2.0
     angles = rate / 10 * (places + 0.004 * np.sin(np.arange(15)))
     times = _fixed(places * limits.TICK_HZ / 10, limits.TICK_FRACTION_BITS)
-    return motion.pack(5, [_fixed(angles, limits.STEP_FRACTION_BITS)], [times], 1, motion.NO_RAMPS, 0)
+    return motion.pack(5, [_fixed(angles, limits.STEP_FRACTION_BITS)], [times], 1, motion.no_ramps(), 0)
 
 
 def chance(rng: np.random.Generator) -> bytes:

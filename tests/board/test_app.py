@@ -23,7 +23,6 @@ BASICS = SCRIPTS / "probes" / "app_basics.py"
 SUBJECTS = [
     *(SCRIPTS / "cases" / f"app_{name}.py" for name in ("commands", "runs", "faults", "start")),
     *(SCRIPTS / "cases" / f"app_{name}.py" for name in ("sequence_start", "sequences")),
-    SCRIPTS / "cases" / "heap_modules.py",
 ]
 
 

@@ -38,7 +38,7 @@ def straight(times_s: list[float], angles: list[float]) -> bytes:
         [[round(angle * 2**limits.STEP_FRACTION_BITS) for angle in angles]],
         [[round(time * limits.TICK_HZ * 2**limits.TICK_FRACTION_BITS) for time in times_s]],
         1,
-        motion.NO_RAMPS,
+        motion.no_ramps(),
         0,
     )
 

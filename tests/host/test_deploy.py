@@ -1,26 +1,30 @@
-"""What a deployment would do: which files, in which form, on which boards; the compiled program is made once."""
+"""What a deployment would do: which files, in which form, on which boards."""
 
 from __future__ import annotations
 
-import json
 import shutil
+import struct
 import sys
-from collections.abc import Callable, Iterator
+import zlib
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from armtempo.basics.errors import InputError, LinkError, MissingPackageError
-from armtempo.deploy import changes, compiled_cache, package, program_files, remote
-from armtempo.deploy.remote import Remote, Survey
+from armtempo.basics.errors import LinkError, MissingPackageError
+from armtempo.deploy import changes, program_files, remote, sectors
+from armtempo.deploy.changes import Wanted
+from armtempo.deploy.remote import Remote, SectorsFound, Survey
 from armtempo.link.program_version import PACKAGES, own_crc, package_folder
 from armtempo_shared.program_hash import sources_crc
 
-pytestmark = pytest.mark.xdist_group("compact program")  # which takes seconds to make
+pytestmark = pytest.mark.xdist_group("compiled program")  # which takes seconds to make
 
-CORTEX_M4 = 6 | 3 << 8 | 7 << 10
-BOARD = Survey("STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 180, 512, False, None, {})
-FILES = {"armtempo_board/core.mpy": bytes(range(256)), "armtempo_board/__init__.mpy": b""}
+CORTEX_M4 = program_files.STM32F4
+BLANK = SectorsFound("ff" * 12, 0, True)
+BOARD = Survey(
+    "STM32F4DISC with STM32F407", (1, 29, 0), CORTEX_M4, 95_000, 180, 512, False, None, {}, {}, BLANK
+)
 
 
 def quiet(text: str) -> None: ...
@@ -55,37 +59,74 @@ def test_the_hash_covers_names_and_contents_in_all_packages(tmp_path: Path) -> N
     assert crc() in found
 
 
+def held(image: bytes) -> SectorsFound:
+    """What a survey finds of an image."""
+    return SectorsFound(image[:12].hex(), zlib.crc32(image[12:]), False)
+
+
 @pytest.mark.slow
-def test_compiled_files_fit_the_smallest_board() -> None:
+def test_the_compiled_program_takes_few_blocks_and_two_sectors() -> None:
     told: list[str] = []
-    library = changes.choose(BOARD, False, told.append)
+    program = changes.choose(BOARD, False, told.append)
     assert "too small for the sources" in told[0]
-    assert library["/flash/lib/armtempo_archive.mpy"][:2] == b"M\x06"
-    blocks = sum(-(-len(data) // 512) for data in (*library.values(), *program_files.start_files().values()))
-    largest, usual, arm_and_folders = 33, 3 * 4, 4
-    assert blocks + largest + usual + arm_and_folders <= BOARD.free_blocks
-    assert blocks <= 116, "board/docs/memory.md"
+    files = {**program.files, **program_files.start_files()}
+    assert program.files[program_files.LOADER][:2] == b"M\x06"
+    assert sum(-(-len(data) // BOARD.block_size) for data in files.values()) <= 10, "board/docs/memory.md"
+    assert len(program.image) < 0.6 * sectors.SIZE
+    change = changes.difference(BOARD, program)
+    assert (change.write, change.remove, change.image) == (program.files, [], program.image)
+    written = {path: (len(data), changes.digest(data)) for path, data in program.files.items()}
+    there = replace(BOARD, files=written, sectors=held(program.image))
+    assert changes.difference(there, program).is_none()
+    damaged = replace(held(program.image), crc=1)
+    assert changes.difference(replace(there, sectors=damaged), program).image == program.image
+
+
+def test_sectors_that_hold_something_else_are_not_touched() -> None:
+    other = replace(BOARD, sectors=SectorsFound("01" * 12, 0, False))
+    with pytest.raises(LinkError, match=r"0x080c0000 on.*hold something else"):
+        changes.choose(other, True, quiet)
+    assert changes.difference(other, Wanted({})).image is None
+    interrupted = replace(other, files={program_files.ERASING: (0, "")})
+    assert changes.choose(interrupted, True, quiet).image
+    change = changes.difference(interrupted, Wanted({}))
+    assert (change.image, change.remove) == (b"", []), "to be erased; the file goes after that"
+    assert changes.difference(replace(BOARD, sectors=held(b"ARMT" + bytes(20))), Wanted({})).image == b""
+    with pytest.raises(LinkError, match="less than 1 MB of flash"):
+        changes.choose(replace(BOARD, sectors=None), True, quiet)
 
 
 @pytest.mark.slow
-def test_the_program_fits_again_where_it_is_and_the_flash_is_full() -> None:
-    library = changes.choose(BOARD, True, quiet)
-    on_it = {**library, **program_files.start_files()}
-    files = {path: (len(data), changes.digest(data)) for path, data in on_it.items()}
-    assert changes.choose(replace(BOARD, files=files, free_blocks=0), True, quiet) == library
-    another = {**files, "/flash/main.py": (600, "")}  # it will be kept aside
-    with pytest.raises(LinkError, match="the board has room for"):
-        changes.choose(replace(BOARD, files=another, free_blocks=0), True, quiet)
-    changes.choose(replace(BOARD, files=another, free_blocks=1), True, quiet)
+def test_all_code_of_an_image_is_aligned() -> None:
+    """And the files in it are those that mpy-cross made, but for fillers in numbers."""
+    data = program_files.image(CORTEX_M4)
+    length = int.from_bytes(data[12:14], "little")
+    lines = data[14 : 14 + length].decode().split("\n")[1:]
+    needed = lines[: lines.index("later")]
+    assert "board/app/program" in needed[-1]
+    assert any(line.startswith("board/app/standalone ") for line in lines)
+    found = 0
+    for line in lines:
+        if " " in line:
+            at = int(line.split()[1])
+            count = int.from_bytes(data[at : at + 4], "little")
+            for entry in range(at + 4, at + 4 + 8 * count, 8):
+                place, about = struct.unpack_from("<II", data, entry)
+                assert place % 4 == 0
+                assert place + (about >> 8) <= len(data)
+                found += 1
+            assert data[at + 4 + 8 * count] == ord("M")
+    assert found > 500
 
 
 @pytest.mark.slow
 def test_sources_go_where_there_is_room() -> None:
-    library = changes.choose(replace(BOARD, free_blocks=2000, free_heap=200_000), False, quiet)
-    assert "/flash/lib/armtempo_board/app/app.py" in library
+    program = changes.choose(replace(BOARD, free_blocks=2000, free_heap=200_000), False, quiet)
+    assert "/flash/lib/armtempo_board/app/app.py" in program.files
+    assert not program.image
     told: list[str] = []
-    library = changes.choose(replace(BOARD, free_blocks=2000), False, told.append)
-    assert list(library) == ["/flash/lib/armtempo_archive.mpy", "/flash/lib/armtempo.z"]
+    program = changes.choose(replace(BOARD, free_blocks=2000), False, told.append)
+    assert list(program.files) == [program_files.LOADER]
     assert "memory is too small for the sources" in told[0]
 
 
@@ -97,7 +138,7 @@ def test_only_what_differs_is_written() -> None:
         "/flash/lib/armtempo_board/gone.py": (1, ""),
         "/flash/boot.py": (1, ""),
     }
-    change = changes.difference(replace(BOARD, files=files), library)
+    change = changes.difference(replace(BOARD, files=files), Wanted(library))
     assert change.write == {"/flash/lib/armtempo_board/b.py": b"b"}
     assert change.remove == ["/flash/lib/armtempo_board/gone.py"]
 
@@ -131,14 +172,14 @@ def test_program_in_the_firmware_leaves_no_library() -> None:
     told: list[str] = []
     frozen = replace(BOARD, firmware_crc=own_crc(), free_blocks=20)
     changes.check_suitable(frozen)
-    assert changes.choose(frozen, False, told.append) == {}
+    assert changes.choose(frozen, False, told.append) == Wanted({})
     assert "part of the board's firmware" in told[0]
 
 
 @pytest.mark.slow
 def test_full_flash_is_refused() -> None:
-    full = replace(BOARD, free_blocks=20)
-    with pytest.raises(LinkError, match="has room for 20; nothing of it is in use") as refused:
+    full = replace(BOARD, free_blocks=2)
+    with pytest.raises(LinkError, match="has room for 2; nothing of it is in use") as refused:
         changes.choose(full, True, quiet)
     assert "remove" not in refused.value.hint
     mine = replace(full, others={"/flash/notes.txt": 700, "/flash/armtempo/a.atm": 60_000})
@@ -161,18 +202,6 @@ def test_a_board_under_cpython_takes_no_compiled_files() -> None:
 def test_compiled_files_of_another_version_are_refused(mpy: int) -> None:
     with pytest.raises(LinkError, match="takes compiled files of version"):
         program_files.library(mpy)
-
-
-@pytest.mark.slow
-def test_package_folder_lists_what_it_holds(tmp_path: Path) -> None:
-    package.write(tmp_path / "new")
-    content = json.loads((tmp_path / "new" / "package.json").read_text())
-    names = [name for name, _ in content["urls"]]
-    files = [path for path in (tmp_path / "new").rglob("*") if path.is_file()]
-    assert {str(path.relative_to(tmp_path / "new")) for path in files} == {*names, "package.json"}
-    assert names[-1] == "main.py"
-    with pytest.raises(InputError, match="not empty"):
-        package.write(tmp_path / "new")
 
 
 def test_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,84 +246,3 @@ def test_a_process_that_is_no_longer_wanted_is_ended_and_waited_for() -> None:
     assert process.returncode is not None
     assert process.stdout
     assert process.stdout.closed
-
-
-@pytest.fixture
-def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], dict[str, bytes]]:
-    """Makes the files, and counts how often."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-
-    def made() -> dict[str, bytes]:
-        made.times += 1  # type: ignore[attr-defined]
-        return FILES
-
-    made.times = 0  # type: ignore[attr-defined]
-    return made
-
-
-def kept(folder: Path) -> Path:
-    return folder / "armtempo" / "program.json"
-
-
-def test_what_is_kept_is_not_made_again(make: Callable[[], dict[str, bytes]]) -> None:
-    for _ in range(3):
-        assert compiled_cache.fetch("program", "a key", make) == FILES
-    assert make.times == 1  # type: ignore[attr-defined]
-
-
-def test_another_key_makes_it_anew(make: Callable[[], dict[str, bytes]]) -> None:
-    compiled_cache.fetch("program", "a key", make)
-    assert compiled_cache.fetch("program", "another", make) == FILES
-    assert make.times == 2  # type: ignore[attr-defined]
-
-
-@pytest.mark.parametrize("damage", ["cut", "altered", "no JSON", "other JSON", "a folder"])
-def test_damaged_files_are_not_used(
-    damage: str, make: Callable[[], dict[str, bytes]], tmp_path: Path
-) -> None:
-    compiled_cache.fetch("program", "a key", make)
-    path = kept(tmp_path)
-    content = json.loads(path.read_text())
-    if damage == "altered":
-        content["files"]["armtempo_board/core.mpy"] = content["files"]["armtempo_board/__init__.mpy"]
-    text = {"no JSON": "", "other JSON": "[]", "cut": path.read_text()[:200]}.get(damage, json.dumps(content))
-    path.unlink()
-    if damage == "a folder":
-        path.mkdir()
-    else:
-        path.write_text(text)
-    assert compiled_cache.fetch("program", "a key", make) == FILES
-    assert make.times == 2  # type: ignore[attr-defined]
-
-
-def test_a_folder_that_cannot_be_written_costs_time_only(
-    make: Callable[[], dict[str, bytes]], tmp_path: Path
-) -> None:
-    (tmp_path / "armtempo").write_text("a file where the folder would be")
-    for _ in range(2):
-        assert compiled_cache.fetch("program", "a key", make) == FILES
-    assert make.times == 2  # type: ignore[attr-defined]
-
-
-def test_every_file_is_part_of_the_key(tmp_path: Path) -> None:
-    (tmp_path / "a" / "b").mkdir(parents=True)
-    keys = {compiled_cache.key_of([tmp_path])}
-    (tmp_path / "a" / "b" / "x.py").write_text("1")
-    keys.add(compiled_cache.key_of([tmp_path]))
-    (tmp_path / "a" / "b" / "x.py").write_text("2")
-    keys.add(compiled_cache.key_of([tmp_path]))
-    (tmp_path / "a" / "b" / "x.py").rename(tmp_path / "a" / "b" / "y.py")
-    keys.add(compiled_cache.key_of([tmp_path]))
-    keys.add(compiled_cache.key_of([tmp_path], "another compiler"))
-    assert len(keys) == 5
-
-
-@pytest.mark.slow
-def test_the_program_that_is_kept_is_the_one_that_is_made(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    mpy = 7 << 10 | 3 << 8 | 6  # MicroPython 1.23 and newer on a Cortex-M4
-    made = program_files.library(mpy)
-    monkeypatch.setattr(program_files, "_compile", None)
-    assert program_files.library(mpy) == made

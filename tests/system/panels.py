@@ -17,7 +17,8 @@ from typing import Any, TypeVar
 import armtempo
 from armtempo.basics import toml_table
 from armtempo.basics.errors import LinkError
-from armtempo.deploy import package, program_files
+from armtempo.deploy import program_files
+from armtempo.deploy.firmware import frozen
 from armtempo.model import shipped
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState
@@ -188,7 +189,7 @@ def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "
     job = () if arm else ("--job", "job.toml")
     with ExitStack() as stack:
         moved = armtempo.Arm.of(arm) if arm else ARM
-        package.fill(folder / "flash", _library())
+        frozen.fill(folder / "flash", _library())
         options = LaunchOptions(
             folder / "flash",
             virtual_time=False,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.basics.errors import BoardError, LinkError, MissingPackageError
-from armtempo.deploy import deploy, package, remote
+from armtempo.deploy import deploy, remote
 from armtempo.deploy.firmware import frozen
 from armtempo.link import Client, open_board
 from armtempo.simulator import LaunchOptions, VirtualBoard, edgelog, launch
@@ -89,7 +89,7 @@ def test_sources_on_an_empty_board_and_back(tmp_path: Path) -> None:
 
 def fill(link: Client, data: bytes) -> list[str]:
     """Store a motion under one name after the other, until the board refuses; the names."""
-    for number in range(100):
+    for number in range(200):
         try:
             link.upload(f"more{number}", data)
         except BoardError:
@@ -99,7 +99,7 @@ def fill(link: Client, data: bytes) -> list[str]:
 
 @pytest.mark.slow
 def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
-    """All that fits, refusals by name, a power cycle, and at the end the flash as it was."""
+    """All that fits, refusals by name, a power cycle, damage, and at the end the flash as it was."""
     flash = tmp_path / "flash"
     with board(INTERPRETERS[-1], flash) as found:
         before = {path.name: path.read_bytes() for path in flash.iterdir()}
@@ -129,15 +129,39 @@ def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
     with board(INTERPRETERS[-1], flash) as found:
         armtempo("home", "--arm", "paper", "--port", found.port, folder=tmp_path)
         assert "complete" in armtempo("run", file, "--port", found.port, folder=tmp_path)
+    sectors = tmp_path / "flash.sectors"
+    whole = sectors.read_bytes()
+    sectors.write_bytes(whole[:70_000] + bytes([whole[70_000] ^ 1]) + whole[70_001:])
+    first_of_erasing = 5  # after the removal of both start files, and the making of one
+    with board(INTERPRETERS[-1], flash, power_cut_at=first_of_erasing) as found:
+        assert "armtempo deploy" in armtempo("status", "--port", found.port, folder=tmp_path, code=1)
+        assert "mpremote failed" in armtempo("undeploy", "--port", found.port, folder=tmp_path, code=1)
+        assert sectors.read_bytes() != whole
+        armtempo("deploy", "--mpy", "--port", found.port, folder=tmp_path)
+        assert sectors.read_bytes() == whole
         armtempo("undeploy", "--port", found.port, folder=tmp_path)
+    assert not sectors.exists(), "they are blank again"
     shutil.rmtree(flash / "armtempo")
     assert {path.name: path.read_bytes() for path in flash.iterdir()} == before
 
 
-def test_cut_off_deployment_is_completed_by_the_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sectors_that_hold_something_else_are_left_alone(tmp_path: Path) -> None:
+    sectors = tmp_path / "flash.sectors"
+    sectors.write_bytes(bytes(1 << 18))
+    with board(INTERPRETERS[-1], tmp_path / "flash") as found:
+        refused = armtempo("deploy", "--mpy", "--port", found.port, folder=tmp_path, code=1)
+        assert "hold something else" in refused
+        armtempo("undeploy", "--port", found.port, folder=tmp_path)
+    assert sectors.read_bytes() == bytes(1 << 18)
+
+
+@pytest.mark.parametrize("cut", [5, 30], ids=["files", "sectors"])
+def test_cut_off_deployment_is_completed_by_the_next(
+    cut: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(remote, "SILENCE_S", 6.0)  # a loaded machine must get as far as the cut
     monkeypatch.setattr(remote, "SLOWEST_BYTES_S", 1e6)
-    with board(INTERPRETERS[-1], tmp_path / "flash", power_cut_at=60) as found:
+    with board(INTERPRETERS[-1], tmp_path / "flash", power_cut_at=cut) as found:
         with pytest.raises(LinkError, match="repaired by doing it again"):
             deploy(found.port, False, lambda text: None, lambda done, whole: None)
         assert "armtempo deploy" in armtempo("status", "--port", found.port, folder=tmp_path, code=1)
@@ -162,17 +186,6 @@ def test_without_a_compiler_the_program_is_not_ended(tmp_path: Path, monkeypatch
             deploy(found.port, mpy=True)
         assert before.status().state == "unconfigured"
         assert before.info.boot == boot
-
-
-def test_mip_installs_the_package(tmp_path: Path) -> None:
-    package.write(tmp_path / "package")
-    with board(INTERPRETERS[-1], tmp_path / "flash") as found:
-        mpremote(
-            found.port, "mip", "install", "--target", "/flash", str(tmp_path / "package" / "package.json")
-        )
-    for path in (tmp_path / "package").rglob("*.mpy"):
-        assert (tmp_path / "flash" / path.relative_to(tmp_path / "package")).read_bytes() == path.read_bytes()
-    assert (tmp_path / "flash" / "main.py").exists()
 
 
 def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:

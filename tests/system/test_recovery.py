@@ -189,7 +189,7 @@ def file(bench: Bench, name: str, text: str) -> None:
 
 def full_flash(bench: Bench) -> None:
     shutil.rmtree(bench.flash / "lib")
-    (bench.flash / "data.csv").write_bytes(bytes(512 * (190 - 40)))
+    (bench.flash / "data.csv").write_bytes(bytes(512 * (190 - 14)))
 
 
 def full_of_motions(bench: Bench) -> None:

@@ -42,8 +42,8 @@ ON_SOURCES = [
     if case.interpreter != "micropython" or is_for(case, "not compiled") or not is_for(case, "not on CPython")
 ]
 """What MicroPython runs with the sources themselves: what reaches into the program by the names in them or needs what
-compiled files are without, and what CPython runs too; with what is deployed, compact, it runs all others."""
-COMPACT = [case for case in ALL if case.interpreter == QUICKEST and not is_for(case, "not compiled")]
+compiled files are without, and what CPython runs too; with the core, which is deployed, it runs all others."""
+CORE = [case for case in ALL if case.interpreter == QUICKEST and not is_for(case, "not compiled")]
 
 
 @pytest.fixture(scope="session")
@@ -87,12 +87,14 @@ def _add_legs(folder: Path) -> None:
 
 
 @pytest.fixture(scope="session")
-def compact(tmp_path_factory: pytest.TempPathFactory) -> str:
+def core(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The folder of the program as ``armtempo deploy`` compiles it."""
-    folder = tmp_path_factory.mktemp("compact")
-    for name, text in program_files.compact_files().items():
-        (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_text(text)
+    folder = tmp_path_factory.mktemp("core")
+    texts = program_files.core()
+    for name in program_files.modules():
+        if (module := program_files.dotted(name)) in texts:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(texts[module])
     for path, data in program_files.start_files().items():
         (folder / program_files.PACKAGES[0] / Path(path).name).write_bytes(data)
     return str(folder)
@@ -109,12 +111,9 @@ def test_case(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
     play(case, flashes, tmp_path)
 
 
-@pytest.mark.xdist_group("compact program")  # which takes seconds to make
-@scripted.each(COMPACT)
-def test_case_with_the_compact_program(
-    case: scripted.Case, flashes: Path, compact: str, tmp_path: Path
-) -> None:
-    play(case, flashes, tmp_path, compact)
+@scripted.each(CORE)
+def test_case_with_the_core(case: scripted.Case, flashes: Path, core: str, tmp_path: Path) -> None:
+    play(case, flashes, tmp_path, core)
 
 
 def test_every_motion_of_a_soak_makes_the_steps_of_its_record(tmp_path: Path) -> None:

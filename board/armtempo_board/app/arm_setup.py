@@ -1,26 +1,25 @@
-"""Checks an arm record and makes the engine for it, or refuses it. Imported for that and unloaded afterwards.
+"""Checks an arm record and makes the engine for it, or refuses it.
 
-Store, check and engine never need memory at the same time. Each step is a separate function (``_step``), as
-references in a stack frame would keep its modules in memory.
+Store, check and engine never need memory at the same time.
 """
 
 import gc
 from array import array
 
-from armtempo_shared import codes
+from armtempo_shared import armrecord, codes
 from armtempo_shared.messages import ARM_RECORD_NAME
 from pyb import Pin, Timer
 
-from armtempo_board import features, heap
+from armtempo_board import features
+from armtempo_board.app import room
 from armtempo_board.app.board import NEVER_MS
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
+from armtempo_board.motion import arm_check
+from armtempo_board.storage import store
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from typing import Any
-
     from armtempo_board.app.board import Board
     from armtempo_board.motion.arm_check import Record
 
@@ -33,7 +32,7 @@ def take_stored(board: "Board") -> None:
     board.arm_waits = False
     board.arm_problem = board.arm_value = 0
     try:
-        _step(_take, board, _step(_checked, board, _step(_stored, board)))
+        _take(board, _checked(board, _stored(board)))
     except Refused as refused:
         if refused.code != codes.NOT_FOUND:
             board.arm_problem, board.arm_value = refused.code, refused.value
@@ -46,25 +45,17 @@ def take_new(board: "Board") -> None:
     """Use the uploaded arm record; if it is invalid, raises Refused and keeps the present one."""
     board.arm_waits = False
     try:
-        record = _step(_checked, board, _step(_new, board))
+        record = _checked(board, _new(board))
     except Refused:
-        _step(_decide, board, False)
+        _decide(board, False)
         raise
-    _step(_decide, board, True)
+    _decide(board, True)
     board.arm_problem = board.arm_value = 0
     try:
-        _step(_take, board, record)
+        _take(board, record)
     except Exception:
         _drop_engine(board)
         raise
-
-
-def _step(function: "Callable[..., Any]", board: "Board", *arguments: object) -> "Any":
-    """Call one of the functions below, then unload its modules."""
-    try:
-        return function(board, *arguments)
-    finally:
-        heap.forget()
 
 
 def _stored(board: "Board") -> bytes:
@@ -82,15 +73,11 @@ def _new(board: "Board") -> bytes:
 
 
 def _decide(board: "Board", is_fit: bool) -> None:
-    from armtempo_board.storage import store  # here, so that it can be forgotten
-
     store.Store(board.root, recover=False).take_arm(is_fit)
 
 
 def _checked(board: "Board", data: bytes) -> "Record":
     """The unpacked arm record; raises Refused if it is invalid."""
-    from armtempo_board.motion import arm_check  # here, so that it can be forgotten
-
     return arm_check.checked(data, board.workspace.room)
 
 
@@ -104,8 +91,7 @@ def _take(board: "Board", record: "Record") -> None:
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
     _drop_engine(board)
-    _share_room(board, len(joints))
-    heap.forget("room", "engine_memory")
+    room.share(board.workspace, len(joints))
     board.make_engine(head, joints)
     board.all_but_limits = all_but_limits
     if known:
@@ -116,23 +102,15 @@ def _take(board: "Board", record: "Record") -> None:
     board.raw = array("i", [0] * (COMMANDED + 2 * board.joints))
     board.samples.configure(board.joints)
     if features.OUTPUTS and (outputs or inputs):
-        from armtempo_board.app import output_setup  # here, so that it can be forgotten
+        from armtempo_board.app import output_setup  # here, as few arms need its memory
 
         output_setup.attach(board, outputs, inputs)
 
 
 def _facts(record: "Record") -> "tuple[int, int]":
     """The record's identity of the arm, and whether it stops if the host is silent."""
-    from armtempo_shared import armrecord  # here, so that it can be forgotten
-
     head, joints, _, _, _ = record
     return armrecord.without_limits(head, joints), head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
-
-
-def _share_room(board: "Board", joints: int) -> None:
-    from armtempo_board.app import room  # here, so that it can be forgotten
-
-    room.share(board.workspace, joints)
 
 
 def _drop_engine(board: "Board") -> None:
@@ -145,7 +123,6 @@ def _drop_engine(board: "Board") -> None:
     board.joints = board.arm_crc = 0
     board.samples.configure(0)
     board.raw = array("i", [0] * COMMANDED)
-    heap.forget()
     gc.collect()
 
 

@@ -8,18 +8,22 @@ from array import array
 import machine
 from armtempo_shared import codes
 from armtempo_shared.messages import NO_JOINT
+from armtempo_shared.table import offset
 from micropython import const
 
-from armtempo_board import heap
+from armtempo_board.app import room
 from armtempo_board.app.sample_buffer import SampleBuffer
 from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
 from armtempo_board.errors import Refused
 from armtempo_board.motion.engine import Engine
 from armtempo_board.motion.engine_parts import EngineParts
+from armtempo_board.storage import store
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
+
+    from armtempo_board.storage.motion_file import MotionFile
 
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _BOOT_BYTES = const(4)
@@ -30,10 +34,6 @@ class Board:
     """``root``: the folder of the store. ``fault``: code of a fault that is pending from the start, 0 for none."""
 
     def __init__(self, root: str, program_crc: int, fault: int) -> None:
-        from armtempo_shared.table import offset  # here, so that it can be forgotten
-
-        from armtempo_board.app import room
-
         flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
         self.workspace = room.workspace()  # before anything fragments the heap
         self.samples = SampleBuffer(room.sample_bytes(), flags_at)
@@ -57,31 +57,38 @@ class Board:
         self.raw = array("i", [0] * COMMANDED)  # a sample of the arm
         self.pending = fault
 
-    # the store, loaded only while needed: its code takes memory that a motion needs
+    # the store, there only while needed: it takes memory that a motion needs
 
     def store(self) -> "Any":
-        """The store, loaded if needed; an upload in progress keeps it."""
+        """The store, made if needed; an upload in progress keeps it."""
         if self._store is None:
-            heap.forget()
-            from armtempo_board.storage import store
-
             self._store = store.Store(self.root)
         return self._store
 
     def forget_store(self) -> None:
-        """Abort an upload in progress, and unload the store."""
+        """Abort an upload in progress, and drop the store."""
         if self._store is not None:
             self._store.abandon()
             self.drop_store()
 
     def drop_store(self) -> None:
-        """Unload the store; keep the files of an upload in progress."""
+        """Drop the store; keep the files of an upload in progress."""
         self._store = None
 
     def make_engine(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
         """For an arm, as ``armrecord.unpack`` gives it."""
         gc.collect()
         self.engine = Engine(EngineParts(head, joints, self.workspace))
+
+    def checked(self, motion: "MotionFile", crc: "int | None") -> "MotionFile":
+        """The motion; raises Refused if it is another than expected (``crc``), or not for this arm."""
+        if crc is not None and motion.crc != crc:
+            raise Refused(codes.BAD_CHECKSUM)
+        if motion.arm_crc != self.arm_crc:
+            raise Refused(codes.ARM_MISMATCH)
+        if motion.joints != self.joints:
+            raise Refused(codes.WRONG_JOINTS, value=motion.joints)
+        return motion
 
     # state
 

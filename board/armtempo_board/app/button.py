@@ -5,6 +5,8 @@ import time
 from micropython import const
 from pyb import Pin
 
+from armtempo_board.hardware import pins
+
 _STEADY_MS = const(30)
 
 
@@ -12,8 +14,6 @@ class Button:
     """``pressed`` returns True once for each press that lasts long enough."""
 
     def __init__(self) -> None:
-        from armtempo_board.hardware import pins  # here, so that it can be forgotten
-
         self._pin = Pin(pins.BUTTON, Pin.IN, Pin.PULL_DOWN)
         self._high = True  # a level that is high at the start is not a press
         self._changed_ms = time.ticks_ms()

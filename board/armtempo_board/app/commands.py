@@ -2,10 +2,11 @@
 
 During a motion only the commands of ``_WHILE_MOVING`` and ``Board.rows`` are accepted; of these, all but
 ``hello``, ``stop`` and ``speed`` allocate nothing. Commands of the store and the drivers are in
-``store_commands.py``, imported when needed; of outputs and inputs in ``output_commands.py``, loaded for arms
+``store_commands.py``; of outputs and inputs in ``output_commands.py``, loaded for arms
 that have them; of sequences in ``sequence_command.py``, loaded when a sequence is started.
 """
 
+import gc
 from struct import calcsize, pack_into, unpack_from
 
 from armtempo_shared import codes, limits
@@ -19,9 +20,11 @@ from armtempo_shared.messages import (
     RESUME,
     SLOWEST_PERMILLE,
 )
+from armtempo_shared.table import offset, rows
 from micropython import const
 
 from armtempo_board import features, step_rates
+from armtempo_board.app import store_commands
 from armtempo_board.buffers import u32
 from armtempo_board.errors import Refused
 
@@ -43,6 +46,7 @@ _HANDLER = const(0)
 _FIELDS = const(1)
 _ANSWER = const(2)
 _TAIL = const(3)
+_NUMBER, _ROW = const(0), const(1)  # of the last command
 _UNKNOWN = codes.UNKNOWN_COMMAND if features.ALL else codes.NEEDS_FIRMWARE
 
 
@@ -50,24 +54,20 @@ class Commands:
     """Executes the command in ``link.reader`` and gives the reply to the link."""
 
     def __init__(self, controller: "Controller", link: "SerialLink") -> None:
-        from armtempo_shared.table import offset, rows  # here, so that they can be forgotten
-
-        from armtempo_board.app.command_rows import ROWS
-
         self.controller = controller
         self.board = controller.board
         self.greeted = False  # a host has said hello
         self.leaving = False  # a host has asked for the REPL
         self.link = link
         self._session = 0
-        self._numbers = bytes(ROWS)
+        self._last: "Any" = (0, None)  # number and row of the last command that was looked up
         self._while_moving: "dict[int, Any]" = {}
-        for number, (name, fields, values, tail) in ROWS.items():
-            handler = getattr(type(self), name, None)
-            if handler and name in _WHILE_MOVING:
-                self._while_moving[number] = handler, fields, values, tail
+        for name, number, _, _, _ in rows("C"):
+            if name in _WHILE_MOVING and hasattr(type(self), name):
+                self._while_moving[number] = self._row(number)
             if name == "hello":
                 self._hello_number = number
+        self._numbers = bytes([number for _, number, _, _, _ in rows("C")])
         self._ticks_at = _ANSWER_AT + offset("A", "status", "ticks")
         (_, self._ok, _, _, _), (_, self._error, self._error_fields, _, _) = rows("R")
 
@@ -113,20 +113,17 @@ class Commands:
         self.link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
 
     def _row(self, number: int) -> tuple:
-        """The row of a command that is refused during a motion."""
-        from armtempo_board.app.command_rows import ROWS  # here, so that it can be forgotten
-
-        name, fields, values, tail = ROWS[number]
-        return (
-            name if number in _STORE or number == _DRIVERS else getattr(type(self), name, None),
-            fields,
-            values,
-            tail,
-        )
+        """The row of a command; the last one is kept, as an upload asks for the same again and again."""
+        if self._last[_NUMBER] != number:
+            gc.collect()  # what is kept should lie at a low address
+            for (name, found, fields, _, tail), (_, _, values, _, _) in zip(rows("C"), rows("A")):
+                if found == number:
+                    in_store = number in _STORE or number == _DRIVERS
+                    handler = name if in_store else getattr(type(self), name, None)
+                    self._last = number, (handler, fields, values, tail)
+        return self._last[_ROW]  # type: ignore[no-any-return]
 
     def _store(self, name: str, row: tuple, length: int) -> "int | None":
-        from armtempo_board.app import store_commands  # here, so that it can be forgotten
-
         return getattr(store_commands, name)(self, row, length)  # type: ignore[no-any-return]
 
     def _refuse(self, number: int, code: int, joint: int = NO_JOINT, value: int = 0) -> None:

@@ -17,7 +17,10 @@ from armtempo_shared.messages import RESUME, SAMPLE_BRAKING, START_HELD, START_H
 from micropython import const
 
 from armtempo_board import features, heap
+from armtempo_board.app import arm_setup
+from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
+from armtempo_board.motion import endpoints
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -128,27 +131,26 @@ class Controller:
 
     def configure(self) -> None:
         """Use the stored arm record, if there is a valid one."""
-        from armtempo_board.app import arm_setup  # here, so that it can be forgotten
-
         arm_setup.take_stored(self.board)
 
     def take_new_arm(self) -> None:
         """Take the arm record that was uploaded; Refused if it cannot be, and the one in force stays that."""
-        from armtempo_board.app import arm_setup  # here, so that it can be forgotten
-
         arm_setup.take_new(self.board)
 
     def home(self, mask: int, steps: "Sequence[int]") -> None:
         """Declare the positions of the joints in ``mask``; ``steps`` has an entry for every joint."""
-        from armtempo_board.app import run_start  # here, so that it can be forgotten
-
-        run_start.home(self.board, mask, steps)
+        engine = self.board.engine
+        for joint in range(self.board.joints):
+            row = engine.limits[joint]
+            if mask >> joint & 1 and not row["min_steps"] <= steps[joint] <= row["max_steps"]:
+                raise Refused(codes.OUT_OF_RANGE, joint, steps[joint])
+        engine.home(mask, steps)
 
     def load(self, name: str, crc: "int | None" = None) -> "MotionFile":
         """The stored motion, with head and checksum checked; raises Refused."""
-        from armtempo_board.app import run_start  # here, so that it can be forgotten
-
-        return run_start.opened(self.board, name, crc)
+        store = self.board.store()
+        gc.collect()  # objects that stay during the run should lie at low addresses
+        return self.board.checked(store.motion(name), crc)
 
     def _assume(self, motion: "MotionFile", unknown: int) -> int:
         """Assume that the joints are at the start of a homing motion; those of unknown position are unknown
@@ -156,15 +158,22 @@ class Controller:
 
         Returns one bit per joint that moves.
         """
-        from armtempo_board.app import run_start  # here, so that it can be forgotten
-
-        self._assumed = run_start.assume(self.board, motion, unknown)
-        return run_start.moving(motion)
+        board = self.board
+        board.engine.snapshot(board.raw)
+        moving = 0
+        for joint in range(board.joints):
+            if endpoints.start_offset(motion, joint, board.raw[COMMANDED + joint]):
+                unknown |= 1 << joint
+            if endpoints.at_start(motion, joint) != endpoints.at_end(motion, joint):
+                moving |= 1 << joint
+        self.home(unknown, [endpoints.start_offset(motion, joint, 0) for joint in range(board.joints)])
+        self._assumed = unknown
+        return moving
 
     def tidy(self) -> None:
-        """Free what only the last commands needed, so that new objects lie close to the permanent ones."""
+        """Free what only the last commands needed, so that new objects lie close to those that stay."""
         self.board.forget_store()
-        heap.tidy()
+        gc.collect()
 
     def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
         """Start a stored motion or sequence, or raise Refused. ``crc``: of the record that the host expects;
@@ -196,7 +205,7 @@ class Controller:
         def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
             self.tidy()
             try:
-                from armtempo_board.app import sequence_start  # here, so that it can be forgotten
+                from armtempo_board.app import sequence_start  # here, as only sequences need its memory
 
                 self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
             except MemoryError:
@@ -232,7 +241,7 @@ class Controller:
         self.run_number += 1
         self._braking = False
         self._can_brake = motion.can_brake
-        heap.tidy()
+        gc.collect()
         heap.collect_often(0)
         self.running = True
         if features.JOG:

@@ -3,6 +3,7 @@
 from struct import calcsize, pack_into
 
 from armtempo_shared.messages import MAX_PAYLOAD
+from armtempo_shared.table import offset, rows
 from micropython import const
 
 from armtempo_board import features
@@ -19,8 +20,6 @@ class Events:
     """Gives pending events to the link when it has room."""
 
     def __init__(self, controller: "Controller", link: "SerialLink") -> None:
-        from armtempo_shared.table import offset, rows  # here, so that it can be forgotten
-
         self._controller = controller
         self._board = controller.board
         self._link = link

@@ -2,6 +2,8 @@
 
 from pyb import Pin
 
+from armtempo_board.hardware import pins
+
 _GREEN, _ORANGE, _RED, _BLUE = 0, 1, 2, 3
 _LED_OF_STATE = bytes((_ORANGE, _ORANGE, _GREEN, _BLUE, _BLUE, _RED))
 """By the state's number: unconfigured, unhomed, idle, moving, braking, fault (``messages.STATES``)."""
@@ -11,8 +13,6 @@ class Leds:
     """Lights the LED of the state; writes to the pins only if the state has changed."""
 
     def __init__(self) -> None:
-        from armtempo_board.hardware import pins  # here, so that it can be forgotten
-
         self._pins = [Pin(name, Pin.OUT_PP) for name in pins.LEDS]
         self._state = -1
         self.show(0)

@@ -1,10 +1,14 @@
-"""Makes the outputs and inputs of an arm; unloaded afterwards."""
+"""Makes the outputs and inputs of an arm."""
 
 from array import array
 
+from armtempo_shared.table import rows
 from pyb import Pin, Timer
 
-from armtempo_board import heap
+from armtempo_board.app import output_commands
+from armtempo_board.hardware import pins
+from armtempo_board.hardware.digital_inputs import DigitalInputs
+from armtempo_board.hardware.outputs import Outputs
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -23,24 +27,15 @@ def attach(board: "Board", outputs: "Rows", inputs: "Rows") -> None:
 
     ``outputs``, ``inputs``: rows of the arm record (``armrecord.OUTPUT``, ``INPUT``).
     """
-    from armtempo_shared.table import rows
-
-    from armtempo_board.app import output_commands
-
     board.outputs = outputs_of(outputs)
     board.inputs = inputs_of(inputs)
     handlers = output_commands.output, output_commands.inputs_and_outputs
     for (_, number, fields, _, tail), (_, _, values, _, _), handler in zip(rows("O"), rows("P"), handlers):
         board.rows[number] = (handler, fields, values, tail)
-    # They stay, and are not known by name any more
-    heap.forget("output_commands", "outputs", "digital_inputs")
 
 
 def outputs_of(table: "Rows") -> "Outputs":
     """The outputs of an arm, set to their safe values."""
-    from armtempo_board.hardware import pins
-    from armtempo_board.hardware.outputs import Outputs
-
     numbers = array("H")
     for row in table:
         numbers.extend(array("H", [row["low"], row["high"], row["safe"]]))
@@ -73,9 +68,6 @@ def _driven(
 
 def inputs_of(table: "Rows") -> "DigitalInputs":
     """The inputs of an arm, with their present levels."""
-    from armtempo_board.hardware import pins
-    from armtempo_board.hardware.digital_inputs import DigitalInputs
-
     found = []
     numbers = array("I")
     for row in table:

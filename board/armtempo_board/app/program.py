@@ -11,14 +11,20 @@ from micropython import const
 
 from armtempo_board.stepgen import step_generator  # isort: skip  # noqa: F401  nested imports cost stack: the deepest first
 from armtempo_board.motion import engine  # isort: skip  # noqa: F401  and what is deep without that
+from armtempo_board.motion import engine_parts  # isort: skip  # noqa: F401
+
+from armtempo_shared.program_hash import program_crc
 
 import armtempo_board
-from armtempo_board import features, heap
+from armtempo_board import features
 from armtempo_board.app.app import App
 from armtempo_board.app.button import Button
 from armtempo_board.app.leds import Leds
 from armtempo_board.app.watchdog import Watchdog, has_reset
 from armtempo_board.errors import Refused
+
+if features.ALL:
+    from armtempo_board.storage import measured_rates
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -53,18 +59,11 @@ def main(root: str = ROOT) -> None:
 
 
 def _build(port: "pyb.USB_VCP", root: str) -> App:
-    """Make the App; unload the modules that only its set-up needs, to save heap."""
-    from armtempo_shared.program_hash import program_crc  # here, so that it can be forgotten
-
     crc = program_crc(armtempo_board.__file__, armtempo_shared.__file__)
-    del program_crc
     built = App(port, root, crc, codes.WATCHDOG if has_reset() else 0)
     built.controller.board.forget_store()
     if features.ALL:
-        from armtempo_board.storage import measured_rates  # here, so that it can be forgotten
-
         measured_rates.read(root, built.controller.board.board_id, crc)
-    heap.forget()
     return built
 
 

@@ -1,18 +1,16 @@
 """Division of the heap at the program's start: engine, samples, the rest.
 
-The rest is for link and commands, for the modules that are loaded and unloaded (storage, commands of the
-store, the check of a motion), and for their objects: docs/memory.md.
+The rest is for link and commands, for the store, the check of a motion and what runs during it: docs/memory.md.
 """
 
 import gc
 
 from armtempo_shared import engine_memory
 
-from armtempo_board import heap
 from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 26_900  # bytes of heap for the rest; what is to spare: docs/memory.md
+_RESERVE = 20_000  # bytes of heap for the rest; what is to spare: docs/memory.md
 _USUAL_JOINTS = 3
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;
@@ -23,7 +21,6 @@ _STEP_WORDS = 64
 def workspace() -> "Workspace":
     """Memory for the largest arm that fits."""
     address = backup_sram.find()
-    heap.forget("registers")
     gc.collect()
     free = _free()
     room = engine_memory.LARGEST_BYTES

@@ -8,11 +8,11 @@ import gc
 from array import array
 
 from armtempo_shared import sequence
+from armtempo_shared.engine_memory import ahead_bytes
 from armtempo_shared.limits import MOST_STEPS
 from armtempo_shared.motion import MotionError
 from micropython import const
 
-from armtempo_board.app.run_start import checked
 from armtempo_board.app.sequencer import Place, Sequencer
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 _OP, _NUMBER = const(0), const(1)  # of a row
 _NONE = const(-1)
-_BESIDE_BYTES = const(16_500)
-"""Free heap needed: 5 700 bytes for the motions' other needs, the rest for garbage between two collections."""
+_BESIDE_BYTES = const(13_000)
+"""Free heap needed: 2 200 bytes for the motions' other needs, the rest for garbage between two collections."""
 
 
 class AheadSequencer(Sequencer):
@@ -45,8 +45,6 @@ class AheadSequencer(Sequencer):
 
     def begin(self) -> None:
         """As ``Sequencer.begin``; decides whether motions are prepared."""
-        from armtempo_shared.engine_memory import ahead_bytes  # here, so that it can be forgotten
-
         super().begin()
         controller = self._controller
         joints = controller.board.joints
@@ -132,7 +130,7 @@ class AheadSequencer(Sequencer):
     def _open(self, number: int) -> "MotionFile":
         board = self._controller.board
         name, crc = self._record.motion(number)
-        return checked(board, store.Store(board.root, recover=False).motion(name), crc)
+        return board.checked(store.Store(board.root, recover=False).motion(name), crc)
 
     def _stands_at(self, motion: "MotionHead", joint: int) -> int:
         """Position of a joint before the motion, in steps."""

@@ -4,6 +4,7 @@ from array import array
 from struct import calcsize, pack_into
 
 from armtempo_shared.messages import PAYLOAD_AT
+from armtempo_shared.table import rows
 from micropython import const
 
 from armtempo_board.buffers import copy, pack_offsets
@@ -32,8 +33,6 @@ class SequenceCommand:
     """``told``: state of the sequence, or how it ended; ``name``: its name; ``counters``: names of its counters."""
 
     def __init__(self, told: "array[int]", name: bytes, counters: "list[bytes]") -> None:
-        from armtempo_shared.table import rows  # here, so that it can be forgotten
-
         self._told = told
         self._name = name
         self._counters = counters
@@ -47,8 +46,6 @@ class SequenceCommand:
 
     def attach(self, commands: "dict[int, Any]") -> None:
         """Add its commands to the board's commands."""
-        from armtempo_shared.table import rows  # here, so that it can be forgotten
-
         for (name, number, fields, _, tail), (_, _, answer, _, _) in zip(rows("S"), rows("T")):
             commands[number] = (getattr(self, name), fields, answer, tail)
 

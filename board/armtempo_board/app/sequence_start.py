@@ -1,5 +1,5 @@
 """Checks before the start of a sequence: everything that it names exists, and each motion begins at the end
-of the one before. Unloaded before anything moves.
+of the one before.
 """
 
 from armtempo_shared import codes, sequence
@@ -7,6 +7,7 @@ from armtempo_shared.motion import MotionError
 from armtempo_shared.sequence import SequenceError
 from armtempo_shared.sequence_check import check
 
+from armtempo_board.app.sequence_ahead import AheadSequencer
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
@@ -44,8 +45,6 @@ def _kind(controller: "Runner") -> "type[Sequencer]":
     """The class that prepares motions, if the program has it."""
     if not controller.board.workspace.is_short:
         try:
-            from armtempo_board.app.sequence_ahead import AheadSequencer  # here, so that it can be forgotten
-
             return AheadSequencer
         except ImportError:  # not part of the program in files
             pass

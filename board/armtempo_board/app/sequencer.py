@@ -1,6 +1,6 @@
 """Runs a sequence: executes its rows between motions, in the main loop.
 
-Imported when a sequence starts and unloaded after its end. ``sequence_start`` has checked everything that it names.
+``sequence_start`` has checked everything that it names.
 """
 
 import gc
@@ -112,9 +112,8 @@ class Sequencer:
         free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES
         if free < _START_BYTES:
             controller.sequence = None
-            heap.forget()
             raise Refused(codes.NO_SEQUENCE_ROOM, value=_START_BYTES - free)
-        heap.keep_code(not controller.board.workspace.is_short)
+        heap.collect_often(heap.OFTEN if controller.board.workspace.is_short else heap.SELDOM)
         self._command.attach(controller.board.rows)
 
     def change_rate(self, rate: int) -> None:
@@ -153,13 +152,11 @@ class Sequencer:
         """Check the splines of a motion once, before any moves: its record (its checksum is compared each
         time) and the arm cannot change during the sequence.
         """
-        from armtempo_board.motion.start_check import check_splines  # here, so that it can be forgotten
-
         record = self._record
         name, crc = record.motion(self._checked)
         try:
             engine = self._controller.board.engine
-            check_splines(self._controller.load(name, crc), engine.drives, engine.limits)
+            engine.check_splines(self._controller.load(name, crc))
         except Refused:
             for self.told[ROW] in range(record.rows):
                 row = record.row(self.told[ROW])
@@ -224,4 +221,4 @@ class Sequencer:
         self.told[ENDING] = ending
         self.told[CODE] = code
         self._controller.sequence = None
-        heap.keep_code(False)
+        heap.collect_often()

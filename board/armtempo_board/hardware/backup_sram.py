@@ -11,6 +11,8 @@ from armtempo_shared.engine_memory import PROCESSOR_WORDS
 from machine import mem32
 from micropython import const
 
+from armtempo_board.hardware import registers
+
 _BEGIN = const(0x40024000)  # not in MicroPython's table of addresses
 _ONES = const(0x2AAAAAAA)  # a small integer
 _PROBED = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, PROCESSOR_WORDS - 1)  # words: every line of the address
@@ -21,8 +23,6 @@ def find() -> int:
 
     Not called on a chip without it, where the access itself would fail.
     """
-    from armtempo_board.hardware import registers  # here, so that it can be forgotten
-
     registers.apply(registers.BACKUP_SRAM)
     # DBP acts some bus cycles after it is written (errata ES0182, delay of the backup domain's protection): a line of
     # Python takes longer, and the test finds out

@@ -3,7 +3,7 @@
 import stm
 from pyb import Pin
 
-from armtempo_board.hardware import isr
+from armtempo_board.hardware import isr, pins, registers
 
 
 class EncoderInput:
@@ -13,8 +13,6 @@ class EncoderInput:
     """
 
     def __init__(self, channel: int, inverted: int) -> None:
-        from armtempo_board.hardware import pins, registers  # here, so that they can be forgotten
-
         timer, first, second, alternate = pins.ENCODER[channel]
         for name in (first, second):
             Pin(name, Pin.AF_PP, pull=Pin.PULL_UP, alt=alternate)

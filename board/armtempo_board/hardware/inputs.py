@@ -9,12 +9,12 @@ its wire breaks.
 
 import micropython
 import stm
-from armtempo_shared import codes
+from armtempo_shared import armrecord, codes
 from armtempo_shared.messages import NO_JOINT
 from machine import disable_irq, enable_irq
 from pyb import ExtInt, Pin
 
-from armtempo_board.hardware import isr
+from armtempo_board.hardware import isr, pins
 from armtempo_board.hardware.sampler import Sampler
 
 TYPE_CHECKING = False
@@ -26,10 +26,6 @@ class Inputs:
     """``head`` and ``joints``: of the arm record; ``sampler`` has the memory that the interrupts share."""
 
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", sampler: Sampler) -> None:
-        from armtempo_shared import armrecord  # here, so that it can be forgotten
-
-        from armtempo_board.hardware import pins
-
         flags = head["flags"]
         self._block = sampler.block
         self._port = stm.GPIOE
@@ -59,8 +55,6 @@ class Inputs:
         return isr.freezer(block)
 
     def _release_word(self) -> int:
-        from armtempo_board.hardware import pins  # here, so that it can be forgotten
-
         bit = 1 << pins.line(pins.ENABLE)
         return bit << 16 if self.on_level else bit  # the upper half of BSRR clears
 
@@ -73,10 +67,6 @@ class Inputs:
         return pin
 
     def _add_limits(self, joints: "list[dict[str, int]]") -> None:
-        from armtempo_shared import armrecord  # here, so that they can be forgotten
-
-        from armtempo_board.hardware import pins
-
         fitted = {}
         for number, joint in enumerate(joints):
             bit = 1 << pins.line(pins.DIR[joint["channel"]])

@@ -11,7 +11,7 @@ from machine import disable_irq, enable_irq, mem32
 from micropython import const
 from pyb import Pin
 
-from armtempo_board.hardware import isr
+from armtempo_board.hardware import isr, pins, registers
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -33,8 +33,6 @@ class Ring:
     """
 
     def __init__(self, channel: int, block: "array[int]", at: int, words: "memoryview") -> None:
-        from armtempo_board.hardware import pins, registers  # here, so that they can be forgotten
-
         pin, timer, compare, alternate, stream, dma_channel = pins.STEP[channel]
         self.entries = entries = len(words) - 1
         self.words = words
@@ -56,8 +54,6 @@ class Ring:
         Pin(pin, Pin.AF_PP, alt=alternate)
 
     def _describe(self, pin: str, timer: int, compare: int) -> None:
-        from armtempo_board.hardware import pins  # here, so that it can be forgotten
-
         block, at = self._block, self._at
         self.state[isr.NDTR_AT] = (self._ndtr - stm.DMA1) // 4
         block[at + isr.CCR_AT] = isr.CCR1 + compare - 1

@@ -25,9 +25,11 @@ from armtempo_shared.limits import LONGEST_RUN_TICKS
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
-from armtempo_board import features, heap
+from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
+from armtempo_board.motion import endpoints, motion_check
+from armtempo_board.stepgen.override import Override
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -47,6 +49,7 @@ _PERMILLE = const(1000)
 _KITICKS_PER_32_MS = const(2625)
 _MOST_KITICKS = const(5_000_000)  # a minute
 _ALL_JOINTS = const(0xFF)
+_ANY_JOINT = const(0)
 # work besides the filling of queues: one of these in each call of ``service``
 _POLL_SWITCHES = const(0)
 _CHECK_FOLLOWING = const(1)
@@ -160,24 +163,30 @@ class Engine:
             gc.collect()
 
     def _override(self, rate: int, motion: "MotionHead") -> "Any":
-        """Check the motion; returns its time law, after loading the code for motions."""
-        from armtempo_board.motion import start_check  # here, so that it can be forgotten
-
-        limits = None if self.skip_check else self.limits
-        duration_ticks = start_check.check_start(motion, self.drives, limits, self.known)
-        del start_check
-        heap.tidy()
-        try:
-            from armtempo_board.stepgen.override import Override
-        except MemoryError:  # what the first attempt left free lies otherwise
-            gc.collect()
-            from armtempo_board.stepgen.override import Override
-
+        """Check the motion; returns its time law."""
+        if not self.skip_check:
+            self.check_splines(motion)
+        self._check_start(motion)
+        gc.collect()
         override = Override()
-        override.begin(rate, motion, duration_ticks)
+        override.begin(rate, motion, endpoints.duration_ticks(motion))
         if override.end_ticks() > LONGEST_RUN_TICKS:
             raise Refused(codes.TOO_LONG)
         return override
+
+    def check_splines(self, motion: "MotionHead") -> None:
+        """Check the splines of a motion; raises Refused."""
+        joint = self.drives[_ANY_JOINT]  # as the gap is the same for all; it walks through the motion
+        motion_check.check(motion, self.limits, joint.gap_ticks, joint.generator.subintervals)
+
+    def _check_start(self, motion: "MotionHead") -> None:
+        """Raise Refused if the motion does not start where the joints are."""
+        for number, joint in enumerate(self.drives):
+            if not self.known >> number & 1:
+                raise Refused(codes.UNHOMED, number)
+            off = endpoints.start_offset(motion, number, joint.position(joint.ring.matches()))
+            if off:
+                raise Refused(codes.WRONG_START, number, off)
 
     def start(self) -> None:
         """Start the counters."""

@@ -3,8 +3,7 @@
 from armtempo_shared import armrecord
 from micropython import const
 
-from armtempo_board import heap
-from armtempo_board.hardware import isr
+from armtempo_board.hardware import isr, registers
 from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.inputs import Inputs
 from armtempo_board.motion.clock import MotionClock
@@ -31,8 +30,6 @@ class EngineParts:
     """
 
     def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:
-        from armtempo_board.hardware import registers  # here, so that it can be forgotten
-
         self.feeder = workspace.feeder
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
         fitted = [EncoderInput(row["encoder"], row["encoder_inverted"]) for row in rows]
@@ -43,7 +40,6 @@ class EngineParts:
         registers.apply(registers.CLOCKS)
         registers.apply(registers.TIMERS)
         rings = workspace.rings([row["max_rate"] for row in joints])
-        heap.forget("room", "engine_memory")
         arm = head, joints
         self.drives = [
             JointDrive(n, arm, self.sampler, ring, workspace.memory) for n, ring in enumerate(rings)

@@ -1,12 +1,12 @@
 """Following error: the deviation of an encoder from the commanded steps."""
 
+from armtempo_shared import armrecord
+
 
 class FollowingError:
     """``row``: the joint's part of the arm record."""
 
     def __init__(self, row: "dict[str, int]") -> None:
-        from armtempo_shared import armrecord  # here, so that it can be forgotten
-
         numerator, denominator = row["counts_num"], row["counts_den"]
         common = _common_divisor(abs(numerator), denominator) or 1
         self._numerator = numerator // common

@@ -11,7 +11,7 @@ from armtempo_shared import codes
 from micropython import const
 from pyb import Pin
 
-from armtempo_board.hardware import isr
+from armtempo_board.hardware import isr, pins
 from armtempo_board.hardware.ring import Ring
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.memory import Memory
@@ -50,8 +50,6 @@ class JointDrive:
         ring_words: "memoryview",
         memory: Memory,
     ) -> None:
-        from armtempo_board.hardware import pins  # here, so that it can be forgotten
-
         head, rows = arm
         row = rows[number]
         self._sampler = sampler

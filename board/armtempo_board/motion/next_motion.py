@@ -9,6 +9,7 @@ import gc
 from array import array
 
 from armtempo_shared import codes
+from armtempo_shared.engine_memory import GENERATOR_WORDS
 from armtempo_shared.limits import LONGEST_RUN_TICKS, MAX_STEP_RATE_SUM
 from micropython import const
 
@@ -48,8 +49,6 @@ class NextMotion:
     """
 
     def __init__(self, engine: "Engine") -> None:
-        from armtempo_shared.engine_memory import GENERATOR_WORDS  # here, so that it can be forgotten
-
         self._engine = engine
         joints = len(engine.drives)
         memory = Memory([GENERATOR_WORDS] * joints)

@@ -1,6 +1,14 @@
 """Memory for the engine, made once and reused for each arm, so that the heap does not fragment."""
 
 import uctypes
+from armtempo_shared.engine_memory import (
+    LARGEST_BYTES,
+    PROCESSOR_WORDS,
+    SHORT_MS,
+    blocks,
+    lasting_ms,
+    ring_words,
+)
 
 from armtempo_board.hardware.sampler import Sampler
 from armtempo_board.memory import Memory
@@ -19,11 +27,6 @@ class Workspace:
     """
 
     def __init__(self, room: int, address: int = 0) -> None:
-        from armtempo_shared.engine_memory import (  # here, so that it can be forgotten
-            LARGEST_BYTES,
-            PROCESSOR_WORDS,
-        )
-
         self.room = room
         self.is_short = room < LARGEST_BYTES  # the heap does not have enough for every arm
         self._own = None if address else Memory([PROCESSOR_WORDS]).take(PROCESSOR_WORDS)
@@ -34,19 +37,11 @@ class Workspace:
 
     def make_memory(self, words: int) -> None:
         """Allocate blocks of ``words`` words; raises MemoryError if the heap has no such block."""
-        from armtempo_shared.engine_memory import PROCESSOR_WORDS, blocks  # here, so that it can be forgotten
-
         self.memory = Memory([])  # what was there goes first
         self.memory = Memory(blocks(words), self._address, PROCESSOR_WORDS)
 
     def rings(self, rates: "list[int]") -> "list[Any]":
         """Take all memory back, then allocate a ring for each of these step rates, the largest first."""
-        from armtempo_shared.engine_memory import (  # here, so that it can be forgotten
-            SHORT_MS,
-            lasting_ms,
-            ring_words,
-        )
-
         self.memory.release()
         lasts_ms = lasting_ms(rates, self.memory.size) or SHORT_MS
         sizes = [ring_words(rate, lasts_ms) for rate in rates]

@@ -12,6 +12,8 @@ loaded, so the rest of the program knows quintics only.
 import micropython
 from micropython import const
 
+from armtempo_board.stepgen.bezier_weights import table
+
 BIAS = 1 << 28
 LOW_BITS = 28
 
@@ -39,8 +41,6 @@ _WEIGHTS: "dict[int, bytes]" = {}
 def weights(degree: int) -> bytes:
     """What ``from_control_points`` takes for a spline of this degree; made once."""
     if degree not in _WEIGHTS:
-        from armtempo_board.stepgen.bezier_weights import table  # here, so that it can be forgotten
-
         _WEIGHTS[degree] = table(degree)
     return _WEIGHTS[degree]
 

@@ -2,7 +2,7 @@
 
 The same law serves a slower run, a change of speed, a pause and braking (stepgen/time_law.py). Rates are in
 thousandths. Numbers of ``Override`` may be large integers: it is called when a motion is loaded or a rate is asked
-for. Imported before a motion, and forgotten after it.
+for.
 """
 
 from array import array

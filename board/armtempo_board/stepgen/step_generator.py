@@ -25,6 +25,7 @@ from micropython import const
 from armtempo_board.memory import Memory
 from armtempo_board.stepgen import newton, step_queue
 from armtempo_board.stepgen.newton import solve
+from armtempo_board.stepgen.override import JointLaw
 from armtempo_board.stepgen.step_queue import emit, has_room, put_single
 from armtempo_board.stepgen.subintervals import Subintervals
 
@@ -139,8 +140,6 @@ class StepGenerator:
         ``pulse_ticks``: STEP high time; ``gap_ticks``: least time between steps in opposite directions. Two that
         would be closer are both left out.
         """
-        from armtempo_board.stepgen.override import JointLaw  # here, so that it can be forgotten
-
         self._law = JointLaw(self._law_words)
         self.subintervals.load(motion, joint)
         self.subintervals.min_ticks = gap_ticks >> 3

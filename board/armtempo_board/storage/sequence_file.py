@@ -2,6 +2,7 @@
 
 from armtempo_shared import codes
 from armtempo_shared.sequence import OtherVersionError, SequenceRecord
+from armtempo_shared.sequence_check import check
 
 from armtempo_board.errors import Refused
 from armtempo_board.storage.motion_file import stated_crc
@@ -21,6 +22,10 @@ class SequenceFile(SequenceRecord):
         except OtherVersionError:
             raise Refused(codes.OTHER_VERSION)
         self.crc = stated_crc(path, length)
+
+    def check(self) -> None:
+        """Raise SequenceError, with the row, if it is invalid."""
+        check(self)
 
     def part(self, offset: int, size: int) -> bytes:
         """See ``SequenceRecord``."""

@@ -3,15 +3,14 @@
 A record is written to ``NAME.new``, read back, synced and renamed. If a power cut leaves a ``.new`` file,
 ``recover`` uses it if the old file is gone and the new one is complete, and removes it otherwise.
 
-A record has the name of its motion or sequence, or ``ARM_RECORD_NAME``; its first bytes give its kind. The
-module is imported when needed and unloaded before a motion (see ``Board.store``): it reads and writes no file
-during one.
+A record has the name of its motion or sequence, or ``ARM_RECORD_NAME``; its first bytes give its kind. No file is
+read or written during a motion.
 """
 
 import os
 from binascii import crc32, hexlify
 
-from armtempo_shared import codes
+from armtempo_shared import armrecord, codes
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
 from armtempo_shared.messages import ARM_RECORD_NAME
 from micropython import const
@@ -199,7 +198,7 @@ class Store:
             return self._sequence(_motion_file(name))
 
         def _sequence(self, file_name: str) -> "Any":
-            from armtempo_board.storage import sequence_file  # here, so that it can be forgotten
+            from armtempo_board.storage import sequence_file  # here, as only sequences need its memory
 
             size = self._size_of(file_name)
             try:
@@ -208,10 +207,8 @@ class Store:
                 raise Refused(codes.BAD_RECORD)
 
         def _check_sequence(self, file_name: str) -> None:
-            from armtempo_shared import sequence_check  # here, so that it can be forgotten
-
             try:
-                sequence_check.check(self._sequence(file_name))
+                self._sequence(file_name).check()
             except ValueError:  # SequenceError
                 raise Refused(codes.BAD_RECORD)
 
@@ -377,8 +374,6 @@ class Store:
         except Refused:
             return False
         if file_name == _ARM:
-            from armtempo_shared import armrecord  # here, so that it can be forgotten
-
             try:
                 armrecord.unpack(data)
             except armrecord.ArmRecordError:

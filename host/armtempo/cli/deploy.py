@@ -11,31 +11,24 @@ from armtempo import deploy as deployment
 from armtempo.cli import chosen, options, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
-from armtempo.deploy import package as packages
 from armtempo.model.arm import Arm
 from armtempo.robot import engine_room
 
 
 @click.command("deploy")
-@click.option("--mpy", is_flag=True, help="Compile with mpy-cross: smaller, and faster to start.")
-@options.folder(
-    "--package",
-    help="Instead write FOLDER for 'mpremote mip install --target /flash FOLDER/package.json'.",
+@click.option(
+    "--mpy", is_flag=True, help="The core, compiled with mpy-cross, in the last sectors of the chip's flash."
 )
 @options.arm
 @options.port
 @options.as_json
-def deploy(mpy: bool, package: Path | None, arm_path: Path | None, port: str | None, as_json: bool) -> None:
+def deploy(mpy: bool, arm_path: Path | None, port: str | None, as_json: bool) -> None:
     """Install or update the board program on a board.
 
-    mpremote copies the files below /flash/lib that differ; every file is read back. An existing boot.py or main.py is
-    backed up. If interrupted, run it again. At the end it prints which arms fit into the remaining memory, and whether
-    the given arm does.
+    mpremote copies the files below /flash/lib that differ, and writes the compiled program to the last two sectors of
+    the chip's flash; all is read back. An existing boot.py or main.py is backed up. If interrupted, run it again. At
+    the end it prints which arms fit into the remaining memory, and whether the given arm does.
     """
-    if package is not None:
-        packages.write(package)
-        results.show(as_json, {"package": str(package)}, [f"written: {package}"])
-        return
     arm = chosen.named_arm(arm_path)
     with ProgressBar("copying") as progress:
         info = deployment.deploy(chosen.port(port), mpy, results.teller(as_json), progress)

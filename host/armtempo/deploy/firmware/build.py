@@ -10,7 +10,6 @@ from pathlib import Path
 
 from armtempo.basics.errors import InputError, ToolError
 from armtempo.basics.progress import Progress
-from armtempo.deploy import package
 from armtempo.deploy.firmware import checkout, frozen, image, toolchain
 from armtempo.deploy.firmware.checkout import BoardDefinition, Checkout
 from armtempo.link.program_version import own_crc
@@ -104,7 +103,7 @@ def _check_room(built: Path, made: image.Image, definition: BoardDefinition) -> 
     if end > definition.flash_end:
         raise ToolError(
             f"the firmware is {end - definition.flash_end} bytes larger than the flash of {definition.machine}",
-            "use the program as files, with MicroPython's own firmware ('armtempo deploy')",
+            "use a board whose chip has 1 MB of flash",
         )
 
 
@@ -115,5 +114,5 @@ def _put(built: Path, made: image.Image, out: Path) -> None:
     out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as name:
         whole = Path(name) / "whole"
-        package.fill(whole, {**files, image.ABOUT: image.about(made)})
+        frozen.fill(whole, {**files, image.ABOUT: image.about(made)})
         os.replace(whole, out)

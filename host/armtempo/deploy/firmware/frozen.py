@@ -1,13 +1,17 @@
 """The board program as a folder from which MicroPython's own build makes it a part of the firmware.
 
-The sources go in as they are. Machine code, byte code, names and line numbers then stay in the flash.
+The sources go in as they are, but with constants in the place of their names (``constants.py``). Machine code, byte
+code, names and line numbers then stay in the flash.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
-from armtempo.deploy import package, program_files
+from armtempo.basics.errors import InputError
+from armtempo.deploy import program_files
+from armtempo.deploy.constants import fold
 from armtempo.link.program_version import PACKAGES, own_crc
 
 MANIFEST = "manifest.py"
@@ -33,12 +37,13 @@ def write(folder: Path, board_manifest: str = USUAL_MANIFEST) -> None:
     ``board_manifest``: what else is frozen. Raises InputError if the folder holds something already or
     cannot be written.
     """
-    package.fill(folder, files(board_manifest))
+    fill(folder, files(board_manifest))
 
 
 def files(board_manifest: str = USUAL_MANIFEST) -> dict[str, bytes]:
     """The folder's files by their path in it."""
-    sources = {name: path.read_bytes() for name, path in program_files.modules().items()}
+    texts = fold(program_files.sources())
+    sources = {name: texts[program_files.dotted(name)].encode() for name in program_files.modules()}
     manifest = Path(__file__).with_name(MANIFEST).read_text(encoding="utf-8")
     made = {
         f"{PACKAGES[1]}/program_hash.py": _HASH_MODULE,
@@ -46,3 +51,19 @@ def files(board_manifest: str = USUAL_MANIFEST) -> dict[str, bytes]:
         MANIFEST: manifest.replace(USUAL_MANIFEST, board_manifest),
     }
     return sources | {name: text.encode() for name, text in made.items()}
+
+
+def fill(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files by their path below a new or empty folder; raises as ``write``."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise InputError(f"{folder} is not empty", "name a new folder")
+        for name, data in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be written: {error.strerror}",
+            "choose a folder that may be written",
+        ) from error

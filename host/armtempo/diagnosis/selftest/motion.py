@@ -111,7 +111,7 @@ def _of(
     splines = [JointSpline(_DEGREE, 1, one, times) for one in points]
     angles = [_fixed(spline.angle_points_deg, STEP_FRACTION_BITS) for spline in splines]
     axis = _fixed(times * TICK_HZ, TICK_FRACTION_BITS)
-    record = motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.NO_RAMPS, 0)
+    record = motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.no_ramps(), 0)
     duration_s = sum(intervals_s)
     steps = [_crossings_s(spline, *end, duration_s) for spline, end in zip(splines, ends, strict=True)]
     looks = np.linspace(0.0, duration_s, _LOOKS)
@@ -128,7 +128,7 @@ def at_rates(rates: Sequence[int], duration_s: float) -> bytes:
     ends = [rate * duration_s / _PEAK for rate in rates]
     angles = [_fixed(bspline.fit((0.0, end), _DEGREE), STEP_FRACTION_BITS) for end in ends]
     axis = _fixed(times * TICK_HZ, TICK_FRACTION_BITS)
-    return motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.NO_RAMPS, 0)
+    return motion_record.pack(_DEGREE, angles, [axis], 1, motion_record.no_ramps(), 0)
 
 
 def evaluated() -> bytes:

@@ -10,3 +10,8 @@ def addressof(buffer):
     where = _own.addressof(buffer)
     memory.objects[where & memory.MASK] = buffer
     return where
+
+
+def bytearray_at(where, size):
+    """The memory at an address of this process, or of the flash on the chip."""
+    return _own.bytearray_at(memory.real(where), size)

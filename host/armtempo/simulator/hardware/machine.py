@@ -26,6 +26,9 @@ class _Memory:
 
     def __setitem__(self, where, value):
         words, at = memory.place(where)
+        if words is memory.sectors:
+            machine_state.flash.sectors.program(at, value)
+            return
         shift = 8 * (where & 3)
         kept = words[at] & ~(self._mask << shift)
         words[at] = kept | (value & self._mask) << shift

@@ -8,7 +8,7 @@ import edge_writer
 import injected_faults
 import machine_state
 import pace
-from chip import flash
+from chip import flash, last_sectors
 from chip.processor import TICKS_PER_MS, Chip
 from firmware import boot, usb_serial
 
@@ -40,6 +40,7 @@ def power_up(options, cause):
     root, programs = options["flash"], options["program"]
     blocks = options["flash_blocks"] or flash.BLOCKS
     machine_state.flash = flash.FlashFolder(root, blocks, programs, _stall, cut_at, damage)
+    machine_state.flash.sectors = board.sectors = last_sectors.Sectors(machine_state.flash, root + ".sectors")
     injected_faults.Faults(board, options["faults"])
     return mode
 

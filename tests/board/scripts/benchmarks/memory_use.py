@@ -1,12 +1,11 @@
 """How the heap of the board program grows: prints a name and the bytes in use at each stage.
 
-The program is driven through its serial port, so it may be the compact one. Hardware is the memory of ``bare``.
-Arguments: folder of the store, with an arm and a motion; a file with the frames that a host sends, each behind
-its length in two bytes, the last one starting the motion; a file for what the program answers; bytes of heap that
-the program finds.
+The program runs from the image for the chip's last two sectors, which is mapped to their address; hardware is the
+memory of ``bare``. Arguments: folder of the store, with an arm and a motion; a file with the frames that a host sends,
+each behind its length in two bytes, the last one starting the motion; a file for what the program answers; bytes of
+heap that the program finds; the image.
 """
 
-import builtins
 import gc
 import os
 import sys
@@ -15,6 +14,7 @@ sys.path.insert(0, __file__.rsplit("/", 2)[0] + "/rigs/bare")
 
 import struct
 
+import ffi
 import firmware_heap
 import machine
 import micropython
@@ -25,6 +25,9 @@ from firmware_heap import Beyond, nothing
 
 _START = 0
 _MOST = 0
+_SECTORS_AT, _SECTORS_BYTES = 0x080C0000, 0x40000
+_STATIC = 0x10000000  # beyond 2**30 an id is a negative number: what is the interpreter's own, and lies there
+_ALL, _PRIVATE_FIXED = 7, 0x12  # of mmap
 
 
 def tell(name):
@@ -32,6 +35,8 @@ def tell(name):
     gc.collect()
     if name == "end":
         ANSWERS.close()
+        print("check", _MOST)
+        print("code elsewhere", elsewhere())
     else:
         print(name, gc.mem_alloc() - _START)
 
@@ -91,11 +96,37 @@ def unpack_from(*arguments):
     return struct.unpack_from(*arguments)
 
 
-def watch(name, *arguments):
-    """As the built-in ``__import__``; what comes after the check tells of it."""
-    if name == "armtempo_board.endpoints":
-        print("check", _MOST)
-    return IMPORT(name, *arguments)
+def map_sectors(path):
+    """Map the image to where the chip has its last two sectors."""
+    with open(path, "rb") as file:
+        mmap = ffi.open("libc.so.6").func("p", "mmap", "piiiii")
+        assert mmap(_SECTORS_AT, _SECTORS_BYTES, _ALL, _PRIVATE_FIXED, file.fileno(), 0) == _SECTORS_AT
+
+
+def functions(names):
+    """Functions of a module, and of the classes in it."""
+    for item in names.values():
+        if id(item) < _STATIC:
+            continue
+        if type(item).__name__ == "type":
+            yield from functions(item.__dict__)
+        elif type(item).__name__ == "function":
+            yield item
+
+
+def elsewhere():
+    """How many of the program's functions do not have their code in the sectors."""
+    others = {unpack_from}
+    for name, module in sys.modules.items():
+        if not name.startswith("armtempo_") and hasattr(module, "__dict__"):
+            others.update(functions(module.__dict__))
+    found = 0
+    for name, module in sys.modules.items():
+        if name.startswith("armtempo_") and "." in name:
+            for function in functions(module.__dict__):
+                code = machine.mem32[id(function) + 12]
+                found += function not in others and not _SECTORS_AT <= code < _SECTORS_AT + _SECTORS_BYTES
+    return found
 
 
 machine.unique_id = lambda: b"123456789012"
@@ -115,16 +146,16 @@ sys.modules["micropython"] = Beyond(micropython, alloc_emergency_exception_buf=n
 firmware_heap.FRAMES = sys.argv[2]
 firmware_heap.tell = tell
 ANSWERS = open(sys.argv[3], "wb")  # noqa: SIM115  until the end
-IMPORT = builtins.__import__
+map_sectors(sys.argv[5])
 gc.collect()
 _START = gc.mem_alloc()
 
-from armtempo_board import program  # noqa: E402
+import armtempo_sectors  # noqa: E402, F401
+from armtempo_board import load_program  # noqa: E402
 
+program = load_program()
 tell("modules")
-builtins.__import__ = watch
 try:
     program.main(sys.argv[1])
 finally:
-    builtins.__import__ = IMPORT
     ANSWERS.close()

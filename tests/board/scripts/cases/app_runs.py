@@ -57,7 +57,7 @@ def case_speed_of_what_moves_and_of_the_next_start():
 def case_stop_freezes_what_cannot_brake():
     app, host = connected()
     crc = armrecord.unpack(stand_in.arm())[2]
-    stiff = motion.pack(5, [[0] * 8] * 2, [[0] * 8] * 2, 1, motion.NO_RAMPS, crc)
+    stiff = motion.pack(5, [[0] * 8] * 2, [[0] * 8] * 2, 1, motion.no_ramps(), crc)
     host.upload("stiff", stiff)
     host.ask("start", (0, wire.record_crc(stiff)), "stiff")
     host.ask("stop", (0,))

@@ -17,7 +17,7 @@ from armtempo_board.hardware import isr
 from armtempo_shared import codes
 from armtempo_shared.limits import LONGEST_RUN_TICKS
 from armtempo_shared.messages import NO_JOINT, RESUME
-from armtempo_shared.motion import EVEN_RAMP, NO_RAMPS, RAMP_SHAPES
+from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPES, no_ramps
 from brake_motion import BRAKE_TICKS, RAMP_BITS, RAMPS, ramp_way, record
 from engine_rig import FEWER, TICK_HZ, Rig, arm
 
@@ -194,8 +194,6 @@ def case_whole_path():  # slow
 
 def some_leg(rig, start, end):
     """A motion of three joints from the steps ``start`` to ``end``, where they rest, but with acceleration."""
-    from armtempo_board.motion.start_check import check_splines
-
     times = [random.randrange(20, 80) / 1000 for _ in range(14)]
     times = [(number - 2) * times[0] for number in range(4)] + [
         2 * times[0] + sum(times[:n]) for n in range(10)
@@ -208,7 +206,7 @@ def some_leg(rig, start, end):
         angles.append(first + [random.random() * size for _ in range(4)] + last)
     motion = record(some_ramps(), angles, times)
     try:
-        check_splines(motion, rig.engine.drives, rig.engine.limits)
+        rig.engine.check_splines(motion)
     except Refused:  # too abrupt
         return some_leg(rig, start, end)
     return motion
@@ -358,7 +356,7 @@ def case_long_pause():  # not emulated
 
 def case_refused():  # not emulated
     """What cannot change its speed says so, and continues."""
-    rig, _ = begin(record(NO_RAMPS))
+    rig, _ = begin(record(no_ramps()))
     for rate in (0, 500, RESUME):
         assert refusal(rig, rate) == codes.FIXED_SPEED
     rig.run_to(3 * TICK_HZ)

@@ -7,7 +7,7 @@ from array import array
 
 import cases
 from armtempo_board.buffers import COMMANDED, PATH_HIGH, PATH_LOW, TICKS_HIGH, TICKS_LOW
-from armtempo_shared.motion import NO_RAMPS
+from armtempo_shared.motion import no_ramps
 from brake_motion import BRAKE_TICKS, RAMP_BITS, RAMPS, path, record
 from engine_rig import FEWER, TICK_HZ, Motion, Rig, Steps, arm  # simulated hardware; before what needs any
 
@@ -103,7 +103,7 @@ def case_never_longer_than_the_motion():  # not emulated
 def case_not_planned_for():  # not emulated
     """A motion without a braking time is frozen."""
     rig = Rig(joints(), planned=False)
-    begin(rig, NO_RAMPS)
+    begin(rig, no_ramps())
     rig.run_to(TICK_HZ // 2)
     rig.engine.brake()
     assert not rig.engine.moving

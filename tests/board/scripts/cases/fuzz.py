@@ -14,7 +14,6 @@ import stand_in
 
 stand_in.install()
 
-from armtempo_board import heap  # noqa: E402
 from armtempo_board.app.app import App  # noqa: E402
 from armtempo_board.link import frame_reader, serial_link  # noqa: E402
 from armtempo_board.storage import motion_file, store  # noqa: E402
@@ -121,7 +120,6 @@ def board():
     chip = flash.Flash()
     store.os = chip
     store.open = motion_file.open = chip.open
-    heap.forget = lambda *names: None  # a store that is imported anew would be on the real flash
     port = stand_in.Port()
     app = App(port, "/flash")
     host = stand_in.Host(app, port)

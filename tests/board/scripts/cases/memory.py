@@ -9,11 +9,12 @@ import cases
 # isort: split
 import stm
 import uctypes
+
+from armtempo_board.stepgen.step_generator import StepGenerator  # isort: skip  as program.py: the deepest first
 from armtempo_board.app import room
 from armtempo_board.hardware import backup_sram, registers
 from armtempo_board.memory import Memory
 from armtempo_board.motion.workspace import Workspace
-from armtempo_board.stepgen.step_generator import StepGenerator
 from armtempo_shared import engine_memory
 from machine import mem32
 

@@ -249,16 +249,13 @@ class Rig:
         self.board = bare_board.start()
         self.board.observers.append(self)
         self._zero = 0
-        import armtempo_board.motion.joint_drive
-        import armtempo_board.motion.motion_check
-        from armtempo_board import heap
         from armtempo_board.hardware import pins
+        from armtempo_board.motion import engine, joint_drive, motion_check
 
         if planned:
-            armtempo_board.motion.joint_drive.StepGenerator = StepGenerator
-            armtempo_board.motion.endpoints = Evaluator
-            armtempo_board.motion.motion_check.check = Evaluator.check
-            heap.forget = lambda *names: None  # what stands in for the evaluator stays
+            joint_drive.StepGenerator = StepGenerator
+            engine.endpoints = Evaluator
+            motion_check.check = Evaluator.check
         self.arm = machine_state.arm = motors.ArmOnPins(self.board, pins, lambda: (self.head, joints), 1, ())
         self.pins = pins
         self.pulses = [

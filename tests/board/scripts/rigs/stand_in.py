@@ -101,20 +101,14 @@ def install():
     ends.start_offset = lambda motion, joint, position: 7 - position
     ends.at_start = lambda motion, joint: 7 * 64
     ends.at_end = lambda motion, joint: 8 * 64
-    checks = Module()
-    checks.check_splines = lambda motion, engine, limits: engine.check_splines()
     ahead = Module()
     ahead.NextMotion = NextMotion
-    from armtempo_board import heap
-
-    heap.forget = lambda *names: None  # what stands in for a module stays
     sys.modules["machine"] = machine
     sys.modules["pyb"] = pyb
     sys.modules["armtempo_board.motion.engine"] = engine
     sys.modules["armtempo_board.motion.engine_parts"] = parts
     sys.modules["armtempo_board.app.room"] = room
     sys.modules["armtempo_board.motion.endpoints"] = ends
-    sys.modules["armtempo_board.motion.start_check"] = checks
     sys.modules["armtempo_board.motion.next_motion"] = ahead
     sys.modules["time"] = _install_time()
     if not hasattr(sys, "print_exception"):
@@ -199,7 +193,7 @@ class Engine:
         self.has_time = True
         self.no_memory = False
 
-    def check_splines(self):
+    def check_splines(self, motion):
         self.calls.append("check")
         if self.unfit:
             from armtempo_board.errors import Refused

@@ -218,6 +218,37 @@ def case_each_timer_is_clocked_by_its_bit():
             assert mem32[stm.RCC + enable] ^ before == 1 << first_bit + place, number
 
 
+def case_the_last_sectors_are_erased_and_written_as_the_manual_says():
+    """RM0090 3.5 to 3.9: keys, an erased bit can only be cleared, other sectors are not touched."""
+    bare_board.start()
+    begin, key, control, status = 0x080C0000, stm.FLASH + 4, stm.FLASH + 0x10, stm.FLASH + 0x0C
+    mem32[begin] = 0
+    mem32[control] = 0x201
+    mem32[begin] = 0
+    assert mem32[control] == -1 << 31 and mem32[begin] == -1, "locked"
+    mem32[key] = 0x45670123
+    mem32[key] = 0xCDEF89AB
+    mem32[begin] = 0
+    assert mem32[status] & 0xF2 and mem32[begin] == -1, "without PG"
+    mem32[control] = 0x201
+    mem32[begin] = 0x12345678
+    mem32[begin] = 0x0F0F0F0F
+    mem32[begin + 0x20000] = 7
+    assert mem32[begin] == 0x12345678 & 0x0F0F0F0F
+    assert bytes(uctypes.bytearray_at(begin, 4)) == b"\x08\x06\x04\x02"
+    mem32[control] = 0x202 | 10 << 3
+    mem32[control] = 0x202 | 10 << 3 | 1 << 16
+    assert (mem32[begin], mem32[begin + 0x20000]) == (-1, 7)
+    mem32[control] = 0x202 | 11 << 3 | 1 << 16
+    assert mem32[begin + 0x20000] == -1
+    try:
+        mem32[control] = 0x202 | 5 << 3 | 1 << 16
+        raise AssertionError("MicroPython's own")
+    except ValueError:
+        pass
+    assert machine.mem16[0x1FFF7A22] == 1024
+
+
 for name in cases.wanted(globals()):
     bare_board.start(flash=SCRATCH + "/flash")
     globals()[name]()

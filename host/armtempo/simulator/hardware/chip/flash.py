@@ -53,6 +53,7 @@ class FlashFolder:
         self._writing = []
         self._unsynced = []
         self.renamed = None
+        self.sectors = None
 
     def real(self, path):
         """The host's path of a path on the board; OSError if nothing is mounted there, or it is unreadable."""

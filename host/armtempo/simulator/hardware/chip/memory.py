@@ -29,6 +29,12 @@ SIZE = BLOCK_BYTES * len(BLOCKS)
 MASK = 0xFFFFFFFF
 BACKUP_WORDS = 1024
 _BACKUP_ON_CHIP = 0x40024000
+SECTORS_AT = 0x080C0000
+SECTOR_BYTES = 128 * 1024
+SECTORS_BYTES = 2 * SECTOR_BYTES
+"""Of the last two sectors of a flash of 1 MB."""
+_FLASH_SIZE_AT = 0x1FFF7A20
+_FLASH_SIZE = 1024 << 16  # KB, in the upper half of the word (RM0090 39.2)
 _AHB1ENR, _APB1ENR = 12, 16  # words of RCC
 _BKPSRAMEN, _PWREN, _DBP = 18, 28, 8  # bits
 _RTC_BYTES = BLOCK_BYTES
@@ -51,6 +57,8 @@ base = uctypes.addressof(words)
 raw_backup, backup = _memory(4 * BACKUP_WORDS)
 """The backup SRAM; it has no registers, so writes to it are not detected."""
 backup_base = uctypes.addressof(backup)
+raw_sectors, sectors = _memory(SECTORS_BYTES)
+_sectors_base = uctypes.addressof(sectors)
 
 objects = {}
 """Buffers that a DMA stream can use, by the low 32 bits of their address: those of ``uctypes.addressof``."""
@@ -82,7 +90,16 @@ def place(where):
     for begin in (backup_base, _BACKUP_ON_CHIP):
         if 0 <= where - begin < 4 * BACKUP_WORDS:
             return backup, where - begin >> 2
+    if 0 <= where - SECTORS_AT < SECTORS_BYTES:
+        return sectors, where - SECTORS_AT >> 2
+    if where & ~3 == _FLASH_SIZE_AT:
+        return [_FLASH_SIZE], 0
     return words, word_at(where)
+
+
+def real(where):
+    """Where memory is in this process that on the chip is at an address."""
+    return _sectors_base + where - SECTORS_AT if 0 <= where - SECTORS_AT < SECTORS_BYTES else where
 
 
 def word_at_low(where):

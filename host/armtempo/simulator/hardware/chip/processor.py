@@ -74,6 +74,7 @@ class Chip:
         self.dma = dma.Controller()
         self.pins = gpio.Pins()
         self.backup = memory.BackupSram()
+        self.sectors = None
         self.cycles = CycleCounter(self)
         self.timers = {}
         for number, bits, rate in ((2, 32, 1), (5, 32, 1), (1, 16, 2), (8, 16, 2), (3, 16, 1), (4, 16, 1),
@@ -129,6 +130,8 @@ class Chip:
             self.backup.sync_rtc()
         if "DWT" in names or "SCS" in names:
             self.cycles.sync()
+        if "FLASH" in names and self.sectors:
+            self.sectors.sync()
         if "DMA1" in names or "RCC" in names:
             rcc = memory.words[memory.index("RCC") + 12]
             self.dma.sync((rcc >> 21) & 1)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
-_FRAME = re.compile(r'File "(?:[^"]*/)?(armtempo_[^"]+\.py)", line (\d+), in (\w+)')
+_FRAME = re.compile(r'File "(?:[^"]*/)?(armtempo_[^"]+\.py|\w+)", line (\d+), in (\w+)')
+"""From the chip's last two sectors a module's name is all that is known of its file."""
 
 
 def in_full(traceback: str, sources: Mapping[str, str]) -> str:
@@ -15,9 +17,13 @@ def in_full(traceback: str, sources: Mapping[str, str]) -> str:
     ``sources``: text by the path from the packages on.
     """
 
+    paths = {Path(path).stem: path for path in sources}
+
     def place(frame: re.Match[str]) -> str:
-        path, line, name = frame[1], int(frame[2]), frame[3]
-        around = _around(sources[path], line, name) if path in sources else ""
+        path, line, name = paths.get(frame[1], frame[1]), int(frame[2]), frame[3]
+        if path not in sources:
+            return frame[0]
+        around = _around(sources[path], line, name)
         return f'File "{path}", line {line}, in {around}{name}'
 
     return _FRAME.sub(place, traceback)
