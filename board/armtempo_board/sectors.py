@@ -37,6 +37,7 @@ _MOST_FUNCTIONS = const(0xFF)
 _LENGTH_BYTES = const(2)
 _MOST = const(0x40000)
 _RAM = const(0x10000000)  # no address of RAM is below
+_UNALIGNED = const(15)  # bits that no address of memory from the heap has
 _POINT = "/armtempo"
 _PACKAGE = "armtempo_"
 _BEFORE = const(10)  # letters of "/armtempo_"
@@ -49,11 +50,11 @@ _ENOENT = const(2)
 # words of MicroPython's objects (py/objfun.h, py/emitglue.h, py/objproperty.c)
 _FUNCTIONS, _CODE = const(8), const(12)  # of a function
 _RAW_CODE, _RAW_FUNCTIONS = const(4), const(8)  # of one in a function, which is made when that is called
-_METHOD_END, _PROPERTY_END = const(8), const(16)  # behind the functions of a static method, a property
+_METHOD_END, _PROPERTY_END = const(8), const(16)  # after the functions of a static method, a property
 
 
 class _File(io.IOBase):
-    """A compiled file, which is read once, from its begin on."""
+    """A compiled file, which is read once, from its start."""
 
     def __init__(self, at: int) -> None:
         self._at = at
@@ -159,7 +160,8 @@ def _settle(names: "dict[str, Any]", kinds: "list[int]", about: int) -> None:
 def _swap(code_at: int, functions_at: int, about: int) -> None:
     """Give an object the code in the flash that is the same, byte for byte, as its own; and those in it."""
     code = mem32[code_at]
-    if code < _RAM:  # it is in the flash already, or MicroPython's own
+    # In the flash already, MicroPython's own, or no address: the objects of a later MicroPython may differ
+    if code < _RAM or code & _UNALIGNED:
         return
     first = about + _WORD
     for entry in range(first, first + _ENTRY_BYTES * mem32[about], _ENTRY_BYTES):

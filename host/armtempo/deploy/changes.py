@@ -50,7 +50,7 @@ class Change:
     write: dict[str, bytes]
     remove: list[str]
     image: bytes | None
-    """What the last two sectors is to hold, empty: nothing; None: what it holds stays."""
+    """New content of the last two sectors, empty: none; None: they keep theirs."""
 
     def is_none(self) -> bool:
         """Whether there is nothing to do."""
