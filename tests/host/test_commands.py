@@ -398,7 +398,6 @@ def test_the_program_on_a_board(project: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("armtempo.deploy.deploy", deploy)
     monkeypatch.setattr("armtempo.deploy.undeploy", lambda port, tell: tell("removed"))
     assert said("deploy", "--port", "x")["arm_fits"]
-    assert said("deploy", "--package", "package") == {"package": "package"}
     assert said("undeploy", "--port", "x") == {"port": "x", "program": None}
 
 

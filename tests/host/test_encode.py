@@ -16,7 +16,7 @@ from armtempo.planning import checks, point_to_point
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.records import decode, encode
 from armtempo.robot import engine_room
-from armtempo.robot.engine_room import AS_FILES, IN_FIRMWARE, Room
+from armtempo.robot.engine_room import CORE, IN_FIRMWARE, Room
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, engine_memory, limits, motion
 from armtempo_shared.engine_memory import SHORT_MS, room_words
@@ -199,21 +199,19 @@ def six_joints() -> Arm:
 
 
 def test_an_arm_that_fits_is_told_with_its_bytes() -> None:
-    line = engine_room.of_arm(PAPER, board(AS_FILES))
+    line = engine_room.of_arm(PAPER, board(CORE))
     needed = engine_memory.needed_bytes(engine_room.encode.step_rates(PAPER))
-    assert line == f"memory on the board: {needed} bytes for 3 joints of {AS_FILES.size}"
-    assert "fits with the program as files or in the firmware" in engine_room.of_arm(PAPER)
+    assert line == f"memory on the board: {needed} bytes for 3 joints of {CORE.size}"
+    assert "fits with MicroPython's own firmware or with the program in it" in engine_room.of_arm(PAPER)
 
 
 def test_an_arm_with_more_joints_is_sent_to_the_firmware() -> None:
     arm = six_joints()
     with pytest.raises(InputError) as refused:
-        engine_room.check(arm, board(AS_FILES))
-    assert f"the board has {AS_FILES.size}" in refused.value.problem
+        engine_room.check(arm, board(CORE))
+    assert f"the board has {CORE.size}" in refused.value.problem
     assert "armtempo flash" in refused.value.hint
-    assert "too much, or put the program into the board's firmware" in engine_room.of_arm(
-        arm, board(AS_FILES)
-    )
+    assert "too much, or put the program into the board's firmware" in engine_room.of_arm(arm, board(CORE))
     assert "fits only with the program in the firmware" in engine_room.of_arm(arm)
     engine_room.check(arm, board(IN_FIRMWARE))
 
@@ -227,16 +225,16 @@ def test_a_room_that_is_too_small_is_told_in_bytes() -> None:
 
 
 def test_no_way_out_is_promised_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine_room, "IN_FIRMWARE", AS_FILES)
+    monkeypatch.setattr(engine_room, "IN_FIRMWARE", CORE)
     with pytest.raises(InputError) as refused:
-        engine_room.check(six_joints(), board(AS_FILES))
+        engine_room.check(six_joints(), board(CORE))
     assert "armtempo flash" not in refused.value.hint
 
 
 def test_a_board_tells_what_the_firmware_would_give() -> None:
-    lines = engine_room.of_board(board(AS_FILES))
+    lines = engine_room.of_board(board(CORE))
     assert len(lines) == 2
-    assert "1 x 240000 steps/s, 2 x 62000 steps/s, 3 x 30000 steps/s" in lines[0]
+    assert "1 x 240000 steps/s, 2 x 120000 steps/s, 3 x 62000 steps/s" in lines[0]
     assert "6 x 40000 steps/s" in lines[1]
     assert "sequences" in lines[1]
     assert len(engine_room.of_board(board(IN_FIRMWARE))) == 1
@@ -252,17 +250,17 @@ def test_the_words_name_the_highest_rate_that_fits() -> None:
 
 
 def test_rings_last_as_long_as_there_is_memory_for() -> None:
-    for rates, in_firmware, as_files in (
+    for rates, in_firmware, core in (
         ([5_000] * 3, 12, 12),
-        ([20_000] * 3, 12, 3),
-        ([30_000] * 3, 12, 2),
-        ([60_000] * 3, 12, 0),
+        ([20_000] * 3, 12, 6),
+        ([30_000] * 3, 12, 3),
+        ([60_000] * 3, 12, 2),
         ([80_000] * 3, 12, 0),
         ([20_000] * 6, 6, 0),
         ([40_000] * 6, 3, 0),
     ):
         assert engine_memory.lasting_ms(rates, room_words(len(rates), IN_FIRMWARE.size)) == in_firmware
-        assert engine_memory.lasting_ms(rates, room_words(len(rates), AS_FILES.size)) == as_files
+        assert engine_memory.lasting_ms(rates, room_words(len(rates), CORE.size)) == core
     for lasts_ms in engine_memory.LASTING_MS:
         for rate in (5_000, 60_000, 240_000):
             entries = engine_memory.ring_words(rate, lasts_ms) - 1

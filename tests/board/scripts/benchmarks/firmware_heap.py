@@ -1,6 +1,6 @@
 """Stands in main.py of an emulated board for the start of the program: prints the heap after each stage.
 
-The program is driven through its serial port, so it may be the compact one. ``memory_use.py`` has that port too.
+The program is driven through its serial port. ``memory_use.py`` has that port too.
 All is in this one small file, because it shares the chip's heap with the program.
 """
 
