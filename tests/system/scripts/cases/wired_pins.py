@@ -14,6 +14,7 @@ from firmware.external_interrupts import set_level
 # isort: split
 import struct
 
+from armtempo_board.stepgen import step_generator  # isort: skip  # noqa: F401  as program.py: the deepest first
 from armtempo_board.app import arm_setup, output_setup
 from armtempo_board.app.output_setup import inputs_of, outputs_of
 from pin_rows import GRIPPER, PART, PUMP
