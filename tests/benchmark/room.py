@@ -2,7 +2,7 @@
 
     python -m tests.benchmark.room MICROPYTHON [CHANGES]
 
-MICROPYTHON and how it is run: tests/benchmark/firmware.py. The program, as files and within the firmware, is driven by
+MICROPYTHON and how it is run: tests/benchmark/firmware.py. The program, on it and within the firmware, is driven by
 a host's frames: for each arm it is started afresh, gets the arm, a motion, home, start and stop. CHANGES: then, in one
 start of the program, that many random arms (1 to 6 joints, 1000 to 240 000 steps/s), each with an upload, a run and a
 removal; more than 40 are up to 40 different ones, again and again.
