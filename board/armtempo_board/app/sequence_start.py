@@ -38,17 +38,8 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, fla
     except (MotionError, SequenceError):
         raise Refused(codes.BAD_RECORD)
     _check_rows(controller, record, ends)
-    return _kind(controller)(controller, record, name.encode(), rate)
-
-
-def _kind(controller: "Runner") -> "type[Sequencer]":
-    """The class that prepares motions, if the program has it."""
-    if not controller.board.workspace.is_short:
-        try:
-            return AheadSequencer
-        except ImportError:  # not part of the program in files
-            pass
-    return Sequencer
+    kind = Sequencer if controller.board.workspace.is_short else AheadSequencer
+    return kind(controller, record, name.encode(), rate)
 
 
 class _Ends:

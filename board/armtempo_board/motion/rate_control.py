@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-# As in joint_drive.py; a joint gets another time law, and computes its first steps by it, within _JOINT_KITICKS
+# as in joint_drive.py; a joint gets another time law, and computes its first steps by it, within _JOINT_KITICKS
 _LOOP_KITICKS = const(2048)
 _JOINT_KITICKS = const(341)
+
 _PERMILLE = const(1000)
 
 

@@ -218,7 +218,8 @@ def _sectors_commands(image: bytes, folder: Path) -> list[list[str]]:
 
     Of the image's head only the magic number comes first: with the rest it is whole.
     """
-    commands = [["exec", _WRITE_SECTORS.read_text(encoding="utf-8")], ["exec", "erase()"]]
+    script = sectors.script(_WRITE_SECTORS, ERASING=program_files.ERASING)
+    commands = [["exec", script], ["exec", "erase()"]]
     magic = len(sectors.MAGIC)
     places = [0, *range(sectors.HEAD_BYTES, len(image), _PIECE), magic] if image else []
     ends = {0: magic, magic: sectors.HEAD_BYTES}

@@ -34,7 +34,7 @@ class SectorsFound:
     head: str
     """Its first bytes, in hex."""
     crc: int
-    """crc32 of as many bytes behind these as they say."""
+    """crc32 of the bytes after these, as many as these say."""
     is_blank: bool
 
     def holds(self, image: bytes) -> bool:
@@ -125,7 +125,7 @@ class Remote:
 
     def survey(self) -> Survey:
         """Examine firmware and files."""
-        answer = self.run(["exec", _SURVEY.read_text(encoding="utf-8")])
+        answer = self.run(["exec", sectors.script(_SURVEY)])
         try:
             found: dict[str, Any] = json.loads(answer.strip().splitlines()[-1])
             files = {path: (size, digest) for path, (size, digest) in found.pop("files").items()}

@@ -11,6 +11,7 @@ import struct
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 ADDRESS = 0x080C0000
 """Of sectors 10 and 11, the last of a chip with 1 MB (RM0090 3.3)."""
@@ -86,6 +87,14 @@ def _module(at: int, data: bytes, listed: Sequence[Code]) -> bytes:
     )
     whole = struct.pack("<I", len(table) // 8) + table + aligned
     return whole + bytes(-len(whole) % 4)
+
+
+def script(path: Path, **values: str) -> str:
+    """A script for the board's prompt in which AT, SIZE and the ``values`` are known."""
+    known = {"AT": ADDRESS, "SIZE": SIZE, **values}
+    return "".join(f"{name} = {value!r}\n" for name, value in known.items()) + path.read_text(
+        encoding="utf-8"
+    )
 
 
 def codes(data: bytes) -> list[Code]:
