@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from types import TracebackType
 from typing import Self
 
@@ -17,7 +16,7 @@ from armtempo.basics.errors import BoardError, LinkError
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
 from armtempo.link.refusal import refusal
-from armtempo.link.transport import Transport
+from armtempo.link.session import OnLoss
 from armtempo.model.arm import Arm
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMotion, JogMove
@@ -80,7 +79,7 @@ class HeldJog:
         self._run = 0
         self._said_s = 0.0
         self._positions: Positions | None = None
-        self._reopen: Callable[[], Transport] | None = None
+        self._ends = ExitStack()
 
     def __enter__(self) -> Self:
         """Upload and start it; raises BoardError if the board refuses."""
@@ -89,10 +88,7 @@ class HeldJog:
         encoded = _encoded(self.motion, self.arm)
         client.upload(encoded.name, encoded.data)
         # Nothing holds the jog while a broken port is waited for
-        self._reopen, client.session.reopen = (
-            client.session.reopen,
-            None,
-        )
+        self._ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
         try:
             self._run = client.start(encoded.name, encoded.key.crc, START_HELD).run
         except BaseException:
@@ -157,7 +153,7 @@ class HeldJog:
         try:
             self._rest()
         except LinkError:
-            self._client.session.reopen = self._reopen
+            self._ends.close()
             if value is None:  # do not hide the first error
                 raise
             return
@@ -182,5 +178,5 @@ class HeldJog:
             self.fault = status.as_fault()
 
     def _clean_up(self) -> None:
-        self._client.session.reopen = self._reopen
+        self._ends.close()
         self._client.remove(self.motion.trajectory.name)
