@@ -14,7 +14,7 @@ from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
-from armtempo.model import boards, outputs_file, parts_file, pin_use, room, shipped, tool_pose
+from armtempo.model import boards, drive_limits, outputs_file, parts_file, pin_use, room, shipped, tool_pose
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
@@ -157,9 +157,7 @@ class Arm:
     @cached_property
     def driven(self) -> tuple[DrivenJoint, ...]:
         """The joints with a motor, in order; raises InputError if one of them has no limits."""
-        return tuple(
-            _driven(self.name, joint, joint.motor) for joint in self.joints if joint.motor is not None
-        )
+        return tuple(_driven(self, joint, joint.motor) for joint in self.joints if joint.motor is not None)
 
     @cached_property
     def driven_indices(self) -> tuple[int, ...]:
@@ -238,14 +236,14 @@ class Arm:
         return ""
 
 
-def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:
+def _driven(arm: Arm, joint: Joint, motor: Motor) -> DrivenJoint:
     if joint.limits is None:
-        raise InputError(f"arm {arm!r}: {joint.name} has a motor but no limits", "add a limits table")
+        raise InputError(f"arm {arm.name!r}: {joint.name} has a motor but no limits", "add a limits table")
     return DrivenJoint(
         joint.name,
         joint.range_deg,
         joint.home_deg,
-        joint.limits,
+        drive_limits.kept(joint.limits, motor, joint.encoder, arm.driver),
         motor,
         joint.encoder,
         joint.switches,

@@ -225,6 +225,7 @@ class DrivenJoint:
     range_deg: tuple[float, float]
     home_deg: float
     limits: Limits
+    """Those of the table, or what the driver and the encoder allow, if that is less (drive_limits.py)."""
     motor: Motor
     encoder: Encoder | None
     switches: LimitSwitches

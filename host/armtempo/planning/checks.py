@@ -20,6 +20,7 @@ from armtempo_shared.limits import (
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
+from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
 from armtempo.model.job import (
     Job,
@@ -71,6 +72,16 @@ def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
             f"steps/s, the board does {MAX_STEP_RATE} at most {ESTIMATED}",
             "check the unit, lower the limit, or use fewer microsteps",
         )
+
+
+def hardware_notes(arm: Arm) -> tuple[str, ...]:
+    """Limits of the arm's tables that the driver or the encoder does not allow."""
+    return tuple(
+        f"{joint.name}: {bound.key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: planned with "
+        f"{bound.value:.4g}"
+        for joint in arm.joints
+        for bound in drive_limits.exceeded(joint, arm.driver)
+    )
 
 
 def check_job(arm: Arm, job: Job) -> None:

@@ -51,7 +51,8 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
     room_check.check(holding, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
-    return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())
+    notes = (*checks.hardware_notes(arm), *notes, *planned.notes)
+    return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
 
 
 @cache
