@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.basics import number_table
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
 from armtempo.kinematics import Geometry, forward
@@ -287,25 +286,37 @@ def test_an_impossible_rate_is_refused(rate: float) -> None:
         exchange.times_s(1.0, rate)
 
 
+RAD = ("0,-1.0471975511965976,0.6981317007977318", "0.349065850,-1.308996939,0.872664626")
+
+
 @pytest.mark.parametrize(
     ("text", "radians"),
     [
-        ("0,-60,40\n20,-75,50\n", False),
-        ("a,b,c\n0,-60,40\n\n20,-75,50\n", False),
-        ("joint 3,joint 1,joint 2\n40,0,-60\n50,20,-75\n", False),
-        ("time_s,j1_angle_deg,j2_angle_deg,j3_angle_deg\n8,0,-60,40\n9,20,-75,50\n", False),
-        ("0;-60;40\n20;-75;50\n", False),
-        ("joint 1;joint 2;joint 3\n0,0;-60,0;40,0\n20,0;-75,0;50,0\n", False),
-        ("0\t-60\t40\n20\t-75\t50\n", False),
-        ("\ufeffa\tb\tc\r\n0\t-60\t4e1\r\n20\t-75\t50\r\n", False),
-        ("0,-1.0471975511965976,0.6981317007977318\n0.349065850,-1.308996939,0.872664626\n", True),
+        ("0,-60,40\n20,-75,50\n", None),
+        ("joint 3,joint 1,joint 2\n40,0,-60\n\n50,20,-75\n", None),
+        ("J3,J1,J2\n40,0,-60\n50,20,-75\n", None),
+        ("Joint 3, JOINT_1, Joint2\n40,0,-60\n50,20,-75\n", None),
+        ("q3_deg,q1_deg,joint_2_position (deg)\n40,0,-60\n50,20,-75\n", None),
+        ("time_s,j1_angle_deg,j2_angle_deg,j3_angle_deg\n8,0,-60,40\n9,20,-75,50\n", None),
+        ("joint 1,joint 2,joint 3,joint 5\n0,-60,40,0\n20,-75,50,0\n", None),
+        ("# axis 2,axis 1,axis 3\n-60,0,40\n# a remark\n-75,20,50\n", None),
+        ("0;-60;40\n20;-75;50\n", None),
+        ("joint 1;joint 2;joint 3;\n0,0;-60,0;40,0;\n20,0;-75,0;50,0;\n", None),
+        ("0\t-60\t40\n20\t-75\t50\n", None),
+        ("0  -60   40\n 20 -75 50\n", None),
+        ("joint 2  joint 1  joint 3\n-60 0 40\n-75 20 50\n", None),
+        ("j2 j1 j3\n-60 0 40\n-75 20 50\n", None),
+        ("\ufeffj1\tj2\tj3\r\n0\t-60\t4e1\r\n20\t-75\t50\r\n", None),
+        ("\n".join(RAD), True),
+        ("\n".join(("joint 1 (rad),joint 2 [rad],joint_3_rad", *RAD)), None),
+        ("joint 1 (deg),joint 2 (rad),joint 3\n0,-1.0471975512,40\n20,-1.3089969390,50\n", None),
     ],
 )
-def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radians: bool) -> None:
+def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radians: bool | None) -> None:
     table = tmp_path / "via.csv"
     table.write_text(text, encoding="utf-8")
     np.testing.assert_allclose(
-        via_table.via_points(number_table.read(table), ARM, radians).via_deg,
+        via_table.read(table, ARM, radians).via_deg,
         [[0, -60, 40], [20, -75, 50]],
         atol=1e-6,
     )
@@ -317,12 +328,32 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
         ("", "0 via points"),
         ("0,-60,40\n", "1 via points"),
         ("0,-60,40\n20,-75\n", "line 2: 2 values"),
+        ("0,-60,40\n20,-75,50,60\n", "line 2: 4 values"),
         ("0,-60,40\n20,x,50\n", "line 2: 'x' is not a finite number"),
         ("0,-60,40\n20,nan,50\n", "line 2: 'nan'"),
         ("0,-60,inf\n20,-75,50\n", "line 1: 'inf'"),
+        ("0,-6o,40\n20,-75,50\n", "line 1: '-6o' is no number"),
+        ("0,-60,40,1\n20,-75,50,2\n", "line 1: 4 columns without a header.*time.*time_s,joint 1"),
+        ("0,-60\n20,-75\n", "line 1: 2 columns without a header, but 3 joints"),
         ("joint 1,joint 2\n1,2\n", "line 1: the header does not name"),
+        ("a,b,c\n0,-60,40\n20,-75,50\n", "does not name.*joint 1,joint 2,joint 3"),
+        ("time,shoulder,elbow\n0,-60,40\n1,-75,50\n", "does not name"),
+        ("joint 1,joint 2,joint 2\n0,-60,40\n1,-75,50\n", "line 1: two columns are called 'joint2'"),
+        ("joint 1,j2,joint 2,joint 3\n0,-60,1,40\n1,-75,1,50\n", "'j2' and 'joint 2' both name joint 2"),
+        ("j1 (gon),j2,j3\n0,-60,40\n1,-75,50\n", "'j1 \\(gon\\)': the unit is not known"),
+        (
+            "j1,j2,j3,j4\n0,-60,40,0\n20,-75,50,9\n",
+            "line 3: joint 4 at 9 degrees has no motor, it stays at 0",
+        ),
         ("joint 1;joint 2;joint 3\n0;-60;40\n1;2\n", "line 3: 2 values"),
-        ("time_s,joint 1,joint 2,joint 3\n1,0,-60,40\n1,20,-75,50\n", "line 3: time_s does not increase"),
+        ("time_s,joint 1,joint 2,joint 3\n1,0,-60,40\n1,20,-75,50\n", "line 3: the time does not increase"),
+        ("\n".join(RAD), "no angle is beyond 1.31: degrees or radians.*--radians"),
+        ("\n".join(("j1,j2,j3", *RAD)), "degrees or radians"),
+        ("x_mm,y_mm\n1,2\n3,4\n", "does not name"),
+        ("x,y,z\n0.2,0,0.1\n0.3,0,0.1\n", "mm or metres.*x_m,y_m,z_m"),
+        ("x,y,z,rx,ry,rz\n200,0,100,0,0,0\n300,0,100,0,0,0\n", "'rx' is not known as part of a pose"),
+        ("x,y,z,qw,qx,qy\n200,0,100,1,0,0\n300,0,100,1,0,0\n", "qw, qx, qy are not an orientation"),
+        ("t,x,y,z\n0,200,0,100\n1,300,0,100\n", "poses are not thinned"),
         ("header:\n  stamp: {sec: 0, nanosec: 0}\n", "is a ROS message, not a table; export"),
     ],
 )
@@ -330,7 +361,60 @@ def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text:
     table = tmp_path / "via.csv"
     table.write_text(text)
     with pytest.raises(InputError, match=said):
-        via_table.via_points(number_table.read(table), ARM)
+        via_table.read(table, ARM)
+
+
+def test_a_unit_of_the_header_is_not_overruled(tmp_path: Path) -> None:
+    table = tmp_path / "via.csv"
+    table.write_text("\n".join(("joint 1 (rad),joint 2 (rad),joint 3 (rad)", *RAD)))
+    with pytest.raises(InputError, match="other units than --degrees"):
+        via_table.read(table, ARM, radians=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "rotation"),
+    [
+        ("z_mm,x_mm,y_mm,yaw_deg,pitch_deg,roll_deg\n20,300,10,30,20,10\n25,310,10,30,20,10\n", (10, 20, 30)),
+        ("z_m,x_m,y_m\n0.02,0.3,0.01\n0.025,0.31,0.01\n", None),
+        ("x y z qw qx qy qz\n300 10 20 0 1 0 0\n310 10 25 0 1 0 0\n", (180, 0, 0)),
+        ("X,Y,Z,pitch (rad)\n300,10,20,1.5707963267949\n310,10,25,1.5707963267949\n", (0, 90, 0)),
+    ],
+)
+def test_a_table_of_poses_becomes_poses(
+    tmp_path: Path, text: str, rotation: tuple[float, float, float] | None
+) -> None:
+    table = tmp_path / "poses.csv"
+    table.write_text(text)
+    first, second = Job.from_csv(table, ARM).via
+    assert isinstance(first, Pose)
+    assert isinstance(second, Pose)
+    np.testing.assert_allclose([row[3] for row in first.matrix[:3]], [300, 10, 20])
+    np.testing.assert_allclose([row[3] for row in second.matrix[:3]], [310, 10, 25])
+    if rotation is None:
+        assert first.fixed == ()
+    else:
+        np.testing.assert_allclose(first.matrix, from_rpy((300, 10, 20), rotation), atol=1e-9)
+
+
+def test_numbers_of_joints_are_not_guessed_where_they_are_ambiguous(tmp_path: Path) -> None:
+    first, second, third = ARM.joints[:3]
+    arm = replace(ARM, joints=(first, replace(second, motor=None), third, *ARM.joints[3:]))
+    table = tmp_path / "via.csv"
+    table.write_text("j1,j2\n0,40\n20,50\n")
+    with pytest.raises(InputError, match="joint 1,joint 3"):
+        via_table.read(table, arm)
+    table.write_text("joint 3,joint 1\n40,0\n50,20\n")
+    np.testing.assert_allclose(via_table.read(table, arm).via_deg, [[0, 40], [20, 50]])
+
+
+def test_columns_that_are_not_read_are_named(tmp_path: Path) -> None:
+    table = tmp_path / "via.csv"
+    table.write_text("j1,j2,j3,gripper,j1_speed_deg_s\n0,-60,40,1,0\n20,-75,50,1,0\n")
+    assert via_table.read(table, ARM).notes == ("columns that were not used: gripper",)
+    table.write_text("0,-60,40\n20,-75,50\n")
+    assert via_table.read(table, ARM).notes == (
+        "no header: the columns were taken as joint 1,joint 2,joint 3",
+    )
 
 
 @pytest.mark.slow
@@ -339,7 +423,7 @@ def test_an_exported_motion_comes_back_thinned_to_the_tolerance(tmp_path: Path, 
     plan = shipped_plan()
     table = tmp_path / "feed.csv"
     table.write_text(plan.to_csv(60.0))
-    found = via_table.via_points(number_table.read(table), ARM, tolerance_deg=tolerance)
+    found = via_table.read(table, ARM, tolerance_deg=tolerance)
     assert found.lines == 409
     assert 5 < len(found.via_deg) < {1.0: 15, 0.1: 25, 0.01: 50}[tolerance]
     times = exchange.times_s(plan.trajectory.duration_s, 60.0)
@@ -356,8 +440,8 @@ def test_a_path_without_times_is_thinned_where_asked(tmp_path: Path) -> None:
     table = tmp_path / "arc.csv"
     turn = np.linspace(0.0, np.pi, 600)
     table.write_text("".join(f"{20 * np.cos(a)},{-60 + 20 * np.sin(a)},40\n" for a in np.repeat(turn, 2)))
-    assert len(via_table.via_points(number_table.read(table), ARM).via_deg) == 1200
-    found = via_table.via_points(number_table.read(table), ARM, tolerance_deg=0.1)
+    assert len(via_table.read(table, ARM).via_deg) == 1200
+    found = via_table.read(table, ARM, tolerance_deg=0.1)
     assert 3 < len(found.via_deg) < 25
     np.testing.assert_allclose(found.via_deg[[0, -1]], [[20, -60, 40], [-20, -60, 40]], atol=1e-9)
 

@@ -220,7 +220,8 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
         raise InputError(
             f"job {job.name!r}: a via angle is not a finite number", "give every angle as a number of degrees"
         )
-    if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE):
+    circles = any(way.circle_through_mm is not None for way in job.ways)
+    if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE) and not circles:
         raise PlanError(
             f"job {job.name!r}: all via points are the same, so nothing moves", "change at least one angle"
         )

@@ -113,7 +113,7 @@ def resolve(arm: Arm, job: Job) -> Resolved:
         if number in led and isinstance(via, Pose):
             target = via.exact(where)
             needed = _led(arm, job, number, np.degrees(postures[-1])[setup.driven], setup)
-            notes += _miss_note(setup, target, needed, number)
+            _check_arrival(setup, target, needed, where)
         elif isinstance(via, Pose):
             target = via.exact(where)
             previous = posture if via.posture_deg is None else _preferred(setup, via.posture_deg, where)
@@ -138,6 +138,16 @@ def _led(arm: Arm, job: Job, number: int, before_deg: Array, setup: _Setup) -> A
     found = setup.home.copy()
     found[setup.driven] = np.radians(stretches.end_deg(arm, job, number, before_deg))
     return found
+
+
+def _check_arrival(setup: _Setup, target: Pose, needed: Array, where: str) -> None:
+    """Raise PlanError if a line does not end at its pose."""
+    miss = setup.miss(target, needed)
+    if not Constraint.of(target).reached(miss):
+        raise PlanError(
+            f"{where}: the line ends {miss} from the pose, as it keeps less of the orientation",
+            "ask for the whole orientation, for approach, or for position_mm alone; or leave line out",
+        )
 
 
 def posture_deg(arm: Arm, posture: ArmPosture) -> Array:
