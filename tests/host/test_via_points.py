@@ -17,8 +17,9 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.pose import from_rpy
+from armtempo.model.posture import ArmPosture
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import planner, via_points
+from armtempo.planning import planner, point_to_point, via_points
 from click.testing import CliRunner
 from scipy.interpolate import CubicSpline
 
@@ -274,6 +275,49 @@ def test_ros_points_are_in_radians_and_in_order() -> None:
     last = [float(value) for value in points[-1].removeprefix("- positions: [").rstrip("]").split(",")]
     np.testing.assert_allclose(last, np.radians([180, -38, -52]), atol=1e-9)
     assert "time_from_start: {sec: 0, nanosec: 100000000}" in text
+
+
+@pytest.mark.parametrize("rate", [1.0, 100.0, 333.3, 1e5])
+@pytest.mark.parametrize("more_s", [-3e-10, 0.0, 3e-10, 1e-8, 1e-6])
+def test_stamps_rise_in_nanoseconds(rate: float, more_s: float) -> None:
+    stamps = [round(1e9 * time) for time in exchange.times_s(1.0 + more_s, rate)]
+    assert stamps == sorted(set(stamps))
+    assert stamps[-1] == round(1e9 * (1.0 + more_s))
+
+
+def test_exports_give_back_the_same_numbers() -> None:
+    plan = shipped_plan()
+    times = exchange.times_s(plan.trajectory.duration_s, 10.0)
+    rows = list(csv.DictReader(plan.to_csv(10.0).splitlines()))
+    assert [float(row["j2_angle_deg"]) for row in rows] == plan.trajectory(times)[:, 1].tolist()
+    points = [line for line in plan.to_ros(10.0).splitlines() if line.startswith("- positions: ")]
+    found = [[float(each) for each in point[14:-1].split(",")] for point in points]
+    assert found == np.radians(plan.trajectory(times)).tolist()
+
+
+NEAR = 90.0 + 1e-4 / ARM.driven[0].steps_per_deg
+"""Beyond a range to 90 by less than rounding in single precision."""
+
+
+def test_rounding_beyond_a_range_is_its_end(tmp_path: Path) -> None:
+    """Of a table, a job, a posture of the arm file, a move and a sequence."""
+    first = replace(ARM.joints[0], range_deg=(-90.0, 90.0))
+    arm = replace(ARM, joints=(first, *ARM.joints[1:]))
+    table = tmp_path / "via.csv"
+    table.write_text("j1 (rad),j2 (deg),j3 (deg)\n1.570796327,-60,40\n-1.5707964,-60,40\n")
+    for job in (
+        Job.from_csv(table, arm),
+        Job("near", via_deg=[(NEAR, -60, 40), (180.0 - NEAR - 180.0, -60, 40)]),
+    ):
+        angles, _ = planner.via_angles(arm, job)
+        assert angles[:, 0].tolist() == [90.0, -90.0]
+    assert arm.angles_problem((NEAR, -60.0, 40.0)) == ""
+    assert point_to_point.posture((NEAR, -60.0, 40.0), arm)[0] == 90.0
+    assert via_points.posture_deg(arm, ArmPosture("near", (NEAR, -60.0, 40.0)))[0] == 90.0
+    for beyond in (90.01, -90.01):
+        assert "outside of its range" in arm.angles_problem((beyond, -60.0, 40.0))
+        with pytest.raises(InputError, match="outside of its range"):
+            point_to_point.posture((beyond, -60.0, 40.0), arm)
 
 
 def test_the_start_is_there_at_any_rate() -> None:

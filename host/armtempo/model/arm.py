@@ -212,12 +212,16 @@ class Arm:
             )
         return found[0]
 
+    def placed(self, angles_deg: Iterable[float]) -> tuple[float, ...]:
+        """The driven joints' angles, (J,), those that are only by rounding beyond a range at its end."""
+        return tuple(joint.placed(float(angle)) for joint, angle in zip(self.driven, angles_deg, strict=True))
+
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
         """Why the driven joints cannot be at these angles; "" if they can."""
         angles = tuple(angles_deg)
         if len(angles) != len(self.driven):
             return f"{len(angles)} angles, but {len(self.driven)} joints have a motor"
-        for joint, angle in zip(self.driven, angles, strict=True):
+        for joint, angle in zip(self.driven, self.placed(angles), strict=True):
             low, high = joint.range_deg
             if not low <= angle <= high:
                 return f"{joint.name}: {angle:g} degrees is outside of its range {low:g} to {high:g}"

@@ -77,7 +77,7 @@ def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:
     else:
         angles, notes = np.array(job.via, dtype=float), ()
     checks.check_via(arm, job, angles)
-    return angles, notes
+    return np.array([arm.placed(row) for row in angles]), notes
 
 
 def straight_line(
