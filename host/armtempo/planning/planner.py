@@ -77,7 +77,8 @@ def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:
     else:
         angles, notes = np.array(job.via, dtype=float), ()
     checks.check_via(arm, job, angles)
-    return np.array([arm.placed(row) for row in angles]), notes
+    angles = np.array([arm.placed(row) for row in angles])
+    return angles, (*notes, *checks.long_ways(arm, angles))
 
 
 def straight_line(
