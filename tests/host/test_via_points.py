@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,8 +18,9 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.pose import from_rpy
+from armtempo.model.posture import ArmPosture
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import planner, via_points
+from armtempo.planning import planner, point_to_point, via_points
 from click.testing import CliRunner
 from scipy.interpolate import CubicSpline
 
@@ -274,6 +276,126 @@ def test_ros_points_are_in_radians_and_in_order() -> None:
     last = [float(value) for value in points[-1].removeprefix("- positions: [").rstrip("]").split(",")]
     np.testing.assert_allclose(last, np.radians([180, -38, -52]), atol=1e-9)
     assert "time_from_start: {sec: 0, nanosec: 100000000}" in text
+
+
+WIDE = replace(ARM, joints=(replace(ARM.joints[0], range_deg=(-400.0, 400.0)), *ARM.joints[1:]))
+
+
+def recording(angles: Iterable[float], period_s: float = 0.1) -> str:
+    """A table of joint 1, the others at rest."""
+    rows = [f"{period_s * line},{angle},-60,40" for line, angle in enumerate(angles)]
+    return "\n".join(("time,j1,j2,j3", *rows)) + "\n"
+
+
+def within_a_turn(angle: float) -> float:
+    """From -180 to below 180."""
+    return (angle + 180.0) % 360.0 - 180.0
+
+
+@pytest.mark.parametrize(("start", "end"), [(160, 200), (-160, -200), (170, 390), (0, -400)])
+@pytest.mark.parametrize("least", [-180.0, 0.0])
+def test_a_recording_within_a_turn_goes_on(tmp_path: Path, start: int, end: int, least: float) -> None:
+    """Angles of -180 to 180, or of 0 to 360."""
+    table = tmp_path / "recorded.csv"
+    step = 2.0 * np.sign(end - start)
+    way = np.arange(start, end + step, step)
+    told = (way - least) % 360.0 + least
+    arm = replace(WIDE, joints=(replace(WIDE.joints[0], range_deg=(-800.0, 800.0)), *ARM.joints[1:]))
+    table.write_text(recording(told))
+    found = via_table.read(table, arm)
+    assert found.via_deg[[0, -1], 0] == pytest.approx(told[0] + np.array([0.0, end - start]))
+    if told[-1] != told[0] + end - start:
+        assert "recorded within a turn" in found.notes[-1]
+
+
+def test_a_recording_that_cannot_go_on_is_refused_with_its_line(tmp_path: Path) -> None:
+    table = tmp_path / "recorded.csv"
+    table.write_text(recording([176, 178, -180, -178]))
+    with pytest.raises(InputError, match="line 5: joint 1 is recorded within a turn, and goes on to 182"):
+        via_table.read(
+            table, replace(ARM, joints=(replace(ARM.joints[0], range_deg=(-180.0, 181.0)), *ARM.joints[1:]))
+        )
+    table.write_text(recording([160, 165, -170, -165]))
+    with pytest.raises(InputError, match="line 4: joint 1 jumps from 165 to -170 degrees, faster than"):
+        via_table.read(table, WIDE)
+
+
+def test_a_slow_way_back_is_no_jump(tmp_path: Path) -> None:
+    table = tmp_path / "recorded.csv"
+    table.write_text(recording([170, 0, -170, 0, 170], period_s=5.0))
+    assert np.ptp(via_table.read(table, WIDE).via_deg[:, 0]) == 340.0
+
+
+def test_a_long_way_round_is_said() -> None:
+    job = Job("round", via_deg=[(350.0, -60.0, 40.0), (10.0, -60.0, 40.0)])
+    (note,) = planner.via_angles(WIDE, job)[1]
+    assert note == (
+        "P0 to P1: joint 1 goes 340 degrees from 350 to 10; 370, 20 the other way, is in its range too"
+    )
+
+
+@pytest.mark.parametrize("numerical", [False, True])
+def test_a_pose_is_reached_the_short_way(numerical: bool) -> None:
+    six = Arm.of("parol6")
+    joints = tuple(
+        replace(each, range_deg=(each.range_deg[0] - 400.0, each.range_deg[1] + 400.0)) for each in six.joints
+    )
+    arm = replace(six, joints=joints)
+    start = np.array([175.0, -100.0, 200.0, 175.0, 40.0, -178.0])
+    end = start + np.array([10.0, 3.0, -4.0, 10.0, 2.0, -12.0])
+    pose = Pose.of_matrix(forward(Geometry.of(arm), np.radians(end)))
+    if numerical:
+        pose = replace(Pose.of_approach(pose_position(pose), np.array(pose.matrix)[:3, 2]))
+    angles, notes = planner.via_angles(arm, Job("short", via=(tuple(start), pose)))
+    assert np.abs(angles[1] - angles[0]).max() < 60.0
+    assert notes == ()
+
+
+def pose_position(pose: Pose) -> list[float]:
+    return [row[3] for row in pose.matrix[:3]]
+
+
+@pytest.mark.parametrize("rate", [1.0, 100.0, 333.3, 1e5])
+@pytest.mark.parametrize("more_s", [-3e-10, 0.0, 3e-10, 1e-8, 1e-6])
+def test_stamps_rise_in_nanoseconds(rate: float, more_s: float) -> None:
+    stamps = [round(1e9 * time) for time in exchange.times_s(1.0 + more_s, rate)]
+    assert stamps == sorted(set(stamps))
+    assert stamps[-1] == round(1e9 * (1.0 + more_s))
+
+
+def test_exports_give_back_the_same_numbers() -> None:
+    plan = shipped_plan()
+    times = exchange.times_s(plan.trajectory.duration_s, 10.0)
+    rows = list(csv.DictReader(plan.to_csv(10.0).splitlines()))
+    assert [float(row["j2_angle_deg"]) for row in rows] == plan.trajectory(times)[:, 1].tolist()
+    points = [line for line in plan.to_ros(10.0).splitlines() if line.startswith("- positions: ")]
+    found = [[float(each) for each in point[14:-1].split(",")] for point in points]
+    assert found == np.radians(plan.trajectory(times)).tolist()
+
+
+NEAR = 90.0 + 1e-4 / ARM.driven[0].steps_per_deg
+"""Beyond a range to 90 by less than rounding in single precision."""
+
+
+def test_rounding_beyond_a_range_is_its_end(tmp_path: Path) -> None:
+    """Of a table, a job, a posture of the arm file, a move and a sequence."""
+    first = replace(ARM.joints[0], range_deg=(-90.0, 90.0))
+    arm = replace(ARM, joints=(first, *ARM.joints[1:]))
+    table = tmp_path / "via.csv"
+    table.write_text("j1 (rad),j2 (deg),j3 (deg)\n1.570796327,-60,40\n-1.5707964,-60,40\n")
+    for job in (
+        Job.from_csv(table, arm),
+        Job("near", via_deg=[(NEAR, -60, 40), (180.0 - NEAR - 180.0, -60, 40)]),
+    ):
+        angles, _ = planner.via_angles(arm, job)
+        assert angles[:, 0].tolist() == [90.0, -90.0]
+    assert arm.angles_problem((NEAR, -60.0, 40.0)) == ""
+    assert point_to_point.posture((NEAR, -60.0, 40.0), arm)[0] == 90.0
+    assert via_points.posture_deg(arm, ArmPosture("near", (NEAR, -60.0, 40.0)))[0] == 90.0
+    for beyond in (90.01, -90.01):
+        assert "outside of its range" in arm.angles_problem((beyond, -60.0, 40.0))
+        with pytest.raises(InputError, match="outside of its range"):
+            point_to_point.posture((beyond, -60.0, 40.0), arm)
 
 
 def test_the_start_is_there_at_any_rate() -> None:

@@ -335,7 +335,7 @@ def _named(name: str, where: str, arm: Arm) -> tuple[float, ...] | Pose:
 
 def read_angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:
     """Angles of the driven joints in degrees, (J,), each within its range."""
-    found = table.numbers(key, len(arm.driven))
+    found = arm.placed(table.numbers(key, len(arm.driven)))
     for joint, angle in zip(arm.driven, found, strict=True):
         low, high = joint.range_deg
         if not low <= angle <= high:

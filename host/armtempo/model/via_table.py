@@ -31,6 +31,8 @@ _METRES = 2.0
 _RESTS_DEG = 0.01
 """Allowed distance from home of a joint without a motor."""
 LARGEST_DEG = 90.0
+_SPEED_MARGIN = 1.05
+"""Recordings may be faster than the limit by this factor, as their times scatter."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,11 @@ def via_points(
     angles = _angles(table, header, arm, radians)
     _check_resting(table, header, arm, radians)
     times, notes = _times(table, header), _notes(table, header, arm)
+    if times is not None:
+        angles, jumps = unwrapped(
+            angles, times, arm, [f"{table.path}: line {line}" for line, _ in table.rows]
+        )
+        notes += jumps
     if tolerance_deg is None and times is None:
         return ImportedPath(angles, len(angles), notes=notes)
     tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
@@ -222,6 +229,46 @@ def _times(table: NumberTable, header: Header) -> Array | None:
                 "put the lines in order, or leave the column of times out",
             )
     return times
+
+
+def unwrapped(
+    angles_deg: Array, times_s: Array, arm: Arm, where: Sequence[str]
+) -> tuple[Array, tuple[str, ...]]:
+    """A recording (n, J) with its jumps of a turn taken out, and a note for each joint that had some.
+
+    A joint that moves by more than half a turn between two points, faster than its speed limit, has been recorded
+    within a turn: it goes on by the short way. Raises InputError, with ``where`` of the point, if it is faster than its
+    limit that way too, or leaves its range. ``times_s``: (n,), increasing.
+    """
+    found = angles_deg.copy()
+    notes = []
+    for number, joint in enumerate(arm.driven):
+        column = found[:, number]
+        steps = np.diff(column)
+        limit = joint.limits.speed_deg_s * np.diff(times_s) * _SPEED_MARGIN
+        jumps = np.flatnonzero((np.abs(steps) > 180.0) & (np.abs(steps) > limit))
+        for jump in jumps.tolist():
+            turn = -360.0 * round(steps[jump] / 360.0)
+            if abs(steps[jump] + turn) > limit[jump]:
+                raise InputError(
+                    f"{where[jump + 1]}: {joint.name} jumps from {angles_deg[jump, number]:g} to "
+                    f"{angles_deg[jump + 1, number]:g} degrees, faster than its speed limit",
+                    "correct the line, or leave the time out: then every line is a via point",
+                )
+            column[jump + 1 :] += turn
+        low, high = joint.range_deg
+        if not jumps.size:
+            continue
+        if (outside := np.flatnonzero((column < low) | (column > high))).size:
+            raise InputError(
+                f"{where[int(outside[0])]}: {joint.name} is recorded within a turn, and goes on to "
+                f"{column[outside[0]]:g} degrees, outside of its range {low:g} to {high:g}",
+                "widen range_deg if the joint can turn that far, or cut the recording before that",
+            )
+        notes.append(
+            f"{joint.name}: recorded within a turn; it goes on from {column[jumps[0]]:g} to {column[-1]:g} degrees"
+        )
+    return found, tuple(notes)
 
 
 def thinned(points_deg: Array, tolerance_deg: float, times_s: Array | None = None) -> Array:

@@ -156,7 +156,7 @@ def posture_deg(arm: Arm, posture: ArmPosture) -> Array:
     They are the ones that ``resolve`` takes. Raises PlanError if the arm cannot take it.
     """
     if not isinstance(posture.where, Pose):
-        return np.array(posture.where, dtype=float)
+        return np.array(arm.placed(posture.where))
     setup = _Setup.of(arm)
     where = f"posture {posture.name!r}"
     target = posture.where.exact(where)
