@@ -383,8 +383,8 @@ def test_joints_that_stand_still_or_move_in_proportion_cost_no_brake_times(
     arm = Arm.load("ar4")
     limits = [joint.limits for joint in arm.driven]
     here = np.array([20.0, 10.0, -20.0, 15.0, 40.0, 30.0])
-    one = point_to_point.straight("go", here, here + [0, 9, 0, 0, 0, 0], arm)
-    all_of_them = point_to_point.straight("go", here, here + [9, 9, -9, 9, 9, -9], arm)
+    one = point_to_point.straight("go", here, here + np.array([0, 9, 0, 0, 0, 0]), arm)
+    all_of_them = point_to_point.straight("go", here, here + np.array([9, 9, -9, 9, 9, -9]), arm)
     alone = evaluated(one, limits, monkeypatch)
     assert alone < 1_000_000
     assert evaluated(all_of_them, limits, monkeypatch) < 1.2 * alone

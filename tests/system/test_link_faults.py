@@ -29,6 +29,7 @@ from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import limits, wire
+from armtempo_shared.messages import MAX_COMMAND
 
 from tests import interpreters
 from tests.inprocess import Noise, clean
@@ -223,7 +224,7 @@ def _recorded(path: Path) -> Recording:
 
 def frames(data: bytes) -> Iterator[tuple[int, int, bytes]]:
     """All frames of one direction; there must be nothing else."""
-    parser = wire.Parser()
+    parser = wire.Parser(MAX_COMMAND)
     parser.feed(data)
     while (frame := parser.next()) is not None:
         yield frame

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -26,7 +25,7 @@ from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state, goto, stored_motion
 from armtempo.robot.stop_request import StopRequest
 
-NAME = stored_motion.TEMPORARY + "jog"
+NAME = "jog"
 HOLD_S = 0.08
 """Interval of the hold messages of a held jog: three in a row may be lost."""
 BEFORE_BRAKING_S = 0.15
@@ -53,7 +52,7 @@ def step(client: Client, arm: Arm, move: JogMove, speed: float, stop: StopReques
     Raises BoardError if the board refuses or a fault ends it; otherwise as ``plan``.
     """
     motion = plan(client, arm, move, speed)
-    goto.move_once(client, _encoded(motion, arm), stop)
+    goto.move_once(client, _encoded(motion, arm).data, stop)
     return motion
 
 
@@ -87,16 +86,16 @@ class HeldJog:
         client = self._client
         client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
-        client.upload(encoded.name, encoded.data)
+        key = stored_motion.put_once(client, encoded.data)
         # Nothing holds the jog while a broken port is waited for
         self._reopen, client.session.reopen = (
             client.session.reopen,
             None,
         )
         try:
-            self._run = client.start(encoded.name, encoded.key.crc, START_HELD).run
+            self._run = client.start(key.name, key.crc, START_HELD).run
         except BaseException:
-            self._clean_up()
+            client.session.reopen = self._reopen
             raise
         self.moving = True
         for _ in range(_FIRST):
@@ -157,12 +156,11 @@ class HeldJog:
         try:
             self._rest()
         except LinkError:
-            self._client.session.reopen = self._reopen
             if value is None:  # do not hide the first error
                 raise
             return
-        with suppress(LinkError):
-            self._clean_up()
+        finally:
+            self._client.session.reopen = self._reopen
         if self.fault is not None and value is None:
             raise refusal("a fault ended the jog", self.fault.code, self.fault.joint)
 
@@ -180,7 +178,3 @@ class HeldJog:
         self.moving = False
         if status.fault and self.fault is None:
             self.fault = status.as_fault()
-
-    def _clean_up(self) -> None:
-        self._client.session.reopen = self._reopen
-        self._client.remove(self.motion.trajectory.name)

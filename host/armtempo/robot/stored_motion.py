@@ -1,4 +1,4 @@
-"""Start, follow and stop a stored motion."""
+"""Store a motion; start, follow and stop one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from armtempo_shared import wire
-from armtempo_shared.messages import PERMILLE
+from armtempo_shared.messages import ONCE_NAME, PERMILLE
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.basics.progress import Progress
@@ -28,8 +28,6 @@ FREEZE_S = 2.0
 """Longest time that freezing takes."""
 TURN_S = 1.0
 """A request from another thread waits this long for its turn to talk to the board."""
-TEMPORARY = "tmp-"
-"""Prefix of the names of motions that are removed after use."""
 
 
 def store(
@@ -37,19 +35,14 @@ def store(
 ) -> MotionKey:
     """Upload a motion record under ``name``, unless the board already has it.
 
-    Raises LinkError if the board has another motion of this name, unless ``replace`` is true, the name is
-    temporary, or that motion is damaged.
+    Raises LinkError if the board has another motion of this name, unless ``replace`` is true, or that motion is
+    damaged.
     """
     key = MotionKey(name, wire.record_crc(data))
     found = client.find(name)
     if found is not None and found.crc == key.crc:
         return key
-    if (
-        found is not None
-        and (found.joints or found.sequence)
-        and not replace
-        and not name.startswith(TEMPORARY)
-    ):
+    if found is not None and (found.joints or found.sequence) and not replace:
         button = ", which its button starts" if found.default else ""
         raise LinkError(
             f"the board has another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
@@ -59,6 +52,11 @@ def store(
     return key
 
 
+def put_once(client: Client, data: bytes) -> MotionKey:
+    """Put a motion record into the board's memory, to be run once; raises InputError if it is too large."""
+    return MotionKey(ONCE_NAME, client.put_once(data))
+
+
 def replay(
     client: Client,
     motion: MotionKey,
@@ -66,7 +64,7 @@ def replay(
     sink: SampleSink = lambda *_: None,
     flags: int = 0,
 ) -> RunEnd:
-    """Start a stored motion and follow it to its end; a stop request makes the board brake.
+    """Start a motion and follow it to its end; a stop request makes the board brake.
 
     Any error here stops the board. Raises BoardError if the board refuses to start, LinkError if it cannot be
     reached any more, Stopped if the stop was requested before the start.
