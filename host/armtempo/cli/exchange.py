@@ -85,8 +85,8 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     if found.thinned_to_deg is None:
         return [*notes, written]
     thinned = (
-        f"{found.lines} lines reduced to {len(found.via_deg)} via points: a spline through them follows the table "
-        f"within {found.thinned_to_deg:g} deg; 'armtempo plan' computes new times"
+        f"{found.lines} lines reduced to {len(found.via_deg)} via points: the planned path stays within "
+        f"{found.thinned_to_deg:.2g} deg of the table (proven); 'armtempo plan' computes new times"
     )
     return [*notes, thinned, written]
 
