@@ -585,11 +585,22 @@ def apart_deg(one: np.ndarray, other: np.ndarray) -> float:
 def test_what_is_planned_keeps_the_tolerance(rows: list[tuple[float, float, float]]) -> None:
     """Of uneven via points, which a spline on uneven knots follows and that on even ones does not."""
     points = np.array(rows, dtype=float)
-    found = thinning.thinned(points, 0.1)
+    found = thinning.thinned(points, 0.1, ranges_deg=np.array([joint.range_deg for joint in ARM.driven]))
     job = Job("again", via_deg=found.via_deg.tolist())
     plan = planner.plan(ARM, replace(job, refine=1, starts=1, polish=False, iterations=5))
     moved = plan.trajectory(np.linspace(0.0, plan.trajectory.duration_s, 1500))
     assert apart_deg(moved, points) <= found.off_deg + 0.02 <= 0.12
+
+
+def test_a_recording_beyond_a_range_is_refused_with_its_line(tmp_path: Path) -> None:
+    table = tmp_path / "recorded.csv"
+    table.write_text(recording([-9.0, -10.04, -9.0]))
+    assert via_table.read(table, ARM).via_deg[:, 0].min() >= -10.0
+    table.write_text(recording([-9.0, -10.2, -9.0]))
+    with pytest.raises(
+        InputError, match=r"line 3: joint 1 at -10.2 degrees is outside of its range -10 to 190"
+    ):
+        via_table.read(table, ARM)
 
 
 def test_rests_of_a_recording_are_kept_as_stops(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.splines import bspline
+from armtempo.splines import bspline, extremes
 from armtempo.splines.bspline import REST_PIECES
 
 DEGREE = 5
@@ -27,7 +27,10 @@ _NEARBY = 5
 """Segments on which a via point more or less has an effect worth checking."""
 _GRADE = 2.1
 """Largest ratio of neighbouring segments at first."""
-_TRIES = 4
+_TRIES = 5
+_INSIDE = 1.5
+"""Distance from the end of a range, for a spline that was beyond it by 1."""
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +45,17 @@ class Thinned:
     """Rests at the beginning and at the end."""
 
 
-def thinned(points_deg: Array, tolerance_deg: float, times_s: Array | None = None) -> Thinned:
+def thinned(
+    points_deg: Array, tolerance_deg: float, times_s: Array | None = None, ranges_deg: Array | None = None
+) -> Thinned:
     """Via points such that the spline through them (degree 5, shared timing) and the points' polyline are near.
 
     To each place on one there is one on the other within ``tolerance_deg``, in the same order (Fréchet distance), the
-    largest over the joints. ``points_deg``: (n, J); ``times_s``: (n,), increasing; with times, rests are kept. Raises
-    InputError for a tolerance outside (0, LARGEST_DEG], points that do not move, and if more via points are needed than
-    a motion can have.
+    largest over the joints. ``points_deg``: (n, J); ``times_s``: (n,), increasing; with times, rests are kept.
+    ``ranges_deg``: (J, 2), which the spline keeps if the points do, by a path that is a little inside where it would
+    swing out; points beyond them by less than half of the tolerance, as recordings have them, count as at their ends.
+    Raises InputError for a tolerance outside (0, LARGEST_DEG], points that do not move, and if more via points are
+    needed than a motion can have.
     """
     if not 0.0 < tolerance_deg <= LARGEST_DEG:
         raise InputError(
@@ -58,23 +65,43 @@ def thinned(points_deg: Array, tolerance_deg: float, times_s: Array | None = Non
     stretches, waits_s = _at_rests(points_deg, times_s, _STILL * tolerance_deg)
     if not stretches:
         raise InputError("all points are the same within the tolerance", "give a path that moves")
-    lines = [_Polyline.of(*stretch) for stretch in stretches]
-    wanted = tolerance_deg
+    low, high = (
+        np.full((2, points_deg.shape[1]), np.inf) * [[-1.0], [1.0]] if ranges_deg is None else ranges_deg.T
+    )
+    beyond_deg = float(np.abs(points_deg - np.clip(points_deg, low, high)).max())
+    if beyond_deg > 0.5 * tolerance_deg:
+        raise InputError(f"a point is {beyond_deg:.3g} degrees beyond the range of its joint", "correct it")
+    wanted, inside = tolerance_deg - beyond_deg, np.zeros(2)
     for _ in range(_TRIES):
+        lines = [
+            _Polyline.of(np.clip(points, low + inside[0], high - inside[1]), times)
+            for points, times in stretches
+        ]
         places = [_enough(line, wanted) for line in lines]
         via = [line.at(place) for line, place in zip(lines, places, strict=True)]
-        off_deg = _off_whole(lines, places, via)
-        if off_deg <= tolerance_deg:
+        whole = _whole(via)
+        off_deg = _off_whole(whole, lines, places) + float(inside.max()) + beyond_deg
+        out = _excess(whole, low, high)
+        if off_deg <= tolerance_deg and not out.any():
             break
+        inside = np.where(out > 0.0, inside + _INSIDE * out, inside)
         wanted *= 0.5
     else:
         raise InputError(
-            f"the rests cannot be kept within {tolerance_deg:g} degrees", "allow more with --tolerance-deg"
+            f"its rests and the ends of ranges cannot be kept within {tolerance_deg:g} degrees",
+            "allow more with --tolerance-deg",
         )
     numbers = np.cumsum([len(each) - 1 for each in via]).tolist()
     rests = dict(zip(numbers[:-1], waits_s[1:-1], strict=True))
     points = np.concatenate([via[0], *(each[1:] for each in via[1:])])
     return Thinned(points, rests, off_deg, (waits_s[0], waits_s[-1]))
+
+
+def _excess(whole: Array, low: Array, high: Array) -> Array:
+    """How far the spline is below and above the ranges, the most of any joint: (2,); 0 inside."""
+    least, most = extremes.range_of(np.moveaxis(bspline.polynomials(whole, DEGREE), 2, 0))
+    beyond = np.array([np.max(low - least), np.max(most - high)])
+    return np.where(beyond > _ROUNDING, beyond, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,10 +223,10 @@ def _offs(line: _Polyline, places: Array, segments: Sequence[int]) -> Array:
     )
 
 
-def _off_whole(lines: Sequence[_Polyline], places: Sequence[Array], via: Sequence[Array]) -> float:
-    """The bound for all stretches on the spline that rests between them, as the planner joins it."""
-    if len(lines) == 1:
-        return float(_offs(lines[0], places[0], range(len(places[0]) - 1)).max())
+def _whole(via: Sequence[Array]) -> Array:
+    """Control points of the spline through the via points of all stretches, as the planner joins them at rests."""
+    if len(via) == 1:
+        return bspline.fit(via[0], DEGREE)
     rows: list[Array] = []
     knots = [0]
     for each in via:
@@ -208,18 +235,22 @@ def _off_whole(lines: Sequence[_Polyline], places: Sequence[Array], via: Sequenc
         ends[[0, -1]] = each[[0, -1]]
         rows.append(ends if not rows else ends[1:])
         knots.append(knots[-1] + len(pieces))
-    if knots[-1] > MAX_SEGMENTS - DEGREE * (len(lines) - 1):
+    if knots[-1] > MAX_SEGMENTS - DEGREE * (len(via) - 1):
         raise InputError(
-            f"{sum(map(len, via))} via points with {len(lines) - 1} rests do not fit the board",
+            f"{sum(map(len, via))} via points with {len(via) - 1} rests do not fit the board",
             "allow more with --tolerance-deg, or cut the table into several motions",
         )
-    control = bspline.fit(np.concatenate(rows), DEGREE, knots[1:-1])
-    worst, begin = 0.0, 0
+    return bspline.fit(np.concatenate(rows), DEGREE, knots[1:-1])
+
+
+def _off_whole(control: Array, lines: Sequence[_Polyline], places: Sequence[Array]) -> float:
+    """The bound of the distance between the spline with all rests and the path."""
+    pieces = 1 if len(lines) == 1 else REST_PIECES
+    worst, at = 0.0, 0
     for line, own in zip(lines, places, strict=True):
-        for number, (first, last) in enumerate(pairwise(own)):
-            at = begin + REST_PIECES * number
-            worst = max(worst, _off(control[at : at + REST_PIECES + DEGREE], line.between(first, last)))
-        begin += REST_PIECES * (len(own) - 1)
+        for first, last in pairwise(own):
+            worst = max(worst, _off(control[at : at + pieces + DEGREE], line.between(first, last)))
+            at += pieces
     return worst
 
 

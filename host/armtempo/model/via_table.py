@@ -99,7 +99,8 @@ def via_points(
     if tolerance_deg is None and times is None:
         return ImportedPath(angles, len(angles), notes=notes)
     tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
-    found = thinning.thinned(angles, tolerance, times)
+    _check_ranges(table, angles, arm, 0.5 * tolerance)
+    found = thinning.thinned(angles, tolerance, times, np.array([joint.range_deg for joint in arm.driven]))
     for where, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
         if left_out_s:
             notes += (f"{left_out_s:.3g} s of rest at the {where} are left out",)
@@ -194,6 +195,18 @@ def _check_resting(table: NumberTable, header: Header, arm: Arm, radians: bool |
                     f"{table.path}: line {line}: {joint.name} at {angle:g} degrees has no motor, it stays at "
                     f"{joint.home_deg:g}",
                     "leave its column out, or give it a motor in the arm file",
+                )
+
+
+def _check_ranges(table: NumberTable, angles: Array, arm: Arm, allowed_deg: float) -> None:
+    for joint, column in zip(arm.driven, angles.T, strict=True):
+        low, high = joint.range_deg
+        for (line, _), angle in zip(table.rows, column.tolist(), strict=True):
+            if not low - allowed_deg <= angle <= high + allowed_deg:
+                raise InputError(
+                    f"{table.path}: line {line}: {joint.name} at {angle:g} degrees is outside of its range {low:g} to "
+                    f"{high:g}",
+                    "correct the table, or range_deg in the arm file",
                 )
 
 
