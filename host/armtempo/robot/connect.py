@@ -33,14 +33,14 @@ def connect(
     """Connect to the board on ``port``; use the result as a context, or ``close`` it.
 
     ``port``: a serial device or URL; ``"sim"`` starts a virtual board that ends when it is closed,
-    ``"sim:FOLDER"`` one with its flash in FOLDER, and its arm where it was closed. None: ARMTEMPO_PORT or
-    the project folder's ``armtempo.toml``, else the only board plugged in (reported to ``tell``), never a
-    virtual board. ``arm``: moved by a virtual board's motors; None: ideal motors. ``log_traffic``: file for all
-    bytes in both directions; ``sink`` is called with the same. ``any_program``: accept a board whose program
-    differs from the installed one. ``tell`` is called with messages about the connection; default: the
-    logger "armtempo". Until the board is closed, other programs on this machine can watch and stop it (``attach``). A port in
-    use is retried for a few seconds, as many programs use it only briefly, and taken over from a program that
-    hangs, unless the arm moves.
+    ``"sim:FOLDER"`` one with its flash in FOLDER, and its arm where it was closed. None: ARMTEMPO_PORT or the
+    project folder's ``armtempo.toml``, else the only board plugged in (reported to ``tell``), never a virtual
+    board. ``arm``: moved by a virtual board's motors; None: ideal motors. ``log_traffic``: file for all bytes
+    in both directions; ``sink`` is called with the same. ``any_program``: accept a board whose program differs
+    from the installed one. ``tell`` is called with messages about the connection; default: the logger
+    "armtempo". Until the board is closed, other programs on this machine can watch and stop it (``attach``). A
+    port in use is retried for a few seconds, as many programs use it only briefly, and taken over from a
+    program that hangs, unless the arm moves.
 
     Raises InputError if there is no such port, or if none is set and not exactly one board is plugged in;
     PortInUseError if another program has the port, LinkError if the board does not answer or runs another
