@@ -15,7 +15,7 @@ _SPARE_ENTRIES = 8  # entries of a ring that are not overwritten, as in isr.py
 PROCESSOR_WORDS = 1024
 """Words (4 bytes) of the chip's backup SRAM, which is not in MicroPython's heap (hardware/backup_sram.py of the board
 program). DMA cannot read them, so they are not used for rings."""
-GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 49, 26, 128)
+GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 49, 27, 224)
 """Words of a joint's step generator, in the order of allocation.
 
 Pieces of angle and of time, their control points, their measures; the solver, the time law, the queue of steps.
