@@ -29,6 +29,10 @@ The last words are unused at the ends of blocks.
 """
 
 
+ONCE_BYTES = 3072
+"""Bytes of heap for a motion that is run once, beside the engine: a line of six joints in 32 segments fits."""
+
+
 def ring_words(rate: int, lasts_ms: int) -> int:
     """Words of the ring of a joint of at most ``rate`` steps/s: one more than its entries, a power of two.
 

@@ -190,7 +190,7 @@ def board(room: Room) -> Hello:
     return Hello(
         protocol=1, joints=0, encoders=0, state="unconfigured", tick_hz=84_000_000, max_rate=240_000,
         max_rate_sum=240_000, free_flash=0, free_heap=0, arm_crc=0, program_crc=0, boot=1,
-        engine_room=room.size, features=0, arm_problem=0, arm_value=0, board_id="1",
+        engine_room=room.size, features=0, arm_problem=0, arm_value=0, once_bytes=3072, board_id="1",
     )  # fmt: skip
 
 

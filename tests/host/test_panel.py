@@ -117,8 +117,8 @@ def test_other_machines_need_the_token(query: str, cookie: str, allowed: bool) -
 class Session:
     """A session of nobody's."""
 
-    def __init__(self) -> None:
-        self.listeners: list[Callable[[Any], None]] = []
+    def listen(self, listener: object) -> None:
+        """Nothing is to be heard."""
 
     def in_a_hurry(self, timeout_s: float) -> Any:
         raise LinkError("nothing answers")
@@ -170,7 +170,7 @@ class Board:
 def operator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Operator]:
     monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 1000.0)  # it is never asked for its state
     board = Board()
-    made = Operator(lambda sink: board, "sim", Desk(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type, return-value]
+    made = Operator(lambda sink, tell: board, "sim", Desk(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type, return-value]
     made.take_control(ME)
     yield made
     made.close()
@@ -362,9 +362,11 @@ def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceDesk) -> None:
 
 def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_path: Path) -> None:
     board = Board()
+    told: list[Callable[[str], object]] = []
     answers = [LinkError("the board runs another program"), PortInUseError("in use by another"), board]
 
-    def connect(sink: object) -> Board:
+    def connect(sink: object, tell: Callable[[str], object]) -> Board:
+        told.append(tell)
         answer = answers.pop(0)
         if isinstance(answer, LinkError):
             raise answer
@@ -383,7 +385,7 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
         assert made.trouble == trouble
     assert len(deployed) == 2
     assert made.board is board  # type: ignore[comparison-overlap]
-    board.client.session.tell("the cable is out; waiting for it to come back")
+    told[-1]("the cable is out; waiting for it to come back")
     assert "cable" in made.why_not(ME, Needs.BOARD)
     assert "cable" in made.log.last[-1]
     made.close()
@@ -416,7 +418,7 @@ def test_a_fault_of_ours_does_not_end_the_states(
         yield 1 // 0
 
     board.client.session.in_a_hurry = fail
-    made = Operator(lambda sink: board, "sim", Desk(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type, return-value]
+    made = Operator(lambda sink, tell: board, "sim", Desk(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type, return-value]
     wait(lambda: len(asked) > 3)
     made.close()
     assert "the board's state" in caplog.text

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import shutil
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,7 +30,8 @@ HEAVY = (
 def alone(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """No claims of programs outside of the tests, no answers of other tests."""
     monkeypatch.setattr(quick_stop, "_answers", {})
-    monkeypatch.setenv("TMPDIR", str(tmp_path_factory.mktemp("temporary")))
+    for name in ("TMPDIR", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path_factory.mktemp("temporary")))
 
 
 @pytest.fixture
@@ -179,7 +182,40 @@ def test_the_folder_for_temporary_files_is_the_one_of_tempfile(
         wanted = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True
         ).stdout
-        assert os.path.dirname([*claim_file.folders()][-1]) == wanted.strip()
+        assert wanted.strip() in map(os.path.dirname, claim_file.folders())
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes are of POSIX")
+@pytest.mark.parametrize("taken", ["open to others", "link", "file"])
+def test_a_folder_that_another_user_made_first_does_not_keep_a_stop_out(
+    taken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As any user can in /tmp: then the claims are in a folder of the user's own."""
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    cache = tempfile.mkdtemp(prefix="own-")
+    monkeypatch.setenv("XDG_CACHE_HOME", cache)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    usual = tmp_path / f"armtempo-{os.getuid()}"
+    if taken == "link":
+        (tmp_path / "elsewhere").mkdir(mode=0o700)
+        usual.symlink_to(tmp_path / "elsewhere")
+    elif taken == "file":
+        usual.write_text("")
+    else:
+        usual.mkdir()
+        usual.chmod(0o777)
+    port = "/dev/taken"
+    server = Server(claim.new(port, port, port), {"stop": lambda request: {"moving": True}})
+    try:
+        assert Path(server.claim.address).is_relative_to(cache)
+        quick_stop.send(["--port", port])
+        answer = quick_stop.take_answer(port, False)
+        assert answer
+        assert answer.moved
+    finally:
+        server.close()
+        shutil.rmtree(cache)
+    assert not list(tmp_path.glob("**/*.claim"))
 
 
 @pytest.mark.parametrize(("missing", "fits"), [(0, True), (1, False)])

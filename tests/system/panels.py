@@ -118,8 +118,10 @@ class Panel:
         self.process.stdout.close()
 
     def check(self) -> None:
-        """That nothing failed in its program: what waits for it would wait long."""
-        assert "Traceback" not in "".join(self.errors), "".join(self.errors)
+        """That nothing failed in its program, what waits for it would wait long; and that NiceGUI warned of nothing."""
+        said = "".join(self.errors)
+        assert "Traceback" not in said, said
+        assert "deprecated" not in said, said
 
     def cut(self, cut: bool) -> None:
         """Cut the cable, or mend it."""

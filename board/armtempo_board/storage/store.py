@@ -181,9 +181,11 @@ class Store:
         """All bytes of a small record; refuses with NOT_FOUND, or TOO_LONG if it does not fit into memory."""
         return self._read(_file_name(name))
 
-    def motion(self, name: str) -> motion_file.MotionFile:
-        """A stored motion, with head and checksum checked."""
-        return self._motion(_motion_file(name))
+    def motion(
+        self, name: str, kind: "Any" = motion_file.MotionFile, *arguments: object
+    ) -> motion_file.MotionFile:
+        """A stored motion, with head and checksum checked; ``kind``: of the object, with its further arguments."""
+        return self._motion(_motion_file(name), kind, *arguments)
 
     if features.SEQUENCES:
 
@@ -355,10 +357,12 @@ class Store:
         finally:
             file.close()
 
-    def _motion(self, file_name: str) -> motion_file.MotionFile:
+    def _motion(
+        self, file_name: str, kind: "Any" = motion_file.MotionFile, *arguments: object
+    ) -> motion_file.MotionFile:
         size = self._size_of(file_name)
         try:
-            return self._guard(motion_file.MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
+            return self._guard(kind, self._path(file_name), size, *arguments)  # type: ignore[no-any-return]
         except ValueError:  # MotionError
             if not self._is_sequence(file_name):
                 raise Refused(codes.BAD_RECORD)

@@ -134,8 +134,8 @@ def examine_board(state: BoardState | ArmtempoError) -> list[Finding]:
         found.append(error("stored arm", state.arm_problem, "armtempo configure"))
     if state.fault:
         found.append(error("fault", state.fault, "remove its cause, then 'armtempo clear'"))
-    if state.frames_bad or state.samples_lost:
-        text = f"{state.frames_bad} damaged messages, {state.samples_lost} samples lost"
+    if state.frames_bad:
+        text = f"{state.frames_bad} damaged messages"
         found.append(note("link", text, "if it continues, try another cable or USB socket"))
     return found
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics import json_text
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
@@ -142,7 +143,7 @@ def hold(folder: Path, resume: bool) -> Answers:
 def _kept(draft: Path) -> Answers:
     """The valid answers of a draft; raises InputError if there are none."""
     try:
-        found = json.loads(draft.read_text(encoding="utf-8"))
+        found = json_text.loads(draft.read_text(encoding="utf-8"))
         given = {str(key): str(value) for key, value in found.items()}
     except (OSError, ValueError, AttributeError):
         raise InputError(f"{draft}: no kept answers", "leave out --resume") from None

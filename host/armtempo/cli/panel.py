@@ -61,7 +61,7 @@ def panel(
             wanted = LaunchOptions(sim_flash(name), virtual_time=False, arm=arm)
             name = stack.enter_context(launch(wanted)).port
         operator = Operator(
-            lambda sink: chosen.board(BoardOptions(name), arm, sink=sink),
+            lambda sink, tell: chosen.board(BoardOptions(name), arm, sink=sink, tell=tell),
             name,
             Desk(arm, Path(), job),
             chosen.runs(None),

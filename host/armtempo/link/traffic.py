@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from armtempo_shared import wire
+from armtempo_shared.messages import MAX_COMMAND
 
 from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
@@ -43,7 +44,7 @@ class Decoder:
     """Decodes chunks of both directions; keeps incomplete frames for the next chunk."""
 
     def __init__(self) -> None:
-        self._parsers = {TO_BOARD: wire.Parser(), FROM_BOARD: wire.Parser()}
+        self._parsers = {TO_BOARD: wire.Parser(MAX_COMMAND), FROM_BOARD: wire.Parser()}
 
     def feed(self, direction: str, data: bytes) -> list[str]:
         """A description of each frame that this chunk completes, and a note on damaged bytes."""

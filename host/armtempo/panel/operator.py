@@ -57,7 +57,9 @@ class Operator:
     Commands run one at a time in separate threads; ``stop`` does not wait for them.
     """
 
-    def __init__(self, connect: Callable[[Sink], Board], port: str, desk: Desk, runs: Path) -> None:
+    def __init__(
+        self, connect: Callable[[Sink, Callable[[str], object]], Board], port: str, desk: Desk, runs: Path
+    ) -> None:
         """``connect`` opens the board's ``port``.
 
         A board that does not answer, or runs another program, is ``trouble``: the panel can deploy the program.
@@ -103,7 +105,7 @@ class Operator:
 
     def _open(self) -> None:
         try:
-            board = self._connect(self._take_traffic)
+            board = self._connect(self._take_traffic, self._tell)
         except PortInUseError:
             raise
         except LinkError as error:
@@ -115,8 +117,7 @@ class Operator:
         except BaseException:
             board.close()
             raise
-        board.client.session.listeners.append(self.live.take_event)
-        board.client.session.tell = self._tell
+        board.client.session.listen(self.live.take_event)
         self._board, self.trouble = board, ""
 
     def _tell(self, text: str) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 from nicegui import run, ui
 
 from armtempo import pipeline
-from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.chain import chains_mm
@@ -134,8 +133,12 @@ class PlanTab:
             self._page.attempt(lambda: self._take_rows(given))
 
     def _take_rows(self, text: str) -> None:
-        table = number_table.of_text(text, words.PASTED)
-        self._rows = via_table.via_points(table, self._operator.arm).via_deg.tolist()
+        found = via_table.of_text(text, words.PASTED, self._operator.arm)
+        if found.poses:
+            raise InputError(
+                "the table has poses, here are angles", "make a job of it: 'armtempo import', and open that"
+            )
+        self._rows = found.via_deg.tolist()
         self._changed()
 
     def _changed(self) -> None:

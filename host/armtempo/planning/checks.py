@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from armtempo_shared import motion
@@ -20,6 +21,7 @@ from armtempo_shared.limits import (
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
+from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
 from armtempo.model.job import (
     Job,
@@ -71,6 +73,16 @@ def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
             f"steps/s, the board does {MAX_STEP_RATE} at most {ESTIMATED}",
             "check the unit, lower the limit, or use fewer microsteps",
         )
+
+
+def hardware_notes(arm: Arm) -> tuple[str, ...]:
+    """Limits of the arm's tables that the driver or the encoder does not allow."""
+    return tuple(
+        f"{joint.name}: {bound.key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: planned with "
+        f"{bound.value:.4g}"
+        for joint in arm.joints
+        for bound in drive_limits.exceeded(joint, arm.driver)
+    )
 
 
 def check_job(arm: Arm, job: Job) -> None:
@@ -220,10 +232,29 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
         raise InputError(
             f"job {job.name!r}: a via angle is not a finite number", "give every angle as a number of degrees"
         )
-    if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE):
+    circles = any(way.circle_through_mm is not None for way in job.ways)
+    if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE) and not circles:
         raise PlanError(
             f"job {job.name!r}: all via points are the same, so nothing moves", "change at least one angle"
         )
+
+
+def long_ways(arm: Arm, via_deg: Array) -> tuple[str, ...]:
+    """Notes: joints that move by more than half a turn between two via points (n + 1, J), where a shorter way ends
+    at the same place."""
+    notes = []
+    for number, joint in enumerate(arm.driven):
+        for via, (start, end) in enumerate(pairwise(via_deg[:, number].tolist()), 1):
+            turn = -360.0 * round((end - start) / 360.0)
+            if turn:
+                low, high = joint.range_deg
+                short = end + turn
+                can = "is in its range too" if low <= short <= high else "is out of its range"
+                notes.append(
+                    f"P{via - 1} to P{via}: {joint.name} goes {abs(end - start):.4g} degrees from {start:.4g} to "
+                    f"{end:.4g}; {short:.4g}, {abs(short - start):.4g} the other way, {can}"
+                )
+    return tuple(notes)
 
 
 def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:

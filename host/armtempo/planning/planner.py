@@ -51,7 +51,8 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
     room_check.check(holding, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
-    return Plan(arm, job, via, (*notes, *planned.notes), trajectory, planned.searches, reached, versions())
+    notes = (*checks.hardware_notes(arm), *notes, *planned.notes)
+    return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
 
 
 @cache
@@ -76,7 +77,8 @@ def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:
     else:
         angles, notes = np.array(job.via, dtype=float), ()
     checks.check_via(arm, job, angles)
-    return angles, notes
+    angles = np.array([arm.placed(row) for row in angles])
+    return angles, (*notes, *checks.long_ways(arm, angles))
 
 
 def straight_line(

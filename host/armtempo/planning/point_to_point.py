@@ -57,6 +57,7 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
             f"a posture of arm {arm.name!r} has {len(arm.driven)} angles, not {found.size}",
             "give one angle for each joint with a motor",
         )
+    found = np.array(arm.placed(found))
     for joint, angle in zip(arm.driven, found, strict=True):
         low, high = joint.range_deg
         if not low <= angle <= high:

@@ -15,7 +15,10 @@ from armtempo.ports.claim import VERSION, PortClaim
 from armtempo.ports.messages import LineReader, Message, to_line
 
 HUNG_S = 2.0
-"""A program that has not answered ``hello`` for this long counts as hanging."""
+"""A program that has neither answered ``hello`` nor given a sign of life in its claim (``claim.beat``) for this
+long counts as hanging; one that gives the sign is busy."""
+_RETRY_S = 0.02
+"""Interval of attempts to connect to a program that has as many callers waiting as it can have."""
 _REMEMBERED_S = 5.0
 """Time for which a hanging program is not asked again."""
 _END = "end that process, or let a command that needs the port take it over"
@@ -27,20 +30,22 @@ class Ownership(Enum):
     """The state of a program that has claimed a port."""
 
     ALIVE = "alive"
+    """It answers, or is busy."""
     HUNG = "hung"
     """The process exists and does not answer."""
     DEAD = "dead"
 
 
 def ownership(claim: PortClaim) -> Ownership:
-    """Whether the program that has claimed a port answers, hangs or is gone."""
-    if time.monotonic() < _hung.get(claim.number, 0.0) + _REMEMBERED_S:
+    """Whether the program that has claimed a port is alive, hangs or is gone."""
+    known = time.monotonic() < _hung.get(claim.number, 0.0) + _REMEMBERED_S
+    if known and claim.silent_s() > HUNG_S:
         return Ownership.HUNG
     try:
         Caller(claim).close()
         return Ownership.ALIVE
     except NoAnswerError:
-        return Ownership.HUNG
+        return Ownership.HUNG if claim.silent_s() > HUNG_S else Ownership.ALIVE
     except LinkError:
         return Ownership.DEAD
 
@@ -155,17 +160,23 @@ def _connect(claim: PortClaim) -> socket.socket:
         if claims.LOCAL_SOCKETS
         else (socket.AF_INET, ("127.0.0.1", int(claim.address)))
     )
-    found = socket.socket(kind, socket.SOCK_STREAM)
-    found.settimeout(HUNG_S)
-    try:
-        found.connect(address)
-    except (TimeoutError, BlockingIOError):
-        found.close()
-        raise NoAnswerError(f"{claim.who} has {claim.port} and accepts no connection", _END) from None
-    except OSError as error:
-        found.close()
-        raise LinkError(f"{claim.who} had {claim.port} and is gone", "try again: the port is free") from error
-    return found
+    limit_s = time.monotonic() + HUNG_S
+    while True:
+        found = socket.socket(kind, socket.SOCK_STREAM)
+        found.settimeout(HUNG_S)
+        try:
+            found.connect(address)
+            return found
+        except (TimeoutError, BlockingIOError) as error:
+            found.close()
+            if isinstance(error, TimeoutError) or time.monotonic() > limit_s:
+                raise NoAnswerError(f"{claim.who} has {claim.port} and accepts no connection", _END) from None
+            time.sleep(_RETRY_S)  # a local socket says at once that too many callers wait
+        except OSError as error:
+            found.close()
+            raise LinkError(
+                f"{claim.who} had {claim.port} and is gone", "try again: the port is free"
+            ) from error
 
 
 def _checked(message: Message) -> Message:

@@ -94,7 +94,7 @@ class Board:
         One that waits longer, for a cable that is out, finds that the board is closed.
         """
         with self.client.session.in_a_hurry(TURN_S):
-            self.client.session.check = self._closed
+            self.client.session.guard(self._closed)
             yield
 
     def _closed(self) -> None:

@@ -19,7 +19,7 @@ from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.planning import point_to_point
 from armtempo.records import encoded_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import TEMPORARY, raise_fault, replay, store
+from armtempo.robot.stored_motion import put_once, raise_fault, replay
 
 FAST, SLOW = 0.2, 0.04
 """Fractions of the joint's limits in the first and in the second approach."""
@@ -190,12 +190,10 @@ class _GroupHoming:
         for index, (from_deg, to_deg) in ways_deg.items():
             start_deg[index], end_deg[index] = from_deg, to_deg
         slow_arm = _slowed(self.arm, fraction)
-        trajectory = point_to_point.straight(TEMPORARY + "home", start_deg, end_deg, slow_arm)
+        trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
         motion = encoded_motion.of_trajectory(trajectory, self.arm)
-        key = store(self.client, motion.name, motion.data)
-        end = replay(self.client, key, self.stop, flags=START_HOMING)
+        end = replay(self.client, put_once(self.client, motion.data), self.stop, flags=START_HOMING)
         tripped = self.client.status().fault_joint
-        self.client.remove(key.name)
         raise_fault(end)
         self.stop.check()
         steps = end.positions.commanded_steps

@@ -13,10 +13,11 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.model import arm_json
+from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report import run_folder
 from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
-from armtempo.robot.goto import go_back
+from armtempo.robot.goto import move_once
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
 
@@ -69,15 +70,14 @@ def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> R
         "board": vars(client.info),
         "motion_crc": f"{motion.key.crc:08x}",
     }
-    folder = RunFolder(
-        run_folder.new_folder(parent, motion.name), motion.name, run_folder.scales(motion.arm), origin
-    )
-    folder.write_motion(motion.data)
-    if motion.plan is not None:
-        motion.plan.save(folder.path / run_folder.TRAJECTORY)
-    else:
-        arm_json.save(motion.arm, folder.path / run_folder.ARM)
-    folder.write()
+    with run_folder.new_folder(parent, motion.name) as path:
+        folder = RunFolder(path, motion.name, run_folder.scales(motion.arm), origin)
+        folder.write_motion(motion.data)
+        if motion.plan is not None:
+            motion.plan.save(path / run_folder.TRAJECTORY)
+        else:
+            arm_json.save(motion.arm, path / run_folder.ARM)
+        folder.write()
     return folder
 
 
@@ -89,13 +89,14 @@ def repeat(
     stop: StopRequest,
     watcher: Watcher,
 ) -> Iterator[Repetition]:
-    """Replay a stored motion ``times`` times into the run folder, and return along the path in between.
+    """Replay a stored motion ``times`` times into the run folder, and backwards in between.
 
     Yields each repetition when it has ended. A stop request ends the series; a fault raises BoardError.
     """
+    back = encoded_motion.way_back(motion) if times > 1 else b""
     for number in range(times):
         if number:
-            go_back(client, motion, stop)
+            move_once(client, back, stop)
         if stop.wanted:
             return
         end = _recorded(client, motion, folder, stop, watcher)
