@@ -22,7 +22,7 @@ Pieces of angle and of time, their control points, their measures; the solver, t
 """
 GENERATOR_WORDS = sum(GENERATOR_PARTS)
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
-LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 9
+LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 178
 """Words for arms whose highest step rates sum up to 240 000 steps/s; some have short rings then.
 
 The last words are unused at the ends of blocks.
