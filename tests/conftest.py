@@ -31,6 +31,7 @@ def own_settings() -> Iterator[None]:
     folder = tempfile.mkdtemp(prefix="run-")  # short: the path of a socket has 100 bytes
     os.environ["XDG_RUNTIME_DIR"] = folder
     os.environ["XDG_CACHE_HOME"] = str(interpreters.ROOT / ".cache")
+    os.environ["COLUMNS"] = "1000"  # no sentence that a test looks for is wrapped
     os.environ["PYTHONWARNINGS"] = ",".join(f"error::{name}" for name in DEPRECATIONS)
     yield
     shutil.rmtree(folder, ignore_errors=True)

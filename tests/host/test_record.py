@@ -261,7 +261,7 @@ def test_a_damaged_run_folder_is_read_or_refused_in_words(
     made_runs.draw_nothing(monkeypatch)
     whole = made_runs.make(tmp_path / "whole", repetitions=2)
     refused = 0
-    for number in range(300):
+    for number in range(120):
         folder = shutil.copytree(whole, tmp_path / "damaged", dirs_exist_ok=True)
         name = numbers.choice(("run.json", "samples-01.csv", "samples-02.csv"))
         (spoil_json if name.endswith("json") else spoil_table)(folder / name, numbers)
@@ -273,11 +273,11 @@ def test_a_damaged_run_folder_is_read_or_refused_in_words(
                 assert np.isfinite(one.time_s).all()
                 assert np.isfinite(one.commanded_deg).all()
             refused += any(one.problem for one in found.repetitions)
-            if number % 5 == 0:
+            if number % 10 == 0:
                 run_report.write(folder)
         except ArmtempoError:
             refused += 1
-    assert refused > 100
+    assert refused > 40
 
 
 def test_two_runs_at_once_get_folders_of_their_own(tmp_path: Path) -> None:

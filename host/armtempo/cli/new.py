@@ -113,12 +113,12 @@ def hold(folder: Path, resume: bool) -> Answers:
     """Ask all questions. The text of KeyboardInterrupt says how to continue if answers were kept."""
     draft = draft_path(folder)
     answers = _kept(draft) if resume else {}
-    click.echo("'?' explains a question, '<' goes back to the previous one; Ctrl-C keeps the answers.")
+    results.echo("'?' explains a question, '<' goes back to the previous one; Ctrl-C keeps the answers.")
     try:
         while (question := questions.following(answers)) is not None:
             text = click.prompt(question.text, default=question.default).strip()
             if text == "?":
-                click.echo(question.explanation)
+                results.echo(question.explanation)
             elif text == "<":
                 if answers:
                     answers.popitem()
@@ -126,7 +126,7 @@ def hold(folder: Path, resume: bool) -> Answers:
                 try:
                     question.read(text)
                 except questions.WrongAnswerError as wrong:
-                    click.echo(f"  {wrong}")
+                    results.echo(f"  {wrong}")
                     continue
                 answers[question.key] = text
                 draft.parent.mkdir(parents=True, exist_ok=True)

@@ -29,7 +29,7 @@ def status(given: BoardOptions) -> None:
         results.show_json(found.to_json())
         return
     for line in lines(found):
-        click.echo(line)
+        results.echo(line)
 
 
 def _named(found: BoardState, arm_path: Path | None) -> BoardState:

@@ -92,7 +92,7 @@ def _show(found: BoardState, as_json: bool) -> None:
         results.show_json(found.to_json())
         return
     for line in state.motion_lines(_with_degrees(found)):
-        click.echo(line)
+        results.echo(line)
 
 
 def _with_degrees(found: BoardState) -> BoardState:
