@@ -35,6 +35,7 @@ from armtempo.robot import (
     goto,
     homing,
     jog,
+    kept_position,
     recording,
     sequence_recording,
     sequence_run,
@@ -94,6 +95,7 @@ class Board:
         One that waits longer, for a cable that is out, finds that the board is closed.
         """
         with self.client.session.in_a_hurry(TURN_S):
+            kept_position.keep(self.client, self.port)
             self.client.session.guard(self._closed)
             yield
 
