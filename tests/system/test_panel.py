@@ -371,6 +371,41 @@ def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel) -> None:
     assert page.locator(".armtempo-lit").count() == 0
 
 
+def test_a_target_is_shown_then_approached_while_held_and_postures_are_stored(
+    page: Any, panel: Panel
+) -> None:
+    home(page)
+    where = page.inner_text("#armtempo-where")
+    away = page.get_by_role("button", name="Go to away")
+    press(page, away, lambda: away.click())  # it is only shown
+    page.wait_for_function("armtempo.ghost")
+    page.wait_for_timeout(1000)
+    assert page.inner_text("#armtempo-where") == where
+    page.get_by_role("switch", name="With one click").click()
+    press(page, away, lambda: away.click())
+    wait_for(page, "away: done", place="armtempo-said")
+    wait_for(page, "30.0", place="armtempo-where")
+    page.get_by_role("switch", name="With one click").click()
+    page.get_by_role("button", name="1", exact=True).click()
+    plus = page.get_by_label("joint 1 +")
+    press(page, plus, lambda: plus.click())
+    wait_for(page, "step: done", place="armtempo-said")
+    wait_for(page, "31.0", place="armtempo-where")
+    page.get_by_role("button", name="While held").click()
+    page.get_by_role("button", name="Store…").click()
+    page.get_by_role("dialog").get_by_label("Name").fill("tray")
+    panels.answer(page, "Store")
+    page.get_by_role("button", name="Go to tray").wait_for()
+    assert "[posture.tray]\nangles_deg = [31" in (panel.folder / "arm.toml").read_text()
+    page.get_by_role("button", name="Guide by hand…").click()
+    panels.answer(page, "Guide by hand…")
+    wait_for(page, "unhomed", "Guide by hand…")
+    wait_for(page, "31.", place="armtempo-where")  # the encoders tell
+    panels.answer(page, "The current on")
+    wait_for(page, "Guide by hand…: done", place="armtempo-said")
+    wait_for(page, "idle")
+
+
 def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> None:
     assert page.evaluate("armtempo.SILENT_MS + armtempo.LOOK_MS") < 1000
     silent = """ms => {
@@ -531,10 +566,10 @@ def test_nothing_moves_that_nobody_means_any_more(
     home(page)
     where = page.inner_text("#armtempo-where")
     button = (
-        page.get_by_label("joint 1 +")
-        if command == "jog"
-        else page.get_by_role("button", name="away", exact=True)
+        page.get_by_label("joint 1 +") if command == "jog" else page.get_by_role("button", name="Go to away")
     )
+    if command == "posture":
+        page.get_by_role("switch", name="With one click").click()
     button.hover()
     if how == "stalls":
         network.stall(True)
