@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 import tomlkit
 from armtempo.basics import toml_table
+from armtempo.model import shipped
 from armtempo.panel import words
 
 from tests import browser
@@ -404,6 +405,36 @@ def test_a_target_is_shown_then_approached_while_held_and_postures_are_stored(
     panels.answer(page, "The current on")
     wait_for(page, "Guide by hand…: done", place="armtempo-said")
     wait_for(page, "idle")
+
+
+def test_names_from_files_are_text(chromium: Any, tmp_path: Path) -> None:
+    names = [
+        'j"><img src=x onerror=window.hurt=1>',
+        'k\' :innerHTML="hurt=2" onclick="window.hurt=3"',
+        "`${hurt=4}`",
+    ]
+    text = tmp_path / "own.toml"
+    content = tomlkit.parse(shipped.arm_path().read_text())
+    for joint, name in zip([one for one in content["joint"] if "motor" in one], names, strict=True):  # type: ignore[union-attr]
+        joint["name"] = name
+    text.write_text(tomlkit.dumps(content))
+    with panels.panels(tmp_path, arm=str(text)) as running:
+        window = chromium.new_context(viewport=panels.SMALL)
+        page = panels.opened(window, running().address)
+        home(page)
+        for name in names:
+            assert page.get_by_label(f"{name} +", exact=True).inner_text().strip() == "+"
+            assert page.get_by_text(name, exact=True).first.is_visible()
+        for tab in TABS:
+            show(page, tab)
+            page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
+        page.wait_for_timeout(500)
+        assert page.evaluate("window.hurt") is None
+        blocked = "document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=window.hurt=5>')"
+        page.evaluate(blocked)  # and what would get in all the same is not run
+        page.wait_for_timeout(500)
+        assert page.evaluate("window.hurt") is None
+        window.close()
 
 
 def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> None:
