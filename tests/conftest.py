@@ -31,6 +31,7 @@ def own_settings() -> Iterator[None]:
     folder = tempfile.mkdtemp(prefix="run-")  # short: the path of a socket has 100 bytes
     os.environ["XDG_RUNTIME_DIR"] = folder
     os.environ["XDG_CACHE_HOME"] = str(interpreters.ROOT / ".cache")
+    os.environ["COLUMNS"] = "1000"  # no sentence that a test looks for is wrapped
     os.environ["PYTHONWARNINGS"] = ",".join(f"error::{name}" for name in DEPRECATIONS)
     yield
     shutil.rmtree(folder, ignore_errors=True)
@@ -65,6 +66,8 @@ def _compile_sources() -> None:
 def pytest_sessionstart(session: pytest.Session) -> None:
     """In CI nothing may be left out."""
     if not hasattr(session.config, "workerinput"):
+        writer = session.config.get_terminal_writer()
+        writer.fullwidth = writer.fullwidth  # as it is before ``own_settings`` sets COLUMNS
         _compile_sources()
     if interpreters.MISSING and os.environ.get("CI"):
         pytest.exit(f"CI needs the interpreters {', '.join(interpreters.MISSING)}", returncode=1)

@@ -246,7 +246,7 @@ EVENTS: "dict[str, str]" = {
     "sample": "One sample of run `run`, `index` counting from 0. `ticks`: motion clock, `path`: the motion's own "
     "time. `flags` 1: taken while braking. Tail: per joint commanded steps and encoder counts (two i32).",
     "done": "The run ended without a fault, at its end or after a stop; sent after its last sample. `lost`: samples "
-    "that were overwritten before they were acknowledged. Tail as in `sample`.",
+    "that were overwritten before they were sent. Tail as in `sample`.",
     "fault": "A fault: no more steps are made. `code` from the table below, `joint` 255 if it concerns no joint. "
     "Tail as in `sample`.",
     "row": "A row of the sequence has begun, the `passed`-th since its start: `row`, `step` and `cycle` as in "

@@ -53,6 +53,19 @@ def test_every_error_of_the_host_says_what_to_do_next() -> None:
 
 
 @pytest.mark.slow
+@sources.TOGETHER
+def test_no_error_says_its_hint_in_its_problem_too() -> None:
+    """Clauses of several words; the two are shown together."""
+    twice = [
+        f"{message.file}:{message.line}: {clause}"
+        for message in in_host()
+        for clause in map(str.strip, re.split("[;:]", message.hint or ""))
+        if clause.count(" ") > 1 and clause in message.problem
+    ]
+    assert twice == []
+
+
+@pytest.mark.slow
 def test_the_collector_finds_what_has_no_next_step() -> None:
     source = """
 raise InputError("no")
@@ -241,9 +254,11 @@ def test_a_motion_has_to_be_named_where_the_button_starts_none(tmp_path: Path) -
 def test_a_sound_link_is_called_so(tmp_path: Path) -> None:
     client, _ = ready(Pipe(tmp_path / "flash"))
     found = board_state.read(client, "pipe")
-    assert "link      OK: no damaged messages, no lost samples" in state.lines(found)
+    assert "link      OK: no damaged messages" in state.lines(found)
     worse = state.lines(replace(found, frames_bad=3, samples_lost=2))
-    assert "link      3 damaged messages, 2 lost samples: check cable and plugs" in worse
+    assert "link      3 damaged messages: check cable and plugs; 2 samples were not read in time" in worse
+    unread = state.lines(replace(found, samples_lost=2))  # of a run that the button started
+    assert "link      OK: no damaged messages; 2 samples were not read in time" in unread
 
 
 def test_a_misspelt_key_is_guessed() -> None:

@@ -119,10 +119,55 @@ def test_lives_hangs_died(server: Server, monkeypatch: pytest.MonkeyPatch) -> No
     with deaf:
         deaf.bind(server.claim.address)
         deaf.listen()
+        server.claim.write()
+        silent(server.claim, -60.0)
+        assert ownership(server.claim) is Ownership.ALIVE  # its sign of life is fresh: it is busy
+        silent(server.claim, caller.HUNG_S + 1.0)
         assert ownership(server.claim) is Ownership.HUNG
         with pytest.raises(NoAnswerError, match="does not answer"):
             Caller(server.claim)
-    Path(server.claim.address).unlink()
+    server.claim.remove()
+    Path(server.claim.address).unlink(missing_ok=True)
+
+
+def silent(found: PortClaim, seconds: float) -> None:
+    """Its program gave the last sign of life so long ago."""
+    for path in found._files():
+        os.utime(path, (time.time() - seconds,) * 2)
+
+
+def test_a_sign_of_life_is_given_all_the_time(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armtempo.ports.server.BEAT_S", 0.05)
+    silent(server.claim, 60.0)
+    limit_s = time.monotonic() + 30.0
+    while server.claim.silent_s() > 30.0:
+        assert time.monotonic() < limit_s
+        with Caller(server.claim) as other:  # also while callers come
+            other.ask("echo", 5.0, text="1")
+
+
+@pytest.mark.skipif(not claim.LOCAL_SOCKETS, reason="other sockets wait by themselves")
+def test_a_program_with_many_callers_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forty at once on a program that lets two wait: none takes it for one that hangs."""
+    monkeypatch.setattr("armtempo.ports.server._BACKLOG", 1)
+    server = Server(claim.new("/dev/p", "/dev/p", "/dev/p"), {"echo": handle}, ECHO)
+    found: list[object] = []
+
+    def ask() -> None:
+        try:
+            with Caller(server.claim) as other:
+                found.append(other.ask("echo", 60.0, text="here")["echo"])
+        except LinkError as error:
+            found.append(error)
+
+    monkeypatch.setattr(caller, "HUNG_S", 60.0)
+    callers = [threading.Thread(target=ask) for _ in range(40)]
+    for thread in callers:
+        thread.start()
+    for thread in callers:
+        thread.join()
+    server.close()
+    assert found == ["here"] * len(callers)
 
 
 def test_that_a_program_hangs_is_remembered_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -208,7 +253,7 @@ class Owner:
 
     def __init__(self) -> None:
         transport = SimpleNamespace(name="/dev/p")
-        self.session = SimpleNamespace(transport=transport, in_a_hurry=self._turn, listeners=[])
+        self.session = SimpleNamespace(transport=transport, in_a_hurry=self._turn, listen=repr, guard=repr)
         self.told: list[tuple[object, ...]] = []
         self.rate = 1000
 

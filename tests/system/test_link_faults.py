@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from armtempo import simulator
 from armtempo.basics.errors import BoardError
-from armtempo.link import open_board, traffic
+from armtempo.link import Opening, open_board, traffic
 from armtempo.link.board_messages import Done, Event, Sample
 from armtempo.link.follow import Follower
 from armtempo.link.session import Session
@@ -207,7 +207,10 @@ def _recorded(path: Path) -> Recording:
         point_to_point.straight("go", home_deg, home_deg + AWAY_DEG, commandline.ARM), commandline.ARM
     )
     starter = interpreters.starter(INTERPRETERS[-1])
-    with launch(LaunchOptions(interpreter=starter)) as process, open_board(process.port, made.path) as board:
+    with (
+        launch(LaunchOptions(interpreter=starter)) as process,
+        open_board(process.port, Opening(made.path)) as board,
+    ):
         arm_state.configure(board, commandline.ARM, replace=True)
         arm_state.home(board, commandline.ARM)
         stored = stored_motion.store(board, "go", data)

@@ -181,7 +181,10 @@ class JointDrive:
 
     def follow(self, law: "array[int]", is_last: bool) -> None:
         """Follow another time law (see ``StepGenerator.follow``)."""
-        self.generator.follow(law, is_last, self.ring)
+        ring = self.ring
+        self.generator.follow(law, is_last, ring.state)
+        if ring.state[isr.FED]:
+            ring.feed()  # the interrupt may have found no ring that it writes to, and stopped
         self._next_refill_kiticks = -_NEVER_KITICKS
 
     def finish(self) -> None:

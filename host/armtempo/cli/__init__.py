@@ -104,6 +104,8 @@ class LazyGroup(click.Group):
         try:
             with raised_by_signals():
                 return super().invoke(ctx)
+        except click.UsageError as error:
+            raise click.UsageError(results.fitted(error.format_message(), "Error: "), error.ctx) from None
         except ArmtempoError as error:
             results.show_error(error, as_json=as_json)
             ctx.exit(error.exit_code)
@@ -122,7 +124,7 @@ class LazyGroup(click.Group):
             )
             ctx.exit(1)
         except KeyboardInterrupt as error:
-            click.echo(f"armtempo: interrupted{': ' if error.args else ''}{error}", err=True)
+            results.echo(f"armtempo: interrupted{': ' if error.args else ''}{error}", err=True)
             ctx.exit(INTERRUPTED)
 
 

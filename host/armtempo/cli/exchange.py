@@ -85,8 +85,8 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     if found.thinned_to_deg is None:
         return [*notes, written]
     thinned = (
-        f"{found.lines} lines reduced to {len(found.via_deg)} via points: a spline through them follows the table "
-        f"within {found.thinned_to_deg:g} deg; 'armtempo plan' computes new times"
+        f"{found.lines} lines reduced to {len(found.via_deg)} via points: the planned path stays within "
+        f"{found.thinned_to_deg:.2g} deg of the table (proven); 'armtempo plan' computes new times"
     )
     return [*notes, thinned, written]
 
@@ -193,6 +193,7 @@ def import_urdf(
         "worst_position_mm": float(fit.position_mm),
         "worst_rotation_deg": float(fit.rotation_deg),
         "radii_mm": [joint.radius_mm for joint in arm.joints],
+        "doubts": list(chain.doubts),
     }
     lines = [
         f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}",
@@ -200,6 +201,9 @@ def import_urdf(
         f"{sum(joint.radius_mm > 0.0 for joint in arm.joints)} of {len(arm.joints)} rows have a radius_mm, from the "
         "links' shapes",
         f"wrote {out}; add the motors, then: armtempo check --arm {out}",
+    ]
+    lines += [
+        f"note: {doubt} A URDF has radians; correct it, or range_deg in {out}" for doubt in chain.doubts
     ]
     if meshes:
         lines.append(f"wrote {len(written)} meshes into {mesh_files.folder_of(out)}")

@@ -116,10 +116,7 @@ class Remote:
                     (text.strip() for text in reversed(said) if text.strip()), "the board fell silent"
                 )
                 raise LinkError(
-                    (
-                        f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again; "
-                        f"if that fails too: {RECOVERY}"
-                    ),
+                    f"mpremote failed on {self.port}: {last}",
                     f"what was begun is repaired by doing it again; if that fails too: {RECOVERY}",
                 )
 

@@ -73,7 +73,6 @@ class Client:
         self._info: board_messages.Hello | None = None
         self.rate = PERMILLE
         """Speed at which motions are started, in thousandths of the planned one."""
-        session.greet = self._greet_again
 
     @property
     def info(self) -> board_messages.Hello:
@@ -93,6 +92,7 @@ class Client:
         fields = [*values, board_id]
         fields[3] = board_messages.state_name(values[3])
         self._info = board_messages.Hello(*fields)
+        self.session.greeted(self._greet_again)
         return self._info
 
     def need(self, feature: str, what: str) -> None:

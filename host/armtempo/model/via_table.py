@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from armtempo_shared.limits import MAX_SEGMENTS
-from numpy.typing import NDArray
 
 from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.number_table import NumberTable
-from armtempo.model import table_header
+from armtempo.model import table_header, thinning
 from armtempo.model.arm import Arm
 from armtempo.model.table_header import Column, Header
 from armtempo.model.tool_pose import WHOLE
@@ -30,7 +28,6 @@ _METRES = 2.0
 """Positions below this may be in metres."""
 _RESTS_DEG = 0.01
 """Allowed distance from home of a joint without a motor."""
-LARGEST_DEG = 90.0
 _SPEED_MARGIN = 1.05
 """Recordings may be faster than the limit by this factor, as their times scatter."""
 
@@ -45,7 +42,9 @@ class ImportedPath:
     poses: tuple[Mapping[str, Sequence[float] | float], ...] = ()
     """The keys of each pose, as in a job file."""
     thinned_to_deg: float | None = None
-    """The tolerance of the thinning; None if every line is a via point."""
+    """How far the planned spline is from the table at most; None if every line is a via point."""
+    rests_s: Mapping[int, float] = field(default_factory=dict)
+    """Seconds of rest at via points, by their number from 0."""
     notes: tuple[str, ...] = ()
     """How the columns were taken, for the user."""
 
@@ -100,7 +99,14 @@ def via_points(
     if tolerance_deg is None and times is None:
         return ImportedPath(angles, len(angles), notes=notes)
     tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
-    return ImportedPath(thinned(angles, tolerance, times), len(angles), thinned_to_deg=tolerance, notes=notes)
+    _check_ranges(table, angles, arm, 0.5 * tolerance)
+    found = thinning.thinned(angles, tolerance, times, np.array([joint.range_deg for joint in arm.driven]))
+    for where, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
+        if left_out_s:
+            notes += (f"{left_out_s:.3g} s of rest at the {where} are left out",)
+    return ImportedPath(
+        found.via_deg, len(angles), thinned_to_deg=found.off_deg, rests_s=found.rests_s, notes=notes
+    )
 
 
 def job_text(name: str, path: ImportedPath) -> str:
@@ -115,8 +121,17 @@ def job_text(name: str, path: ImportedPath) -> str:
             "\n[[via]]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in pose.items())
             for pose in path.poses
         )
+    if path.rests_s:
+        return head + "".join(
+            f"\n[[via]]\nangles_deg = {_value(row)}\n" + _rest(path.rests_s.get(number))
+            for number, row in enumerate(path.via_deg.tolist())
+        )
     rows = "".join(f"    {_value(row)},\n" for row in path.via_deg.tolist())
     return f"{head}via_deg = [\n{rows}]\n"
+
+
+def _rest(rest_s: float | None) -> str:
+    return "" if rest_s is None else f"stop = true\ndwell_s = {rest_s:.10g}\n"
 
 
 def _value(value: Sequence[float] | float) -> str:
@@ -180,6 +195,18 @@ def _check_resting(table: NumberTable, header: Header, arm: Arm, radians: bool |
                     f"{table.path}: line {line}: {joint.name} at {angle:g} degrees has no motor, it stays at "
                     f"{joint.home_deg:g}",
                     "leave its column out, or give it a motor in the arm file",
+                )
+
+
+def _check_ranges(table: NumberTable, angles: Array, arm: Arm, allowed_deg: float) -> None:
+    for joint, column in zip(arm.driven, angles.T, strict=True):
+        low, high = joint.range_deg
+        for (line, _), angle in zip(table.rows, column.tolist(), strict=True):
+            if not low - allowed_deg <= angle <= high + allowed_deg:
+                raise InputError(
+                    f"{table.path}: line {line}: {joint.name} at {angle:g} degrees is outside of its range {low:g} to "
+                    f"{high:g}",
+                    "correct the table, or range_deg in the arm file",
                 )
 
 
@@ -269,52 +296,3 @@ def unwrapped(
             f"{joint.name}: recorded within a turn; it goes on from {column[jumps[0]]:g} to {column[-1]:g} degrees"
         )
     return found, tuple(notes)
-
-
-def thinned(points_deg: Array, tolerance_deg: float, times_s: Array | None = None) -> Array:
-    """A subset of the points (n, J) such that a cubic spline through it passes all others within ``tolerance_deg``.
-
-    The spline rests at both ends. Its parameter is ``times_s`` (n,), increasing, else the square root of the
-    distance between points. The first and the last point are kept. Raises InputError for a tolerance outside
-    (0, LARGEST_DEG], and if more points are needed than a motion can have.
-    """
-    if not 0.0 < tolerance_deg <= LARGEST_DEG:
-        raise InputError(
-            f"a tolerance of {tolerance_deg:g} degrees is not allowed",
-            f"give one above 0, at most {LARGEST_DEG:g}",
-        )
-    places, points = (times_s, points_deg) if times_s is not None else _centripetal(points_deg)
-    kept = _enough(places, points, tolerance_deg)
-    for index in kept[1:-1]:
-        fewer = kept[kept != index]
-        if _errors_deg(places, points, fewer).max() <= tolerance_deg:
-            kept = fewer
-    return points[kept]
-
-
-def _enough(places: Array, points: Array, tolerance_deg: float) -> NDArray[np.int64]:
-    """Indices of enough points; each step adds the point with the largest error."""
-    kept = np.array([0, len(points) - 1])
-    while (errors := _errors_deg(places, points, kept)).max() > tolerance_deg:
-        kept = np.sort(np.append(kept, int(errors.argmax())))
-        if len(kept) > MAX_SEGMENTS + 1:
-            raise InputError(
-                f"more than {MAX_SEGMENTS + 1} via points are needed to keep within {tolerance_deg:g} degrees",
-                "allow more with --tolerance-deg, or cut the table into several motions",
-            )
-    return kept
-
-
-def _errors_deg(places: Array, points: Array, kept: NDArray[np.int64]) -> Array:
-    """Distance of each point from the spline through the kept points, the largest over its joints: (n,)."""
-    from scipy.interpolate import CubicSpline  # imported here, because that takes longer than a plan
-
-    spline = CubicSpline(places[kept], points[kept], bc_type="clamped")
-    return np.asarray(np.abs(spline(places) - points).max(axis=1))
-
-
-def _centripetal(points: Array) -> tuple[Array, Array]:
-    """Centripetal parameters, (m,), and the points, (m, J), without repeated ones."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    moved = np.append(True, steps > 0.0)
-    return np.append(0.0, np.cumsum(np.sqrt(steps[moved[1:]]))), points[moved]

@@ -118,6 +118,11 @@ def leads_tool(job: Job) -> bool:
     return bool(job.ways) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
 
 
+def has_stretches(job: Job) -> bool:
+    """Whether the job is planned as stretches: it leads the tool, or its spline rests at via points."""
+    return leads_tool(job) or (bool(job.stops) and not is_free(job))
+
+
 def _check_ways(job: Job, where: str) -> None:
     """Raise InputError for lines and speeds of the tool that contradict the rest of the job."""
     if job.timing != "shared" or job.degree != 5:
@@ -169,11 +174,12 @@ def _check_path(job: Job) -> None:
         )
     if leads_tool(job):
         _check_ways(job, where)
-    elif job.stops and not is_free(job):
+    elif has_stretches(job) and (job.timing != "shared" or job.degree != 5):
         raise InputError(
-            f"{where}: the spline through the via points rests at its ends only",
-            'a stop needs path = "free", or plan the stretches between the stops one by one with --split',
+            f'{where}: a stop needs timing = "shared" and degree 5',
+            "leave timing and degree out, or plan the stretches between the stops one by one with --split",
         )
+    _check_stops(job, where)
     if is_free(job):
         _check_free(job, where)
 
@@ -207,6 +213,11 @@ def _check_free(job: Job, where: str) -> None:
                 f'{where}: {what} needs timing = "shared", where the joints pass via points together',
                 'give timing = "shared" (--timing shared), or leave that out',
             )
+    if together["a corridor"] and any(stop.dwell_s > 0.0 for stop in job.stops):
+        raise InputError(f"{where}: a corridor and a dwell do not go together", "give stops without dwell_s")
+
+
+def _check_stops(job: Job, where: str) -> None:
     inner = range(1, len(job.via) - 1)
     for stop in job.stops:
         if stop.via not in inner or not 0.0 <= stop.dwell_s < math.inf:
@@ -216,8 +227,6 @@ def _check_free(job: Job, where: str) -> None:
             )
     if len({stop.via for stop in job.stops}) < len(job.stops):
         raise InputError(f"{where}: two stops at one via point", "leave one of them out")
-    if together["a corridor"] and any(stop.dwell_s > 0.0 for stop in job.stops):
-        raise InputError(f"{where}: a corridor and a dwell do not go together", "give stops without dwell_s")
 
 
 def check_via(arm: Arm, job: Job, via_deg: Array) -> None:

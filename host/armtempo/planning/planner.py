@@ -40,7 +40,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
     way = around.motion if checks.is_free(job) else through_plan.motion
-    if checks.leads_tool(job):
+    if checks.has_stretches(job):
         from armtempo.planning.line import line_plan  # here, because most jobs need no kinematics
 
         way = line_plan.motion

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -146,9 +147,10 @@ class RunFolder:
     def begin_repetition(self) -> SampleFile:
         """A new sample file, to be used as a context."""
         repetition = Repetition(f"samples-{len(self.repetitions) + 1:02d}.csv")
+        file = SampleFile(self, repetition)
         self.repetitions.append(repetition)
         self.write()
-        return SampleFile(self, repetition)
+        return file
 
 
 class SampleFile:
@@ -187,8 +189,22 @@ class SampleFile:
             self._folder.write()
 
 
-def new_folder(parent: Path, name: str) -> Path:
-    """A new folder ``parent/name-001`` (or the next free number); raises InputError if it cannot be made."""
+@contextmanager
+def new_folder(parent: Path, name: str) -> Iterator[Path]:
+    """A new folder ``parent/name-001`` (or the next free number), to be filled within this context.
+
+    It is removed again if that fails, for example on a full disk: no folder is left that is none of a run.
+    Raises InputError if it cannot be made.
+    """
+    path = _made(parent, name)
+    try:
+        yield path
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise
+
+
+def _made(parent: Path, name: str) -> Path:
     try:
         for number in range(1, 10_000):
             path = parent / f"{name}-{number:03d}"

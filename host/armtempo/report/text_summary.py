@@ -93,9 +93,14 @@ def _settings(plan: Plan) -> list[str]:
     if checks.is_free(job):
         pieces = len(first.angle_points_deg) - first.degree
         return ["free path", timing, f"{pieces} pieces{auto}", f"{job.starts} starts", f"seed {job.seed}"]
-    if checks.leads_tool(job):
+    if checks.has_stretches(job):
         pieces = len(first.angle_points_deg) - first.degree
-        return ["tool led", timing, f"{pieces} pieces", f"refine {first.refine}{auto}"]
+        return [
+            "tool led" if checks.leads_tool(job) else "with stops",
+            timing,
+            f"{pieces} pieces",
+            f"refine {first.refine}{auto}",
+        ]
     search = f"{job.optimiser}, {job.population} x {job.iterations}"
     if job.optimiser == GRADIENT:
         search = f"{job.optimiser}, {job.starts} starts"
@@ -137,7 +142,7 @@ def _polished(search: Search) -> str:
 def _free_path(plan: Plan) -> list[str]:
     """The most that a free path could save; nothing if that is little or the path is given."""
     job, total_s = plan.job, plan.trajectory.duration_s
-    if job.path != "through" or checks.leads_tool(job):
+    if job.path != "through" or checks.has_stretches(job):
         return []
     floor_s = free_plan.floor_of(plan.arm, job, plan.via_deg, [*range(len(plan.arm.driven))]).time_s
     if (saved := 1.0 - floor_s / total_s) <= _WORTH_SAYING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
@@ -16,7 +16,7 @@ from armtempo.basics.errors import BoardError, LinkError
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
 from armtempo.link.refusal import refusal
-from armtempo.link.transport import Transport
+from armtempo.link.session import OnLoss
 from armtempo.model.arm import Arm
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMotion, JogMove
@@ -79,7 +79,7 @@ class HeldJog:
         self._run = 0
         self._said_s = 0.0
         self._positions: Positions | None = None
-        self._reopen: Callable[[], Transport] | None = None
+        self._ends = ExitStack()
 
     def __enter__(self) -> Self:
         """Upload and start it; raises BoardError if the board refuses."""
@@ -87,19 +87,14 @@ class HeldJog:
         client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
         key = stored_motion.put_once(client, encoded.data)
-        # Nothing holds the jog while a broken port is waited for
-        self._reopen, client.session.reopen = (
-            client.session.reopen,
-            None,
-        )
-        try:
+        with ExitStack() as ends:
+            # Nothing holds the jog while a broken port is waited for
+            ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
             self._run = client.start(key.name, key.crc, START_HELD).run
-        except BaseException:
-            client.session.reopen = self._reopen
-            raise
-        self.moving = True
-        for _ in range(_FIRST):
-            self._say_so()
+            self.moving = True
+            for _ in range(_FIRST):
+                self._say_so()
+            self._ends = ends.pop_all()
         return self
 
     @property
@@ -160,7 +155,7 @@ class HeldJog:
                 raise
             return
         finally:
-            self._client.session.reopen = self._reopen
+            self._ends.close()
         if self.fault is not None and value is None:
             raise refusal("a fault ended the jog", self.fault.code, self.fault.joint)
 

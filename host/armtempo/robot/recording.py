@@ -70,15 +70,14 @@ def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> R
         "board": vars(client.info),
         "motion_crc": f"{motion.key.crc:08x}",
     }
-    folder = RunFolder(
-        run_folder.new_folder(parent, motion.name), motion.name, run_folder.scales(motion.arm), origin
-    )
-    folder.write_motion(motion.data)
-    if motion.plan is not None:
-        motion.plan.save(folder.path / run_folder.TRAJECTORY)
-    else:
-        arm_json.save(motion.arm, folder.path / run_folder.ARM)
-    folder.write()
+    with run_folder.new_folder(parent, motion.name) as path:
+        folder = RunFolder(path, motion.name, run_folder.scales(motion.arm), origin)
+        folder.write_motion(motion.data)
+        if motion.plan is not None:
+            motion.plan.save(path / run_folder.TRAJECTORY)
+        else:
+            arm_json.save(motion.arm, path / run_folder.ARM)
+        folder.write()
     return folder
 
 
