@@ -66,6 +66,8 @@ def _compile_sources() -> None:
 def pytest_sessionstart(session: pytest.Session) -> None:
     """In CI nothing may be left out."""
     if not hasattr(session.config, "workerinput"):
+        writer = session.config.get_terminal_writer()
+        writer.fullwidth = writer.fullwidth  # as it is before ``own_settings`` sets COLUMNS
         _compile_sources()
     if interpreters.MISSING and os.environ.get("CI"):
         pytest.exit(f"CI needs the interpreters {', '.join(interpreters.MISSING)}", returncode=1)

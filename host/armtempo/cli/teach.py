@@ -198,7 +198,7 @@ def by_hand(keys: Keys, points: TaughtPoints, button: Callable[[], bool] = lambd
     said = ""
     while True:
         shown = f"{_row(points.where().round(2).tolist())} ° by the encoders"
-        results.echo(
+        click.echo(
             f"\r\x1b[K{len(points.points_deg)} points | {shown}{' | ' if said else ''}{said}", nl=False
         )
         key = keys.read(_BY_HAND_S)

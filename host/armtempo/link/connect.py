@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,6 +82,8 @@ class Opening:
     """Accept a board whose program differs from the installed one."""
     take_moving: bool = False
     """Take the port over from a program that hangs even while the board moves: for a stop."""
+    start_deg: Sequence[float] | None = None
+    """Where the arm of a virtual board stands, degrees (J,); None: at home."""
     tell: Callable[[str], object] = lambda text: None
     """Called with messages about the connection."""
 
@@ -99,7 +101,7 @@ def open_board(port: str, how: Opening = Opening(), arm: Arm | None = None) -> I
         if hanging is not None:
             device = hanging.device
         else:
-            device = stack.enter_context(_virtual_port(port, arm)) if names.is_sim(port) else port
+            device = stack.enter_context(_virtual_port(port, arm, how)) if names.is_sim(port) else port
         sinks = [] if how.sink is None else [how.sink]
         if how.log_traffic is not None:
             sinks.append(stack.enter_context(traffic.LogFile(how.log_traffic)))
@@ -180,11 +182,11 @@ def greet(session: Session, session_number: int | None = None) -> Client:
 
 
 @contextmanager
-def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
+def _virtual_port(port: str, arm: Arm | None, how: Opening) -> Iterator[str]:
     """A virtual board's port; if its program fails, link errors end with the last line of its log."""
     from armtempo.simulator import LaunchOptions, launch
 
-    with launch(LaunchOptions(names.sim_flash(port), arm=arm)) as board:
+    with launch(LaunchOptions(names.sim_flash(port), arm=arm, start_deg=how.start_deg)) as board:
         try:
             yield board.port
         except LinkError as error:

@@ -13,6 +13,7 @@ from armtempo.link.connect import Opening, open_board, patiently
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.arm import Arm
 from armtempo.ports import board_port
+from armtempo.robot import kept_position
 from armtempo.robot.board import Board
 from armtempo.robot.sharing import Sharing
 
@@ -32,14 +33,14 @@ def connect(
     """Connect to the board on ``port``; use the result as a context, or ``close`` it.
 
     ``port``: a serial device or URL; ``"sim"`` starts a virtual board that ends when it is closed,
-    ``"sim:FOLDER"`` one with its flash in FOLDER. None: ARMTEMPO_PORT or the project folder's
-    ``armtempo.toml``, else the only board plugged in (reported to ``tell``), never a virtual board. ``arm``:
-    moved by a virtual board's motors; None: ideal motors. ``log_traffic``: file for all bytes in both
-    directions; ``sink`` is called with the same. ``any_program``: accept a board whose program differs from
-    the installed one. ``tell`` is called with messages about the connection; default: the logger "armtempo".
-    Until the board is closed, other programs on this machine can watch and stop it (``attach``). A port in
-    use is retried for a few seconds, as many programs use it only briefly, and taken over from a program that
-    hangs, unless the arm moves.
+    ``"sim:FOLDER"`` one with its flash in FOLDER, and its arm where it was closed. None: ARMTEMPO_PORT or the
+    project folder's ``armtempo.toml``, else the only board plugged in (reported to ``tell``), never a virtual
+    board. ``arm``: moved by a virtual board's motors; None: ideal motors. ``log_traffic``: file for all bytes
+    in both directions; ``sink`` is called with the same. ``any_program``: accept a board whose program differs
+    from the installed one. ``tell`` is called with messages about the connection; default: the logger
+    "armtempo". Until the board is closed, other programs on this machine can watch and stop it (``attach``). A
+    port in use is retried for a few seconds, as many programs use it only briefly, and taken over from a
+    program that hangs, unless the arm moves.
 
     Raises InputError if there is no such port, or if none is set and not exactly one board is plugged in;
     PortInUseError if another program has the port, LinkError if the board does not answer or runs another
@@ -63,7 +64,10 @@ def connect_now(port: str, arm: Arm | None, how: Opening) -> Board:
     """As ``connect``, to a given port and without waiting; raises PortInUseError if another program has it."""
     stack = ExitStack()
     taps = _Taps(how.sink)
-    client = stack.enter_context(open_board(port, replace(how, sink=taps), arm))
+    kept = kept_position.read(port)
+    how = replace(how, sink=taps, start_deg=kept.angles_deg(arm) if kept else None)
+    client = stack.enter_context(open_board(port, how, arm))
+    kept_position.take(client, port, kept)
     board = Board(client, port, stack)
     sharing = Sharing(client, board.state, board.stops, lambda: board.arm)
     stack.callback(sharing.close)
