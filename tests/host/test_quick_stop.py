@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
+import random
 import shutil
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -16,6 +20,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.basics.settings import ProjectSettings
 from armtempo.ports import claim, claim_file, names, quick_stop
 from armtempo.ports.caller import Ownership, ownership
+from armtempo.ports.line_socket import LineSocket, request_line
 from armtempo.ports.messages import Message
 from armtempo.ports.server import Server
 
@@ -160,6 +165,38 @@ def test_a_refusal_is_left_to_the_command() -> None:
     finally:
         server.close()
     assert quick_stop.take_answer(PORT, False) is None
+
+
+@pytest.mark.skipif(not claim.LOCAL_SOCKETS, reason="other sockets wait by themselves")
+def test_a_stop_waits_for_a_program_that_many_ask() -> None:
+    """Whose system refuses more callers for a moment."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening, ExitStack() as callers:
+        address = f"{os.environ['XDG_RUNTIME_DIR']}/full"
+        listening.bind(address)
+        listening.listen(0)
+        full = False
+        while not full:
+            caller = callers.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
+            caller.setblocking(False)
+            full = caller.connect_ex(address) != 0
+        threading.Timer(0.1, lambda: [listening.accept()[0].close() for _ in range(2)]).start()
+        LineSocket(address, 60.0).close()
+
+
+def test_a_request_is_the_json_that_any_reader_takes() -> None:
+    numbers = random.Random(3)
+    letters = 'aé"\\\n\x00\ud800😀'
+    for _ in range(300):
+        text = "".join(numbers.choices(letters, k=5))
+        fields = {
+            "by": text,
+            "now": numbers.random() < 0.5,
+            "rate": numbers.randrange(-(2**70), 2**70),
+            "topics": [text],
+        }
+        line = request_line(7, "stop", fields)
+        assert line.endswith(b"}\n")
+        assert json.loads(line) == {"id": 7, "request": "stop", **fields}
 
 
 @pytest.mark.parametrize("port", ["/dev/ü", "C:\\x\ny", "rfc2217://host:1", ""])

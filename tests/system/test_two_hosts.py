@@ -121,7 +121,7 @@ def moving(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     plan.save(folder / "long.json")
     with launch(LaunchOptions(folder / "flash", virtual_time=False)) as board:
         commandline.ended(start("home", "--arm", "paper", "--port", board.port, folder=folder))
-        owner = start("run", "long.json", "--port", board.port, folder=folder)
+        owner = start("run", "long.json", "--speed", "10", "--port", board.port, folder=folder)
         try:
             samples = folder / "runs" / "long-001" / "samples-01.csv"
             commandline.wait_for(lambda: samples.exists() and samples.stat().st_size > 200, "samples")

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import itertools
-import socket
 import time
 from collections.abc import Iterator
 from enum import Enum
 from typing import Any, Self
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortGivenUpError
-from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
-from armtempo.ports.messages import LineReader, Message, to_line
+from armtempo.ports.line_socket import LineSocket, LongLineError, request_line
+from armtempo.ports.messages import Message, parse
 
 HUNG_S = 2.0
 """A program that has neither answered ``hello`` nor given a sign of life in its claim (``claim.beat``) for this
 long counts as hanging; one that gives the sign is busy."""
-_RETRY_S = 0.02
-"""Interval of attempts to connect to a program that has as many callers waiting as it can have."""
 _REMEMBERED_S = 5.0
 """Time for which a hanging program is not asked again."""
 _END = "end that process, or let a command that needs the port take it over"
@@ -66,7 +63,6 @@ class Caller:
         self._numbers = itertools.count(1)
         self._published: list[Message] = []
         self._socket = _connect(claim)
-        self._reader = LineReader(self._socket)
         try:
             self.ask("hello", HUNG_S, version=VERSION, token=claim.token)
         except BaseException as error:
@@ -83,7 +79,7 @@ class Caller:
         """
         number = next(self._numbers)
         limit_s = time.monotonic() + timeout_s
-        self._send(to_line({"id": number, "request": request, **fields}))
+        self._send(request_line(number, request, fields))
         while True:
             message = self._receive(max(0.0, limit_s - time.monotonic()))
             if message is None:
@@ -126,8 +122,7 @@ class Caller:
 
     def _send(self, line: bytes) -> None:
         try:
-            self._socket.settimeout(HUNG_S)
-            self._socket.sendall(line)
+            self._socket.send(line, HUNG_S)
         except TimeoutError:
             raise NoAnswerError(
                 f"{self.claim.who} has {self.claim.port} and accepts no requests", _END
@@ -138,15 +133,14 @@ class Caller:
     def _receive(self, timeout_s: float | None) -> Message | None:
         """The next message; None after ``timeout_s``."""
         try:
-            self._socket.settimeout(None if timeout_s is None else max(timeout_s, 1e-3))
-            message = self._reader.read()
+            line = self._socket.line(None if timeout_s is None else max(timeout_s, 1e-3))
         except TimeoutError:
             return None
-        except OSError as error:
+        except (OSError, LongLineError) as error:
             raise self._gone() from error
-        if message is None:
+        if line is None:
             raise self._gone()
-        return message
+        return parse(line)
 
     def _gone(self) -> LinkError:
         return PortGivenUpError(
@@ -154,29 +148,13 @@ class Caller:
         )
 
 
-def _connect(claim: PortClaim) -> socket.socket:
-    kind, address = (
-        (socket.AF_UNIX, claim.address)
-        if claims.LOCAL_SOCKETS
-        else (socket.AF_INET, ("127.0.0.1", int(claim.address)))
-    )
-    limit_s = time.monotonic() + HUNG_S
-    while True:
-        found = socket.socket(kind, socket.SOCK_STREAM)
-        found.settimeout(HUNG_S)
-        try:
-            found.connect(address)
-            return found
-        except (TimeoutError, BlockingIOError) as error:
-            found.close()
-            if isinstance(error, TimeoutError) or time.monotonic() > limit_s:
-                raise NoAnswerError(f"{claim.who} has {claim.port} and accepts no connection", _END) from None
-            time.sleep(_RETRY_S)  # a local socket says at once that too many callers wait
-        except OSError as error:
-            found.close()
-            raise LinkError(
-                f"{claim.who} had {claim.port} and is gone", "try again: the port is free"
-            ) from error
+def _connect(claim: PortClaim) -> LineSocket:
+    try:
+        return LineSocket(claim.address, HUNG_S)
+    except TimeoutError:
+        raise NoAnswerError(f"{claim.who} has {claim.port} and accepts no connection", _END) from None
+    except OSError as error:
+        raise LinkError(f"{claim.who} had {claim.port} and is gone", "try again: the port is free") from error
 
 
 def _checked(message: Message) -> Message:
