@@ -395,14 +395,14 @@ def test_a_target_is_shown_then_approached_while_held_and_postures_are_stored(
     page.get_by_role("button", name="While held").click()
     page.get_by_role("button", name="Store…").click()
     page.get_by_role("dialog").get_by_label("Name").fill("tray")
-    panels.answer(page, "Store")
+    assert panels.answer(page, "Store") == ""
     page.get_by_role("button", name="Go to tray").wait_for()
     assert "[posture.tray]\nangles_deg = [31" in (panel.folder / "arm.toml").read_text()
     page.get_by_role("button", name="Guide by hand…").click()
-    panels.answer(page, "Guide by hand…")
+    assert panels.answer(page, "Guide by hand…") == ""
     wait_for(page, "unhomed", "Guide by hand…")
     wait_for(page, "31.", place="armtempo-where")  # the encoders tell
-    panels.answer(page, "The current on")
+    assert panels.answer(page, "The current on") == ""
     wait_for(page, "Guide by hand…: done", place="armtempo-said")
     wait_for(page, "idle")
 
