@@ -26,7 +26,7 @@ START_FILES = ("boot.py", "main.py")
 """Files of the board package that become files of the flash's root; main.py goes last."""
 LOADER = f"{LIBRARY}/armtempo_sectors.mpy"
 ERASING = f"{LIBRARY}/armtempo_erasing"
-"""Is there while the chip's last two sectors are erased (write_sectors.txt)."""
+"""Exists while the chip's last two sectors are erased (write_sectors.txt)."""
 _LOADER = "sectors.py"
 """File of the board package that finds modules in the chip's last two sectors."""
 _HASH = f"{PACKAGES[1]}.program_hash"
