@@ -260,7 +260,8 @@ def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> st
 
 def answer(page: Any, button: str) -> str:
     """Press a button of the dialog, and wait until that is gone; why it was refused, which leaves it open."""
-    dialog = page.get_by_role("dialog")
+    wanted = page.get_by_role("button", name=button, exact=True)
+    dialog = page.get_by_role("dialog").filter(has=wanted)  # another one may open in its place
     refusal = press(page, dialog.get_by_role("button", name=button, exact=True))
     if refusal:
         dialog.get_by_role("button", name="Cancel").click()
