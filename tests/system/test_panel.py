@@ -368,7 +368,7 @@ def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel) -> None:
     press(page, page.get_by_role("button", name="Run", exact=True))
     page.wait_for_selector(".armtempo-lit:has-text('2')")
     page.keyboard.press("Escape")
-    page.wait_for_selector("text=cycle 0: stopped")
+    page.wait_for_selector("text=cycle 1: stopped")
     assert page.locator(".armtempo-lit").count() == 0
 
 
