@@ -138,7 +138,7 @@ class SequenceTab:
             self._lit = step
         if state is not None:
             # The board counts the cycles that are finished
-            cycle = state.cycle + (state.ending != "done")
+            cycle = state.cycle + (state.ending != "finished")
             text = words.STEP_NOW.format(step=state.step, cycle=cycle)
             self._where.set_text(text if running else f"{text}: {state.ending}")
 
