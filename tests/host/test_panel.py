@@ -272,6 +272,7 @@ class Jog:
 
     def __init__(self) -> None:
         self.held = 0
+        self.ends = ""
         self.angles_deg = ARM.home_deg
         self.ended = threading.Event()
 
