@@ -214,6 +214,13 @@ def test_an_arm_that_fits_is_told_with_its_bytes() -> None:
     assert "fits with MicroPython's own firmware or with the program in it" in engine_room.of_arm(PAPER)
 
 
+@pytest.mark.parametrize("size", range(8_000, 24_000, 500))
+def test_what_is_said_to_fit_fits_with_the_margin_of_the_record(size: int) -> None:
+    for joints in range(1, limits.MAX_JOINTS + 1):
+        if rate := Room(size)._highest_rate(joints):
+            assert Room(size).holds([engine_room.encode.with_margin(rate)] * joints), (joints, rate)
+
+
 def test_an_arm_with_more_joints_is_sent_to_the_firmware() -> None:
     arm = six_joints()
     with pytest.raises(InputError) as refused:
@@ -243,7 +250,7 @@ def test_no_way_out_is_promised_that_is_none(monkeypatch: pytest.MonkeyPatch) ->
 def test_a_board_tells_what_the_firmware_would_give() -> None:
     lines = engine_room.of_board(board(CORE))
     assert len(lines) == 2
-    assert "1 x 240000 steps/s, 2 x 120000 steps/s, 3 x 62000 steps/s" in lines[0]
+    assert "1 x 240000 steps/s, 2 x 120000 steps/s, 3 x 61000 steps/s" in lines[0]
     assert "6 x 40000 steps/s" in lines[1]
     assert "sequences" in lines[1]
     assert len(engine_room.of_board(board(IN_FIRMWARE))) == 1

@@ -384,7 +384,7 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPat
         main, ["import-urdf", str(FOLDER / "three_planar.urdf"), "-o", str(tmp_path / "a")]
     )
     assert result.exit_code == 1
-    assert "pip install 'armtempo[urdf]'" in result.output
+    assert "pip install 'yourdfpy" in result.output
 
 
 def test_a_table_that_does_not_keep_to_the_urdf_is_not_written(

@@ -31,6 +31,7 @@ _NEW = ".new"
 _ENOSPC = const(28)
 _ERRNO = const(0)  # of an exception's arguments
 _ST_SIZE = const(6)  # of os.stat
+_FOLDER = const(0x4000)  # in its first entry
 _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
@@ -104,7 +105,8 @@ class Store:
 
     def names(self) -> "list[str]":
         """Names of the stored motions and sequences, sorted."""
-        return sorted([name[: -len(_MOTION)] for name in self._files() if name.endswith(_MOTION)])
+        files = [name for name in self._files() if name.endswith(_MOTION) and not self._is_folder(name)]
+        return sorted([name[: -len(_MOTION)] for name in files])
 
     def begin(self, name: str, size: int) -> None:
         """Begin an upload; aborts one in progress."""
@@ -299,6 +301,13 @@ class Store:
             return os.listdir(self._root)
         except OSError:
             return []
+
+    def _is_folder(self, file_name: str) -> bool:
+        """Whether it is a folder, which somebody else made."""
+        try:
+            return os.stat(self._path(file_name))[0] & _FOLDER != 0
+        except OSError:
+            return True
 
     def _size_of(self, file_name: str) -> int:
         """Bytes of a file; NOT_FOUND."""

@@ -105,7 +105,7 @@ class LazyGroup(click.Group):
             with raised_by_signals():
                 return super().invoke(ctx)
         except click.UsageError as error:
-            raise click.UsageError(results.fitted(error.format_message(), "Error: "), error.ctx) from None
+            (error.ctx or ctx).fail(results.fitted(error.format_message(), "Error: "))
         except ArmtempoError as error:
             results.show_error(error, as_json=as_json)
             ctx.exit(error.exit_code)

@@ -23,7 +23,7 @@ _NEXT = """\
 report: {page}
         open it in a browser: {uri}
 next:   armtempo new my_arm            a folder for your own arm and job, step by step
-        armtempo panel --port sim      the arm in a browser (needs armtempo[panel])
+        armtempo panel --port sim      the arm in a browser (needs the extra 'panel')
         armtempo demo --pick-and-place a gripper and a part sensor
         armtempo --help                all commands"""
 

@@ -192,7 +192,7 @@ def _package(name: str, extra: str) -> Finding:
         if extra:
             advice = f"{installation.command(name, extra)} if you want it"
             return note(name, "not installed", advice)
-        return error(name, "missing", "pip install --force-reinstall armtempo")
+        return error(name, "missing", "install armtempo again, as it was installed")
 
 
 def ports() -> list[Finding]:

@@ -23,7 +23,7 @@ from armtempo.basics.errors import (
 )
 from armtempo.link import traffic
 from armtempo.link.client import Client
-from armtempo.link.program_version import UPDATE, own_crc
+from armtempo.link.program_version import IN_LIBRARY, UPDATE, own_crc
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
@@ -46,6 +46,11 @@ _NUDGE = b"\r\x02\r" + _ECHO + b"\r"
 """Ends a line, leaves a raw REPL, and writes a comment, which a prompt echoes even in an unfinished line; the
 board program ignores these bytes."""
 _ASK = b"print('armtempo','is','here')if'armtempo'in open('/flash/main.py').read()else 0\r"
+_ASK_PARTS = (
+    "import os;print('armtempo','in','parts')if[n for n in os.listdir('/flash/lib')if n in"
+    f"{IN_LIBRARY!r}]else 0\r"
+).encode()
+_IN_PARTS = b"armtempo in parts"
 _HERE = b"armtempo is here"
 """The prompt's answer if the program is in the flash; differs from the echo of the question."""
 
@@ -206,6 +211,12 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
                 f"{where} runs MicroPython but not the armtempo program, which is on it: mpremote or an IDE ended it",
                 f"press the board's reset button, or: mpremote connect {transport.name} reset; if it does "
                 "not start then: armtempo deploy",
+            )
+        transport.write(_ASK_PARTS)
+        if _IN_PARTS in _listen(transport):
+            return NoProgramError(
+                f"{where} runs MicroPython but not the armtempo program: its deployment was interrupted",
+                "'armtempo deploy' completes it",
             )
         return NoProgramError(
             f"{where} runs MicroPython but not the armtempo program",

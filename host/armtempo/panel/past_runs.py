@@ -11,10 +11,10 @@ from typing import Any
 from armtempo import pipeline
 from armtempo.basics.errors import RunFolderError
 from armtempo.panel import words
+from armtempo.report.run import Run
 from armtempo.report.run_folder import META
 from armtempo.report.sequence_folder import FORMAT as SEQUENCE
 from armtempo.report.sequence_reader import SequenceRun
-from armtempo.robot.run import Run
 
 REPORT_PAGE = "report.html"
 _known: dict[Path, tuple[int, PastRun]] = {}

@@ -189,6 +189,11 @@ def _max_rate(joint: DrivenJoint) -> int:
             ),
             "check the unit, microsteps and gear_ratio",
         )
+    return with_margin(rate)
+
+
+def with_margin(rate: float) -> int:
+    """What the arm record has for a joint that steps at most at a rate, in steps/s: more, for rounding."""
     return int(rate * 1.01) + 1
 
 

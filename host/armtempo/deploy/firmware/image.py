@@ -49,7 +49,7 @@ def find(here: Path) -> Path:
     found = [path.parent for path in here.glob(f"*/{ABOUT}")] + [*here.glob("armtempo-firmware-*.zip")]
     if len(found) == 1:
         return found[0]
-    get = "download armtempo-firmware-BOARD.zip of a release, or build one with 'armtempo firmware'"
+    get = "build one with 'armtempo firmware'; 'armtempo help firmware' says how"
     if not found:
         raise InputError(
             "no firmware given, and none found here", f"{get}; then: armtempo flash --image FILE"
