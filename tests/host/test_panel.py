@@ -25,6 +25,7 @@ from armtempo.link.board_messages import Positions, Sample
 from armtempo.model import mesh_files, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.room import FAR_MM, ArmRoom, KeepOut
+from armtempo.panel import words
 from armtempo.panel.access import COOKIE, MOST_BYTES, Access, Policy
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
@@ -420,6 +421,8 @@ def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
         time.sleep(0.01)
     wait(jog.ended.is_set)
     assert how not in ("silent", "late") or time.monotonic() - begin_s > HELD_S / 4
+    wait(lambda: not operator.busy)
+    assert any(words.BROWSER_SILENT in line for line in operator.log.last) == (how in ("silent", "late"))
 
 
 def test_a_release_that_overtakes_its_press_ends_it(operator: Operator) -> None:
