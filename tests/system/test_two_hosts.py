@@ -124,7 +124,7 @@ def moving(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
         owner = start("run", "long.json", "--speed", "10", "--port", board.port, folder=folder)
         try:
             samples = folder / "runs" / "long-001" / "samples-01.csv"
-            commandline.wait_for(lambda: samples.exists() and samples.stat().st_size > 200, "samples")
+            commandline.wait_for(lambda: samples.exists() and samples.read_text().count("\n") > 2, "samples")
             yield owner, board.port
         finally:
             owner.kill()
