@@ -258,11 +258,14 @@ def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> st
     raise AssertionError(refusal)
 
 
-def answer(page: Any, button: str) -> None:
-    """Press a button of the dialog, and wait until that is gone; again where the press came too late."""
+def answer(page: Any, button: str) -> str:
+    """Press a button of the dialog, and wait until that is gone; why it was refused, which leaves it open."""
     dialog = page.get_by_role("dialog")
-    press(page, dialog.get_by_role("button", name=button))
+    refusal = press(page, dialog.get_by_role("button", name=button, exact=True))
+    if refusal:
+        dialog.get_by_role("button", name="Cancel").click()
     dialog.wait_for(state="detached")
+    return refusal
 
 
 def home(page: Any) -> None:
