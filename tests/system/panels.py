@@ -202,6 +202,7 @@ def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "
         options = LaunchOptions(
             folder / "flash",
             virtual_time=False,
+            instant_flash=True,
             interpreter=interpreters.starter("cpython"),  # takes the sources
             arm=moved,
             flash_blocks=SOURCES_BLOCKS,
