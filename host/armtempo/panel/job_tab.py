@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -272,9 +272,12 @@ class JobTab:
     def _why_no_plan(self) -> str:
         return words.BUSY.format(what=words.PLAN) if self._planning else ""
 
-    async def _plan(self, press: Press) -> None:
+    def _plan(self, press: Press) -> Awaitable[None]:
+        self._operator.check(self._page.client, press, Needs.CONTROL)
+        return self._make_plan()
+
+    async def _make_plan(self) -> None:
         try:
-            self._operator.check(self._page.client, press, Needs.CONTROL)
             job, version = self._jobs.job(), self._jobs.version
             self._show_planning(True)
             plan = await run.io_bound(pipeline.plan, self._operator.arm, job, self._progress)
