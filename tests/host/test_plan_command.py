@@ -37,7 +37,7 @@ def test_plans_the_shipped_job_without_options() -> None:
     assert result.exit_code == 0, result.output
     assert "joint 3" in result.output
     assert "written: feed.json" in result.output
-    assert "steps/s, the board does 240000 (estimated; 'armtempo selftest'" in result.output
+    assert "steps/s; the board supports 240000 (estimated; 'armtempo selftest'" in result.output
     assert Plan.load("feed.json").job.iterations == 20
 
 

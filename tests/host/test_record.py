@@ -145,9 +145,9 @@ def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
         run.begin_repetition() as file,
     ):
         file.append(sample(0))
-        file._file.close()
-        file._file = full.open("w", encoding="utf-8", newline="")
-        file._csv = csv.writer(file._file)
+        file._rows._file.close()
+        file._rows._file = full.open("w", encoding="utf-8", newline="")
+        file._rows._csv = csv.writer(file._rows._file)
         file.append(sample(1))
     found = run_reader.load(run.path).repetitions[0]
     assert (found.state, found.index.tolist()) == (run_folder.BROKEN, [0])
@@ -187,6 +187,17 @@ def test_a_file_has_its_content_before_its_name(tmp_path: Path, monkeypatch: pyt
     replace_text(tmp_path / "arm.toml", "four")
     assert done[:2] == ["sync 4", "rename"]
     assert done[2:] in ([], ["sync folder"])
+
+
+def test_a_disk_that_cannot_sync_is_written_to_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cannot(number: int) -> None:
+        raise OSError(errno.EINVAL, "Invalid argument")
+
+    monkeypatch.setattr(os, "fsync", cannot)
+    replace_text(tmp_path / "arm.toml", "four")
+    assert (tmp_path / "arm.toml").read_text() == "four"
 
 
 BAD_VALUES = (

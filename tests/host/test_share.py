@@ -17,19 +17,21 @@ from typing import Any, cast
 
 import pytest
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortError
-from armtempo.link import Client
+from armtempo.link import Client, Opening
 from armtempo.link.board_messages import Levels
 from armtempo.link.refusal import refusal
 from armtempo.link.turns import Turns
-from armtempo.ports import caller, claim
+from armtempo.ports import caller, claim, claim_file
 from armtempo.ports.caller import Caller, Ownership, ownership
 from armtempo.ports.claim import PortClaim
 from armtempo.ports.messages import REQUESTS, Field, LineReader, Message, check
 from armtempo.ports.server import Server
-from armtempo.robot import stored_motion
+from armtempo.robot import connect, stored_motion
 from armtempo.robot.shared_board import SharedBoard
 from armtempo.robot.sharing import Sharing
 from armtempo_shared import wire
+
+from tests import inprocess
 
 ANY = Field("anything", lambda _: True, needed=False)
 ECHO = {**REQUESTS, "echo": {"text": ANY, "refuse": ANY}}
@@ -76,6 +78,25 @@ def test_a_stop_brakes_unless_it_is_to_be_now() -> None:
     finally:
         server.close()
     assert asked == [(False, "another program"), (True, "armtempo stop")]
+
+
+def test_an_arm_that_no_other_program_can_stop_says_so_before_it_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No folder for claims is this user's alone."""
+    (tmp_path / "taken").write_text("")
+    monkeypatch.setattr(claim_file, "folders", lambda: iter([str(tmp_path / "taken")]))
+    told: list[str] = []
+
+    @contextmanager
+    def open_board(*_: object) -> Iterator[Client]:
+        yield inprocess.connect(inprocess.Pipe(tmp_path / "flash"))
+
+    monkeypatch.setattr(connect, "open_board", open_board)
+    with connect.connect_now("/dev/p", None, Opening(tell=told.append)):
+        assert len(told) == 1
+        assert "not even 'armtempo stop'" in told[0]
+        assert str(tmp_path / "taken") in told[0]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes are of POSIX")

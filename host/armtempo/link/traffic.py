@@ -7,6 +7,7 @@ A log is a text file with one tab-separated line per chunk of bytes::
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -179,7 +180,10 @@ def read_log(path: Path) -> Iterator[Chunk]:
         try:
             if len(fields) != 4 or fields[1] not in (TO_BOARD, FROM_BOARD):
                 raise ValueError("four columns expected, the second > or <")
-            yield Chunk(float(fields[0]), fields[1], bytes.fromhex(fields[2]))
+            time_s = float(fields[0])
+            if not math.isfinite(time_s):
+                raise ValueError(f"{fields[0]} is no time")
+            yield Chunk(time_s, fields[1], bytes.fromhex(fields[2]))
         except ValueError as error:
             raise InputError(
                 f"{path}, line {number}: not a line of a traffic log: {error}",

@@ -17,7 +17,7 @@ from __future__ import annotations
 import csv
 import json
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -153,27 +153,46 @@ class RunFolder:
         return file
 
 
+class RowFile:
+    """A new table in a run folder, whose rows are readable as soon as they are added."""
+
+    def __init__(self, path: Path, columns: Iterable[str]) -> None:
+        """Raises RunFolderError if it cannot be written, as ``add`` does."""
+        self._path = path
+        with writing(path):
+            self._file = path.open("x", newline="", encoding="utf-8")
+        self._csv = csv.writer(self._file, lineterminator="\n")
+        self.add(columns)
+
+    def add(self, cells: Iterable[str]) -> None:
+        """Add a row."""
+        with writing(self._path):
+            self._csv.writerow(cells)
+            self._file.flush()
+
+    def close(self) -> None:
+        """Close the file; ``add`` has reported what failed."""
+        with suppress(OSError):
+            self._file.close()
+
+
+def end_without_board(error: type[BaseException] | None) -> str:
+    """The state of what ended before the board said how, by the ``error`` that ended it."""
+    return INTERRUPTED if error is not None and issubclass(error, KeyboardInterrupt) else BROKEN
+
+
 class SampleFile:
     """The sample file of a running repetition; leaving the context stores how it ended."""
 
     def __init__(self, folder: RunFolder, repetition: Repetition) -> None:
         self.repetition = repetition
         self._folder = folder
-        self._path = folder.path / repetition.file
-        with writing(self._path):
-            self._file = self._path.open("x", newline="", encoding="utf-8")
-        self._csv = csv.writer(self._file, lineterminator="\n")
-        self._line(list(columns(folder.joints)))
+        self._rows = RowFile(folder.path / repetition.file, columns(folder.joints))
 
     def append(self, sample: Sample) -> None:
         """Add a sample; raises RunFolderError if it cannot be written."""
-        self._line(row(sample, self._folder.joints))
+        self._rows.add(row(sample, self._folder.joints))
         self.repetition.samples += 1
-
-    def _line(self, cells: list[str]) -> None:
-        with writing(self._path):
-            self._csv.writerow(cells)
-            self._file.flush()
 
     def __enter__(self) -> Self:
         return self
@@ -181,10 +200,9 @@ class SampleFile:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(OSError):  # the error was reported by append
-            self._file.close()
+        self._rows.close()
         if self.repetition.state == RUNNING:
-            self.repetition.state = INTERRUPTED if kind is KeyboardInterrupt else BROKEN
+            self.repetition.state = end_without_board(kind)
         with unless(value):
             self._folder.write()
 

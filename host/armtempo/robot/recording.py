@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from armtempo_shared.limits import TICK_HZ
 
@@ -13,6 +14,7 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.model import arm_json
+from armtempo.model.arm import Arm
 from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report import run_folder
@@ -61,17 +63,16 @@ class ProgressWatcher(Watcher):
         self._inner.end(repetition)
 
 
+def origin(client: Client, arm: Arm, port: str) -> dict[str, Any]:
+    """The entries of any run.json on arm and board."""
+    return {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
+
+
 def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> RunFolder:
     """A new run folder with everything that is needed to repeat the run."""
-    origin = {
-        "arm": motion.arm.name,
-        "port": port,
-        "virtual": client.info.virtual,
-        "board": vars(client.info),
-        "motion_crc": f"{motion.key.crc:08x}",
-    }
+    where = {**origin(client, motion.arm, port), "motion_crc": f"{motion.key.crc:08x}"}
     with run_folder.new_folder(parent, motion.name) as path:
-        folder = RunFolder(path, motion.name, run_folder.scales(motion.arm), origin)
+        folder = RunFolder(path, motion.name, run_folder.scales(motion.arm), where)
         folder.write_motion(motion.data)
         if motion.plan is not None:
             motion.plan.save(path / run_folder.TRAJECTORY)

@@ -19,6 +19,7 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.records import encoded_sequence
 from armtempo.report import run_folder, sequence_folder
 from armtempo.report.sequence_folder import SequenceFolder
+from armtempo.robot.recording import origin
 
 ACKNOWLEDGED = 8
 """Received samples are acknowledged to the board after this many."""
@@ -89,13 +90,7 @@ def recorder(client: Client, content: SequenceContent, parent: Path, port: str) 
                 content.plan.save(path / sequence_folder.SEQUENCE)
             else:
                 arm_json.save(content.arm, path / run_folder.ARM)
-            origin = {
-                "arm": content.arm.name,
-                "port": port,
-                "virtual": client.info.virtual,
-                "board": vars(client.info),
-                "motions": [content.record.motion(index)[0] for index in range(content.record.motions)],
-            }
+            names = [content.record.motion(index)[0] for index in range(content.record.motions)]
             folder = SequenceFolder(
                 path,
                 content.name,
@@ -103,7 +98,7 @@ def recorder(client: Client, content: SequenceContent, parent: Path, port: str) 
                 content.words,
                 tuple(row[4] for row in rows),
                 tuple(row[1] + 1 if row[0] == sequence.MOVE else 0 for row in rows),
-                origin,
+                {**origin(client, content.arm, port), "motions": names},
             )
             ends.enter_context(folder)
         yield _FolderRecorder(client, folder)
