@@ -30,20 +30,16 @@ def point(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("seed", range(5))
 def test_derivatives_of_the_ratios_are_theirs(seed: int) -> None:
     angle, time, limits = point(seed)
-    weights = np.random.default_rng(seed).normal(0, 1, (3, 3, 2))
     gradient = limit_rows.gradient(angle, time, limits)
-    curvature = limit_rows.curvature(angle, time, limits, weights)
     step = 1e-6
     for number in range(6):
         moved = []
         for sign in (1, -1):
             one, two = angle.copy(), time.copy()
             (one if number < 3 else two)[number % 3] += sign * step
-            moved.append((limit_rows.ratios(one, two, limits), limit_rows.gradient(one, two, limits)))
-        slope = (moved[0][0] - moved[1][0]) / (2 * step)
+            moved.append(limit_rows.ratios(one, two, limits))
+        slope = (moved[0] - moved[1]) / (2 * step)
         assert gradient[:, number] == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(gradient).max())
-        bend = np.einsum("lpj,lvpj->vpj", weights, (moved[0][1] - moved[1][1]) / (2 * step))
-        assert curvature[number] == pytest.approx(bend, rel=1e-6, abs=1e-6 * np.abs(curvature).max())
 
 
 @pytest.mark.slow
@@ -242,11 +238,12 @@ def test_rows_of_a_path_are_its_ratios_and_have_their_derivatives(kind: int) -> 
     assert rows.ratios(time) == pytest.approx(-limit_rows.ratios(angle, time, limits)[kind, :, 1], rel=1e-12)
     gradient, weights = rows.gradient(time), np.array([2.0, -1.0, 0.5])
     assert gradient == pytest.approx(-limit_rows.gradient(angle, time, limits)[kind, 3:, :, 1], rel=1e-12)
-    spread = np.zeros((3, 3, 2))
-    spread[kind, :, 1] = -weights
-    whole = limit_rows.curvature(angle, time, limits, spread)[3:, 3:, :, 1]
+    whole, step = np.empty((3, 3, 3)), 1e-6
+    for column, moved in enumerate(step * np.eye(3)):
+        change = rows.gradient(time + moved[:, None]) - rows.gradient(time - moved[:, None])
+        whole[:, column] = weights * change / (2 * step)
     for (row, column), bent in rows.curvature(time, weights).items():
-        assert bent == pytest.approx(whole[row, column], rel=1e-9, abs=1e-12)
+        assert bent == pytest.approx(whole[row, column], rel=1e-6, abs=1e-6 * np.abs(whole).max())
 
 
 @pytest.mark.parametrize("seed", range(20))
