@@ -130,7 +130,7 @@ def test_automatic_refinement_stays_within_the_record() -> None:
     rng = np.random.default_rng(3)
     via = tuple(map(tuple, np.cumsum(rng.normal(0, 10, (120, 1)), axis=0).tolist()))
     arm = problems.make_arm([[50.0, 50.0, 150.0]])
-    plan = planner.plan(arm, Job("long", via, optimiser="gradient", starts=1))
+    plan = planner.plan(arm, Job("long", via, optimiser="gradient", starts=1, path="through"))
     refine = plan.trajectory.joints[0].refine
     assert 1 < refine < 18
     assert 119 * refine <= 2048
@@ -168,7 +168,7 @@ def test_a_search_that_no_bound_holds_back_is_made_once(monkeypatch: pytest.Monk
         return interval_search.Found(inside, np.empty(0))
 
     monkeypatch.setattr(interval_search, "_once", once)
-    job = Job("uneven", tuple(map(tuple, via.tolist())), optimiser="acs")
+    job = Job("uneven", tuple(map(tuple, via.tolist())), optimiser="acs", path="through")
     found = interval_search.search(
         bspline.fit(via, 5), limits, job, np.random.default_rng(0), lambda done, whole: None
     )
@@ -195,7 +195,7 @@ def test_bounds_that_hold_the_search_back_are_widened_and_named(monkeypatch: pyt
 def test_gradients_start_within_bounds_and_are_not_held_by_them() -> None:
     via, _ = uneven()
     arm = problems.make_arm([[50.0, 50.0, 150.0]])
-    job = Job("uneven", tuple(map(tuple, via.tolist())), refine=1, optimiser="gradient")
+    job = Job("uneven", tuple(map(tuple, via.tolist())), refine=1, optimiser="gradient", path="through")
     plan = planner.plan(arm, replace(job, bounds_s=(20.0, 21.0)))
     assert not plan.notes
     assert plan.total_s == pytest.approx(planner.plan(arm, job).total_s, rel=1e-4)
@@ -211,7 +211,7 @@ def test_auto_is_never_slower_than_any_fixed_refine(vias: int, joints: int, timi
     points = bspline.fit(np.random.default_rng(vias).normal(0, 40, (vias, joints)), 5)
     together = [list(range(joints))] if timing == "shared" else [[joint] for joint in range(joints)]
     groups = [Group(tuple(own), points[:, own], LIMITS[: len(own)]) for own in together]
-    job = Job("any", ((0.0,) * joints,) * vias, timing=timing, iterations=20)
+    job = Job("any", ((0.0,) * joints,) * vias, timing=timing, iterations=20, path="through")
     assert time_parameterization.most_refine(job, 257, joints) == 1
     most = min(room, time_parameterization.most_refine(job, vias - 1, joints))
     times = {

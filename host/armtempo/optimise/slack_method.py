@@ -13,6 +13,7 @@ Inequalities that are linear, and met at the start, are met by every iterate.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,14 @@ class Goal:
     iterations: int = 60
 
 
+class _Step(NamedTuple):
+    """A step of the variables, slacks and multipliers."""
+
+    x: Array
+    slack: Array
+    multipliers: Array
+
+
 def minimise(program: Program, x: Array, linear: NDArray[np.bool_], goal: Goal) -> Array:
     """The variables near the local optimum near ``x`` (n,); ``linear``: whether each inequality is, (M,).
 
@@ -72,12 +81,12 @@ def minimise(program: Program, x: Array, linear: NDArray[np.bool_], goal: Goal) 
             return x
         residual = program.equalities.residual(x)
 
-        def step(products: Array | float) -> tuple[Array, Array, Array]:
+        def step(products: Array | float) -> _Step:
             """Newton's step of x, slacks and multipliers towards these products of the latter two."""
             wanted = products / slack  # noqa: B023 - called before the next iteration only
             of_x = factor.solve(at.gradient - at.backward(wanted - weights * short), residual)  # noqa: B023
             of_slack = at.forward(of_x) + short  # noqa: B023
-            return of_x, of_slack, wanted - multipliers - weights * of_slack  # noqa: B023
+            return _Step(of_x, of_slack, wanted - multipliers - weights * of_slack)  # noqa: B023
 
         _, of_slack, of_multipliers = step(0.0)
         one, other = _most(slack, of_slack), _most(multipliers, of_multipliers)

@@ -65,7 +65,8 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
     name = TEMPORARY + "goto"
     if not pace.line:
         found = point_to_point.straight(name, here_deg, target_deg, arm, pace.speed)
-        room_check.check(arm, found)
+        room_check.tell_start(arm, here_deg)
+        room_check.check(arm, found, outwards=True)
         return found
     from armtempo.planning import planner  # imported here, because it loads everything that plans
 

@@ -217,22 +217,6 @@ DRAWN: dict[str, Callable[[], Figure]] = {
 BY_COMMAND: dict[str, tuple[Any, ...]] = {
     "arm.gif": ("arm.gif", [str(ANIMATE)]),
     "ar4.png": ("ar4.png", [*TOOL, "check", "--arm", "ar4", "--picture", "ar4.png"]),
-    "corridor.png": (
-        "*-corridor.png",
-        [
-            *TOOL,
-            "plan",
-            "--path",
-            "free",
-            "--timing",
-            "shared",
-            "--refine",
-            "6",
-            "--starts",
-            "1",
-            "--corridor-curve",
-        ],
-    ),
 }
 
 
