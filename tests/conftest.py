@@ -17,6 +17,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # Started in the background: the commands that the tests start would inherit it and not mind Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+DEPRECATIONS = ("DeprecationWarning", "PendingDeprecationWarning", "FutureWarning")
+"""Errors in the commands that tests start, too; in the tests' own process every warning is one."""
+
 
 @pytest.fixture(scope="session", autouse=True)
 def own_settings() -> Iterator[None]:
@@ -28,6 +31,8 @@ def own_settings() -> Iterator[None]:
     folder = tempfile.mkdtemp(prefix="run-")  # short: the path of a socket has 100 bytes
     os.environ["XDG_RUNTIME_DIR"] = folder
     os.environ["XDG_CACHE_HOME"] = str(interpreters.ROOT / ".cache")
+    os.environ["COLUMNS"] = "1000"  # no sentence that a test looks for is wrapped
+    os.environ["PYTHONWARNINGS"] = ",".join(f"error::{name}" for name in DEPRECATIONS)
     yield
     shutil.rmtree(folder, ignore_errors=True)
 
@@ -61,13 +66,18 @@ def _compile_sources() -> None:
 def pytest_sessionstart(session: pytest.Session) -> None:
     """In CI nothing may be left out."""
     if not hasattr(session.config, "workerinput"):
+        writer = session.config.get_terminal_writer()
+        writer.fullwidth = writer.fullwidth  # as it is before ``own_settings`` sets COLUMNS
         _compile_sources()
     if interpreters.MISSING and os.environ.get("CI"):
         pytest.exit(f"CI needs the interpreters {', '.join(interpreters.MISSING)}", returncode=1)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say at the end what was not run here."""
+    """Say at the end what was not run here, and what CI ran with other Pythons."""
+    if pythons := os.environ.get("PYTHONS"):
+        terminalreporter.section("other Pythons and releases")
+        terminalreporter.write_line(pythons)
     for name in interpreters.MISSING:
         terminalreporter.write_line(
             f"left out: all tests under {name}, which is not on this machine", red=True

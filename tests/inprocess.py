@@ -20,6 +20,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.link import Client, greet
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.session import Session
 from armtempo_shared import motion, wire
 
 from tests.board.scripts.rigs import stand_in
@@ -114,6 +115,8 @@ class Pipe:
         self._sample_s = 0.0
         self._plugged_s = 0.0
         self._silent_s = 0.0
+        self.told: list[str] = []
+        """What the session told its user."""
         self.round_trips = 0
         self.bytes_sent = 0
         self.run_samples = 70
@@ -239,10 +242,7 @@ class Pipe:
 
 def connect(pipe: Pipe) -> Client:
     """A greeted board."""
-    board = greet(pipe, 1, pipe.clock)
-    board.session.reopen = pipe.reopen
-    board.session.sleep = pipe.wait
-    return board
+    return greet(Session(pipe, pipe.clock, reopen=pipe.reopen, tell=pipe.told.append, sleep=pipe.wait), 1)
 
 
 ARM = stand_in.arm(3)

@@ -121,11 +121,11 @@ if TYPE_CHECKING:
     from armtempo.model.tool_way import ToolWay
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.board_port import find_ports
+    from armtempo.report.run import Run
     from armtempo.report.sequence_reader import SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
-    from armtempo.robot.run import Run
     from armtempo.robot.shared_board import SharedBoard, attach
     from armtempo.robot.stop_request import Stopped, StopRequest
     from armtempo.splines.bspline import Spline
@@ -178,7 +178,7 @@ _HOMES = {
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.board_state": ("BoardState",),
     "armtempo.robot.recording": ("Watcher",),
-    "armtempo.robot.run": ("Run",),
+    "armtempo.report.run": ("Run",),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
     "armtempo.report.sequence_reader": ("SequenceRun",),

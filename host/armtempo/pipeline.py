@@ -29,10 +29,10 @@ from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
 from armtempo.records import encode
 from armtempo.report import comparison, sequence_report, text_summary
+from armtempo.report.run import Run
 from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
-from armtempo.robot.run import Run
 
 __all__ = [
     "compare",

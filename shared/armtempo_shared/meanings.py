@@ -186,7 +186,7 @@ COMMANDS: "dict[str, str]" = {
     "`features`: what the program can do beyond one motion at a time, 1 sequences, 2 outputs and inputs, "
     "4 held motions, 8 other speeds; 128: both rates were measured on this board; "
     "`arm_problem`: code of the error in the stored arm record, 0 if it is valid or missing; `arm_value`: its "
-    "value; the "
+    "value; `once_bytes`: of the largest record for `put_once`; the "
     "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: one bit per joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which lags behind "
@@ -201,6 +201,10 @@ COMMANDS: "dict[str, str]" = {
     "put_commit": "Ends the upload: the record is read back from the flash, checked against `crc` and for "
     "completeness, and replaces the old one. An arm record whose engine would not fit is refused before that "
     "(`no_room`), and the old one remains valid; otherwise it takes effect at once.",
+    "put_once": "A piece of the record, `size` bytes in all, of a motion that is run once: it stays in the board's "
+    "memory until the next one or a reset, and nothing is written to the flash. A motion record, or one for the way "
+    "back along a stored motion (`shared/armtempo_shared/backwards.py`). Offset 0 begins a new one. Answer: the next "
+    "offset.",
     "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` after the "
     "last. A damaged one has `crc`, `duration` and `joints` 0. `sequence` 1: it is a sequence, whose `duration` "
     "and `joints` are 0. Tail of the answer: its name.",
@@ -216,11 +220,10 @@ COMMANDS: "dict[str, str]" = {
     "set_default": "What the button starts; an empty name for nothing.",
     "home": "Sets the positions of the joints of the mask `joints` to these steps; the tail has an i32 for every "
     "joint.",
-    "start": "Starts a stored trajectory whose checksum is `crc`. `flags` 1: a limit switch ends it without "
-    "a fault; 2: it is held, and brakes without a fault when no `hold` arrives for 300 ms. Answer: number of the "
-    "run and "
-    "its length in ticks. Or starts a sequence, each of whose motions is a run of its own; then the answer has the "
-    "number of the last run and 0.",
+    "start": "Starts a stored trajectory whose checksum is `crc`; the name `/once`: the record of `put_once`. "
+    "`flags` 1: a limit switch ends it without a fault; 2: it is held, and brakes without a fault when no `hold` "
+    "arrives for 300 ms. Answer: number of the run and its length in ticks. Or starts a sequence, each of whose "
+    "motions is a run of its own; then the answer has the number of the last run and 0.",
     "stop": "`now` 0: brake along the path (freeze if the motion has no brake times); 1: freeze.",
     "speed": "Sets the rate of the motion's own time in thousandths (10 to 1000), along the same path; 0: pause, "
     "65535: the rate before the pause. Refused with `fixed_speed`, or with `too_long` if the run would last longer "
@@ -243,7 +246,7 @@ EVENTS: "dict[str, str]" = {
     "sample": "One sample of run `run`, `index` counting from 0. `ticks`: motion clock, `path`: the motion's own "
     "time. `flags` 1: taken while braking. Tail: per joint commanded steps and encoder counts (two i32).",
     "done": "The run ended without a fault, at its end or after a stop; sent after its last sample. `lost`: samples "
-    "that were overwritten before they were acknowledged. Tail as in `sample`.",
+    "that were overwritten before they were sent. Tail as in `sample`.",
     "fault": "A fault: no more steps are made. `code` from the table below, `joint` 255 if it concerns no joint. "
     "Tail as in `sample`.",
     "row": "A row of the sequence has begun, the `passed`-th since its start: `row`, `step` and `cycle` as in "

@@ -1,9 +1,12 @@
 """Constants of the wire protocol; its messages are in ``table.py``, its frames in ``wire.py``."""
 
-PROTOCOL_VERSION = 5
+PROTOCOL_VERSION = 6
 """Never 3: each ``hello`` contains it, and MicroPython takes this byte for Ctrl-C."""
 SYNC = 0xA5
 MAX_PAYLOAD = 256
+"""Of an answer or event."""
+MAX_COMMAND = 1000
+"""Payload bytes of a command: most motions that are run once fit into one."""
 OVERHEAD = 9
 """Bytes of a frame in addition to its payload: SYNC, length H, sequence B, message id B, crc32 I."""
 LENGTH_AT, SEQUENCE_AT, NUMBER_AT, PAYLOAD_AT = 1, 3, 4, 5
@@ -14,6 +17,8 @@ NO_JOINT = 255
 
 ARM_RECORD_NAME = "/arm"
 """Name of the arm record in ``put_begin``."""
+ONCE_NAME = "/once"
+"""Name in ``start`` of the motion in the board's memory, which ``put_once`` has put there."""
 
 SAMPLE_BRAKING = 1  # flag of a sample: taken while braking
 PERMILLE = 1000

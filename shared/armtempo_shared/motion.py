@@ -112,6 +112,14 @@ def pack(
     return data + struct.pack("<I", crc32(data))
 
 
+def checked_crc(data: "bytes | memoryview") -> int:
+    """The crc32 at the end of a record; raises MotionError if it is wrong."""
+    stated = int(struct.unpack_from("<I", data, len(data) - 4)[0])
+    if crc32(memoryview(data)[:-4]) != stated:
+        raise MotionError("checksum")
+    return stated
+
+
 class MotionHead:
     """The head of a motion record; ``length``: bytes of the whole record.
 
@@ -119,7 +127,10 @@ class MotionHead:
     provides the control points by ``stream``.
     """
 
-    def __init__(self, head: bytes, length: int) -> None:
+    crc: int
+    """The record's checksum, by which host and board know it."""
+
+    def __init__(self, head: "bytes | memoryview", length: int) -> None:
         if length < HEAD_SIZE + 4 or len(head) < HEAD_SIZE:
             raise MotionError("too short")
         (magic, self.degree, self.joints, flags, self.ramp_bits, self.segments, self.refine,
@@ -187,10 +198,9 @@ class Motion(MotionHead):
     order of times) is not checked; the board does that before a start.
     """
 
-    def __init__(self, data: bytes) -> None:
-        super().__init__(data, len(data))
-        if crc32(memoryview(data)[:-4]) != struct.unpack_from("<I", data, len(data) - 4)[0]:
-            raise MotionError("checksum")
+    def __init__(self, data: "bytes | memoryview") -> None:
+        super().__init__(data[:HEAD_SIZE], len(data))
+        self.crc = checked_crc(data)
         self.data = data
 
     def stream(self, offset: int) -> "BinaryIO":

@@ -31,6 +31,7 @@ C remove 14 text
 C rename 15 old_length:B text
 C get 16 offset:I length:H text
 C set_default 17 text
+C put_once 1a offset:H size:H bytes
 C home 20 joints:B bytes
 C start 21 flags:B crc:I text
 C stop 22 now:B
@@ -46,7 +47,7 @@ C drivers 29 on:B
 C samples 30 acknowledged:I wanted:H
 A hello 01 protocol:B joints:B encoders:B state:B tick_hz:I max_rate:I max_rate_sum:I free_flash:I
  free_heap:I arm_crc:I program_crc:I boot:I engine_room:I features:B
- arm_problem:B arm_value:I text
+ arm_problem:B arm_value:I once_bytes:H text
 A status 02 state:B fault:B fault_joint:B known:B run:I ticks:Q path:Q rate:H
  samples_kept:H samples_lost:I frames_bad:I rest_ms:H bytes
 A put_begin 10
@@ -57,6 +58,7 @@ A remove 14
 A rename 15
 A get 16 size:I bytes
 A set_default 17
+A put_once 1a next:H
 A home 20
 A start 21 run:I duration:Q
 A stop 22

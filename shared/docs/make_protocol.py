@@ -6,7 +6,7 @@ from pathlib import Path
 PAGE = Path(__file__).with_name("protocol.md")
 sys.path.insert(0, str(PAGE.parent.parent))
 
-from armtempo_shared import limits, meanings, messages, sequence  # noqa: E402
+from armtempo_shared import engine_memory, limits, meanings, messages, sequence  # noqa: E402
 from armtempo_shared.table import rows  # noqa: E402
 
 
@@ -42,7 +42,11 @@ def _figures() -> str:
         ("figure", "value"),
         ("protocol version", str(messages.PROTOCOL_VERSION)),
         ("first byte of a frame", f"0x{messages.SYNC:02X}"),
-        ("largest payload", f"{messages.MAX_PAYLOAD} bytes"),
+        (
+            "largest payload of a command; of the others",
+            f"{messages.MAX_COMMAND}; {messages.MAX_PAYLOAD} bytes",
+        ),
+        ("largest record that is run once from memory", f"{engine_memory.ONCE_BYTES} bytes"),
         ("largest record", f"{limits.MAX_MOTION_BYTES} bytes"),
         ("longest name", f"{limits.MAX_NAME} characters of a-z A-Z 0-9 - _"),
         ("joints; encoders", f"{limits.MAX_JOINTS}; {limits.MAX_ENCODERS}"),

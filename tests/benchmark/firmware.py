@@ -159,6 +159,7 @@ def chip(port: Path) -> dict[str, Any]:
     makefile = (port / "boards" / BOARD / "mpconfigboard.mk").read_text()
     linker = (port / re.findall(r"^LD_FILES = (\S+)", makefile, re.MULTILINE)[0]).read_text()
     memory = re.findall(r"(\w+) +\(\w+\) *: ORIGIN = (\w+), LENGTH = (\d+)K", linker)
+    memory = [(name.replace("_ISR", "_START"), *sizes) for name, *sizes in memory]  # as 1.23 calls it
     storage, fresh = (port / "storage.h").read_text(), (port / "factoryreset.c").read_text()
     return {
         "memory": {name: [int(begin, 16), int(size)] for name, begin, size in memory},

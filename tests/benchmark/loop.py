@@ -1,23 +1,29 @@
 """What a turn of the program's loop costs on the chip, and up to which rates it keeps up: host/docs/measurements.md.
 
     python -m tests.benchmark.loop MICROPYTHON [files]
+    python -m tests.benchmark.loop MICROPYTHON stops [COUNT [SEED [RATE]]]
 
 MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
 back to too late runs dry as on the chip. What stands in for timers, DMA, USB, encoders, backup SRAM: loop_board.c and
 tests/board/scripts/benchmarks/firmware_loop.py. With ``files`` after it only the costs of a turn, with the program in
 files; only what stands around it is built in, as its heap is not the program's.
+
+With ``stops`` it counts how a stop, a pause with its end and a change of speed end, COUNT of each at random moments of
+a motion up to the rates that hello states (or RATE, of each joint), with one to six joints.
 """
 
 from __future__ import annotations
 
 import itertools
+import random
 import re
 import struct
 import sys
 import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -28,7 +34,7 @@ from armtempo.deploy.firmware import frozen
 from armtempo.model.arm import Arm
 from armtempo.records import encode
 from armtempo_shared import armrecord, wire
-from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
+from armtempo_shared.limits import MAX_JOINTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
 from armtempo_shared.motion import MOST_RAMP_BITS, OTHER_ENTRIES, REST_ENTRIES
 
 from tests.benchmark import firmware
@@ -55,6 +61,9 @@ BRAKE = -1
 CHANGES = ((BRAKE,), (0, 1000))
 CHANGED = ((240_000, 1), (40_000, 1), (80_000, 3), (25_000, 3), (8_000, 6), (20_000, 6), (40_000, 6))
 """Rates of each joint, and joints, whose speed is changed."""
+SOME_CYCLES = (1.3, 2.0, 3.0)
+SOME_CHANGES = ((BRAKE,), (0, 1000), (300, 1000))
+"""At random moments."""
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
 RAMPS = (TICK_HZ // 2 >> MOST_RAMP_BITS,) * (REST_ENTRIES + OTHER_ENTRIES)
@@ -91,6 +100,10 @@ class Case:
     start: list[int]
     changes: tuple[int, ...] = ()
     """Speeds that are asked for while it moves, in thousandths; 0: a pause, BRAKE: a stop."""
+    first_change: int = CHANGE_EVERY
+    """Pairs of other commands until the first of them."""
+    every_ms: int = 50
+    """Between two commands."""
 
 
 @dataclass(frozen=True)
@@ -184,6 +197,7 @@ class Board:
                 CORE_HZ / 1000 / cycles * _INSTRUCTION_NS * CORE_HZ / 1e9
             ),  # SysTick's clock is 168 MHz
             "session": 3,
+            "every_ms": case.every_ms,
         }
         with tempfile.TemporaryDirectory(dir=self._folder) as name:
             tree = Path(name) / "files"
@@ -198,7 +212,8 @@ class Board:
                 )
             cut = Path(name) / "cut"
             cut.write_bytes(struct.pack("<i", -OWN))
-            said = firmware.emulate(self._elf, image, cut, "-icount", f"shift={_SHIFT}")
+            # Without ``sleep`` a run depends on nothing but its case
+            said = firmware.emulate(self._elf, image, cut, "-icount", f"shift={_SHIFT},sleep=off")
         return _read(said, scale / _INSTRUCTION_NS)
 
     def highest(self, joints: int, cycles: float) -> tuple[int, Run | None]:
@@ -245,7 +260,7 @@ def _write(tree: Path, case: Case, settings: dict[str, Any], as_files: bool) -> 
     changes = iter(case.changes)
     for number in range(COMMANDS // 2):
         session += [("status", (), b""), ("samples", (number, 0), b"")]
-        if number % CHANGE_EVERY == CHANGE_EVERY - 1:
+        if (number + 1 - case.first_change) % CHANGE_EVERY == 0 and number + 1 >= case.first_change:
             for rate in itertools.islice(changes, 1):
                 session.append(("stop", (0,), b"") if rate == BRAKE else ("speed", (rate,), b""))
     with (tree / "frames").open("wb") as file:
@@ -332,6 +347,25 @@ def _end(run: Run) -> str:
     )
 
 
+def some_changes(changes: tuple[int, ...], rate: int, joints: int, rng: random.Random) -> Case:
+    """A motion of 3 s with ramps of 0.6 s, and changes from a random moment of it on."""
+    case = cruise(rate, joints, 0.6, 3.0, changes)
+    return replace(case, first_change=rng.randrange(1, 26), every_ms=rng.randrange(30, 60))
+
+
+def count_stops(board: Board, count: int, seed: int, rate: int) -> None:
+    """Print how many of random stops, pauses and changes end in order. ``rate``: of each joint; 0: as hello states."""
+    rng = random.Random(seed)
+    print(f"seed {seed}; in order of {count} stops, {count} pauses with their end, {count} changes of speed")
+    for cycles, joints in itertools.product(SOME_CYCLES, range(1, MAX_JOINTS + 1)):
+        each = rate or min(MAX_STEP_RATE_SUM // joints, MAX_STEP_RATE)
+        cases = [some_changes(what, each, joints, rng) for what in SOME_CHANGES for _ in range(count)]
+        with ThreadPoolExecutor(2) as pool:
+            runs = list(pool.map(board.run, cases, itertools.repeat(cycles)))
+        ends = [sum(not run.fault for run in runs[at : at + count]) for at in range(0, len(runs), count)]
+        print(f"    {cycles} cycles, joints {joints}, {each} steps/s: {ends}", flush=True)
+
+
 def main(micropython: Path, as_files: bool) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
@@ -380,4 +414,9 @@ def _turns(run: Run | None, cycles: float) -> str:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]).resolve(), sys.argv[2:] == ["files"])
+    if sys.argv[2:3] == ["stops"]:
+        with tempfile.TemporaryDirectory() as folder:
+            numbers = map(int, [*sys.argv[3:6], *("4", "1", "0")[len(sys.argv[3:6]) :]])
+            count_stops(Board(Path(sys.argv[1]).resolve(), Path(folder)), *numbers)
+    else:
+        main(Path(sys.argv[1]).resolve(), sys.argv[2:] == ["files"])

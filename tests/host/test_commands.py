@@ -17,6 +17,7 @@ from armtempo.cli.commands import COMMANDS
 from armtempo.kinematics.of_arm import forward
 from armtempo.link import Client, greet
 from armtempo.link.board_messages import Hello
+from armtempo.link.session import Session
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -43,7 +44,7 @@ def pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pipe:
 
     @contextmanager
     def open_board(port: str, *arguments: Any, **options: Any) -> Iterator[Client]:
-        yield greet(found, None, found.clock)
+        yield greet(Session(found, found.clock))
 
     monkeypatch.setattr(connect, "open_board", open_board)
     monkeypatch.chdir(tmp_path)

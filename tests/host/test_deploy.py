@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import struct
+import subprocess
 import sys
 import zlib
 from collections.abc import Iterator
@@ -15,7 +17,7 @@ from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import changes, program_files, remote, sectors
 from armtempo.deploy.changes import Wanted
 from armtempo.deploy.remote import Remote, SectorsFound, Survey
-from armtempo.link.program_version import PACKAGES, own_crc, package_folder
+from armtempo.link.program_version import IN_LIBRARY, PACKAGES, own_crc, package_folder
 from armtempo_shared.program_hash import sources_crc
 
 pytestmark = pytest.mark.xdist_group("compiled program")  # which takes seconds to make
@@ -92,8 +94,45 @@ def test_sectors_that_hold_something_else_are_not_touched() -> None:
     change = changes.difference(interrupted, Wanted({}))
     assert (change.image, change.remove) == (b"", []), "to be erased; the file goes after that"
     assert changes.difference(replace(BOARD, sectors=held(b"ARMT" + bytes(20))), Wanted({})).image == b""
+    damaged = replace(other, files={program_files.LOADER: (4, "")})  # but the file that reads them is there
+    assert changes.choose(damaged, True, quiet).image
     with pytest.raises(LinkError, match="less than 1 MB of flash"):
         changes.choose(replace(BOARD, sectors=None), True, quiet)
+
+
+def test_only_what_a_deployment_writes_is_surveyed(tmp_path: Path) -> None:
+    """By names as MicroPython before 1.25 compares them: no tuple of beginnings."""
+    lib = tmp_path / "flash" / "lib"
+    for name in (
+        "armtempo_board/app/app.py",
+        "armtempo_theirs.py",
+        "armtempo_tools/a.py",
+        "armtempo_sectors.mpy",
+    ):
+        (lib / name).parent.mkdir(parents=True, exist_ok=True)
+        (lib / name).write_text("theirs")
+    (tmp_path / "flash" / "boot.py").write_text("")
+    text = sectors.script(remote._SURVEY, OURS=IN_LIBRARY).replace('"/flash', f'"{tmp_path}/flash')
+    assert "startswith((" not in text
+    begin = text.index("def digest"), text.index("try:\n    space")
+    space = {"OURS": IN_LIBRARY, "os": os, "sha256": None}
+    exec("import hashlib\nfrom binascii import hexlify\n" + text[begin[0] : begin[1]], space)
+    found = {Path(path).relative_to(lib).as_posix() for path in space["files"] if "/lib/" in path}
+    assert found == {"armtempo_board/app/app.py", "armtempo_sectors.mpy"}
+
+
+def test_a_compiler_that_may_not_be_made_executable_is_copied(tmp_path: Path) -> None:
+    """As in an installation of root's, for another user."""
+    file = tmp_path / "mpy-cross"
+    file.write_text("#!/bin/sh\necho compiled\n")
+    file.chmod(0o444)
+    copy = program_files._executable(file)
+    assert file.stat().st_mode & 0o777 == 0o444
+    assert subprocess.run([copy], capture_output=True, text=True, check=True).stdout == "compiled\n"
+    copy.parent.chmod(0o700)
+    file.chmod(0o755)
+    program_files._executable.cache_clear()
+    assert program_files._executable(file) == file
 
 
 @pytest.mark.slow

@@ -53,6 +53,19 @@ def test_every_error_of_the_host_says_what_to_do_next() -> None:
 
 
 @pytest.mark.slow
+@sources.TOGETHER
+def test_no_error_says_its_hint_in_its_problem_too() -> None:
+    """Clauses of several words; the two are shown together."""
+    twice = [
+        f"{message.file}:{message.line}: {clause}"
+        for message in in_host()
+        for clause in map(str.strip, re.split("[;:]", message.hint or ""))
+        if clause.count(" ") > 1 and clause in message.problem
+    ]
+    assert twice == []
+
+
+@pytest.mark.slow
 def test_the_collector_finds_what_has_no_next_step() -> None:
     source = """
 raise InputError("no")
@@ -139,7 +152,7 @@ def test_an_error_reads_as_one_line_too() -> None:
     assert str(errors.InputError("x is 3")) == "x is 3"
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
     missing = errors.MissingPackageError("a figure", "matplotlib", "plot")
-    assert missing.hint == "install it with: pip install 'armtempo[plot]'"
+    assert re.fullmatch(r"install it with: pip install 'matplotlib>=[\d.]+'", missing.hint or "")
 
 
 HOST = Path(errors.__file__).parents[1]
@@ -241,9 +254,11 @@ def test_a_motion_has_to_be_named_where_the_button_starts_none(tmp_path: Path) -
 def test_a_sound_link_is_called_so(tmp_path: Path) -> None:
     client, _ = ready(Pipe(tmp_path / "flash"))
     found = board_state.read(client, "pipe")
-    assert "link      OK: no damaged messages, no lost samples" in state.lines(found)
+    assert "link      OK: no damaged messages" in state.lines(found)
     worse = state.lines(replace(found, frames_bad=3, samples_lost=2))
-    assert "link      3 damaged messages, 2 lost samples: check cable and plugs" in worse
+    assert "link      3 damaged messages: check cable and plugs; 2 samples were not read in time" in worse
+    unread = state.lines(replace(found, samples_lost=2))  # of a run that the button started
+    assert "link      OK: no damaged messages; 2 samples were not read in time" in unread
 
 
 def test_a_misspelt_key_is_guessed() -> None:
@@ -287,9 +302,9 @@ def test_each_topic_of_help_has_its_page(topic: str) -> None:
 @pytest.mark.parametrize(
     ("mark", "said"),
     [
-        ("", "pip install 'armtempo[urdf]'"),
-        ("pipx_metadata.json", "pipx inject armtempo yourdfpy"),
-        ("uv-receipt.toml", "uv tool install 'armtempo[urdf]'"),
+        ("", "pip install 'yourdfpy>=0.0.60'"),
+        ("pipx_metadata.json", "pipx inject armtempo 'yourdfpy>=0.0.60'"),
+        ("uv-receipt.toml", "uv pip install --python {prefix} 'yourdfpy>=0.0.60'"),
     ],
 )
 def test_a_missing_package_is_got_as_armtempo_was(
@@ -298,7 +313,13 @@ def test_a_missing_package_is_got_as_armtempo_was(
     if mark:
         (tmp_path / mark).touch()
     monkeypatch.setattr("sys.prefix", str(tmp_path))
+    said = said.format(prefix=tmp_path)
     assert MissingPackageError("x", "yourdfpy", "urdf").hint == f"install it with: {said}"
+
+
+def test_all_packages_of_an_extra_are_named() -> None:
+    hint = MissingPackageError("x", "segno", "panel").hint
+    assert re.findall(r"'(\w+)>=", hint or "") == ["nicegui", "segno", "tomlkit"]
 
 
 # what the host says if the board refuses: the cause, the joint, the number, what to do

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -366,3 +367,38 @@ def test_a_brake_beyond_the_longest_ramp_has_the_longest() -> None:
     brakes = brake_time.of_motion(motion, [limits] * 3)
     assert brakes.longest_rest_s == pytest.approx(brake_time.LONGEST_S)
     assert brakes.rest_s(0.0) < 1.0
+
+
+def evaluated(trajectory: Trajectory, limits: list[Limits], monkeypatch: pytest.MonkeyPatch) -> int:
+    """How many pairs of acceleration and jerk the brake times of a motion take."""
+    excess, found = brake_time._Ramps.excess, []
+
+    def counted(ramps: brake_time._Ramps, starts: Array, *rest: Any) -> Array:
+        _, rates, _, phases = rest
+        found.append(len(starts) * len(rates) * 3 * phases * len(ramps._joints))
+        return excess(ramps, starts, *rest)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(brake_time._Ramps, "excess", counted)
+        brake_time.of_motion(trajectory, limits)
+    return sum(found)
+
+
+def test_joints_that_stand_still_or_move_in_proportion_cost_no_brake_times(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A bisection for every shape, start and joint took some 15 million for six joints."""
+    arm = Arm.load("ar4")
+    limits = [joint.limits for joint in arm.driven]
+    here = np.array([20.0, 10.0, -20.0, 15.0, 40.0, 30.0])
+    one = point_to_point.straight("go", here, here + np.array([0, 9, 0, 0, 0, 0]), arm)
+    all_of_them = point_to_point.straight("go", here, here + np.array([9, 9, -9, 9, 9, -9]), arm)
+    alone = evaluated(one, limits, monkeypatch)
+    assert alone < 1_000_000
+    assert evaluated(all_of_them, limits, monkeypatch) < 1.2 * alone
+    for single, whole in zip(
+        brake_time.of_motion(one, limits).to_rest,
+        brake_time.of_motion(all_of_them, limits).to_rest,
+        strict=True,
+    ):
+        assert single == pytest.approx(whole, abs=2.0)

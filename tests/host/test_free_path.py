@@ -250,7 +250,7 @@ def test_a_seed_repeats_and_starts_are_reported() -> None:
         ({"stops": (Stop(0),)}, "between the ends"),
         ({"stops": (Stop(2), Stop(2))}, "two stops at one via point"),
         ({"stops": (Stop(2, 1.0),), "corridor_deg": 1.0}, "corridor and a dwell"),
-        ({"path": "through", "stops": (Stop(2),)}, "--split"),
+        ({"path": "through", "stops": (Stop(2),), "timing": "per-joint"}, "--split"),
         ({"refine": 64, "via": FEED.via * 8}, "the board's record holds"),
         ({"starts": 0}, "starts 0"),
     ],

@@ -178,4 +178,4 @@ def test_without_pygame_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(MissingPackageError, match=r"gamepad") as caught, gamepad.added_to(NoKeys(), 3):
         pass
-    assert "armtempo[gamepad]" in (caught.value.hint or "")
+    assert "pygame-ce" in (caught.value.hint or "")

@@ -11,6 +11,7 @@ from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
+from armtempo.model.pose import from_rpy
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_way import ToolWay
 from armtempo.planning import planner
@@ -156,10 +157,90 @@ def test_a_cut_corner_is_smooth_and_near() -> None:
 def test_arcs_go_through_their_point() -> None:
     start, end = np.eye(4), np.eye(4)
     end[:3, 3] = (0.0, 20.0, 0.0)
-    piece = tool_path.arc(start, (-10.0, 10.0, 0.0), end, np.zeros(3), "")
+    piece = tool_path.arc(start, (-10.0, 10.0, 0.0), end, np.zeros(3), "", 0.5)
     assert piece.length == pytest.approx(10.0 * np.pi)
     half = piece.moved(np.array([0.5 * piece.length, piece.length]))
     assert half == pytest.approx(np.array([[-10.0, 10.0, 0.0], [0.0, 20.0, 0.0]]))
+
+
+@pytest.mark.parametrize(
+    ("through", "end"),
+    [
+        ((30.0, 20.0, 0.0), (0.0, 0.0, 0.0)),
+        ((30.0, 20.0, 0.0), (1e-7, 0.0, 0.0)),
+        ((0.0, 0.0, 0.0), (60.0, 0.0, 0.0)),
+        ((60.0, 0.0, 0.0), (60.0, 0.0, 0.0)),
+        ((0.0, 1e-7, 0.0), (60.0, 0.0, 0.0)),
+        ((60.0, 0.0, 1e-7), (60.0, 0.0, 0.0)),
+        ((90.0, 0.0, 0.0), (60.0, 0.0, 0.0)),
+        ((90.0, 1e-5, 0.0), (60.0, 0.0, 0.0)),
+        ((-40.0, 0.0, -1e-4), (60.0, 0.0, 0.0)),
+        ((30.0, 0.0, 0.0), (60.0, 0.0, 0.0)),
+    ],
+)
+def test_arcs_that_their_points_do_not_define_are_refused(
+    through: tuple[float, float, float], end: tuple[float, float, float]
+) -> None:
+    there = np.eye(4)
+    there[:3, 3] = end
+    with pytest.raises(
+        PlanError, match=r"P0 to P1: the start, arc_through_mm and the end do not define an arc"
+    ):
+        tool_path.arc(np.eye(4), through, there, np.zeros(3), "P0 to P1", 0.5)
+
+
+def test_ordinary_arcs_are_defined() -> None:
+    rng = np.random.default_rng(41)
+    for _ in range(200):
+        start, end = np.eye(4), np.eye(4)
+        turn, radius = rng.uniform(0.1, 6.0), rng.uniform(5.0, 500.0)
+        start[:2, 3] = radius, 0.0
+        end[:2, 3] = radius * np.cos(turn), radius * np.sin(turn)
+        middle = (radius * np.cos(turn / 2), radius * np.sin(turn / 2), 0.0)
+        piece = tool_path.arc(start, middle, end, np.zeros(3), "", 0.5)
+        assert piece.length == pytest.approx(radius * turn), "seed 41"
+
+
+def test_a_full_circle_comes_back(tmp_path: Path) -> None:
+    points = tuple(tuple(np.array(moved(*by).matrix)[:3, 3]) for by in ((20, 20, 0), (40, 0, 0)))
+    ways = (ToolWay(1, True, circle_through_mm=points),)
+    plan = planner.plan(ARM, Job("circle", via=(START, moved(0, 0, 0)), ways=ways, refine=2))
+    assert faults(plan) == []
+    middle = HERE[:3, 3] + (20.0, 0.0, 0.0)
+    poses = tool_poses(ARM, plan.trajectory(np.linspace(0.0, plan.trajectory.duration_s, 400)))
+    assert np.linalg.norm(poses[:, :3, 3] - middle, axis=1) == pytest.approx(20.0, abs=0.5)
+    angles = np.unwrap(np.arctan2(*(poses[:, :2, 3] - middle[:2]).T[::-1]))
+    assert abs(angles[-1] - angles[0]) == pytest.approx(2 * np.pi, abs=1e-6)
+    plan.save(tmp_path / "plan.json")
+    assert Plan.load(tmp_path / "plan.json").job == plan.job
+
+
+@pytest.mark.parametrize(
+    "axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, -0.8, 0), (-1, 2, -3), (1e-9, -1, 0)]
+)
+@pytest.mark.parametrize("short_of", [0.0, 1e-13, 1e-9, 1e-4])
+def test_half_turns_have_a_rotation_vector(axis: tuple[float, float, float], short_of: float) -> None:
+    vector = (np.pi - short_of) * np.array(axis) / np.linalg.norm(axis)
+    matrix = tool_path.rotations(vector[None])
+    found = tool_path.rotation_vectors(matrix)
+    assert np.linalg.norm(found) == pytest.approx(np.pi, abs=2e-4)
+    np.testing.assert_allclose(tool_path.rotations(found), matrix, atol=1e-8)
+
+
+def test_a_line_that_turns_the_tool_by_half_a_turn_is_refused() -> None:
+    arm = Arm.of("ar4")
+    here = from_rpy((250.0, 0.0, 300.0), (180.0, 0.0, 0.0))
+    there = from_rpy((290.0, 0.0, 300.0), (180.0, 0.0, 180.0))
+    job = Job("half", via=(Pose.of_matrix(here), Pose.of_matrix(there)), ways=(ToolWay(1, True),))
+    with pytest.raises(PlanError, match="turns by 180 degrees"):
+        planner.plan(arm, job)
+
+
+def test_a_line_that_does_not_end_at_its_pose_is_refused() -> None:
+    """Of pitch alone nothing is kept on the way."""
+    pose = Pose.of_angles(HERE[:3, 3] + (10.0, 0.0, 0.0), {"pitch": 70.0})
+    with pytest.raises(PlanError, match=r"P1: the line ends .* deg from the pose"):
+        planner.plan(ARM, Job("pitch", via=(START, pose), ways=(ToolWay(1, True),)))
 
 
 @pytest.mark.parametrize(
@@ -170,6 +251,7 @@ def test_arcs_go_through_their_point() -> None:
         ({"ways": (ToolWay(1, True, blend_mm=80.0), ToolWay(2, True))}, "more than half"),
         ({"via": FLIPPED}, "joint 4 at -90 degrees, not 90"),
         ({"ways": (ToolWay(1, True, HALF),)}, "one line"),
+        ({"ways": (ToolWay(1, True, circle_through_mm=(HALF, HALF)),)}, "ends where it began"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_followed_says_where(change: dict[str, object], message: str) -> None:

@@ -310,9 +310,10 @@ def test_traffic_log_refuses_other_files(tmp_path: Path) -> None:
     path.write_text("something\n")
     with pytest.raises(InputError, match="not a traffic log"):
         list(traffic.read_log(path))
-    path.write_text(f"{traffic.HEADER}\n1.0\t!\t00\t\n")
-    with pytest.raises(InputError, match="line 2"):
-        list(traffic.read_log(path))
+    for line in ("1.0\t!\t00\t", "nan\t<\t00\t", "1e999\t<\t00\t", "1.0\t<\t0\t", "1.0\t<\t00"):
+        path.write_text(f"{traffic.HEADER}\n{line}\n")
+        with pytest.raises(InputError, match="line 2"):
+            list(traffic.read_log(path))
 
 
 def test_every_message_has_words() -> None:

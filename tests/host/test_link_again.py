@@ -49,10 +49,8 @@ def replay(
 def test_trouble_is_told_once_and_its_end_once(tmp_path: Path, trouble: str) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, stored = prepared(pipe)
-    told: list[str] = []
-    board.session.tell = told.append
     end, indices = replay(board, stored, lambda: getattr(pipe, trouble)(9.0))
-    assert [text.rsplit(" ", 1)[1] for text in told] == ["back", "again"]
+    assert [text.rsplit(" ", 1)[1] for text in pipe.told] == ["back", "again"]
     assert indices == list(range(pipe.run_samples))
     assert end.samples_lost == 0
 
@@ -61,12 +59,10 @@ def test_trouble_is_told_once_and_its_end_once(tmp_path: Path, trouble: str) -> 
 def test_a_board_that_stays_silent_is_given_up_after_a_minute(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, stored = prepared(pipe)
-    told: list[str] = []
-    board.session.tell = told.append
     begin_s = pipe.clock()
     with pytest.raises(LinkError, match="did not answer"):
         replay(board, stored, lambda: pipe.silence_for(1e6))
-    assert len(told) == 1
+    assert len(pipe.told) == 1
     assert 60 < pipe.clock() - begin_s < 80
 
 
@@ -95,7 +91,6 @@ def test_the_same_board_started_anew_is_found_out_before_any_command(tmp_path: P
     with pytest.raises(OtherBoardError, match="restarted"):
         board.home([1, 2, 3])
     assert "home" not in pipe.app.controller.board.engine.calls
-    assert board.session.reopen is not None
 
 
 def test_a_command_under_way_is_answered_after_the_greeting(tmp_path: Path) -> None:
@@ -127,8 +122,6 @@ def test_a_wanted_stop_shortens_the_waiting(tmp_path: Path, trouble: str) -> Non
 def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)
-    told: list[str] = []
-    board.session.tell = told.append
     run = board.start("feed", wire.record_crc(data)).run
     indices = []
     follower = Follower(board, run)
@@ -137,7 +130,7 @@ def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
         if sample.index in (20, 40):
             pipe.unplug_for(1.5)
     assert indices == list(range(pipe.run_samples))
-    assert [text.split()[0] for text in told] == ["the", "connected"] * 2
+    assert [text.split()[0] for text in pipe.told] == ["the", "connected"] * 2
 
 
 @pytest.mark.slow
@@ -215,7 +208,6 @@ def test_who_waits_for_a_cable_does_not_open_a_port_that_was_closed(
     monkeypatch.setattr("armtempo.robot.board.TURN_S", 0.01)
     pipe = Pipe(tmp_path / "flash")
     client = connect(pipe)
-    client.session.reopen = lambda: pipe
     with client.session.turns:
         closing = Thread(target=Board(client, "pipe").close)
         closing.start()
@@ -235,3 +227,35 @@ def test_a_port_that_was_closed_meanwhile_is_a_broken_one() -> None:
         port.read(0.0)
     os.close(host)
     os.close(device)
+
+
+def test_an_error_of_the_caller_leaves_the_link_as_it_was(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, stored = prepared(pipe)
+    with pytest.raises(ZeroDivisionError):
+        replay(board, stored, lambda: print(1 // 0))
+    assert pipe.app.controller.board.engine.calls[-1] == "freeze"  # a motion without brake times
+    pipe.unplug_for(20.0)
+    assert board.status().moving is False
+    assert [text.split()[0] for text in pipe.told] == ["the", "connected"]
+
+
+def test_after_a_stopped_run_a_cable_is_waited_for_as_ever(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, stored = prepared(pipe)
+    stop = StopRequest()
+    replay(board, stored, lambda: stop.ask("a test"), stop)
+    pipe.unplug_for(20.0)
+    assert board.status().moving is False
+    assert len(pipe.told) == 2
+    stop.ask("later")  # wakes nobody
+
+
+@pytest.mark.slow
+def test_a_cable_that_is_out_for_long_ends_the_call_but_not_the_link(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    board, stored = prepared(pipe)
+    with pytest.raises(LinkError, match="unplugged"):
+        replay(board, stored, lambda: pipe.unplug_for(90.0))
+    assert board.status().run
+    assert pipe.told[-1] == "connected to pipe again"

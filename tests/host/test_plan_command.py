@@ -193,11 +193,13 @@ def test_plans_a_free_path_with_a_stop_and_says_its_starts_and_record() -> None:
     assert plan.job.stops[0].dwell_s == 0.5
 
 
-def test_a_stop_on_the_spline_is_refused_and_split_makes_two_motions_of_it() -> None:
+def test_a_spline_stops_and_split_makes_two_motions_of_it() -> None:
     Path("rests.toml").write_text(RESTING)
-    refused = run("--job", "rests.toml")
-    assert refused.exit_code == 2
-    assert "--split" in refused.output
+    whole = run("--job", "rests.toml", "-o", "whole.json")
+    assert whole.exit_code == 0, whole.output
+    assert "with stops, shared timing" in whole.output
+    spline = Plan.load("whole.json").trajectory.joints[0]
+    assert abs(spline(spline.via_times_s[1], 1)) < 1e-6
     result = run("--job", "rests.toml", "--split")
     assert result.exit_code == 0, result.output
     first, second = (Plan.load(f"rests-{number}.json") for number in (1, 2))

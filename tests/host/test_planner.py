@@ -17,6 +17,7 @@ from armtempo.model.plan import Plan
 from armtempo.planning import lower_bounds, path_deviation, planner
 from armtempo.planning.fitness import Fitness, stretch_of
 from armtempo.planning.lower_bounds import Floor
+from armtempo.records import encode
 from armtempo.report import text_summary
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline
@@ -103,6 +104,24 @@ def test_random_jobs_keep_their_limits_or_say_why_not(part: int, monkeypatch: py
         (check_thoroughly if seed % 20 == 0 else check)(plan, f"seed {seed}")
         planned += 1
     assert planned > 140
+
+
+@pytest.mark.parametrize("timing", ["shared", "per-joint"])
+def test_what_the_driver_needs_is_a_limit_of_planning(timing: str) -> None:
+    """Of a step every 60 us, and of opposite steps 1.2 ms apart."""
+    slow = replace(ARM.driver, pulse_us=30.0, low_us=30.0, dir_setup_us=500.0, dir_hold_us=500.0)
+    fast = Limits(500.0, 5000.0, 50_000.0)
+    arm = replace(ARM, driver=slow, joints=tuple(replace(each, limits=fast) for each in ARM.joints))
+    plan = planner.plan(arm, replace(JOB, timing=timing, refine=2, starts=1))
+    check(plan, timing)
+    rates = [
+        one.speed_deg_s * joint.steps_per_deg for joint, one in zip(arm.driven, plan.extremes, strict=True)
+    ]
+    assert max(rates) == pytest.approx(1e6 / 60.0, rel=1e-3)
+    for joint, one in zip(arm.driven, plan.extremes, strict=True):
+        assert one.acceleration_deg_s2 * joint.steps_per_deg * 1.23e-3**2 <= 0.16
+    assert any("a step every 60 us" in note for note in plan.notes)
+    encode.motion_record(plan.trajectory, arm)
 
 
 @pytest.mark.parametrize("timing", ["per-joint", "shared"])

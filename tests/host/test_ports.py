@@ -75,6 +75,20 @@ def test_a_program_that_mpremote_has_ended_needs_a_reset_only() -> None:
     assert "reset button" in said
 
 
+class Interrupted(Silent):
+    """The prompt of a board to which a deployment was interrupted: parts of the program are in its library's folder."""
+
+    def write(self, data: bytes) -> None:
+        found = b"armtempo in parts\r\n" if b"listdir('/flash/lib')" in data else b""
+        self.answer = data + b"\n" + found + b">>> "
+
+
+def test_an_interrupted_deployment_is_completed_by_deploying() -> None:
+    error = connect.explain(Interrupted(), b"")
+    assert "its deployment was interrupted" in str(error)
+    assert error.hint == "'armtempo deploy' completes it"
+
+
 def test_compiled_files_for_a_virtual_board_under_cpython() -> None:
     with pytest.raises(LinkError, match="CPython, or a MicroPython built without them; deploy without --mpy"):
         program_files._compiler(0)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
+import random
+import shutil
 import socket
 import subprocess
 import sys
+import tempfile
+import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -14,6 +20,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.basics.settings import ProjectSettings
 from armtempo.ports import claim, claim_file, names, quick_stop
 from armtempo.ports.caller import Ownership, ownership
+from armtempo.ports.line_socket import LineSocket, request_line
 from armtempo.ports.messages import Message
 from armtempo.ports.server import Server
 
@@ -28,7 +35,8 @@ HEAVY = (
 def alone(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """No claims of programs outside of the tests, no answers of other tests."""
     monkeypatch.setattr(quick_stop, "_answers", {})
-    monkeypatch.setenv("TMPDIR", str(tmp_path_factory.mktemp("temporary")))
+    for name in ("TMPDIR", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path_factory.mktemp("temporary")))
 
 
 @pytest.fixture
@@ -159,6 +167,38 @@ def test_a_refusal_is_left_to_the_command() -> None:
     assert quick_stop.take_answer(PORT, False) is None
 
 
+@pytest.mark.skipif(not claim.LOCAL_SOCKETS, reason="other sockets wait by themselves")
+def test_a_stop_waits_for_a_program_that_many_ask() -> None:
+    """Whose system refuses more callers for a moment."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening, ExitStack() as callers:
+        address = f"{os.environ['XDG_RUNTIME_DIR']}/full"
+        listening.bind(address)
+        listening.listen(0)
+        full = False
+        while not full:
+            caller = callers.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
+            caller.setblocking(False)
+            full = caller.connect_ex(address) != 0
+        threading.Timer(0.1, lambda: [listening.accept()[0].close() for _ in range(2)]).start()
+        LineSocket(address, 60.0).close()
+
+
+def test_a_request_is_the_json_that_any_reader_takes() -> None:
+    numbers = random.Random(3)
+    letters = 'aé"\\\n\x00\ud800😀'
+    for _ in range(300):
+        text = "".join(numbers.choices(letters, k=5))
+        fields = {
+            "by": text,
+            "now": numbers.random() < 0.5,
+            "rate": numbers.randrange(-(2**70), 2**70),
+            "topics": [text],
+        }
+        line = request_line(7, "stop", fields)
+        assert line.endswith(b"}\n")
+        assert json.loads(line) == {"id": 7, "request": "stop", **fields}
+
+
 @pytest.mark.parametrize("port", ["/dev/ü", "C:\\x\ny", "rfc2217://host:1", ""])
 def test_a_claim_comes_back_from_its_file_as_it_was(port: str) -> None:
     made = claim.new(port, port, "/dev/x")
@@ -179,7 +219,40 @@ def test_the_folder_for_temporary_files_is_the_one_of_tempfile(
         wanted = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True
         ).stdout
-        assert os.path.dirname([*claim_file.folders()][-1]) == wanted.strip()
+        assert wanted.strip() in map(os.path.dirname, claim_file.folders())
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes are of POSIX")
+@pytest.mark.parametrize("taken", ["open to others", "link", "file"])
+def test_a_folder_that_another_user_made_first_does_not_keep_a_stop_out(
+    taken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As any user can in /tmp: then the claims are in a folder of the user's own."""
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    cache = tempfile.mkdtemp(prefix="own-")
+    monkeypatch.setenv("XDG_CACHE_HOME", cache)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    usual = tmp_path / f"armtempo-{os.getuid()}"
+    if taken == "link":
+        (tmp_path / "elsewhere").mkdir(mode=0o700)
+        usual.symlink_to(tmp_path / "elsewhere")
+    elif taken == "file":
+        usual.write_text("")
+    else:
+        usual.mkdir()
+        usual.chmod(0o777)
+    port = "/dev/taken"
+    server = Server(claim.new(port, port, port), {"stop": lambda request: {"moving": True}})
+    try:
+        assert Path(server.claim.address).is_relative_to(cache)
+        quick_stop.send(["--port", port])
+        answer = quick_stop.take_answer(port, False)
+        assert answer
+        assert answer.moved
+    finally:
+        server.close()
+        shutil.rmtree(cache)
+    assert not list(tmp_path.glob("**/*.claim"))
 
 
 @pytest.mark.parametrize(("missing", "fits"), [(0, True), (1, False)])

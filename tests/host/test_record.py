@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import os
+import random
+import shutil
+import stat
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.basics.atomic_file import replace_text
+from armtempo.basics.errors import ArmtempoError, InputError, RunFolderError
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
-from armtempo.report import analysis, differentiation, peaks, run_folder, run_reader
+from armtempo.records import encoded_motion
+from armtempo.report import analysis, differentiation, peaks, run_folder, run_reader, run_report
 from armtempo.report.run_reader import RepetitionData
+from armtempo.robot import recording
 from armtempo.splines import bspline
 from armtempo.splines.extremes import of_joints
 from armtempo.splines.trajectory import JointSpline, Trajectory
+
+from tests.host import made_runs
+from tests.inprocess import Pipe, ready
 
 SCALES = run_folder.scales(Arm.paper())
 
@@ -34,7 +47,13 @@ def sample(index: int) -> Sample:
 
 
 def folder(path: Path) -> run_folder.RunFolder:
-    return run_folder.RunFolder(run_folder.new_folder(path, "feed"), "feed", SCALES, {"port": "sim"})
+    return run_folder.RunFolder(new_folder(path), "feed", SCALES, {"port": "sim"})
+
+
+def new_folder(parent: Path) -> Path:
+    """An empty one."""
+    with run_folder.new_folder(parent, "feed") as path:
+        return path
 
 
 def test_whole_run(tmp_path: Path) -> None:
@@ -84,11 +103,11 @@ def test_half_a_line_is_dropped(tmp_path: Path) -> None:
 
 
 def test_folders_never_collide(tmp_path: Path) -> None:
-    names = [run_folder.new_folder(tmp_path, "feed").name for _ in range(3)]
+    names = [new_folder(tmp_path).name for _ in range(3)]
     assert names == ["feed-001", "feed-002", "feed-003"]
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be made"):
-        run_folder.new_folder(tmp_path / "file", "feed")
+        new_folder(tmp_path / "file")
 
 
 def test_damaged_folders_are_named(tmp_path: Path) -> None:
@@ -126,20 +145,147 @@ def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
         run.begin_repetition() as file,
     ):
         file.append(sample(0))
-        file._file.close()
-        file._file = full.open("w", encoding="utf-8", newline="")
-        file._csv = csv.writer(file._file)
+        file._rows._file.close()
+        file._rows._file = full.open("w", encoding="utf-8", newline="")
+        file._rows._csv = csv.writer(file._rows._file)
         file.append(sample(1))
     found = run_reader.load(run.path).repetitions[0]
     assert (found.state, found.index.tolist()) == (run_folder.BROKEN, [0])
 
 
+def test_a_folder_that_the_disk_has_no_room_for_is_not_left_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The disk is full at each write of a new run's, one after the other."""
+    board, _ = ready(Pipe(tmp_path / "flash"))
+    motion = encoded_motion.of_plan(made_runs.shipped_plan())
+    writes = (Path, "write_bytes"), (os, "fsync"), (os, "replace")
+    for place, name in writes:
+        with monkeypatch.context() as change:
+            change.setattr(place, name, no_space)
+            with pytest.raises(ArmtempoError, match="cannot be written: No space"):
+                recording.new_run(tmp_path / "runs", motion, "port", board)
+        assert list((tmp_path / "runs").iterdir()) == []
+
+
+def no_space(*_: object) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_file_has_its_content_before_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise a power failure may leave an empty file in place of the old one."""
+    done: list[str] = []
+
+    def sync(number: int) -> None:
+        done.append(
+            f"sync {os.fstat(number).st_size}" if stat.S_ISREG(os.fstat(number).st_mode) else "sync folder"
+        )
+
+    monkeypatch.setattr(os, "fsync", sync)
+    replace_file = os.replace
+    monkeypatch.setattr(os, "replace", lambda *paths: (done.append("rename"), replace_file(*paths)))
+    replace_text(tmp_path / "arm.toml", "four")
+    assert done[:2] == ["sync 4", "rename"]
+    assert done[2:] in ([], ["sync folder"])
+
+
+BAD_VALUES = (
+    None,
+    "",
+    "x",
+    "nan",
+    "inf",
+    -1,
+    0,
+    1e300,
+    10**400,
+    True,
+    [],
+    [1],
+    {},
+    {"a": 1},
+    "../run.json",
+    "\ud800",
+)
+BAD_CELLS = ("", "nan", "inf", "-inf", "1e300", "9" * 400, "x", "1;2", '"', "\0", "-1", "1.5", "é")
+
+
+def places(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Each table or list in a JSON value, and each of its keys."""
+    inner = (
+        list(value.items())
+        if isinstance(value, dict)
+        else list(enumerate(value))
+        if isinstance(value, list)
+        else []
+    )
+    for key, entry in inner:
+        yield value, key
+        yield from places(entry)
+
+
+def spoil_json(path: Path, numbers: random.Random) -> None:
+    """One value is another, or missing, or no JSON number."""
+    content = json.loads(path.read_text())
+    table, key = numbers.choice(list(places(content)))
+    if isinstance(table, dict) and numbers.random() < 0.2:
+        del table[key]
+    else:
+        table[key] = "@" if numbers.random() < 0.3 else numbers.choice(BAD_VALUES)
+    text = json.dumps(content, ensure_ascii=True)
+    path.write_text(text.replace('"@"', numbers.choice(("NaN", "Infinity", "1e999", "-1e999"))))
+
+
+def spoil_table(path: Path, numbers: random.Random) -> None:
+    """One cell is another, missing, or one too many."""
+    lines = [line.split(",") for line in path.read_text().split("\n")]
+    row = numbers.choice(lines)
+    kind, at = numbers.randrange(4), numbers.randrange(len(row))
+    if kind == 0:
+        del row[at]
+    elif kind == 1:
+        row.insert(at, numbers.choice(BAD_CELLS))
+    else:
+        row[at] = numbers.choice(BAD_CELLS)
+    path.write_text("\n".join(map(",".join, lines)))
+
+
+@pytest.mark.slow
+def test_a_damaged_run_folder_is_read_or_refused_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Random damage to each of its files: no traceback, no number that is none."""
+    seed = 37
+    print("seed", seed)
+    numbers = random.Random(seed)
+    made_runs.draw_nothing(monkeypatch)
+    whole = made_runs.make(tmp_path / "whole", repetitions=2)
+    refused = 0
+    for number in range(120):
+        folder = shutil.copytree(whole, tmp_path / "damaged", dirs_exist_ok=True)
+        name = numbers.choice(("run.json", "samples-01.csv", "samples-02.csv"))
+        (spoil_json if name.endswith("json") else spoil_table)(folder / name, numbers)
+        try:
+            found = run_reader.load(folder)
+            for joint in found.joints:
+                assert np.isfinite([joint.steps_per_deg, joint.counts_per_deg]).all()
+            for one in found.repetitions:
+                assert np.isfinite(one.time_s).all()
+                assert np.isfinite(one.commanded_deg).all()
+            refused += any(one.problem for one in found.repetitions)
+            if number % 10 == 0:
+                run_report.write(folder)
+        except ArmtempoError:
+            refused += 1
+    assert refused > 40
+
+
 def test_two_runs_at_once_get_folders_of_their_own(tmp_path: Path) -> None:
     (tmp_path / "feed-001").symlink_to(tmp_path / "nowhere")  # as if it came into being after a look
-    assert run_folder.new_folder(tmp_path, "feed").name == "feed-002"
+    assert new_folder(tmp_path).name == "feed-002"
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="the run folder cannot be made"):
-        run_folder.new_folder(tmp_path / "file", "feed")
+        new_folder(tmp_path / "file")
 
 
 # analysis of samples: what is put in comes out, gaps and lags included; peaks next to limits

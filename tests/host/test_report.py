@@ -280,7 +280,7 @@ def test_every_column_is_explained(folder: Path) -> None:
         (lambda path: describe(path, name=None), "'name' is missing"),
         (lambda path: describe(path, started=None), "'started' is missing"),
         (lambda path: describe(path, joints=[]), "run.json lists 0 joints, trajectory.json has 3"),
-        (lambda path: describe(path, joints=[{"name": "a"}]), "is missing or wrong"),
+        (lambda path: describe(path, joints=[{"name": "a"}]), "'steps_per_deg' is missing"),
         (lambda path: [file.write_text("") for file in path.glob("samples-*")], "no sample"),
     ],
 )

@@ -17,19 +17,21 @@ from typing import Any, cast
 
 import pytest
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortError
-from armtempo.link import Client
+from armtempo.link import Client, Opening
 from armtempo.link.board_messages import Levels
 from armtempo.link.refusal import refusal
 from armtempo.link.turns import Turns
-from armtempo.ports import caller, claim
+from armtempo.ports import caller, claim, claim_file
 from armtempo.ports.caller import Caller, Ownership, ownership
 from armtempo.ports.claim import PortClaim
 from armtempo.ports.messages import REQUESTS, Field, LineReader, Message, check
 from armtempo.ports.server import Server
-from armtempo.robot import stored_motion
+from armtempo.robot import connect, stored_motion
 from armtempo.robot.shared_board import SharedBoard
 from armtempo.robot.sharing import Sharing
 from armtempo_shared import wire
+
+from tests import inprocess
 
 ANY = Field("anything", lambda _: True, needed=False)
 ECHO = {**REQUESTS, "echo": {"text": ANY, "refuse": ANY}}
@@ -78,6 +80,25 @@ def test_a_stop_brakes_unless_it_is_to_be_now() -> None:
     assert asked == [(False, "another program"), (True, "armtempo stop")]
 
 
+def test_an_arm_that_no_other_program_can_stop_says_so_before_it_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No folder for claims is this user's alone."""
+    (tmp_path / "taken").write_text("")
+    monkeypatch.setattr(claim_file, "folders", lambda: iter([str(tmp_path / "taken")]))
+    told: list[str] = []
+
+    @contextmanager
+    def open_board(*_: object) -> Iterator[Client]:
+        yield inprocess.connect(inprocess.Pipe(tmp_path / "flash"))
+
+    monkeypatch.setattr(connect, "open_board", open_board)
+    with connect.connect_now("/dev/p", None, Opening(tell=told.append)):
+        assert len(told) == 1
+        assert "not even 'armtempo stop'" in told[0]
+        assert str(tmp_path / "taken") in told[0]
+
+
 @pytest.mark.skipif(os.name != "posix", reason="modes are of POSIX")
 def test_only_this_user_gets_in(server: Server) -> None:
     path = Path(server.claim.address)
@@ -119,10 +140,55 @@ def test_lives_hangs_died(server: Server, monkeypatch: pytest.MonkeyPatch) -> No
     with deaf:
         deaf.bind(server.claim.address)
         deaf.listen()
+        server.claim.write()
+        silent(server.claim, -60.0)
+        assert ownership(server.claim) is Ownership.ALIVE  # its sign of life is fresh: it is busy
+        silent(server.claim, caller.HUNG_S + 1.0)
         assert ownership(server.claim) is Ownership.HUNG
         with pytest.raises(NoAnswerError, match="does not answer"):
             Caller(server.claim)
-    Path(server.claim.address).unlink()
+    server.claim.remove()
+    Path(server.claim.address).unlink(missing_ok=True)
+
+
+def silent(found: PortClaim, seconds: float) -> None:
+    """Its program gave the last sign of life so long ago."""
+    for path in found._files():
+        os.utime(path, (time.time() - seconds,) * 2)
+
+
+def test_a_sign_of_life_is_given_all_the_time(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armtempo.ports.server.BEAT_S", 0.05)
+    silent(server.claim, 60.0)
+    limit_s = time.monotonic() + 30.0
+    while server.claim.silent_s() > 30.0:
+        assert time.monotonic() < limit_s
+        with Caller(server.claim) as other:  # also while callers come
+            other.ask("echo", 5.0, text="1")
+
+
+@pytest.mark.skipif(not claim.LOCAL_SOCKETS, reason="other sockets wait by themselves")
+def test_a_program_with_many_callers_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forty at once on a program that lets two wait: none takes it for one that hangs."""
+    monkeypatch.setattr("armtempo.ports.server._BACKLOG", 1)
+    server = Server(claim.new("/dev/p", "/dev/p", "/dev/p"), {"echo": handle}, ECHO)
+    found: list[object] = []
+
+    def ask() -> None:
+        try:
+            with Caller(server.claim) as other:
+                found.append(other.ask("echo", 60.0, text="here")["echo"])
+        except LinkError as error:
+            found.append(error)
+
+    monkeypatch.setattr(caller, "HUNG_S", 60.0)
+    callers = [threading.Thread(target=ask) for _ in range(40)]
+    for thread in callers:
+        thread.start()
+    for thread in callers:
+        thread.join()
+    server.close()
+    assert found == ["here"] * len(callers)
 
 
 def test_that_a_program_hangs_is_remembered_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -208,7 +274,7 @@ class Owner:
 
     def __init__(self) -> None:
         transport = SimpleNamespace(name="/dev/p")
-        self.session = SimpleNamespace(transport=transport, in_a_hurry=self._turn, listeners=[])
+        self.session = SimpleNamespace(transport=transport, in_a_hurry=self._turn, listen=repr, guard=repr)
         self.told: list[tuple[object, ...]] = []
         self.rate = 1000
 

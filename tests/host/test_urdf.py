@@ -28,6 +28,8 @@ from click.testing import CliRunner
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tests.host.arms import run_check
+
 pytestmark = pytest.mark.slow
 
 Array = NDArray[np.float64]
@@ -229,6 +231,46 @@ def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
     assert "3 joints from link 'l1' to 'left_finger'" in said
 
 
+J2_LIMIT = '    <limit lower="-2.0" upper="2.0" effort="10" velocity="1.5"/>\n'
+MIMIC = '<mimic joint="{}" multiplier="-1"/>'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (J2_LIMIT, J2_LIMIT + MIMIC.format("j1"), "joint 'j2': it mimics 'j1'"),
+        ('name="j2" type="revolute"', 'name="j2" type="prismatic"', "joint 'j2': it slides"),
+        ('name="j3" type="revolute"', 'name="j3" type="prismatic"', "joint 'j3': it slides"),
+    ],
+)
+def test_joints_of_the_main_chain_are_not_taken_for_fingers(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    """The tool was the link before them, silently."""
+    text = (FOLDER / "three_planar.urdf").read_text()
+    assert old in text
+    urdf = tmp_path / "changed.urdf"
+    urdf.write_text(text.replace(old, new))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
+    assert result.exit_code == 2
+    assert said in result.output
+
+
+def test_limits_in_degrees_are_suspected_at_import_and_by_check(tmp_path: Path) -> None:
+    text = (FOLDER / "three_planar.urdf").read_text()
+    urdf, out = tmp_path / "degrees.urdf", tmp_path / "arm.toml"
+    urdf.write_text(text.replace(J2_LIMIT, J2_LIMIT.replace("2.0", "90")))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    assert (
+        "joint 'j2': its limits, -90 to 90 rad, are -5156.6 to 5156.6 degrees: are they in degrees?"
+        in result.output
+    )
+    checked = run_check("--arm", out)
+    assert "more than two turns; were degrees taken as radians?" in checked.output
+    assert "if so, write range_deg = [-90, 90]" in checked.output
+
+
 REFUSED = [
     ("two_ends", [], ["choose with --tip", ": tool (j1, j2, j3), l2 (j1, j2), camera (j1, j2), l1 (j1)\n"]),
     ("wheel", [], ["turning without end, as wheels do: 'wheel';"]),
@@ -260,7 +302,6 @@ REFUSED = [
 ]
 
 
-J2_LIMIT = '    <limit lower="-2.0" upper="2.0" effort="10" velocity="1.5"/>\n'
 TOOL = '<link name="tool"/>'
 SPOILED = {
     "broken": lambda text: text[: text.index(J2_LIMIT)],
@@ -343,7 +384,7 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPat
         main, ["import-urdf", str(FOLDER / "three_planar.urdf"), "-o", str(tmp_path / "a")]
     )
     assert result.exit_code == 1
-    assert "pip install 'armtempo[urdf]'" in result.output
+    assert "pip install 'yourdfpy" in result.output
 
 
 def test_a_table_that_does_not_keep_to_the_urdf_is_not_written(

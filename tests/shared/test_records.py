@@ -299,7 +299,7 @@ def test_versions_are_those_of_files_that_exist() -> None:
         "sequence run": 1,
         "claim": 1,
         "arm record": 2,
-        "protocol": 5,
+        "protocol": 6,
     }
 
 
@@ -354,3 +354,4 @@ def test_flags_and_numbers_are_those_that_are_explained() -> None:
     for event in ("fault", "error"):
         assert f"`joint` {messages.NO_JOINT} if" in meanings.EVENTS[event]
     assert messages.ARM_RECORD_NAME in meanings.COMMANDS["put_begin"]
+    assert f"`{messages.ONCE_NAME}`" in meanings.COMMANDS["start"]

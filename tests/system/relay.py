@@ -201,7 +201,7 @@ class HeldJogs:
         self._board = board
         self._cables = (to_board, from_board)
         self._beyond = False
-        board.client.session.listeners.append(self._heard)
+        board.client.session.listen(self._heard)
 
     @classmethod
     @contextmanager

@@ -247,6 +247,6 @@ def test_without_matplotlib_it_says_what_is_missing_and_keeps_the_run(tmp_path: 
     (blocked / "matplotlib" / "__init__.py").write_text(BLOCKED, encoding="utf-8")
     done = commandline.run("demo", folder=tmp_path, PYTHONPATH=str(blocked))
     assert done.exit_code == 0, done.errors
-    done.said("no report", "matplotlib", "pip install 'armtempo[plot]'", "armtempo report")
+    done.said("no report", "matplotlib", "pip install 'matplotlib", "armtempo report")
     assert run_reader.load(tmp_path / "runs" / "feed-001").repetitions[0].state == "complete"
     assert "joint 1" in done.output

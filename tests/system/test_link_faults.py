@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from armtempo import simulator
 from armtempo.basics.errors import BoardError
-from armtempo.link import open_board, traffic
+from armtempo.link import Opening, open_board, traffic
 from armtempo.link.board_messages import Done, Event, Sample
 from armtempo.link.follow import Follower
 from armtempo.link.session import Session
@@ -29,6 +29,7 @@ from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import limits, wire
+from armtempo_shared.messages import MAX_COMMAND
 
 from tests import interpreters
 from tests.inprocess import Noise, clean
@@ -206,7 +207,10 @@ def _recorded(path: Path) -> Recording:
         point_to_point.straight("go", home_deg, home_deg + AWAY_DEG, commandline.ARM), commandline.ARM
     )
     starter = interpreters.starter(INTERPRETERS[-1])
-    with launch(LaunchOptions(interpreter=starter)) as process, open_board(process.port, made.path) as board:
+    with (
+        launch(LaunchOptions(interpreter=starter)) as process,
+        open_board(process.port, Opening(made.path)) as board,
+    ):
         arm_state.configure(board, commandline.ARM, replace=True)
         arm_state.home(board, commandline.ARM)
         stored = stored_motion.store(board, "go", data)
@@ -223,7 +227,7 @@ def _recorded(path: Path) -> Recording:
 
 def frames(data: bytes) -> Iterator[tuple[int, int, bytes]]:
     """All frames of one direction; there must be nothing else."""
-    parser = wire.Parser()
+    parser = wire.Parser(MAX_COMMAND)
     parser.feed(data)
     while (frame := parser.next()) is not None:
         yield frame

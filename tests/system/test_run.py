@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -66,8 +67,26 @@ def test_stored_motion_keeps_its_place_in_a_sim_folder(tmp_path: Path) -> None:
     armtempo("upload", file, "--port", "sim:flash", folder=tmp_path)
     done = commandline.run("run", "small", "--port", "sim:flash", folder=tmp_path)
     assert "samples-01.csv: complete" in done.output
-    assert done.errors.count("started for this command: its arm begins at home") == 1
+    assert done.errors.count("started for this command, its arm where the last one left it") == 1
     assert "started for this command" not in done.output
+
+
+def test_a_sim_folder_keeps_where_the_arm_stands(tmp_path: Path) -> None:
+    def sim(*arguments: str) -> str:
+        return armtempo(*arguments, "--arm", "ar4", "--port", "sim:flash", folder=tmp_path)
+
+    kept = tmp_path / "flash-position.json"
+    sim("home", "1,2,3,4,5,6")
+    moved = kept.read_text()
+    assert re.search(r"joint 1 +1\.00° .*encoder 1\.00°", sim("status"))
+    assert kept.read_text() == moved
+    sim("goto", "2,2,3,4,5,6")
+    assert re.search(r"joint 1 +2\.00°", sim("status"))
+    other = armtempo("status", "--arm", "paper", "--port", "sim:flash", folder=tmp_path)
+    assert "joint 1" in other
+    kept.write_text(moved.replace("[", "[nothing"))
+    assert "position unknown" in sim("status")
+    assert not kept.exists()
 
 
 def test_live_says_where_there_is_no_display(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import pytest
 from armtempo.basics.errors import BoardError, LinkError, RunFolderError
 from armtempo.cli import state
 from armtempo.link.board_messages import SequenceState
+from armtempo.link.session import OnLoss
 from armtempo.report import sequence_report
 from armtempo.report.sequence_report import results
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
@@ -204,14 +205,14 @@ def test_after_a_power_failure_the_folder_says_where_it_stood(tmp_path: Path) ->
     states: list[SequenceState] = []
     with launch(options()) as process, armtempo.connect(process.port, ARM) as board:
         board.home(ARM)
-        board.client.session.reopen = None  # nobody waits for the cable
 
         def cut(state: SequenceState) -> None:
             states.append(state)
             if state.cycle == 2 and process.running():
                 process.stop()
 
-        with pytest.raises(LinkError):
+        nobody_waits = board.client.session.on_loss(OnLoss(retry_s=0.0))
+        with pytest.raises(LinkError), nobody_waits:
             board.run_sequence(plan, cut, out=tmp_path / "runs")
         found = board.last_sequence
     assert found

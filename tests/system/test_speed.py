@@ -11,8 +11,8 @@ from armtempo.basics.errors import BoardError, InputError
 from armtempo.link.board_messages import Sample
 from armtempo.planning import brake_time
 from armtempo.report import replayed, run_report
+from armtempo.report.run import Run
 from armtempo.robot.recording import Watcher
-from armtempo.robot.run import Run
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared.motion import EVEN_RAMP
 

@@ -125,7 +125,7 @@ def moving(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     plan.save(folder / "long.json")
     with launch(LaunchOptions(folder / "flash", virtual_time=False)) as board:
         commandline.ended(start("home", "--arm", "paper", "--port", board.port, folder=folder))
-        owner = start("run", "long.json", "--port", board.port, folder=folder)
+        owner = start("run", "long.json", "--speed", "10", "--port", board.port, folder=folder)
         try:
             samples = folder / "runs" / "long-001" / "samples-01.csv"
             commandline.wait_for(lambda: samples.exists() and samples.stat().st_size > 200, "samples")
@@ -155,6 +155,9 @@ def test_a_stop_gets_in_and_the_run_says_who_asked(now: tuple[str, ...], tmp_pat
 def test_a_program_that_hangs_loses_the_port(tmp_path: Path) -> None:
     with moving(tmp_path) as (owner, port):
         owner.send_signal(signal.SIGSTOP)
+        refused = commandline.run("goto", "home", "--arm", "paper", "--port", port, folder=tmp_path)
+        assert refused.exit_code == 1
+        refused.said("does not answer, and the arm moves", "armtempo stop", f"end process {owner.pid} first")
         stopped = commandline.run("stop", "--port", port, folder=tmp_path)
         assert stopped.exit_code == 0, stopped.errors
         stopped.said("does not answer", "taking the port over")

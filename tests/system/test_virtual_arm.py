@@ -195,9 +195,14 @@ def switched_arm(folder: Path, angle: float = -9.0) -> Arm:
 
 
 @contextmanager
-def unhomed(found: Arm, real: Arm | None = None) -> Iterator[tuple[Client, StopRequest]]:
-    """A virtual board set up for an arm; ``real``: what its motors move instead."""
-    with launch(LaunchOptions(arm=real or found)) as virtual, open_board(virtual.port) as board:
+def unhomed(
+    found: Arm, real: Arm | None = None, start_deg: tuple[float, ...] | None = None
+) -> Iterator[tuple[Client, StopRequest]]:
+    """A virtual board set up for an arm; ``real``: what its motors move instead, from ``start_deg``."""
+    with (
+        launch(LaunchOptions(arm=real or found, start_deg=start_deg)) as virtual,
+        open_board(virtual.port) as board,
+    ):
         arm_state.configure(board, found, replace=True)
         with StopRequest() as stop:
             yield board, stop
@@ -245,8 +250,37 @@ def _moved_deg(cycle: edgelog.PowerCycle, joint: DrivenJoint) -> float:
 
 def test_switch_with_a_broken_wire(tmp_path: Path) -> None:
     with unhomed(switched_arm(tmp_path), PAPER) as (board, stop):  # the input is drawn to where it trips
-        with pytest.raises(LinkError, match="degrees after it had been left"):
+        with pytest.raises(
+            LinkError, match=r'joint 1: its limit switch is still pressed.*arm file has active = "low"'
+        ):
             homing.home_to_switches(board, switched_arm(tmp_path), stop)
+        assert board.status().known == 0
+
+
+@pytest.mark.parametrize("start", [190.5, -10.0, -12.0, -17.0])
+def test_homing_from_beyond_the_range_and_from_beyond_the_switch(
+    tmp_path: Path, start: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The range is -10 to 190, the switch at -11.5."""
+    found = switched_arm(tmp_path, -11.5)
+    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(homing, "SLOW", 0.2)
+    with unhomed(found, start_deg=(start, -60.0, 40.0)) as (board, stop):
+        arm_state.home(board, found)  # wrong: joint 1 is elsewhere
+        homing.home_to_switches(board, found, stop)
+        assert arm_state.posture_deg(board, found) == pytest.approx([0.0, -60.0, 40.0], abs=0.03)
+
+
+def test_homing_to_a_switch_of_the_other_level_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(homing, "FAST", 1.0)
+    found = switched_arm(tmp_path)
+    first = found.joints[0]
+    other = replace(first, switches=replace(first.switches, active="high"))
+    with unhomed(found, replace(found, joints=(other, *found.joints[1:]))) as (board, stop):
+        with pytest.raises(LinkError, match="its level is probably inverted"):
+            homing.home_to_switches(board, found, stop)
         assert board.status().known == 0
 
 

@@ -7,6 +7,7 @@ from array import array
 
 import machine
 from armtempo_shared import codes
+from armtempo_shared.engine_memory import ONCE_BYTES
 from armtempo_shared.messages import NO_JOINT
 from armtempo_shared.table import offset
 from micropython import const
@@ -18,12 +19,14 @@ from armtempo_board.errors import Refused
 from armtempo_board.motion.engine import Engine
 from armtempo_board.motion.engine_parts import EngineParts
 from armtempo_board.storage import store
+from armtempo_board.storage.once import Once
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from armtempo_board.storage.motion_file import MotionFile
+    from armtempo_shared.motion import MotionHead
+
 
 _BYTES_PER_JOINT = const(8)  # in a sample on the wire
 _BOOT_BYTES = const(4)
@@ -36,6 +39,7 @@ class Board:
     def __init__(self, root: str, program_crc: int, fault: int) -> None:
         flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
         self.workspace = room.workspace()  # before anything fragments the heap
+        self.once = Once(ONCE_BYTES)
         self.samples = SampleBuffer(room.sample_bytes(), flags_at)
         self.root = root
         self._store: "Any" = None
@@ -80,7 +84,7 @@ class Board:
         gc.collect()
         self.engine = Engine(EngineParts(head, joints, self.workspace))
 
-    def checked(self, motion: "MotionFile", crc: "int | None") -> "MotionFile":
+    def checked(self, motion: "MotionHead", crc: "int | None") -> "MotionHead":
         """The motion; raises Refused if it is another than expected (``crc``), or not for this arm."""
         if crc is not None and motion.crc != crc:
             raise Refused(codes.BAD_CHECKSUM)

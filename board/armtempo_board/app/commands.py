@@ -186,6 +186,7 @@ class Commands:
             features.BITS | (RATES_MEASURED if 0 < board.joints <= step_rates.joints else 0),
             board.arm_problem,
             board.arm_value,
+            board.once.capacity,
         )
         return self.reply_tail(size, board.board_id)
 

@@ -13,7 +13,7 @@ import time
 
 from armtempo_shared import codes, messages
 from armtempo_shared.limits import HOLD_TIMEOUT_MS
-from armtempo_shared.messages import RESUME, SAMPLE_BRAKING, START_HELD, START_HOMING
+from armtempo_shared.messages import ONCE_NAME, RESUME, SAMPLE_BRAKING, START_HELD, START_HOMING
 from micropython import const
 
 from armtempo_board import features, heap
@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
+    from armtempo_shared.motion import MotionHead
+
     from armtempo_board.app.board import Board
-    from armtempo_board.storage.motion_file import MotionFile
 
 _PERMILLE = const(1000)
 
@@ -146,13 +147,16 @@ class Controller:
                 raise Refused(codes.OUT_OF_RANGE, joint, steps[joint])
         engine.home(mask, steps)
 
-    def load(self, name: str, crc: "int | None" = None) -> "MotionFile":
-        """The stored motion, with head and checksum checked; raises Refused."""
-        store = self.board.store()
+    def load(self, name: str, crc: "int | None" = None) -> "MotionHead":
+        """The motion, with head and checksum checked; raises Refused."""
+        board = self.board
+        if name == ONCE_NAME:
+            return board.checked(board.once.motion(board.store), crc)
+        store = board.store()
         gc.collect()  # objects that stay during the run should lie at low addresses
-        return self.board.checked(store.motion(name), crc)
+        return board.checked(store.motion(name), crc)
 
-    def _assume(self, motion: "MotionFile", unknown: int) -> int:
+    def _assume(self, motion: "MotionHead", unknown: int) -> int:
         """Assume that the joints are at the start of a homing motion; those of unknown position are unknown
         after it too.
 
@@ -176,7 +180,7 @@ class Controller:
         gc.collect()
 
     def begin(self, name: str, flags: int, crc: "int | None" = None) -> None:
-        """Start a stored motion or sequence, or raise Refused. ``crc``: of the record that the host expects;
+        """Start a motion or sequence, or raise Refused. ``crc``: of the record that the host expects;
         None: no host.
         """
         board = self.board
@@ -194,7 +198,7 @@ class Controller:
             self.forget_speed()
         if not name:  # no default is set
             raise Refused(codes.NOT_FOUND)
-        if features.SEQUENCES and self._is_sequence(name):
+        if features.SEQUENCES and name != ONCE_NAME and self._is_sequence(name):
             self._new_sequence(name, crc, rate, flags)
             self.sequence.begin()
             return
@@ -216,7 +220,7 @@ class Controller:
             return bool(self.board.store().is_sequence(name))
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
-        """Start a stored motion at ``rate`` thousandths of its speed, or refuse.
+        """Start a motion at ``rate`` thousandths of its speed, or refuse.
 
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
@@ -233,7 +237,7 @@ class Controller:
             raise
         self.start_loaded(motion, flags)
 
-    def start_loaded(self, motion: "MotionFile", flags: int) -> None:
+    def start_loaded(self, motion: "MotionHead", flags: int) -> None:
         """Start the motion that the engine has loaded; ``flags`` as for ``begin``."""
         self.board.samples.clear()
         self.done = False

@@ -16,7 +16,8 @@ _BYTES_PER_JOINT = const(8)
 
 
 class SampleBuffer:
-    """A FIFO; if it is full the oldest sample is dropped and counted in ``lost``."""
+    """A FIFO; if it is full the oldest sample is dropped, and counted in ``lost`` unless it was sent: then the host
+    may have it."""
 
     def __init__(self, memory: int, flags_at: int) -> None:
         """``memory``: bytes to keep samples in; ``flags_at``: bytes of a sample before its flags."""
@@ -43,8 +44,8 @@ class SampleBuffer:
     def add(self, raw: "array[int]", flags: int) -> None:
         """Store a sample: ``raw`` as filled by the engine; ``flags`` of the sample event."""
         if self.next - self.first == self._capacity:
+            self.lost += self.first == self.sent
             self.first += 1
-            self.lost += 1
             self.sent = max(self.sent, self.first)
         at = self.next % self._capacity * self.size
         flags_at = at + self.flags_at

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from armtempo_shared.motion import MotionHead
 
-    from armtempo_board.storage.motion_file import MotionFile
-
 _OP, _NUMBER = const(0), const(1)  # of a row
 _NONE = const(-1)
 _BESIDE_BYTES = const(13_000)
@@ -127,7 +125,7 @@ class AheadSequencer(Sequencer):
             place.go_on(row)
         return _NONE
 
-    def _open(self, number: int) -> "MotionFile":
+    def _open(self, number: int) -> "MotionHead":
         board = self._controller.board
         name, crc = self._record.motion(number)
         return board.checked(store.Store(board.root, recover=False).motion(name), crc)

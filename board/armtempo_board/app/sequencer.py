@@ -28,8 +28,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any, Protocol
 
+    from armtempo_shared.motion import MotionHead
+
     from armtempo_board.app.board import Board
-    from armtempo_board.storage.motion_file import MotionFile
     from armtempo_board.storage.sequence_file import SequenceFile
 
     class Runner(Protocol):
@@ -39,13 +40,13 @@ if TYPE_CHECKING:
         sequence: Any
         run_number: int
 
-        def load(self, name: str, crc: "int | None" = None) -> MotionFile: ...
+        def load(self, name: str, crc: "int | None" = None) -> MotionHead: ...
 
         def tidy(self) -> None: ...
 
         def begin_motion(self, name: str, crc: "int | None", rate: int) -> None: ...
 
-        def start_loaded(self, motion: MotionFile, flags: int) -> None: ...
+        def start_loaded(self, motion: MotionHead, flags: int) -> None: ...
 
 
 _OP, _NUMBER, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(3), const(4)  # of a row

@@ -56,6 +56,12 @@ def put_commit(commands: "Caller", row: tuple, length: int) -> None:
     board.arm_waits = board.store().commit(crc) == ARM_RECORD_NAME
 
 
+def put_once(commands: "Caller", row: tuple, length: int) -> int:
+    """Add a piece to the motion that is run once."""
+    offset, size = commands.fields(row)
+    return commands.reply(row, commands.board.once.put(offset, size, commands.tail(row, length)))
+
+
 def list(commands: "Caller", row: tuple, length: int) -> int:
     """Answer with one of the stored motions and sequences, and their number."""
     (index,) = commands.fields(row)

@@ -70,13 +70,10 @@ class Ring:
         """Entries written since the stream was started."""
         return self.state[isr.WRITTEN]
 
-    def feed(self, on: int) -> int:
-        """Let the interrupt write to the ring, or not; returns what was before."""
-        before = self.state[isr.FED]
-        self.state[isr.FED] = on
-        if on:
-            mem32[stm.TIM6] = 1  # CR1: it stops while no ring is fed
-        return before
+    def feed(self) -> None:
+        """Let the interrupt write to the ring."""
+        self.state[isr.FED] = 1
+        mem32[stm.TIM6] = 1  # CR1: it stops while no ring is fed
 
     def fed_kiticks(self) -> int:
         """Ki ticks (1024 ticks) from now to the last entry; NOT_FED if the interrupt does not write to the ring."""
@@ -102,7 +99,7 @@ class Ring:
         before = disable_irq()
         late = isr.arm_channel(self._block, self.timer, self.words, self._at)
         enable_irq(before)
-        self.feed(1)
+        self.feed()
         return late
 
     def release(self) -> None:

@@ -6,7 +6,7 @@ outside of frames one byte at a time, so that what follows a frame stays in the 
 
 import time
 
-from armtempo_shared.messages import LENGTH_AT, MAX_PAYLOAD, OVERHEAD, PAYLOAD_AT, SYNC
+from armtempo_shared.messages import LENGTH_AT, MAX_COMMAND, OVERHEAD, PAYLOAD_AT, SYNC
 from micropython import const
 
 from armtempo_board.buffers import CHECK, CRC_TABLE, apply_crc, copy, pack_offsets
@@ -25,7 +25,7 @@ class FrameReader:
     """Call ``poll`` until it returns True; then the frame is in ``data``."""
 
     def __init__(self) -> None:
-        self.data = bytearray(MAX_PAYLOAD + OVERHEAD)
+        self.data = bytearray(MAX_COMMAND + OVERHEAD)
         self.bad = 0  # number of skipped runs of bytes
         self.outside = -1  # last byte received outside of a frame; -1: none in this poll
         self._filled = 0
@@ -62,7 +62,7 @@ class FrameReader:
         if self._filled < PAYLOAD_AT:
             return 1 if self._filled == 0 else PAYLOAD_AT - self._filled
         length = self._announced()
-        if length > MAX_PAYLOAD:
+        if length > MAX_COMMAND:
             return 0
         return max(0, length + OVERHEAD - self._filled)
 
@@ -72,7 +72,7 @@ class FrameReader:
 
     def _accept(self) -> bool:
         length = self._announced()
-        if length > MAX_PAYLOAD or not apply_crc(
+        if length > MAX_COMMAND or not apply_crc(
             CRC_TABLE, self.data, pack_offsets(LENGTH_AT, PAYLOAD_AT + length), CHECK
         ):
             self._reject()

@@ -8,6 +8,7 @@ from array import array
 
 import stm
 from armtempo_shared import codes
+from armtempo_shared.limits import TURN_SLACK_TICKS
 from micropython import const
 from pyb import Pin
 
@@ -31,7 +32,6 @@ _REFILL_KITICKS = const(512)  # at most 6 ms between two checks of a queue that 
 _NEVER_KITICKS = const(1 << 29)
 _NOT_FED = const(-(1 << 22))  # as in ring.py
 _LATEST_KITICKS = const(22)  # of the queue, as in step_queue.py
-_TURN_SLACK_TICKS = const(8400)  # 100 us: how late the interrupt that turns DIR may come
 _TURNS = const(8)
 
 
@@ -59,16 +59,16 @@ class JointDrive:
         self.ring = Ring(row["channel"], block, self._words_at, ring_words)
         self.generator = StepGenerator(memory)
         self._inverted = row["dir_inverted"]
-        self._turn_delay = head["dir_hold_ticks"] + _TURN_SLACK_TICKS
+        self._turn_delay = head["dir_hold_ticks"] + TURN_SLACK_TICKS
         self.gap_ticks = max(
-            head["pulse_ticks"] + self._turn_delay + _TURN_SLACK_TICKS + head["dir_setup_ticks"],
+            head["pulse_ticks"] + self._turn_delay + TURN_SLACK_TICKS + head["dir_setup_ticks"],
             head["pulse_ticks"] + head["low_ticks"],
         )
         name = pins.DIR[row["channel"]]
         self._dir = Pin(name, Pin.OUT_PP, value=0)
         block[self._words_at + isr.DIR_BIT] = 1 << pins.line(name)
         block[isr.PULSE_TICKS] = head["pulse_ticks"]
-        block[isr.TURN_SLACK_TICKS] = _TURN_SLACK_TICKS
+        block[isr.TURN_SLACK_TICKS] = TURN_SLACK_TICKS
         block[isr.DIR_SETUP_TICKS] = head["dir_setup_ticks"]
         self._turn_steps = array("i", [0] * _TURNS)  # steps of the ring before each queued turn
         self._direction = 1
@@ -181,7 +181,10 @@ class JointDrive:
 
     def follow(self, law: "array[int]", is_last: bool) -> None:
         """Follow another time law (see ``StepGenerator.follow``)."""
-        self.generator.follow(law, is_last, self.ring)
+        ring = self.ring
+        self.generator.follow(law, is_last, ring.state)
+        if ring.state[isr.FED]:
+            ring.feed()  # the interrupt may have found no ring that it writes to, and stopped
         self._next_refill_kiticks = -_NEVER_KITICKS
 
     def finish(self) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 # Between two interrupts: 0.5 ms, or twice as long if each ring, when full, lasts _LONG_US. It is not filled before
 # three eighths are free, nor in its last 390 us.
 _PERIOD_TICKS = const(42000)
-_LONG_US = const(3150)
+_LONG_US = const(6300)
 _HALF_SECOND_US = const(500000)  # a step takes two entries
 _CR1 = const(0)  # of a timer
 # what the interrupt takes

@@ -25,7 +25,7 @@ _BASE_HIGH = const(15)
 _IN = const(20)
 _LATEST_KITICKS = const(22)
 _ITEMS = const(32)
-_ITEMS_MASK = const(7)
+_ITEMS_MASK = const(15)
 _COUNT_MASK = const(0xFFFF)
 _BIAS = const(1 << 29)
 _HIGH_BIAS = const(1 << 28)
@@ -141,7 +141,7 @@ def cubics_fit(steps: int, solver: ptr32, queue: ptr32, slack: int) -> int:
     off += 4 * first
     limit = 8 << slack << queue[_TIME_SCALE]
     if off > limit:
-        return 0
+        return -1 if off >> 2 <= limit else -2
     if off <= limit >> 4:
         return 16
     if 5 * off <= limit:

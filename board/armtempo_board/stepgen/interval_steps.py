@@ -11,7 +11,8 @@ from armtempo_board.stepgen.time_law import scale_slope, to_real_time
 _MOST_STEPS = const(1024)  # of a cubic
 _NODES = const(12)  # solved in one call
 _RAMP_SLACK = const(2)  # log2 of how much wider the error bound is within a ramp, whose nodes are less exact
-_MOST_SLACK = const(8)  # and with the time that a tick of the motion takes
+_MOST_SLACK = const(8)
+_SLACK_SHIFT = const(8)  # 2**slack / 8 ticks are 1/1024 of a step's interval
 # results of ``queue_steps``
 NO_ROOM = const(0)  # the queue is full, or reaches UNTIL_KITICKS
 GOES_ON = const(1)
@@ -41,10 +42,10 @@ _SINGLE_STEPS = const(29)
 _HELD_BACK = const(30)
 _HALTED = const(31)
 _ITEMS = const(32)
-_ITEMS_MASK = const(7)
+_ITEMS_MASK = const(15)
 _HIGH_BIAS = const(1 << 28)
 _COUNT_MASK = const(0xFFFF)
-_FULL = const(7)
+_FULL = const(15)
 _BY_LAW = const(1)
 _AT_START = const(2)
 # as in newton.py: words of the solver
@@ -178,7 +179,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                         slack = 0
                 if i >= 0:
                     i = i // ((nodes[_MANTISSA] >> nodes[_EXPONENT]) + 1)
-                    i -= i >> 4
+                    i -= (i >> 6) + 1
                     if length + length > i:
                         length = i >> 1
             while length > 1:
@@ -207,26 +208,37 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
                                 node = ptr32(int(node) + 4 * _NODE_WORDS)
                                 i -= 1
                 if verdict:
-                    # The bound is one of the motion's time
+                    # By a law a step may be 1/1024 of its interval off; in a ramp at least half a tick
                     i = slack
                     if mode:
-                        base = nodes[_MIDDLE_RATE]
-                        while base < 1 << 29 and i < _MOST_SLACK:
-                            base += base
+                        base = nodes[_MANTISSA] >> (nodes[_EXPONENT] + _SLACK_SHIFT)
+                        while base >> i and i < _MOST_SLACK:
                             i += 1
                     verdict = int(cubics_fit(length, solver, queue, i))
-                if verdict:
+                if verdict > 0:
                     break
-                length = (length * (3 - mode)) >> 2  # by a law, trying costs most
+                length = (length * (4 + verdict) if mode and verdict else 3 * length) >> 2
                 words[_CUBIC_STEPS] = length if length > 2 else 2
             if length > 1:
                 reached += length + length
                 if reached == last and nodes[_END_MANTISSA] >> nodes[_END_EXPONENT] > slow_ticks:
                     words[_HELD_BACK] = 1
                     result = STOPPED
+                base = nodes[_MANTISSA] >> nodes[_EXPONENT]
                 put_cubics(length, solver, queue, result - GOES_ON)
                 # The next ones: eighths of these, and longer than before only if it says so
                 i = (length * verdict) >> 3
+                if mode:
+                    # By a law as many as fit next time, fewer as steps become longer: before rest one lasts as long as
+                    # the number of those that are left to the power of -2/3
+                    verdict = nodes[_MANTISSA] >> nodes[_EXPONENT]
+                    i = (i * base + (verdict >> 1)) // verdict
+                    i = (i * (base + verdict) + verdict) // (2 * verdict)
+                    verdict = 8
+                    if i > size:
+                        verdict = 9
+                    elif i < length:
+                        verdict = 7
                 if i > _MOST_STEPS:
                     i = _MOST_STEPS
                 if (i > size and verdict > 8) or (verdict < 8 and i > 1):

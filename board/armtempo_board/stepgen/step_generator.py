@@ -20,6 +20,8 @@ A first step that others follow in the direction of those before is queued as it
 steps back out of the queue, to LAST or FIRST.
 """
 
+from array import array
+
 from micropython import const
 
 from armtempo_board.memory import Memory
@@ -31,7 +33,6 @@ from armtempo_board.stepgen.subintervals import Subintervals
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from array import array
     from typing import Any
 
     from armtempo_shared.motion import MotionHead
@@ -80,6 +81,7 @@ _STOPPED = const(2)
 
 # as in isr.py: word of a ring's state
 _ROOM = const(8)
+_NO_RING = array("i", bytes(4 * 9))  # the state of one that no interrupt writes to
 
 # of ``_pending``
 _NOTHING = const(0)
@@ -89,7 +91,7 @@ _BOTH = const(3)
 _THIS_RING = const(1)  # bit of the first one at hand
 _CLEARED = (_STEPS, _REACHED, _LAST_STEP, _MODE, _HELD_BACK, _HALTED)
 _FIRST_CUBIC_STEPS = const(16)  # tried first in a motion
-_LAW_WORDS = const(26)  # as in time_law.py
+_LAW_WORDS = const(27)  # as in time_law.py
 _BEFORE = const(-1)  # in Ki ticks: before a motion
 _LARGEST = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap, and a small integer in ticks
 
@@ -224,13 +226,15 @@ class StepGenerator:
         self.direction = -self.direction
         self.at_turn = False
 
-    def follow(self, law: "array[int]", is_last: bool, ring: "Any" = None) -> None:
+    def follow(
+        self, law: "array[int]", is_last: bool, ring: "array[int] | memoryview[int]" = _NO_RING
+    ) -> None:
         """Take the motion's time by a law from the real time on at which its ramp begins (time_law.py).
 
         That time must not lie before any ``until_kiticks`` that ``prepare`` was given. Only what was put into the
         queue last lies beyond that: steps of one subinterval, or one that was held back. The ramp of the law before
         must be after what was written. ``is_last``: if the motion's time stands still after the ramp, it is the end.
-        ``ring``: the one that an interrupt may write to meanwhile.
+        ``ring``: the state (isr.py) of the one that an interrupt may write to meanwhile.
         """
         queue = self.queue
         high = self._high()
@@ -239,18 +243,15 @@ class StepGenerator:
         start_kiticks = _kiticks(self._law_words[_REAL_START_HIGH], 0)
         reached = queue[_REACHED]
         if queue[_LATEST_KITICKS] >= start_kiticks and self.waits():
-            # For no longer than this: a full ring may last only 2 ms
-            fed = ring.feed(0) if ring else 0
+            first = queue[_IN] - 1 & 0xFFFF if self._last_is_queued else self._interval_in
+            steps = step_queue.withdraw(queue, first, start_kiticks, ring)
             if self._last_is_queued:
-                step_queue.withdraw(queue, queue[_IN] - 1 & 0xFFFF, start_kiticks)
                 self._pending |= _LAST
             else:
-                reached -= step_queue.withdraw(queue, self._interval_in, start_kiticks)
+                reached -= steps
                 if self._pending == _LAST:
                     self._pending = _NOTHING
                     reached -= 1
-            if ring:
-                ring.feed(fed)
         if reached < 0:
             reached = 0
             self._pending = _FIRST

@@ -51,17 +51,17 @@ SINGLE_STEPS = const(29)  # steps to be solved one by one before a cubic is trie
 HELD_BACK = const(30)
 HALTED = const(31)  # by the law of real time its next step never comes
 _ITEMS = const(32)  # CAPACITY of them
-CAPACITY = const(8)  # items
-QUEUE_SIZE = const(128)
+CAPACITY = const(16)  # items
+QUEUE_SIZE = const(224)
 
 SQUARE = const(8)
 _GROUP_MASK = const(7)
-_FULL = const(7)  # items: there is no room for two more
+_FULL = const(15)  # items: there is no room for two more
 # bits of MODE
 BY_LAW = const(1)  # real time is not the motion's own, see time_law.py
 AT_START = const(2)  # all steps come at the start of the subinterval
 
-_ITEMS_MASK = const(7)
+_ITEMS_MASK = const(15)
 _COUNT_MASK = const(0xFFFF)
 _KITICKS_MASK = const(0x3FFFFF)
 # entries of a ring: a step is the time of its rising and of its falling edge
@@ -79,6 +79,7 @@ _WRITTEN = const(0)
 _LAST_TIME = const(3)
 _FAR_TIME = const(4)
 _MASK = const(5)
+_FED = const(7)
 _ROOM = const(8)
 _RING_AT = const(9)
 _QUEUE_AT = const(11)
@@ -336,11 +337,15 @@ def next_kiticks(queue: ptr32) -> int:
 
 
 @micropython.viper
-def withdraw(queue: ptr32, first: int, from_kiticks: int) -> int:
-    """Take the last items back out, down to one that begins before a time; ``emit`` must not run meanwhile.
+def withdraw(queue: ptr32, first: int, from_kiticks: int, ring: ptr32) -> int:
+    """Take the last items back out, down to one that begins before a time.
 
-    None goes that was put in before the ``first``. Returns their steps that were not written.
+    None goes that was put in before the ``first``. Returns their steps that were not written. ``ring``: its state,
+    which keeps the interrupt from calling ``emit`` meanwhile; about 30 instructions an item, as a full ring may last
+    only 2 ms.
     """
+    fed = ring[_FED]
+    ring[_FED] = 0
     steps = 0
     put_in = queue[IN]
     while put_in != first:
@@ -355,4 +360,5 @@ def withdraw(queue: ptr32, first: int, from_kiticks: int) -> int:
             break
     queue[IN] = put_in
     queue[LATEST_KITICKS] = 0
+    ring[_FED] = fed
     return steps

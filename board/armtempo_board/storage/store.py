@@ -31,6 +31,7 @@ _NEW = ".new"
 _ENOSPC = const(28)
 _ERRNO = const(0)  # of an exception's arguments
 _ST_SIZE = const(6)  # of os.stat
+_FOLDER = const(0x4000)  # in its first entry
 _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
@@ -104,7 +105,8 @@ class Store:
 
     def names(self) -> "list[str]":
         """Names of the stored motions and sequences, sorted."""
-        return sorted([name[: -len(_MOTION)] for name in self._files() if name.endswith(_MOTION)])
+        files = [name for name in self._files() if name.endswith(_MOTION) and not self._is_folder(name)]
+        return sorted([name[: -len(_MOTION)] for name in files])
 
     def begin(self, name: str, size: int) -> None:
         """Begin an upload; aborts one in progress."""
@@ -181,9 +183,11 @@ class Store:
         """All bytes of a small record; refuses with NOT_FOUND, or TOO_LONG if it does not fit into memory."""
         return self._read(_file_name(name))
 
-    def motion(self, name: str) -> motion_file.MotionFile:
-        """A stored motion, with head and checksum checked."""
-        return self._motion(_motion_file(name))
+    def motion(
+        self, name: str, kind: "Any" = motion_file.MotionFile, *arguments: object
+    ) -> motion_file.MotionFile:
+        """A stored motion, with head and checksum checked; ``kind``: of the object, with its further arguments."""
+        return self._motion(_motion_file(name), kind, *arguments)
 
     if features.SEQUENCES:
 
@@ -298,6 +302,13 @@ class Store:
         except OSError:
             return []
 
+    def _is_folder(self, file_name: str) -> bool:
+        """Whether it is a folder, which somebody else made."""
+        try:
+            return os.stat(self._path(file_name))[0] & _FOLDER != 0
+        except OSError:
+            return True
+
     def _size_of(self, file_name: str) -> int:
         """Bytes of a file; NOT_FOUND."""
         try:
@@ -355,10 +366,12 @@ class Store:
         finally:
             file.close()
 
-    def _motion(self, file_name: str) -> motion_file.MotionFile:
+    def _motion(
+        self, file_name: str, kind: "Any" = motion_file.MotionFile, *arguments: object
+    ) -> motion_file.MotionFile:
         size = self._size_of(file_name)
         try:
-            return self._guard(motion_file.MotionFile, self._path(file_name), size)  # type: ignore[no-any-return]
+            return self._guard(kind, self._path(file_name), size, *arguments)  # type: ignore[no-any-return]
         except ValueError:  # MotionError
             if not self._is_sequence(file_name):
                 raise Refused(codes.BAD_RECORD)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
-Array = NDArray[np.float64]
+import numpy as np
+
+Array = np.ndarray[tuple[Any, ...], np.dtype[np.float64]]
+"""``NDArray[np.float64]``, written out: from numpy 2.5 on that is an alias, which says nothing of arrays when a program
+looks at it (``json_codec.decode``)."""

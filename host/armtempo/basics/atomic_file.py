@@ -11,7 +11,7 @@ from armtempo.basics.errors import InputError
 
 
 def replace_text(path: Path, text: str, newline: str | None = None) -> None:
-    """Write a temporary file and rename it, so that the file is never incomplete.
+    """Write a temporary file and rename it, so that the file is never incomplete, not even after a power failure.
 
     ``newline``: as in ``open``. A symbolic link is followed; a pipe or a device, such as /dev/stdout, is
     written directly. Raises InputError if it cannot be written; the old file is kept.
@@ -64,9 +64,23 @@ def why(error: Exception) -> str:
 def _replace(path: Path, text: str, newline: str | None) -> None:
     aside = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
-        aside.write_text(text, encoding="utf-8", newline=newline)
+        with aside.open("w", encoding="utf-8", newline=newline) as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())  # otherwise the name may reach the disk before the content does
         os.replace(aside, path)
+        _sync_folder(path.parent)
     except OSError:
         if aside.is_file():
             aside.unlink()
         raise
+
+
+def _sync_folder(folder: Path) -> None:
+    """Have the new name on the disk, too, where the system can do that; the content is there in any case."""
+    with suppress(OSError):
+        opened = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)

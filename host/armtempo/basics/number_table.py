@@ -1,9 +1,11 @@
-"""Text tables of numbers: columns separated by commas, semicolons or tabs, with or without a header line."""
+"""Text tables of numbers: columns separated by commas, semicolons, tabs or blanks, with or without a header line."""
 
 from __future__ import annotations
 
 import csv
 import math
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +14,8 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import is_number
 
 _SEPARATORS = (";", "\t", ",")
-"""Tried in this order; with the first two, a comma may be the decimal separator."""
+"""Tried in this order, blanks if there is none; with the first two, a comma may be the decimal separator."""
+_BLANKS, _WIDE_BLANKS = re.compile(r"\s+"), re.compile(r"\s{2,}")
 
 
 @dataclass(frozen=True)
@@ -30,51 +33,92 @@ class NumberTable:
         return [self._row(number, row, columns) for number, row in self.rows]
 
     def _row(self, number: int, row: list[str], columns: list[int]) -> list[float]:
-        if len(row) <= max(columns):
-            raise InputError(
-                f"{self.path}: line {number}: {len(row)} values; at least {max(columns) + 1} are needed",
-                "complete the line",
-            )
         for column in columns:
             if not _is_finite(row[column]):
                 raise InputError(
                     f"{self.path}: line {number}: {row[column]!r} is not a finite number",
-                    "write numbers such as 12.5; columns are separated by commas, semicolons or tabs",
+                    "write numbers such as 12.5; columns are separated by commas, semicolons, tabs or blanks",
                 )
         return [float(row[column]) for column in columns]
 
 
-def read(path: Path) -> NumberTable:
-    """The table in a text file, as ``of_text``; raises InputError if it cannot be read."""
+def text_of(path: Path) -> str:
+    """The text of a file; raises InputError if it cannot be read."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}: cannot be read: {why(error)}", "check the path, and that it is a text file in UTF-8"
         ) from None
-    return of_text(text, path)
 
 
 def of_text(text: str, path: Path | str) -> NumberTable:
-    """The table in a text from ``path``; skips empty lines. Raises InputError if it is not a table."""
+    """The table in a text from ``path``; skips empty lines, and those that begin with ``#``.
+
+    A first line without a number is a header, also after a ``#``. Raises InputError if the text is not a table, for a
+    first line of words and numbers, and for a line with more or fewer cells than the first one.
+    """
     separator = _separator(text)
     try:
-        lines = list(enumerate(csv.reader(text.splitlines(), delimiter=separator), 1))
+        lines = list(enumerate(_cells(text.removeprefix("\ufeff").splitlines(), separator), 1))
     except csv.Error as error:
         raise InputError(f"{path}: is not a table: {error}", "give a CSV file") from None
     rows = [(number, [cell.strip() for cell in row]) for number, row in lines if any(map(str.strip, row))]
-    header = rows.pop(0)[1] if rows and not all(map(is_number, _pointed(rows[0][1], separator))) else None
-    return NumberTable(path, header, [(number, _pointed(row, separator)) for number, row in rows])
+    remarks = [row for row in rows if row[1][0].startswith("#")]
+    rows = [row for row in rows if row not in remarks]
+    header = None
+    if rows and not any(map(is_number, _pointed(rows[0][1], separator))):
+        header = rows.pop(0)[1]
+    above = [row for number, row in remarks if rows and number < rows[0][0]]
+    if header is None and above and len(above[-1]) == len(rows[0][1]) > 1:
+        header = [above[-1][0].lstrip("# "), *above[-1][1:]]
+    while header and not header[-1]:
+        header.pop()
+    width = len(header) if header is not None else len(rows[0][1]) if rows else 0
+    rows = [
+        (number, _fitted(_pointed(row, separator), width, f"{path}: line {number}")) for number, row in rows
+    ]
+    if rows and header is None and (words := [cell for cell in rows[0][1] if not is_number(cell)]):
+        raise InputError(
+            f"{path}: line {rows[0][0]}: {words[0]!r} is no number, but others in the line are",
+            "correct it; a header has names only",
+        )
+    return NumberTable(path, header, rows)
 
 
 def _separator(text: str) -> str:
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    return next((separator for separator in _SEPARATORS if separator in first), ",")
+    """The separator of the first line that is no remark; "" for blanks."""
+    lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
+    first = next(lines, "")
+    return next((separator for separator in _SEPARATORS if separator in first), "")
+
+
+def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
+    if separator:
+        return csv.reader(lines, delimiter=separator)
+    rows = [_BLANKS.split(line.strip()) for line in lines]
+    width = max((len(row) for row in rows if row and all(map(is_number, row))), default=0)
+    # a header's names may have single blanks in them
+    return [
+        wide if len(row) != width and len(wide := _WIDE_BLANKS.split(line.strip())) == width else row
+        for line, row in zip(lines, rows, strict=True)
+    ]
+
+
+def _fitted(row: list[str], width: int, where: str) -> list[str]:
+    """The row without empty cells beyond the width; InputError if its cells are more or fewer."""
+    while len(row) > width and not row[-1]:
+        row = row[:-1]
+    if len(row) != width:
+        raise InputError(
+            f"{where}: {len(row)} values, but {width} columns", "give each line a value for each column"
+        )
+    return row
 
 
 def _pointed(row: list[str], separator: str) -> list[str]:
     """The cells with decimal points, if the comma is not the separator."""
-    return row if separator == "," else [cell.replace(",", ".") for cell in row]
+    return row if separator in (",", "") else [cell.replace(",", ".") for cell in row]
 
 
 def _is_finite(text: str) -> bool:

@@ -1,7 +1,9 @@
-"""Text output: escaped control characters, columns, suggestions for misspelt words."""
+"""Text output: escaped control characters, columns, wrapped lines, suggestions for misspelt words."""
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Iterable, Sequence
 
 
@@ -27,15 +29,41 @@ def visible(text: str) -> str:
     )
 
 
-def aligned(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> list[str]:
+def aligned(rows: Sequence[Sequence[str]], widths: Sequence[int], most: int = 80) -> list[str]:
     """The rows as lines: the first column flush left, the others flush right, with a space between at least.
 
-    ``widths``: least width of each column; all rows have as many cells.
+    ``widths``: width of each column, if its cells fit; all rows have as many cells. No column is wider than its cells
+    need if the lines would be longer than ``most``.
     """
     first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
-    fitting = [max(widths[0], first)]
-    fitting += [max(width, 1 + longest) for width, longest in zip(widths[1:], others, strict=True)]
+    needed = [first, *(1 + longest for longest in others)]
+    fitting = [*map(max, widths, needed)]
+    if sum(fitting) > most:
+        fitting = needed
     return [row[0].ljust(fitting[0]) + "".join(map(str.rjust, row[1:], fitting[1:])) for row in rows]
+
+
+def wrapped(line: str, width: int) -> list[str]:
+    """The line, at most ``width`` characters long: broken at spaces, and the rest indented as its text is.
+
+    The text begins behind spaces, a label with two spaces or a colon behind it, or an arrow. A longer word stays whole.
+    """
+    if len(line) <= width:
+        return [line]
+    found = _BEFORE_TEXT.match(line)
+    before = found[0] if found else ""
+    return textwrap.wrap(
+        line[len(before) :],
+        width,
+        initial_indent=before,
+        subsequent_indent=" " * (len(before) or _INDENT),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+_BEFORE_TEXT = re.compile(r" *(?:[\w-]{1,16}:? {2,}|[\w-]{1,10}: |-> )?")
+_INDENT = 2
 
 
 _LIKELY, _SURE = 0.6, 0.8

@@ -34,6 +34,8 @@ Examples:
 """
 
 
+_AS_JSON = "armtempo.as_json"
+"""Key of click's context: whether the command line has ``--json``."""
 _AGAIN_S = 0.01
 _MOST_WAITS = 300
 """Longer than any import takes; a command that is run while importing is interrupted all the same."""
@@ -78,6 +80,11 @@ class LazyGroup(click.Group):
                 parameter.metavar = parameter.metavar or "NUMBER"
         return command
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Note whether JSON is asked for: a failure is a document then, too."""
+        ctx.meta[_AS_JSON] = "--json" in args
+        return super().parse_args(ctx, args)
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -92,11 +99,13 @@ class LazyGroup(click.Group):
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="replace")  # the code page may lack a character
-        as_json = "--json" in [*ctx._protected_args, *ctx.args]
+        as_json = ctx.meta[_AS_JSON]
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads make work on matrices this small slower
         try:
             with raised_by_signals():
                 return super().invoke(ctx)
+        except click.UsageError as error:
+            (error.ctx or ctx).fail(results.fitted(error.format_message(), "Error: "))
         except ArmtempoError as error:
             results.show_error(error, as_json=as_json)
             ctx.exit(error.exit_code)
@@ -115,7 +124,7 @@ class LazyGroup(click.Group):
             )
             ctx.exit(1)
         except KeyboardInterrupt as error:
-            click.echo(f"armtempo: interrupted{': ' if error.args else ''}{error}", err=True)
+            results.echo(f"armtempo: interrupted{': ' if error.args else ''}{error}", err=True)
             ctx.exit(INTERRUPTED)
 
 

@@ -61,20 +61,19 @@ def _check_picture(picture: Path | None, force: bool) -> None:
 
 
 def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], found: list[Finding]) -> None:
-    click.echo(f"arm: {arm.name if arm else '(not readable)'} ({path})")
+    results.echo(f"arm: {arm.name if arm else '(not readable)'} ({path})")
     for line in table(joints):
-        click.echo(line)
+        results.echo(line)
     if joints:
-        click.echo(rate_words(sum(joint.top_steps_s for joint in joints)))
+        results.echo(rate_words(sum(joint.top_steps_s for joint in joints)))
     for finding in found:
-        click.echo(f"{finding.level.value + ':':<9}{finding.where}: {finding.what}")
-        click.echo(f"{'':9}-> {finding.next_step}")
-    wrong = [finding for finding in found if finding.level is not Level.NOTE]
-    if not wrong:
-        click.echo("nothing looks wrong")
+        results.echo(f"{finding.level.value + ':':<9}{finding.where}: {finding.what}")
+        results.echo(f"{'':9}-> {finding.next_step}")
+    if not found:
+        results.echo("nothing looks wrong")
         return
-    errors = sum(finding.level is Level.ERROR for finding in wrong)
-    click.echo(f"{_counted(errors, 'error')}, {_counted(len(wrong) - errors, 'warning')}")
+    levels = [finding.level for finding in found]
+    results.echo(", ".join(_counted(levels.count(one), one.value) for one in Level if one is not Level.GOOD))
 
 
 def _counted(count: int, what: str) -> str:
@@ -93,4 +92,4 @@ def _print_json(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], f
 
 def _draw(arm: Arm, picture: Path) -> None:
     drawing.save(arm_picture.arm_picture(arm), picture)
-    click.echo(f"wrote {picture}", err=True)
+    results.echo(f"wrote {picture}", err=True)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # planner and link take long to import, and many commands nee
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.shared_board import SharedBoard
 
-_ANEW = ", started for this command: its arm begins at home; 'armtempo virtual-board' keeps one running"
+_ANEW = ", started for this command, its arm where the last one left it; 'armtempo virtual-board' keeps one running"
 
 
 # arm and job
@@ -210,17 +210,23 @@ def board(
     any_program: bool = False,
     sink: Sink | None = None,
     wait: bool = True,
+    tell: Callable[[str], object] = remark,
 ) -> Board:
     """The board of ``--port``. A virtual board moves ``arm``, and a remark says that it is virtual.
 
-    ``sink`` gets the traffic. ``wait``: wait a few seconds for a port that another program has, see
-    ``connect``.
+    ``sink`` gets the traffic, ``tell`` messages about the connection. ``wait``: wait a few seconds for a port
+    that another program has, see ``connect``.
     """
+    from armtempo.link import Opening, patiently
     from armtempo.robot import connect
 
-    opened: Callable[..., Board] = connect.connect if wait else connect.connect_now
-    log = given.log_traffic
-    found = opened(given.port, arm, log_traffic=log, sink=sink, any_program=any_program, tell=remark)
+    how = Opening(given.log_traffic, sink, any_program, tell=tell)
+    port = connect.chosen(given.port, tell)
+    found = (
+        patiently(lambda: connect.connect_now(port, arm, how))
+        if wait
+        else connect.connect_now(port, arm, how)
+    )
     if found.info.virtual:
         remark(f"port {found.port}: {_virtual_words(found.port)}")
     return found

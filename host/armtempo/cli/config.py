@@ -39,9 +39,9 @@ def config(
         }
         results.show_json({"project": str(project.file) if project.file else None, "settings": values})
         return
-    click.echo(f"project   {project.file or 'none: no armtempo.toml here or above'}")
+    results.echo(f"project   {project.file or 'none: no armtempo.toml here or above'}")
     for name, one in found.items():
-        click.echo(
+        results.echo(
             f"{name:<10}{one.value} ({one.source})" if one else f"{name:<10}{unset.get(name, 'not set')}"
         )
 
@@ -71,7 +71,9 @@ def ports(as_json: bool) -> None:
     width = max([24, *(1 + len(port.device) for port in found)])
     for port in found:
         mark = "a MicroPython board" if port.board else ""
-        click.echo(f"{port.device:<{width}}{port.description:<31} {mark}".rstrip())
+        results.echo(f"{port.device:<{width}}{port.description:<31} {mark}".rstrip())
     if not found:
-        click.echo("no serial ports found; connect a board to USB; if it has no MicroPython: armtempo flash")
-    click.echo(f"{SIM:<{width}}a virtual board, started for one command")
+        results.echo(
+            "no serial ports found; connect a board to USB; if it has no MicroPython: armtempo flash"
+        )
+    results.echo(f"{SIM:<{width}}a virtual board, started for one command")

@@ -23,7 +23,7 @@ _NEXT = """\
 report: {page}
         open it in a browser: {uri}
 next:   armtempo new my_arm            a folder for your own arm and job, step by step
-        armtempo panel --port sim      the arm in a browser (needs armtempo[panel])
+        armtempo panel --port sim      the arm in a browser (needs the extra 'panel')
         armtempo demo --pick-and-place a gripper and a part sensor
         armtempo --help                all commands"""
 
@@ -55,14 +55,14 @@ def demo(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | 
         return
     with ProgressBar("planning") as progress:
         plan = pipeline.plan(Arm.paper(), Job.paper(), progress)
-    click.echo(f"arm: {chosen.describe_arm(plan.arm)}")
+    results.echo(f"arm: {chosen.describe_arm(plan.arm)}")
     for line in pipeline.summary(plan):
-        click.echo(line)
+        results.echo(line)
     with chosen.board(BoardOptions(port, log_traffic), plan.arm) as board:
         run = run_and_tell(board, plan, 1, chosen.runs(out))
     try:
         page = pipeline.report(run)
-        click.echo(_NEXT.format(page=page, uri=page.resolve().as_uri()))
+        results.echo(_NEXT.format(page=page, uri=page.resolve().as_uri()))
     except MissingPackageError as error:
         results.show_error(
             ArmtempoError(error.problem, f"{error.hint}, then: armtempo report {run.path}"), "no report"
@@ -75,9 +75,9 @@ def _pick_and_place() -> None:
     arm = Arm.load(folder / "arm.toml")
     with ProgressBar("planning") as progress:
         plan = armtempo.plan_sequence(arm, Sequence.load(folder / "sequence.toml", arm), progress)
-    click.echo(f"arm: {chosen.describe_arm(arm)}")
+    results.echo(f"arm: {chosen.describe_arm(arm)}")
     for line in sequences.lines(plan):
-        click.echo(line)
+        results.echo(line)
     part = arm.inputs[arm.input("part")]
     lies_there = InjectedFault(
         "input", 0.1, 1, name=part.pin.removeprefix("P"), level=int(part.active == "high")

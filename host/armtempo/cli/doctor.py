@@ -110,11 +110,11 @@ def _print(parts: dict[str, list[Finding]]) -> None:
     width = max(len(item.where) for items in parts.values() for item in items)
     for part, items in parts.items():
         if items:
-            click.echo(part)
+            results.echo(part)
         for item in items:
-            click.echo(f"  {item.level.word:<6}{item.where:<{width}}  {item.what}")
+            results.echo(f"  {item.level.word:<6}{item.where:<{width}}  {item.what}")
             if item.next_step:
-                click.echo(f"  {'':<6}{'':<{width}}  -> {item.next_step}")
+                results.echo(f"  {'':<6}{'':<{width}}  -> {item.next_step}")
 
 
 def examine_board(state: BoardState | ArmtempoError) -> list[Finding]:
@@ -134,8 +134,8 @@ def examine_board(state: BoardState | ArmtempoError) -> list[Finding]:
         found.append(error("stored arm", state.arm_problem, "armtempo configure"))
     if state.fault:
         found.append(error("fault", state.fault, "remove its cause, then 'armtempo clear'"))
-    if state.frames_bad or state.samples_lost:
-        text = f"{state.frames_bad} damaged messages, {state.samples_lost} samples lost"
+    if state.frames_bad:
+        text = f"{state.frames_bad} damaged messages"
         found.append(note("link", text, "if it continues, try another cable or USB socket"))
     return found
 
@@ -192,7 +192,7 @@ def _package(name: str, extra: str) -> Finding:
         if extra:
             advice = f"{installation.command(name, extra)} if you want it"
             return note(name, "not installed", advice)
-        return error(name, "missing", "pip install --force-reinstall armtempo")
+        return error(name, "missing", "install armtempo again, as it was installed")
 
 
 def ports() -> list[Finding]:

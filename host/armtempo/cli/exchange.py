@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from armtempo_shared.limits import MAX_JOINTS
 
-from armtempo.basics import number_table, toml_table
+from armtempo.basics import toml_table
 from armtempo.basics.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results
@@ -25,7 +25,11 @@ from armtempo.new_arm import urdf_reader as reader
 @click.argument("table", type=options.FILE)
 @options.arm
 @click.option("--name", help="Name of the job; default: the table's file name.")
-@click.option("--radians", is_flag=True, help="The angles are in radians.")
+@click.option(
+    "--radians/--degrees",
+    default=None,
+    help="Unit of angles whose column does not name one. Default: degrees, unless that is doubtful.",
+)
 @click.option(
     "--tolerance-deg",
     type=float,
@@ -44,7 +48,7 @@ def import_table(
     table: Path,
     arm_path: Path | None,
     name: str | None,
-    radians: bool,
+    radians: bool | None,
     tolerance_deg: float | None,
     output: Path | None,
     force: bool,
@@ -52,14 +56,15 @@ def import_table(
 ) -> None:
     """Make a job file from the CSV file TABLE: one line per via point, one column per driven joint.
 
-    Columns are separated by commas, semicolons or tabs. A file that 'armtempo export' wrote becomes a job of few via
-    points along the same path.
+    The first line names the columns, in any order: the joints' names or j1, j2, …, with a unit such as (rad); or x, y,
+    z and roll, pitch, yaw for poses. Columns are separated by commas, semicolons, tabs or blanks. A file that
+    'armtempo export' wrote becomes a job of few via points along the same path.
     """
     arm = chosen.load_arm(arm_path)
     title = name or table.stem
     target = output or Path(f"{title}.toml")
     check_not_input(target, (table, arm.source))
-    found = via_table.via_points(number_table.read(table), arm, radians, tolerance_deg)
+    found = via_table.read(table, arm, radians, tolerance_deg)
     text = via_table.job_text(title, found)
     Job.of_table(toml_table.parse(text, str(table)), arm)
     check_replaceable(target, text, force)
@@ -67,21 +72,23 @@ def import_table(
     values = {
         "file": str(target),
         "lines": found.lines,
-        "via_points": len(found.via_deg),
+        "via_points": found.count,
         "thinned_to_deg": found.thinned_to_deg,
+        "notes": list(found.notes),
     }
     results.show(as_json, values, _import_lines(target, found))
 
 
 def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     written = f"written: {target}; plan it with: armtempo plan --job {target}"
+    notes = [f"note: {note}" for note in found.notes]
     if found.thinned_to_deg is None:
-        return [written]
+        return [*notes, written]
     thinned = (
-        f"{found.lines} lines reduced to {len(found.via_deg)} via points: a spline through them follows the table "
-        f"within {found.thinned_to_deg:g} deg; 'armtempo plan' computes new times"
+        f"{found.lines} lines reduced to {len(found.via_deg)} via points: the planned path stays within "
+        f"{found.thinned_to_deg:.2g} deg of the table (proven); 'armtempo plan' computes new times"
     )
-    return [thinned, written]
+    return [*notes, thinned, written]
 
 
 @click.command("export")
@@ -186,6 +193,7 @@ def import_urdf(
         "worst_position_mm": float(fit.position_mm),
         "worst_rotation_deg": float(fit.rotation_deg),
         "radii_mm": [joint.radius_mm for joint in arm.joints],
+        "doubts": list(chain.doubts),
     }
     lines = [
         f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}",
@@ -193,6 +201,9 @@ def import_urdf(
         f"{sum(joint.radius_mm > 0.0 for joint in arm.joints)} of {len(arm.joints)} rows have a radius_mm, from the "
         "links' shapes",
         f"wrote {out}; add the motors, then: armtempo check --arm {out}",
+    ]
+    lines += [
+        f"note: {doubt} A URDF has radians; correct it, or range_deg in {out}" for doubt in chain.doubts
     ]
     if meshes:
         lines.append(f"wrote {len(written)} meshes into {mesh_files.folder_of(out)}")

@@ -70,7 +70,7 @@ def firmware(
         f"{folder}: MicroPython {made.micropython} for {made.machine}, with the program {made.program_crc:08x}"
     )
     if changes.lacks_pins(made.machine):
-        click.echo(f"it cannot drive an arm: {changes.NO_PINS}; {changes.MORE_PINS}", err=True)
+        results.echo(f"it cannot drive an arm: {changes.NO_PINS}; {changes.MORE_PINS}", err=True)
     say(f"next: armtempo flash --image {folder}, then armtempo deploy")
     if as_json:
         results.show_json({"folder": str(folder), **_values(made)})

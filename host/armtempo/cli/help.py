@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 from click.shell_completion import get_completion_class
 
-from armtempo.cli import main
+from armtempo.cli import main, results
 
 TOPICS = {
     "first-hour": "host",
@@ -39,7 +39,7 @@ def show_page(topic: str | None) -> None:
     if topic is None:
         for name in TOPICS:
             title = page(name).partition("\n")[0].lstrip("# ")
-            click.echo(f"{name:18}{title}")
+            results.echo(f"{name:18}{title}")
         return
     click.echo_via_pager(page(topic))
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import click
 
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError
-from armtempo.cli import chosen, gamepad, keys, options, posture
+from armtempo.cli import chosen, gamepad, keys, options, posture, results
 from armtempo.cli.jog_screen import KEYS, SPEEDS, JogScreen
 from armtempo.cli.keys import Keys
 from armtempo.cli.options import BoardOptions
@@ -110,7 +110,7 @@ def pressed_keys(board: Board, with_gamepad: bool) -> Iterator[Keys]:
             yield pressed
             return
         with gamepad.added_to(pressed, len(board.arm.driven)) as both:
-            click.echo(gamepad.HELP)
+            results.echo(gamepad.HELP)
             yield both
 
 
@@ -122,7 +122,7 @@ def screen(
     more_help: str = "",
 ) -> JogScreen:
     """The jog screen, after printing its keys; ``more``: keys of the caller, described by ``more_help``."""
-    click.echo(f"{KEYS}\n{more_help}" if more_help else KEYS)
+    results.echo(f"{KEYS}\n{more_help}" if more_help else KEYS)
     made = JogScreen(board, pressed, more, more_help)
     made.choice.speed = min(range(len(SPEEDS)), key=lambda index: abs(SPEEDS[index] - speed))
     return made

@@ -183,10 +183,10 @@ def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
 
 def _print_text(solver: PoseSolver, found: Iterable[Listing]) -> None:
     if solver.refusals:
-        click.echo(f"no closed form for this arm: {'; '.join(solver.refusals)}")
+        results.echo(f"no closed form for this arm: {'; '.join(solver.refusals)}")
     without = []
     for number, listing in enumerate(found, 1):
-        click.echo("\n".join((f"pose {number}: {listing.text[0]}", *listing.text[1:])))
+        results.echo("\n".join((f"pose {number}: {listing.text[0]}", *listing.text[1:])))
         if not listing.success:
             without.append(number)
     _fail(without)
@@ -242,7 +242,7 @@ def fk(
     if as_json:
         results.show_json(_values(arm, angles_deg))
     else:
-        click.echo("\n".join(_lines(arm, angles_deg)))
+        results.echo("\n".join(_lines(arm, angles_deg)))
 
 
 def _angles(where: tuple[str, ...], arm: Arm) -> Array:

@@ -6,7 +6,6 @@ import time
 from types import TracebackType
 from typing import Self
 
-import click
 import numpy as np
 from armtempo_shared.limits import TICK_HZ
 
@@ -26,7 +25,7 @@ class Live(Watcher):
 
     def __init__(self, window: bool, where: str = "", aside: bool = False) -> None:
         """``where``: text about a virtual board; ``aside``: print to stderr."""
-        self._say = results.remark if aside else click.echo
+        self._say = results.remark if aside else results.echo
         self._window = window
         self._where = f", on {where}" if where else ""
         self._plot: LivePlot | None = None

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from armtempo.basics import json_text
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, results
@@ -112,12 +113,12 @@ def hold(folder: Path, resume: bool) -> Answers:
     """Ask all questions. The text of KeyboardInterrupt says how to continue if answers were kept."""
     draft = draft_path(folder)
     answers = _kept(draft) if resume else {}
-    click.echo("'?' explains a question, '<' goes back to the previous one; Ctrl-C keeps the answers.")
+    results.echo("'?' explains a question, '<' goes back to the previous one; Ctrl-C keeps the answers.")
     try:
         while (question := questions.following(answers)) is not None:
             text = click.prompt(question.text, default=question.default).strip()
             if text == "?":
-                click.echo(question.explanation)
+                results.echo(question.explanation)
             elif text == "<":
                 if answers:
                     answers.popitem()
@@ -125,7 +126,7 @@ def hold(folder: Path, resume: bool) -> Answers:
                 try:
                     question.read(text)
                 except questions.WrongAnswerError as wrong:
-                    click.echo(f"  {wrong}")
+                    results.echo(f"  {wrong}")
                     continue
                 answers[question.key] = text
                 draft.parent.mkdir(parents=True, exist_ok=True)
@@ -142,7 +143,7 @@ def hold(folder: Path, resume: bool) -> Answers:
 def _kept(draft: Path) -> Answers:
     """The valid answers of a draft; raises InputError if there are none."""
     try:
-        found = json.loads(draft.read_text(encoding="utf-8"))
+        found = json_text.loads(draft.read_text(encoding="utf-8"))
         given = {str(key): str(value) for key, value in found.items()}
     except (OSError, ValueError, AttributeError):
         raise InputError(f"{draft}: no kept answers", "leave out --resume") from None

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import secrets
 from contextlib import ExitStack
+from ipaddress import ip_address
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
 
@@ -24,7 +26,7 @@ _LOOPBACK = "127.0.0.1"
     "--host",
     default=_LOOPBACK,
     show_default=True,
-    help="Address to listen on; any other than the default requires the printed token.",
+    help="Address to listen on; 0.0.0.0: on all of this machine's.",
 )
 @click.option(
     "--web-port",
@@ -41,12 +43,13 @@ def panel(
     """Open the panel in a browser: see, move, teach, run and watch the arm.
 
     Ctrl-C ends the panel and brakes a motion. Closing a page while a button is held stops the arm. One page
-    controls the arm, others watch; Stop works on all.
+    controls the arm, others watch; Stop works on all. The printed addresses hold a token, without which nobody
+    is served.
     """
     try:
-        from armtempo.panel.desk import Desk
+        from armtempo.panel.job_editor import JobEditor
         from armtempo.panel.operator import Operator
-        from armtempo.panel.server import Panel, listen
+        from armtempo.panel.server import Panel, listen, reachable, url
     except ModuleNotFoundError as error:
         raise MissingPackageError("the panel", str(error.name), "panel") from None
     from armtempo.simulator import LaunchOptions, launch
@@ -54,26 +57,38 @@ def panel(
     arm = chosen.arm_or_paper(arm_path)
     job = chosen.job_file(job_path)
     name = chosen.port(port)
-    token = "" if host == _LOOPBACK else secrets.token_urlsafe(16)
+    token = secrets.token_urlsafe(16)
     with ExitStack() as stack:
         listening = stack.enter_context(listen(host, web_port))
         if is_sim(name):  # real time, as on a board
             wanted = LaunchOptions(sim_flash(name), virtual_time=False, arm=arm)
             name = stack.enter_context(launch(wanted)).port
         operator = Operator(
-            lambda sink: chosen.board(BoardOptions(name), arm, sink=sink),
+            lambda sink, tell: chosen.board(BoardOptions(name), arm, sink=sink, tell=tell),
             name,
-            Desk(arm, Path(), job),
+            JobEditor(arm, Path(), job),
             chosen.runs(None),
         )
         stack.callback(operator.close)
-        address = f"http://{host}:{listening.getsockname()[1]}/" + (f"?token={token}" if token else "")
-        click.echo(address)
-        if token:
-            _qr_code(address)
+        bound, web_port = listening.getsockname()[:2]
+        addresses = [url(address, web_port, token) for address in reachable(bound)]
+        for address in addresses:
+            click.echo(address)
+        if not ip_address(bound).is_loopback:
+            _qr_code(addresses[0])
         if show:
-            click.launch(address)
+            click.launch(str(_way_in(stack, addresses[-1])))
         Panel(operator).serve(listening, token)
+
+
+def _way_in(stack: ExitStack, address: str) -> Path:
+    """A file of this user's alone that leads to the address: the arguments of a browser can be read by everybody."""
+    folder = stack.enter_context(TemporaryDirectory(prefix="armtempo-", ignore_cleanup_errors=True))
+    file = Path(folder) / "panel.html"
+    file.write_text(
+        f'<!DOCTYPE html><meta http-equiv="refresh" content="0; url={address}">', encoding="utf-8"
+    )
+    return file
 
 
 def _qr_code(address: str) -> None:

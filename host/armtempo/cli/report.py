@@ -13,8 +13,8 @@ from armtempo.basics.atomic_file import check_replaceable
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.cli import options, results
 from armtempo.report import evaluation, sequence_report, verdict
+from armtempo.report.run import Run
 from armtempo.report.sequence_reader import SequenceRun, is_sequence_run
-from armtempo.robot.run import Run
 
 
 @click.command("report")

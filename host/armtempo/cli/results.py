@@ -18,11 +18,13 @@ from typing import Any, Self
 import click
 
 from armtempo.basics.errors import ArmtempoError
-from armtempo.basics.text import visible
+from armtempo.basics.text import visible, wrapped
 
 _DOCUMENT = "armtempo.document"
 """Key of click's context: a JSON document was printed."""
 _PATIENCE_S = 1.0
+_LEAST_COLUMNS = 40
+"""Lines are not wrapped to less, however narrow the terminal: indented text would become a word a line."""
 _BAR_COLUMNS = 24
 """Width of frame, percentage and remaining time; the note is cut so that no line wraps."""
 
@@ -33,7 +35,22 @@ def show(as_json: bool, values: Any, lines: Iterable[str]) -> None:
         show_json(values)
         return
     for line in lines:
-        click.echo(line)
+        echo(line)
+
+
+def echo(text: str = "", err: bool = False) -> None:
+    """Print text on stdout (``err``: stderr), wrapped to the terminal's width; to 80 columns if there is none.
+
+    Not for what programs read.
+    """
+    click.echo(fitted(text), err=err)
+
+
+def fitted(text: str, before: str = "") -> str:
+    """The text, wrapped to be printed behind ``before``."""
+    width = max(shutil.get_terminal_size().columns, _LEAST_COLUMNS)
+    lines = [part for line in f"{before}{text}".split("\n") for part in wrapped(line, width)]
+    return "\n".join(lines)[len(before) :]
 
 
 def show_json(values: Any) -> None:
@@ -51,9 +68,9 @@ def show_error(error: ArmtempoError, who: str = "armtempo", as_json: bool = Fals
     if as_json and _DOCUMENT not in click.get_current_context().meta:
         click.echo(json.dumps({"error": error.problem, "hint": error.hint, "exit_code": error.exit_code}))
         return
-    click.echo(f"{who}: {visible(error.problem)}", err=True)
+    echo(f"{who}: {visible(error.problem)}", err=True)
     if error.hint:
-        click.echo(f"hint: {visible(error.hint)}", err=True)
+        echo(f"hint: {visible(error.hint)}", err=True)
 
 
 def is_quiet() -> bool:
@@ -65,12 +82,12 @@ def is_quiet() -> bool:
 def remark(text: str) -> None:
     """Print a remark on stderr, unless ``armtempo --quiet``."""
     if not is_quiet():
-        click.echo(text, err=True)
+        echo(text, err=True)
 
 
 def teller(as_json: bool) -> Callable[[str], None]:
     """The function that prints progress: to stdout, or to stderr if stdout is for the document."""
-    return remark if as_json else click.echo
+    return remark if as_json else echo
 
 
 class ProgressBar:

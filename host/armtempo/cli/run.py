@@ -14,8 +14,8 @@ from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import is_sequence_plan
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report import text_summary
+from armtempo.report.run import Run
 from armtempo.robot.board import Board
-from armtempo.robot.run import Run
 
 
 @click.command("run")

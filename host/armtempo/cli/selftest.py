@@ -61,7 +61,7 @@ def _with_motors(given: BoardOptions) -> SelfTest:
         return board.motor_test(
             chosen.arm_of_board(board, arm),
             ask=lambda question: click.confirm(question, err=True),
-            tell=lambda what: click.echo(what, err=True),
+            tell=lambda what: results.echo(what, err=True),
         )
 
 

@@ -29,7 +29,7 @@ def status(given: BoardOptions) -> None:
         results.show_json(found.to_json())
         return
     for line in lines(found):
-        click.echo(line)
+        results.echo(line)
 
 
 def _named(found: BoardState, arm_path: Path | None) -> BoardState:
@@ -120,9 +120,9 @@ def tool_words(tool: ToolPlace) -> str:
 
 
 def _link(state: BoardState) -> str:
-    if not state.frames_bad and not state.samples_lost:
-        return "OK: no damaged messages, no lost samples"
-    return f"{state.frames_bad} damaged messages, {state.samples_lost} lost samples: check cable and plugs"
+    bad, unread = state.frames_bad, state.samples_lost
+    found = f"{bad} damaged messages: check cable and plugs" if bad else "OK: no damaged messages"
+    return f"{found}; {unread} samples were not read in time" if unread else found
 
 
 def _arm(state: BoardState) -> str:

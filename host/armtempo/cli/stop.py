@@ -78,7 +78,11 @@ def _rest(shared: SharedBoard) -> BoardState | None:
 
 def _directly(given: BoardOptions, now: bool) -> BoardState:
     """Stop over the port itself."""
-    with chosen.board(given, any_program=True, wait=False) as board:
+    from armtempo.link import Opening
+    from armtempo.robot import connect
+
+    how = Opening(given.log_traffic, any_program=True, take_moving=True, tell=results.remark)
+    with connect.connect_now(given.port or "", None, how) as board:
         board.stop(now)
         return board.state()
 
@@ -88,7 +92,7 @@ def _show(found: BoardState, as_json: bool) -> None:
         results.show_json(found.to_json())
         return
     for line in state.motion_lines(_with_degrees(found)):
-        click.echo(line)
+        results.echo(line)
 
 
 def _with_degrees(found: BoardState) -> BoardState:

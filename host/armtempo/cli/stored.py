@@ -68,11 +68,11 @@ def list_motions(given: BoardOptions) -> None:
             return
         arm = _arm_of(board, given.arm_path)
         virtual = "  on a virtual board" if board.info.virtual else ""
-        click.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum{virtual}")
+        results.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum{virtual}")
         for entry in found:
-            click.echo(_row(entry))
+            results.echo(_row(entry))
             for line in _ends(board, entry, arm):
-                click.echo(f"    {line}")
+                results.echo(f"    {line}")
 
 
 def _listed(entry: StoredMotion) -> dict[str, Any]:

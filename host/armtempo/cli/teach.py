@@ -11,7 +11,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.basics.settings import ARM, ProjectSettings, nothing_set
-from armtempo.cli import chosen, jog, keys, options
+from armtempo.cli import chosen, jog, keys, options, results
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
 from armtempo.model import posture, shipped, taught
@@ -95,7 +95,7 @@ def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> No
     words = ", ".join(
         f"{joint.name} {angle:.12g}°" for joint, angle in zip(arm.driven, angles_deg, strict=True)
     )
-    click.echo(f"{file}: posture {name!r}: {words}")
+    results.echo(f"{file}: posture {name!r}: {words}")
 
 
 def _write_job(board: Board, file: Path, by_hand: bool, gamepad: bool) -> None:
@@ -120,14 +120,14 @@ _MORE = "  p            take a point                   u       forget the last o
 
 def _guide(board: Board, pressed: Keys, points: TaughtPoints) -> None:
     guided = board.by_hand()
-    click.echo(
+    results.echo(
         "hold the arm: it sinks when the motors' current goes off. Enter: off; any other key: leave it on"
     )
     if pressed.read(600.0) not in ("\r", "\n"):
         raise InputError("the motors kept their current", "run it again while someone holds the arm")
     points.where = guided.angles_deg
     with guided:
-        click.echo(
+        results.echo(
             "the current is off. p or the board's button takes a point, u removes the last, q gives the current back "
             "and ends"
         )
@@ -172,7 +172,7 @@ class TaughtPoints:
         """Write the job; raises InputError for fewer than two points."""
         text = taught.of_points(taught.name_of(file), self.points_deg)
         replace_text(file, text)
-        click.echo(
+        results.echo(
             f"written: {file}, {len(self.points_deg)} via points; 'armtempo plan --job {file}' plans it"
         )
 
@@ -205,13 +205,13 @@ def by_hand(keys: Keys, points: TaughtPoints, button: Callable[[], bool] = lambd
         if key in ("q", "Q", END):
             break
         if key == INTERRUPT:
-            click.echo()
+            results.echo()
             raise KeyboardInterrupt
         if key in points.keys:
             said = points.keys[key]()
         if button():
             said = points.take()
-    click.echo()
+    results.echo()
 
 
 def _row(point: list[float]) -> str:

@@ -46,7 +46,7 @@ def _show_messages(messages: Iterator[dict[str, Any]], as_json: bool) -> None:
         if as_json:
             results.show_json(message)
         else:
-            click.echo(_message_line(message))
+            results.echo(_message_line(message))
 
 
 def _message_line(message: dict[str, Any]) -> str:
@@ -114,7 +114,7 @@ def _show_chunk(say: Say, chunk: Chunk, words: list[str]) -> None:
 
 def _print(time_s: float, direction: str, words: list[str]) -> None:
     for line in words:
-        click.echo(f"{time_s:10.4f} {direction} {line}")
+        results.echo(f"{time_s:10.4f} {direction} {line}")
 
 
 def _print_json(time_s: float, direction: str, words: list[str]) -> None:

@@ -59,7 +59,7 @@ def _print(
             f"arm {chosen.describe_arm(arm)} has no {kind}s: write [{kind}.NAME] tables in its file"
         )
     for line in lines:
-        click.echo(line)
+        results.echo(line)
 
 
 def _output_values(output: Output, raw: int) -> dict[str, Any]:

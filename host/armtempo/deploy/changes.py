@@ -147,9 +147,11 @@ def _check_sectors(found: Survey) -> None:
 def owns_sectors(found: Survey) -> bool:
     """Whether the program, or what an interruption left of it, is in the chip's last two sectors.
 
-    Else what they hold is not touched. The magic number is written first; while they are erased there is a file.
+    Else what they hold is not touched. The magic number is written first; while they are erased there is a file; and
+    the one that finds modules in them says so where the magic number is damaged.
     """
-    return found.sectors is not None and (found.sectors.is_ours() or program_files.ERASING in found.files)
+    signs = {program_files.ERASING, program_files.LOADER}
+    return found.sectors is not None and (found.sectors.is_ours() or not signs.isdisjoint(found.files))
 
 
 def difference(found: Survey, program: Wanted) -> Change:

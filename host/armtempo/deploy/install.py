@@ -30,7 +30,7 @@ from armtempo.deploy.changes import (
     owns_sectors,
 )
 from armtempo.deploy.remote import RECOVERY, Remote, Survey, each, rename
-from armtempo.link import open_board, patiently
+from armtempo.link import Opening, open_board, patiently
 from armtempo.link.board_messages import Hello
 from armtempo.ports.names import is_sim
 
@@ -158,7 +158,9 @@ def end_program(port: str, tell: Tell) -> bool:
         )
     with ExitStack() as stack:
         try:
-            board = patiently(lambda: stack.enter_context(open_board(port, any_program=True)))
+            board = patiently(
+                lambda: stack.enter_context(open_board(port, Opening(any_program=True, tell=tell)))
+            )
         except PortError:
             raise
         except NoProgramError:
@@ -166,7 +168,6 @@ def end_program(port: str, tell: Tell) -> bool:
         except LinkError:
             tell("no armtempo program answers; mpremote tries to interrupt what runs there")
             return False
-        board.session.tell = tell
         if board.status().moving:
             raise LinkError(
                 "the board is moving",
@@ -256,7 +257,7 @@ def _await_port(port: str) -> None:
     while True:
         time.sleep(_LOOK_S)
         try:
-            with open_board(port, any_program=True):
+            with open_board(port, Opening(any_program=True)):
                 return
         except (PortError, InputError):
             if time.monotonic() - begin > _START_S:

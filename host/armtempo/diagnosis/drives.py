@@ -6,8 +6,9 @@ from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.basics.errors import ArmtempoError
 from armtempo.diagnosis.finding import Finding, error, note, warning
+from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
-from armtempo.model.parts import DrivenJoint, Driver
+from armtempo.model.parts import DrivenJoint, Driver, Joint
 from armtempo.planning.checks import ESTIMATED, rate_words
 from armtempo.records import encode
 
@@ -19,8 +20,6 @@ _FEWEST_STEPS = 10
 _SLOW_STEPS_S = 10.0
 _SUDDEN_S = 0.01
 """An acceleration limit that allows full speed in less time is probably wrong."""
-_FASTEST_COUNTS_S = 1e6
-"""Largest rate: fewer than 32 768 counts between two readings (board/docs/hardware.md)."""
 
 
 def top_rate_steps_s(joint: DrivenJoint) -> float:
@@ -35,7 +34,8 @@ def motor_rpm(joint: DrivenJoint) -> float:
 
 def findings(arm: Arm) -> list[Finding]:
     """Findings about the drives of all driven joints, and about their sum."""
-    found = [finding for joint in arm.driven for finding in _of(joint, arm.driver)]
+    found = [finding for joint in arm.driven for finding in _of(joint)]
+    found += [finding for joint in arm.joints for finding in _exceeded(joint, arm.driver)]
     rates = sum(top_rate_steps_s(joint) for joint in arm.driven)
     if rates > MAX_STEP_RATE_SUM:
         found.append(
@@ -57,8 +57,21 @@ def record_findings(arm: Arm) -> list[Finding]:
     return []
 
 
-def _of(joint: DrivenJoint, driver: Driver) -> list[Finding]:
-    return [*_motor(joint), *_rates(joint, driver), *_range(joint)]
+def _of(joint: DrivenJoint) -> list[Finding]:
+    return [*_motor(joint), *_rates(joint), *_range(joint)]
+
+
+def _exceeded(joint: Joint, driver: Driver) -> list[Finding]:
+    """Limits beyond what the driver or the encoder allows."""
+    return [
+        warning(
+            joint.name,
+            f"{bound.key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: motions keep to "
+            f"{bound.value:.4g}",
+            f"lower {bound.key} to that, or use fewer microsteps",
+        )
+        for bound in drive_limits.exceeded(joint, driver)
+    ]
 
 
 def _motor(joint: DrivenJoint) -> list[Finding]:
@@ -82,7 +95,7 @@ def _motor(joint: DrivenJoint) -> list[Finding]:
     return found
 
 
-def _rates(joint: DrivenJoint, driver: Driver) -> list[Finding]:
+def _rates(joint: DrivenJoint) -> list[Finding]:
     rate, speed = top_rate_steps_s(joint), joint.limits.speed_deg_s
     at_limit = f"at its speed limit of {speed:g} deg/s"
     rpm = motor_rpm(joint)
@@ -91,11 +104,6 @@ def _rates(joint: DrivenJoint, driver: Driver) -> list[Finding]:
         text = f"{at_limit} it needs {rate:.0f} steps/s, the board makes at most {MAX_STEP_RATE} {ESTIMATED}"
         found.append(
             error(joint.name, text, "lower speed_deg_s or use fewer microsteps; check the gear ratio")
-        )
-    elif rate * (driver.pulse_us + driver.low_us) > 1e6:
-        text = f"{at_limit} a step comes every {1e6 / rate:.3g} us, its pulse takes {driver.pulse_us + driver.low_us:g}"
-        found.append(
-            error(joint.name, text, "lower speed_deg_s, or pulse_us and low_us as far as the driver allows")
         )
     if rate < _SLOW_STEPS_S:
         text = f"{at_limit} the motor makes only {rate:.2g} steps/s"
@@ -138,11 +146,6 @@ def _encoder(joint: DrivenJoint) -> list[Finding]:
     assert joint.encoder is not None
     limit_deg, count_deg = joint.encoder.following_error_deg, 1.0 / joint.counts_per_deg
     found = []
-    if joint.limits.speed_deg_s / count_deg > _FASTEST_COUNTS_S:
-        text = f"at its speed limit the encoder gives {joint.limits.speed_deg_s / count_deg:.3g} counts/s"
-        found.append(
-            warning(joint.name, text, "lower speed_deg_s: above a million counts/s they may be miscounted")
-        )
     if limit_deg == 0.0:
         text = "its encoder is recorded, but following_error_deg = 0 lets nobody watch it"
         found.append(

@@ -23,8 +23,8 @@ COARSE_MM = 0.5
 
 _POSTURES, _SEED = 500, 1
 _STEP_RAD = 1e-5
-_HEAD = ("joint", "steps/deg", "step deg", "step at tool mm", "top steps/s", "motor rpm", "torque margin")
-_WIDTHS = (5, 11, 12, 17, 13, 11, 15)
+_HEAD = ("joint", "steps/deg", "deg/step", "tool mm/step", "top steps/s", "motor rpm", "torque")
+_WIDTHS = (5, 11, 10, 14, 13, 11, 9)
 
 
 @dataclass(frozen=True)
@@ -159,5 +159,5 @@ def _row(joint: JointFigures) -> tuple[str, ...]:
         f"{joint.step_at_tool_mm:.3g}",
         f"{joint.top_steps_s:.0f}",
         f"{joint.motor_rpm:.4g}",
-        "not known" if joint.torque_margin is None else f"{joint.torque_margin:.3g} x",
+        "unknown" if joint.torque_margin is None else f"{joint.torque_margin:.3g} x",
     )

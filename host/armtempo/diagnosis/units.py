@@ -15,6 +15,8 @@ _SHORT_MM, _TINY_MM = 2.0, 0.02
 _NARROW_DEG = (0.1, 2 * math.pi)
 """A range, and an end of one, that may be in radians."""
 _NEAR_RAD = 0.002
+_TURNS_DEG = 720.0
+"""No joint of a small arm turns further, as its cables would not."""
 _TWISTS = [math.pi * part / 12 for part in range(1, 25)]
 
 
@@ -63,6 +65,13 @@ def _twists(arm: Arm) -> Iterator[Finding]:
 def _ranges(arm: Arm) -> Iterator[Finding]:
     for joint in arm.joints:
         low, high = joint.range_deg
+        if max(abs(low), abs(high)) > _TURNS_DEG:
+            right = f"[{math.radians(low):.4g}, {math.radians(high):.4g}]"
+            yield warning(
+                joint.name,
+                f"range_deg = [{low:g}, {high:g}]: more than two turns; were degrees taken as radians?",
+                f"if so, write range_deg = {right}",
+            )
         least, most = _NARROW_DEG
         if high - low > least and max(abs(low), abs(high)) <= most + _NEAR_RAD and _is_fraction(joint):
             right = f"[{math.degrees(low):.4g}, {math.degrees(high):.4g}]"

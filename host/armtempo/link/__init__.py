@@ -4,6 +4,6 @@
 """
 
 from armtempo.link.client import Client
-from armtempo.link.connect import greet, open_board, patiently
+from armtempo.link.connect import Opening, greet, open_board, patiently
 
-__all__ = ["Client", "greet", "open_board", "patiently"]
+__all__ = ["Client", "Opening", "greet", "open_board", "patiently"]

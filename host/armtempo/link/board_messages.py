@@ -38,6 +38,8 @@ class Hello:
     arm_problem: int
     """Error code of the stored arm record; 0 if it is used or there is none."""
     arm_value: int
+    once_bytes: int
+    """Bytes of the largest record that is run once from the board's memory, without being stored."""
     board_id: str
 
     def can(self, feature: str) -> bool:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armtempo_shared import limits, wire
-from armtempo_shared.messages import MAX_PAYLOAD, PERMILLE, START_HELD
+from armtempo_shared.messages import MAX_COMMAND, MAX_PAYLOAD, PERMILLE, START_HELD
 
-from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.errors import BoardError, InputError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.basics.progress import Progress
 from armtempo.link import board_messages
 from armtempo.link.refusal import refusal
@@ -20,7 +20,7 @@ FLASH_TIMEOUT_S = 30.0
 HELLO_TIMEOUT_S = 1.2
 """Time-out of ``hello``; together with the diagnosis of a port without a board it stays under 2 s."""
 SMALLEST_PIECE = 16
-LARGEST_PIECE = MAX_PAYLOAD - 4
+LARGEST_PIECE = MAX_COMMAND - 4
 PIECE_TIMEOUT_S = 0.5
 
 _CTRL_C = 3
@@ -73,7 +73,6 @@ class Client:
         self._info: board_messages.Hello | None = None
         self.rate = PERMILLE
         """Speed at which motions are started, in thousandths of the planned one."""
-        session.greet = self._greet_again
 
     @property
     def info(self) -> board_messages.Hello:
@@ -93,6 +92,7 @@ class Client:
         fields = [*values, board_id]
         fields[3] = board_messages.state_name(values[3])
         self._info = board_messages.Hello(*fields)
+        self.session.greeted(self._greet_again)
         return self._info
 
     def need(self, feature: str, what: str) -> None:
@@ -127,22 +127,42 @@ class Client:
         """Store a record under a name; the board keeps the old one until the new one is complete."""
         crc = wire.record_crc(data)
         self.session.command("put_begin", (len(data), crc), name, silence_timeout_s=FLASH_TIMEOUT_S)
-        offset = 0
-        while offset < len(data):
-            offset = self._put_piece(data, offset)
-            if progress is not None:
-                progress(offset, len(data))
+        self._put("put_data", data, (), progress)
         self.session.command(
             "put_commit", (crc,), silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
         )
 
-    def _put_piece(self, data: bytes, offset: int) -> int:
+    def put_once(self, data: bytes) -> int:
+        """Put the record of a motion that is run once into the board's memory: nothing is stored.
+
+        It is started as ``ONCE_NAME``, with the checksum that this returns, and replaced by the next one. Raises
+        InputError if it is larger than ``info.once_bytes``.
+        """
+        if len(data) > self.info.once_bytes:
+            raise InputError(
+                f"the move takes {len(data)} bytes; the board keeps {self.info.once_bytes} of one that is not stored",
+                "make it shorter, or plan it as a job and store it",
+            )
+        self._put("put_once", data, (len(data),))
+        return wire.record_crc(data)
+
+    def _put(
+        self, command: str, data: bytes, more: tuple[int, ...], progress: Progress | None = None
+    ) -> None:
+        """Send a record in pieces; ``more``: values of each beside its offset."""
+        offset = 0
+        while offset < len(data):
+            offset = self._put_piece(command, data, offset, more)
+            if progress is not None:
+                progress(offset, len(data))
+
+    def _put_piece(self, command: str, data: bytes, offset: int, more: tuple[int, ...]) -> int:
         """Send the next piece; its size is halved after a loss, and doubled again after a success."""
         repeats = self.session.repeats
         try:
             values, _ = self.session.command(
-                "put_data",
-                (offset,),
+                command,
+                (offset, *more),
                 data[offset : offset + self._piece],
                 answer_timeout_s=self._piece_timeout_s(),
             )
@@ -239,8 +259,10 @@ class Client:
         self.session.command("home", (mask,), tail)
 
     def start(self, name: str, crc: int, flags: int = 0) -> Started:
-        """Start a stored motion at ``rate``; ``crc`` is the record's own checksum, ``flags`` of START_HOMING and
-        START_HELD."""
+        """Start a motion at ``rate``, stored or put by ``put_once``.
+
+        ``crc`` is the record's own checksum, ``flags`` of START_HOMING and START_HELD.
+        """
         if flags & START_HELD:
             self.need("jog", "moving by hand")
         if self.rate != PERMILLE:

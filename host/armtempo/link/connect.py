@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -22,7 +23,7 @@ from armtempo.basics.errors import (
 )
 from armtempo.link import traffic
 from armtempo.link.client import Client
-from armtempo.link.program_version import UPDATE, own_crc
+from armtempo.link.program_version import IN_LIBRARY, UPDATE, own_crc
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport, Transport
 from armtempo.model.arm import Arm
@@ -45,6 +46,11 @@ _NUDGE = b"\r\x02\r" + _ECHO + b"\r"
 """Ends a line, leaves a raw REPL, and writes a comment, which a prompt echoes even in an unfinished line; the
 board program ignores these bytes."""
 _ASK = b"print('armtempo','is','here')if'armtempo'in open('/flash/main.py').read()else 0\r"
+_ASK_PARTS = (
+    "import os;print('armtempo','in','parts')if[n for n in os.listdir('/flash/lib')if n in"
+    f"{IN_LIBRARY!r}]else 0\r"
+).encode()
+_IN_PARTS = b"armtempo in parts"
 _HERE = b"armtempo is here"
 """The prompt's answer if the program is in the flash; differs from the echo of the question."""
 
@@ -64,32 +70,41 @@ def patiently(attempt: Callable[[], _Found]) -> _Found:
             time.sleep(_LOOK_S)
 
 
+@dataclass(frozen=True)
+class Opening:
+    """How to open a board's port."""
+
+    log_traffic: Path | None = None
+    """File for the traffic log."""
+    sink: traffic.Sink | None = None
+    """Called with the traffic too."""
+    any_program: bool = False
+    """Accept a board whose program differs from the installed one."""
+    take_moving: bool = False
+    """Take the port over from a program that hangs even while the board moves: for a stop."""
+    start_deg: Sequence[float] | None = None
+    """Where the arm of a virtual board stands, degrees (J,); None: at home."""
+    tell: Callable[[str], object] = lambda text: None
+    """Called with messages about the connection."""
+
+
 @contextmanager
-def open_board(
-    port: str,
-    log_traffic: Path | None = None,
-    sink: traffic.Sink | None = None,
-    arm: Arm | None = None,
-    any_program: bool = False,
-    tell: Callable[[str], object] = lambda text: None,
-) -> Iterator[Client]:
+def open_board(port: str, how: Opening = Opening(), arm: Arm | None = None) -> Iterator[Client]:
     """Open the board on ``port``; a sim port starts a virtual board that lives as long as the context.
 
-    ``log_traffic``: file for the traffic log; ``sink`` is called with the traffic too; ``arm``: moved by a
-    virtual board's motors; ``any_program``: accept a board whose program differs from the installed one;
-    ``tell`` is called with a message if the port is taken over. Raises InputError if there is no such port,
-    PortInUseError if another program has it (see ``patiently``), LinkError if the board does not answer or
-    runs another program. The port is taken over from a program that hangs.
+    ``arm``: moved by a virtual board's motors. Raises InputError if there is no such port, PortInUseError if
+    another program has it (see ``patiently``), LinkError if the board does not answer or runs another program.
+    The port is taken over from a program that hangs.
     """
-    hanging = _check_owner(port, tell)
+    hanging = _check_owner(port, how.tell)
     with ExitStack() as stack:
         if hanging is not None:
             device = hanging.device
         else:
-            device = stack.enter_context(_virtual_port(port, arm)) if names.is_sim(port) else port
-        sinks = [] if sink is None else [sink]
-        if log_traffic is not None:
-            sinks.append(stack.enter_context(traffic.LogFile(log_traffic)))
+            device = stack.enter_context(_virtual_port(port, arm, how)) if names.is_sim(port) else port
+        sinks = [] if how.sink is None else [how.sink]
+        if how.log_traffic is not None:
+            sinks.append(stack.enter_context(traffic.LogFile(how.log_traffic)))
 
         def open_transport() -> Transport:
             transport: Transport = SerialTransport(device, exclusive=hanging is None)
@@ -97,12 +112,14 @@ def open_board(
                 transport = traffic.LoggedTransport(transport, taken_by)
             return transport
 
-        board = _greeted(stack, open_transport())
-        board.session.open_transport = open_transport
-        if not any_program:
+        transport = stack.enter_context(closing(open_transport()))
+        session = Session(transport, reopen=open_transport, comes_back=not names.is_sim(port), tell=how.tell)
+        stack.callback(lambda: session.transport.close())
+        board = greet(session)
+        if hanging is not None:
+            _take_over(hanging, board, how)
+        if not how.any_program:
             _check_program(board)
-        if not names.is_sim(port):  # a virtual board does not come back
-            board.session.reopen = open_transport
         yield board
 
 
@@ -126,16 +143,17 @@ def _check_owner(port: str, tell: Callable[[str], object]) -> PortClaim | None:
         raise PortError(
             f"{claim.who} has port {port} and does not answer", "end that process, then try again"
         )
-    tell(f"{claim.who} has port {port} and does not answer; taking the port over")
     return claim
 
 
-def _greeted(stack: ExitStack, transport: Transport) -> Client:
-    """The board at a transport; the transport in use at the end is closed by the stack."""
-    first = stack.enter_context(closing(transport))
-    board = greet(first)
-    stack.callback(lambda: board.session.transport.close())
-    return board
+def _take_over(hanging: PortClaim, board: Client, how: Opening) -> None:
+    """Say that the port is taken over; raises PortInUseError while the board moves, unless that does not matter."""
+    if board.status().moving and not how.take_moving:
+        raise PortInUseError(
+            f"{hanging.who} has port {hanging.port} and does not answer, and the arm moves",
+            f"stop it with 'armtempo stop'; to go on without that program, end process {hanging.pid} first",
+        )
+    how.tell(f"{hanging.who} has port {hanging.port} and does not answer; taking the port over")
 
 
 def _check_program(board: Client) -> None:
@@ -149,28 +167,26 @@ def _check_program(board: Client) -> None:
         )
 
 
-def greet(
-    transport: Transport, session_number: int | None = None, clock: Callable[[], float] = time.monotonic
-) -> Client:
+def greet(session: Session, session_number: int | None = None) -> Client:
     """Exchange ``hello``; raises LinkError with a diagnosis if no board answers."""
-    board = Client(Session(transport, clock), session_number)
+    board = Client(session, session_number)
     for _ in range(_NOISY_TRIES):
         try:
             board.hello()
             return board
         except NoAnswerError:
-            reason = explain(transport, bytes(board.session.recent))
+            reason = explain(session.transport, bytes(session.recent))
             if not isinstance(reason, DisturbedError):
                 break
     raise reason
 
 
 @contextmanager
-def _virtual_port(port: str, arm: Arm | None) -> Iterator[str]:
+def _virtual_port(port: str, arm: Arm | None, how: Opening) -> Iterator[str]:
     """A virtual board's port; if its program fails, link errors end with the last line of its log."""
     from armtempo.simulator import LaunchOptions, launch
 
-    with launch(LaunchOptions(names.sim_flash(port), arm=arm)) as board:
+    with launch(LaunchOptions(names.sim_flash(port), arm=arm, start_deg=how.start_deg)) as board:
         try:
             yield board.port
         except LinkError as error:
@@ -195,6 +211,12 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
                 f"{where} runs MicroPython but not the armtempo program, which is on it: mpremote or an IDE ended it",
                 f"press the board's reset button, or: mpremote connect {transport.name} reset; if it does "
                 "not start then: armtempo deploy",
+            )
+        transport.write(_ASK_PARTS)
+        if _IN_PARTS in _listen(transport):
+            return NoProgramError(
+                f"{where} runs MicroPython but not the armtempo program: its deployment was interrupted",
+                "'armtempo deploy' completes it",
             )
         return NoProgramError(
             f"{where} runs MicroPython but not the armtempo program",

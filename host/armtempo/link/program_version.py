@@ -9,6 +9,8 @@ from pathlib import Path
 from armtempo_shared.program_hash import sources_crc
 
 PACKAGES = ("armtempo_board", "armtempo_shared")
+IN_LIBRARY = (*PACKAGES, "armtempo_sectors.mpy", "armtempo_erasing")
+"""What a deployment writes to the board's /flash/lib, and removes; whatever else is there belongs to somebody else."""
 UPDATE = "'armtempo flash' if the program is in the board's firmware, else 'armtempo deploy'"
 """What to do about another version."""
 

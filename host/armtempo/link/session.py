@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from armtempo_shared import wire
@@ -44,40 +45,85 @@ Answer = tuple[tuple[Any, ...], Any]
 """Field values (int) and tail (bytes or str) of an answer."""
 
 
-class Session:
-    """The host's end of the protocol; ``clock`` gives seconds and is replaced in tests.
+@dataclass(frozen=True, eq=False)
+class OnLoss:
+    """What to do if the port breaks, for ``Session.on_loss``."""
 
-    If the port breaks, ``reopen`` (if set) is called until it returns a transport on which ``greet`` finds the
-    same board. Then the command in progress is sent again; ``follow`` requests lost samples. The greeting
-    makes the board forget its last answer: if that answer was lost, the board executes the command twice and
-    may refuse it the second time.
+    retry_s: float = RECONNECT_S
+    """How long opening it is retried; 0: the error is raised at once."""
+    stopping: Callable[[], bool] = lambda: False
+    """Whether a stop is wanted: then it is retried only for STOPPING_RECONNECT_S, and the error says that no
+    stop was sent."""
+
+
+class Session:
+    """The host's end of the protocol.
+
+    ``clock`` gives seconds and ``sleep`` lets them pass; both are replaced in tests. ``reopen`` opens the port
+    again after it was closed; ``comes_back``: whether a port that breaks is waited for; ``tell`` is called with
+    messages for the user while other calls wait.
+
+    If the port breaks, ``reopen`` is called until it returns a transport on which the board that was greeted
+    answers (``greeted``). Then the command in progress is sent again; ``follow`` requests lost samples. The
+    greeting makes the board forget its last answer: if that answer was lost, the board executes the command
+    twice and may refuse it the second time.
     """
 
-    def __init__(self, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        reopen: Callable[[], Transport] | None = None,
+        comes_back: bool = True,
+        tell: Callable[[str], object] = lambda text: None,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> None:
         self.transport = transport
         self.clock = clock
-        self.open_transport: Callable[[], Transport] = lambda: transport
-        """Opens the session's port again after it was closed."""
-        self.reopen: Callable[[], Transport] | None = None
-        self.greet: Callable[[], None] = lambda: None
-        """Exchanges ``hello``; raises OtherBoardError if another board answers, or it has restarted."""
-        self.tell: Callable[[str], object] = lambda text: None
-        """Called with messages for the user while other calls wait."""
-        self.stopping: Callable[[], bool] = lambda: False
-        """Whether a stop was requested: then a broken port is retried only for STOPPING_RECONNECT_S."""
-        self.check: Callable[[], None] = lambda: None
-        """Called before the port is used; raises PortError if it is no longer this program's."""
-        self.listeners: list[Callable[[board_messages.Event], None]] = []
-        """Each is called with every event when it arrives, in the thread that reads the port."""
         self.turns = Turns()
         self.events: deque[board_messages.Event] = deque()
         self.recent = bytearray()
         self.repeats = 0
-        self.sleep = time.sleep
+        self._reopen = reopen
+        self._comes_back = comes_back
+        self._tell = tell
+        self._sleep = sleep
+        self._greet: Callable[[], None] | None = None
+        self._reconnecting = False
+        self._guards: list[Callable[[], None]] = []
+        self._listeners: list[Callable[[board_messages.Event], None]] = []
+        self._on_loss: list[OnLoss] = [OnLoss()]
         self._parser = wire.Parser()
         self._sequence = 0
         self._woken = False
         self._heard_s = clock()
+        self._connected_s = self._heard_s
+        """When the port was opened last."""
+
+    def greeted(self, greet: Callable[[], None]) -> None:
+        """The board has answered ``hello``: from now on a port that breaks is opened again.
+
+        ``greet`` exchanges ``hello`` again; raises OtherBoardError if another board answers, or it has restarted.
+        """
+        self._greet = greet
+
+    def listen(self, listener: Callable[[board_messages.Event], None]) -> None:
+        """Call ``listener`` with every event when it arrives, in the thread that reads the port."""
+        self._listeners.append(listener)
+
+    def guard(self, check: Callable[[], None]) -> None:
+        """Call ``check`` before each use of the port; it raises LinkError if the port is no longer this program's."""
+        self._guards.append(check)
+
+    @contextmanager
+    def on_loss(self, what: OnLoss) -> Iterator[None]:
+        """What to do if the port breaks within this context, in any thread; of several the shortest retry counts."""
+        self._on_loss.append(what)
+        try:
+            yield
+        finally:
+            self._on_loss.remove(what)
 
     @property
     def frames_bad(self) -> int:
@@ -118,14 +164,16 @@ class Session:
             now_s = self.clock()
             # On a disturbed line every frame may be lost
             silent = now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
-            if silent or now_s - begin_s >= answer_timeout_s:
-                raise self._no_answer(name, now_s - begin_s)
+            waited_s = now_s - max(begin_s, self._connected_s)
+            if silent or waited_s >= answer_timeout_s:
+                raise self._no_answer(name, waited_s)
             self.repeats += 1
 
     def open_again(self) -> None:
         """Open the port after ``transport.close``; incomplete frames are dropped."""
         self._parser = wire.Parser()
-        self.transport = self.open_transport()
+        if self._reopen is not None:
+            self.transport = self._reopen()
 
     def poll(self, timeout_s: float) -> board_messages.Event | None:
         """The oldest event; None if none arrives within ``timeout_s`` or before ``wake``."""
@@ -191,14 +239,14 @@ class Session:
         return self._next_frame()
 
     def _write(self, data: bytes) -> None:
-        self.check()
+        self._check()
         try:
             self.transport.write(data)
         except LinkError as error:
             self.reconnect(error)
 
     def _read(self, timeout_s: float) -> bytes:
-        self.check()
+        self._check()
         try:
             return self.transport.read(timeout_s)
         except LinkError as error:
@@ -206,49 +254,63 @@ class Session:
             return b""
 
     def reconnect(self, reason: LinkError) -> None:
-        """Close the port and open it again until the board answers, for up to RECONNECT_S.
+        """Close the port and open it again until the board answers, for as long as ``on_loss`` says.
 
         Raises ``reason`` if that fails, OtherBoardError if another board answers.
         """
-        self.check()
-        if self.reopen is None:
-            raise reason
-        self.tell(f"{reason.problem}; waiting for it to come back")
-        self.transport.close()
-        limit_s = self.clock() + RECONNECT_S
-        while not self._found_again(self.reopen):
-            self.check()
-            if self.stopping():
+        with self.turns:
+            self._check()
+            if self._greet is None or self._reconnecting or not self._retry_s():
+                raise reason  # whoever reconnects repeats a command that fails meanwhile
+            self._tell(f"{reason.problem}; waiting for it to come back")
+            self.transport.close()
+            self._reconnecting = True
+            try:
+                self._wait_for_board(self._greet, reason)
+            finally:
+                self._reconnecting = False
+            self._heard_s = self._connected_s = self.clock()
+            self._tell(f"connected to {self.transport.name} again")
+
+    def _check(self) -> None:
+        for check in self._guards:
+            check()
+
+    def _retry_s(self) -> float:
+        return min(what.retry_s for what in self._on_loss) if self._reopen and self._comes_back else 0.0
+
+    def _stopping(self) -> bool:
+        return any(what.stopping() for what in list(self._on_loss))
+
+    def _wait_for_board(self, greet: Callable[[], None], reason: LinkError) -> None:
+        limit_s = self.clock() + self._retry_s()
+        while not self._found_again(greet):
+            self._check()
+            if self._stopping():
                 limit_s = min(limit_s, self.clock() + STOPPING_RECONNECT_S)
             if self.clock() >= limit_s:
                 raise self._gone(reason)
-            self.sleep(REOPEN_INTERVAL_S)
-        self._heard_s = self.clock()
-        self.tell(f"connected to {self.transport.name} again")
+            self._sleep(REOPEN_INTERVAL_S)
 
     def _gone(self, reason: LinkError) -> LinkError:
-        if not self.stopping():
+        if not self._stopping():
             return reason
         return LinkError(
             f"{reason.problem}; no stop could be sent: a motion may still be running",
             "see 'armtempo status' once it is back",
         )
 
-    def _found_again(self, reopen: Callable[[], Transport]) -> bool:
+    def _found_again(self, greet: Callable[[], None]) -> bool:
         """Open the port and greet the board; False if that fails."""
-        self._parser = wire.Parser()
-        self.reopen = None  # the caller repeats a command that fails meanwhile
         try:
-            self.transport = reopen()
-            self.greet()
+            self.open_again()
+            greet()
             return True
         except OtherBoardError:
             raise
         except ArmtempoError:
             self.transport.close()
             return False
-        finally:
-            self.reopen = reopen
 
     def _next_frame(self) -> wire.Frame | None:
         frame: wire.Frame | None = self._parser.next()
@@ -260,7 +322,7 @@ class Session:
         except wire.WireError:
             return  # a reply to an older command, or a message of a newer protocol
         self.events.append(event)
-        for listener in self.listeners:
+        for listener in self._listeners:
             listener(event)
 
 

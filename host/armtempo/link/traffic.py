@@ -7,6 +7,7 @@ A log is a text file with one tab-separated line per chunk of bytes::
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -16,6 +17,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from armtempo_shared import wire
+from armtempo_shared.messages import MAX_COMMAND
 
 from armtempo.basics.atomic_file import why
 from armtempo.basics.errors import InputError
@@ -43,7 +45,7 @@ class Decoder:
     """Decodes chunks of both directions; keeps incomplete frames for the next chunk."""
 
     def __init__(self) -> None:
-        self._parsers = {TO_BOARD: wire.Parser(), FROM_BOARD: wire.Parser()}
+        self._parsers = {TO_BOARD: wire.Parser(MAX_COMMAND), FROM_BOARD: wire.Parser()}
 
     def feed(self, direction: str, data: bytes) -> list[str]:
         """A description of each frame that this chunk completes, and a note on damaged bytes."""
@@ -178,7 +180,10 @@ def read_log(path: Path) -> Iterator[Chunk]:
         try:
             if len(fields) != 4 or fields[1] not in (TO_BOARD, FROM_BOARD):
                 raise ValueError("four columns expected, the second > or <")
-            yield Chunk(float(fields[0]), fields[1], bytes.fromhex(fields[2]))
+            time_s = float(fields[0])
+            if not math.isfinite(time_s):
+                raise ValueError(f"{fields[0]} is no time")
+            yield Chunk(time_s, fields[1], bytes.fromhex(fields[2]))
         except ValueError as error:
             raise InputError(
                 f"{path}, line {number}: not a line of a traffic log: {error}",

@@ -14,7 +14,7 @@ from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
-from armtempo.model import boards, outputs_file, parts_file, pin_use, room, shipped, tool_pose
+from armtempo.model import boards, drive_limits, outputs_file, parts_file, pin_use, room, shipped, tool_pose
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
@@ -157,9 +157,7 @@ class Arm:
     @cached_property
     def driven(self) -> tuple[DrivenJoint, ...]:
         """The joints with a motor, in order; raises InputError if one of them has no limits."""
-        return tuple(
-            _driven(self.name, joint, joint.motor) for joint in self.joints if joint.motor is not None
-        )
+        return tuple(_driven(self, joint, joint.motor) for joint in self.joints if joint.motor is not None)
 
     @cached_property
     def driven_indices(self) -> tuple[int, ...]:
@@ -214,12 +212,16 @@ class Arm:
             )
         return found[0]
 
+    def placed(self, angles_deg: Iterable[float]) -> tuple[float, ...]:
+        """The driven joints' angles, (J,), those that are only by rounding beyond a range at its end."""
+        return tuple(joint.placed(float(angle)) for joint, angle in zip(self.driven, angles_deg, strict=True))
+
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
         """Why the driven joints cannot be at these angles; "" if they can."""
         angles = tuple(angles_deg)
         if len(angles) != len(self.driven):
             return f"{len(angles)} angles, but {len(self.driven)} joints have a motor"
-        for joint, angle in zip(self.driven, angles, strict=True):
+        for joint, angle in zip(self.driven, self.placed(angles), strict=True):
             low, high = joint.range_deg
             if not low <= angle <= high:
                 return f"{joint.name}: {angle:g} degrees is outside of its range {low:g} to {high:g}"
@@ -238,14 +240,14 @@ class Arm:
         return ""
 
 
-def _driven(arm: str, joint: Joint, motor: Motor) -> DrivenJoint:
+def _driven(arm: Arm, joint: Joint, motor: Motor) -> DrivenJoint:
     if joint.limits is None:
-        raise InputError(f"arm {arm!r}: {joint.name} has a motor but no limits", "add a limits table")
+        raise InputError(f"arm {arm.name!r}: {joint.name} has a motor but no limits", "add a limits table")
     return DrivenJoint(
         joint.name,
         joint.range_deg,
         joint.home_deg,
-        joint.limits,
+        drive_limits.kept(joint.limits, motor, joint.encoder, arm.driver),
         motor,
         joint.encoder,
         joint.switches,

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from armtempo.basics import json_codec
+from armtempo.basics import json_codec, json_text
 from armtempo.basics.atomic_file import replace_text, why
 from armtempo.basics.errors import InputError
 from armtempo.model import boards, pin_use
@@ -28,8 +28,8 @@ def save(arm: Arm, path: Path) -> None:
 def load(path: Path) -> Arm:
     """The arm of such a file; raises InputError if it is invalid or damaged, or no joint can be driven."""
     try:
-        content: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        content: Any = json_text.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {why(error)}", _AGAIN) from None
     if not isinstance(content, dict) or (content.get("format"), content.get("version")) != (FORMAT, VERSION):
         raise InputError(f"{path}: is not an arm of format {FORMAT!r}, version {VERSION}", _AGAIN)

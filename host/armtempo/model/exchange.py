@@ -16,6 +16,8 @@ from armtempo.splines.trajectory import Trajectory
 CSV_COLUMNS = ("angle_deg", "speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 MAX_RATE_HZ = 100_000.0
 TIME_COLUMN = "time_s"
+_LEAST_GAP = 0.01
+"""Least time between the last two points, of a period: 100 ns at the highest rate, which no stamp rounds off."""
 
 
 def times_s(duration_s: float, rate_hz: float) -> Array:
@@ -28,7 +30,7 @@ def times_s(duration_s: float, rate_hz: float) -> Array:
             f"a rate of {rate_hz:g} Hz is not allowed",
             f"give one above 0, at most {MAX_RATE_HZ:g} Hz",
         )
-    count = max(math.ceil(duration_s * rate_hz - 1e-9), 1)
+    count = max(math.ceil(duration_s * rate_hz - _LEAST_GAP), 1)
     return np.append(np.arange(count) / rate_hz, duration_s)
 
 
@@ -41,7 +43,7 @@ def to_csv(trajectory: Trajectory, rate_hz: float) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([TIME_COLUMN, *(f"j{n}_{name}" for n in range(1, joints + 1) for name in CSV_COLUMNS)])
     for time, values in zip(times, orders.reshape(len(times), -1), strict=True):
-        writer.writerow([f"{time:.9f}", *(f"{value:.9g}" for value in values)])
+        writer.writerow([repr(value) for value in (float(time), *values.tolist())])
     return text.getvalue()
 
 
@@ -69,7 +71,7 @@ def to_ros(trajectory: Trajectory, joints: Sequence[str], rate_hz: float, frame_
 
 
 def _numbers(values: Array) -> str:
-    return "[" + ", ".join(f"{value:.9f}" for value in values) + "]"
+    return "[" + ", ".join(map(repr, values.tolist())) + "]"
 
 
 def _quoted(text: str) -> str:

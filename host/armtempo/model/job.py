@@ -9,7 +9,7 @@ from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 
-from armtempo.basics import json_codec, number_table, toml_table
+from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
@@ -188,21 +188,19 @@ class Job:
         cls,
         path: Path | str,
         arm: Arm | Path | str,
-        radians: bool = False,
+        radians: bool | None = None,
         tolerance_deg: float | None = None,
     ) -> Job:
-        """A job through the via points of a CSV file: one line per point, one column per driven joint.
+        """A job through the via points of a CSV file: one line per point, its columns named in the first line.
 
-        Its name is the file's. A table with a column ``time_s``, as ``Plan.to_csv`` writes, is a sampled
-        motion: it is thinned to ``tolerance_deg`` (default 0.1), with shared timing, for the spline through the
-        points that remain. Raises InputError with line and value for an invalid angle.
+        A column for each driven joint, or positions and orientations; without a header one for each driven joint in
+        their order. ``radians``: unit of columns that do not name theirs; None: degrees, unless that is doubtful.
+        Its name is the file's. A table with a time, as ``Plan.to_csv`` writes, is a sampled motion: it is thinned to
+        ``tolerance_deg`` (default 0.1), with shared timing. Raises InputError with line and value for an invalid angle.
         """
         file = Path(path)
-        found = via_table.via_points(number_table.read(file), Arm.of(arm), radians, tolerance_deg)
-        rows = found.via_deg.tolist()
-        if found.thinned_to_deg is None:
-            return cls(file.stem, via_deg=rows)
-        return cls(file.stem, via_deg=rows, path="through", timing="shared")
+        found = via_table.read(file, Arm.of(arm), radians, tolerance_deg)
+        return cls.of_table(toml_table.parse(via_table.job_text(file.stem, found), str(path)), Arm.of(arm))
 
     @classmethod
     def searching(cls) -> Mapping[str, object]:
@@ -347,7 +345,7 @@ def _named(name: str, where: str, arm: Arm) -> tuple[float, ...] | Pose:
 
 def read_angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:
     """Angles of the driven joints in degrees, (J,), each within its range."""
-    found = table.numbers(key, len(arm.driven))
+    found = arm.placed(table.numbers(key, len(arm.driven)))
     for joint, angle in zip(arm.driven, found, strict=True):
         low, high = joint.range_deg
         if not low <= angle <= high:

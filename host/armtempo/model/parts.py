@@ -18,6 +18,8 @@ NOTHING = "nothing"
 """What an arm holds that holds no load."""
 _LEAST_LIMIT = 0.001
 _MOST_US = 500.0
+END_STEPS = 0.01
+"""An angle beyond its range by less, from rounded radians or single precision, is the end of the range."""
 Curve = tuple[tuple[float, float], ...]
 CURVE = "pairs of rpm and Nm, at least two: speeds increasing from 0, no torque below 0"
 
@@ -225,6 +227,7 @@ class DrivenJoint:
     range_deg: tuple[float, float]
     home_deg: float
     limits: Limits
+    """Those of the table, or what the driver and the encoder allow, if that is less (drive_limits.py)."""
     motor: Motor
     encoder: Encoder | None
     switches: LimitSwitches
@@ -234,6 +237,11 @@ class DrivenJoint:
     def steps_per_deg(self) -> float:
         """Step pulses per degree of the joint."""
         return self.motor.steps_per_deg
+
+    def placed(self, angle_deg: float, within_steps: float = END_STEPS) -> float:
+        """The angle, or the end of the range if it is beyond it by no more than ``within_steps``."""
+        nearest = min(max(angle_deg, self.range_deg[0]), self.range_deg[1])
+        return nearest if abs(angle_deg - nearest) * self.steps_per_deg <= within_steps else angle_deg
 
     @property
     def counts_per_step(self) -> Fraction:

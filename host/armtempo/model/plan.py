@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from armtempo_shared.basis import BASIS
 
-from armtempo.basics import json_codec
+from armtempo.basics import json_codec, json_text
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import check_replaceable, replace_text, why
@@ -202,13 +202,9 @@ def _read(path: Path | str) -> Any:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {why(error)}", "check its permissions") from None
     try:
-        return json.loads(text, parse_constant=_refuse)
-    except (ValueError, RecursionError) as error:
+        return json_text.loads(text)
+    except ValueError as error:
         raise InputError(f"{path}: damaged or cut: {error}", "plan it again or copy it again") from None
-
-
-def _refuse(name: str) -> None:
-    raise ValueError(f"{name} is not a number")
 
 
 def _check(plan: Plan, path: Path | str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from armtempo_shared import sequence as record
 from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
-from armtempo.basics import json_codec
+from armtempo.basics import json_codec, json_text
 from armtempo.basics.arguments import checked
 from armtempo.basics.atomic_file import check_replaceable, replace_text, why
 from armtempo.basics.errors import InputError
@@ -215,10 +215,10 @@ def _name_in(path: Path) -> str:
 
 def _read(path: Path | str) -> Any:
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        return json_text.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}: cannot be read: {why(error)}", "check the path and its permissions"
         ) from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise InputError(f"{path}: damaged or cut: {error}", _AGAIN) from None

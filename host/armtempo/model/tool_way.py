@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
@@ -16,7 +17,7 @@ TOLERANCE_MM, TOLERANCE_DEG = (0.01, 100.0), (0.01, 90.0)
 LEAST = 1e-3
 """Least speed, acceleration and size of a cut corner."""
 MOST = 1e6
-KEYS = ("line", "arc_through_mm", "blend_mm", "speed_mm_s", "acceleration_mm_s2")
+KEYS = ("line", "arc_through_mm", "circle_through_mm", "blend_mm", "speed_mm_s", "acceleration_mm_s2")
 """Keys of a via point's table for the way to it."""
 
 
@@ -38,6 +39,8 @@ class ToolWay:
     speed_mm_s: float | None = None
     acceleration_mm_s2: float | None = None
     """The tool's limits; None: those of the job."""
+    circle_through_mm: tuple[tuple[float, ...], ...] | None = field(default=None, metadata=json_codec.ADDED)
+    """Two points (3,) of a full circle, which ends where it began."""
 
     def __post_init__(self) -> None:
         """Raise InputError for invalid requirements."""
@@ -47,6 +50,14 @@ class ToolWay:
         if self.arc_through_mm is not None and (not self.line or len(self.arc_through_mm) != 3):
             raise InputError(
                 f"{where}: an arc goes through a point x, y, z", "give 3 numbers, and line = true"
+            )
+        circle = self.circle_through_mm
+        if circle is not None and (
+            not self.line or self.arc_through_mm or [len(point) for point in circle] != [3, 3]
+        ):
+            raise InputError(
+                f"{where}: a full circle goes through two points x, y, z",
+                "give 2 lists of 3 numbers, line = true, and no arc_through_mm",
             )
         if self.blend_mm and not self.line:
             raise InputError(f"{where}: blend_mm cuts the corner at the end of a line", "add line = true")
@@ -69,12 +80,15 @@ def read(table: Table, via: int) -> ToolWay | None:
         table.known(*KEYS)
         return None
     arc = table.numbers("arc_through_mm", 3) if table.has("arc_through_mm") else None
-    line = table.boolean("line", arc is not None)
+    circle = _circle(table)
+    line = table.boolean("line", arc is not None or circle is not None)
     if via == 0:
         key = next(key for key in KEYS if table.has(key))
         raise table.fail(key, "not allowed at the first via point")
-    if arc and not line:
-        raise table.fail("line", "true with arc_through_mm")
+    if (arc or circle) and not line:
+        raise table.fail("line", "true with arc_through_mm and circle_through_mm")
+    if arc and circle:
+        raise table.fail("circle_through_mm", "left out with arc_through_mm")
     if table.has("blend_mm") and not line:
         raise table.fail("blend_mm", "given with line = true only")
     return ToolWay(
@@ -86,7 +100,20 @@ def read(table: Table, via: int) -> ToolWay | None:
         table.number("blend_mm", least=LEAST, most=MOST) if table.has("blend_mm") else 0.0,
         limit(table, "speed_mm_s"),
         limit(table, "acceleration_mm_s2"),
+        circle,
     )
+
+
+def _circle(table: Table) -> tuple[tuple[float, ...], ...] | None:
+    if not table.has("circle_through_mm"):
+        return None
+    points = table.array("circle_through_mm", "two points [x, y, z]")
+    if len(points) != 2:
+        raise table.fail("circle_through_mm", "two points [x, y, z]")
+    both = Table(
+        dict(zip(("point 1", "point 2"), points, strict=True)), table.file, f"{table.place}circle_through_mm "
+    )
+    return both.numbers("point 1", 3), both.numbers("point 2", 3)
 
 
 def _tolerance(table: Table, key: str, allowed: tuple[float, float], default: float) -> float:

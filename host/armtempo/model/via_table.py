@@ -3,151 +3,296 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
-from armtempo_shared.limits import MAX_SEGMENTS
-from numpy.typing import NDArray
 
+from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.number_table import NumberTable
+from armtempo.model import table_header, thinning
 from armtempo.model.arm import Arm
-from armtempo.model.exchange import CSV_COLUMNS, TIME_COLUMN
+from armtempo.model.table_header import Column, Header
+from armtempo.model.tool_pose import WHOLE
 
 TOLERANCE_DEG = 0.1
 """Default tolerance for thinning a sampled motion."""
 _ROS = "header:"
 """Beginning of a ROS message."""
-LARGEST_DEG = 90.0
+_RADIANS, _WIDE_DEG = 7.0, 100.0
+"""Angles below this may be radians, if the joints turn further than that many degrees."""
+_METRES = 2.0
+"""Positions below this may be in metres."""
+_RESTS_DEG = 0.01
+"""Allowed distance from home of a joint without a motor."""
+_SPEED_MARGIN = 1.05
+"""Recordings may be faster than the limit by this factor, as their times scatter."""
 
 
 @dataclass(frozen=True)
 class ImportedPath:
-    """Via points (n, J) in degrees, and the number of lines of their table."""
+    """The via points of a table: angles, or poses."""
 
     via_deg: Array
+    """(n, J), degrees; (0, J) for poses."""
     lines: int
+    poses: tuple[Mapping[str, Sequence[float] | float], ...] = ()
+    """The keys of each pose, as in a job file."""
     thinned_to_deg: float | None = None
-    """The tolerance of the thinning; None if every line is a via point."""
+    """How far the planned spline is from the table at most; None if every line is a via point."""
+    rests_s: Mapping[int, float] = field(default_factory=dict)
+    """Seconds of rest at via points, by their number from 0."""
+    notes: tuple[str, ...] = ()
+    """How the columns were taken, for the user."""
+
+    @property
+    def count(self) -> int:
+        """Number of via points."""
+        return len(self.poses) or len(self.via_deg)
+
+
+def of_text(
+    text: str, path: Path | str, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
+) -> ImportedPath:
+    """Via points from the text of a table, as ``via_points``; ``path`` names it in messages."""
+    if text.lstrip("\ufeff \n").startswith(_ROS):
+        raise InputError(
+            f"{path}: is a ROS message, not a table", "export the trajectory as CSV and import that"
+        )
+    return via_points(number_table.of_text(text, path), arm, radians, tolerance_deg)
+
+
+def read(
+    path: Path, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
+) -> ImportedPath:
+    """Via points from a file, as ``of_text``; raises InputError if it cannot be read."""
+    return of_text(number_table.text_of(path), path, arm, radians, tolerance_deg)
 
 
 def via_points(
-    table: NumberTable, arm: Arm, radians: bool = False, tolerance_deg: float | None = None
+    table: NumberTable, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
 ) -> ImportedPath:
-    """Via points from a table: one line per point, one column per driven joint.
+    """Via points from a table: one line per point, its columns as ``table_header`` describes.
 
-    A first line with a word is a header; if it names the joints (``joint 1``, or ``j1_angle_deg`` as
-    ``exchange.to_csv`` writes), the columns are found by name. A table with ``time_s`` is a sampled motion,
-    thinned to ``tolerance_deg`` (default TOLERANCE_DEG); other tables are only thinned if a tolerance is
-    given. Raises InputError with line and value.
+    ``radians``: unit of angles whose column does not name one; None: degrees, unless all are so small that they may be
+    radians, which is refused. A table with a time is a sampled motion, thinned to ``tolerance_deg`` (default
+    TOLERANCE_DEG); other tables are only thinned if a tolerance is given. Raises InputError with line and value.
     """
-    columns = _columns(table, arm)
-    points = np.array(table.numbers(columns)).reshape(-1, len(columns))
-    if len(points) < 2:
+    header = _header(table, arm)
+    if len(table.rows) < 2:
         raise InputError(
-            f"{table.path}: {len(points)} via points are not a motion", "give at least 2 lines of angles"
+            f"{table.path}: {len(table.rows)} via points are not a motion", "give at least 2 lines of angles"
         )
-    angles = np.degrees(points) if radians else points
-    times = _times(table)
+    if header.pose:
+        return _poses(table, header, radians, tolerance_deg)
+    angles = _angles(table, header, arm, radians)
+    _check_resting(table, header, arm, radians)
+    times, notes = _times(table, header), _notes(table, header, arm)
+    if times is not None:
+        angles, jumps = unwrapped(
+            angles, times, arm, [f"{table.path}: line {line}" for line, _ in table.rows]
+        )
+        notes += jumps
     if tolerance_deg is None and times is None:
-        return ImportedPath(angles, len(points))
+        return ImportedPath(angles, len(angles), notes=notes)
     tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
-    return ImportedPath(thinned(angles, tolerance, times), len(points), tolerance)
+    _check_ranges(table, angles, arm, 0.5 * tolerance)
+    found = thinning.thinned(angles, tolerance, times, np.array([joint.range_deg for joint in arm.driven]))
+    for where, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
+        if left_out_s:
+            notes += (f"{left_out_s:.3g} s of rest at the {where} are left out",)
+    return ImportedPath(
+        found.via_deg, len(angles), thinned_to_deg=found.off_deg, rests_s=found.rests_s, notes=notes
+    )
 
 
 def job_text(name: str, path: ImportedPath) -> str:
     """The text of a job file through these via points, with default settings.
 
-    A thinned path gets shared timing, as its joints pass the points together.
+    A thinned path is the spline through its points, with shared timing, as its joints pass them together.
     """
-    timing = "" if path.thinned_to_deg is None else 'timing = "shared"\n'
-    rows = "".join(f"    [{', '.join(f'{angle:.10g}' for angle in row)}],\n" for row in path.via_deg)
-    return f"name = {json.dumps(name)}\n{timing}via_deg = [\n{rows}]\n"
+    timing = "" if path.thinned_to_deg is None else 'path = "through"\ntiming = "shared"\n'
+    head = f"name = {json.dumps(name)}\n{timing}"
+    if path.poses:
+        return head + "".join(
+            "\n[[via]]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in pose.items())
+            for pose in path.poses
+        )
+    if path.rests_s:
+        return head + "".join(
+            f"\n[[via]]\nangles_deg = {_value(row)}\n" + _rest(path.rests_s.get(number))
+            for number, row in enumerate(path.via_deg.tolist())
+        )
+    rows = "".join(f"    {_value(row)},\n" for row in path.via_deg.tolist())
+    return f"{head}via_deg = [\n{rows}]\n"
 
 
-def _times(table: NumberTable) -> Array | None:
-    """The column ``time_s``, (n,), which must increase; None if there is none."""
-    if table.header is None or TIME_COLUMN not in table.header:
+def _rest(rest_s: float | None) -> str:
+    return "" if rest_s is None else f"stop = true\ndwell_s = {rest_s:.10g}\n"
+
+
+def _value(value: Sequence[float] | float) -> str:
+    if isinstance(value, Sequence):
+        return f"[{', '.join(f'{number:.10g}' for number in value)}]"
+    return f"{value:.10g}"
+
+
+def _header(table: NumberTable, arm: Arm) -> Header:
+    if table.header is not None:
+        return table_header.read(table.header, arm, f"{table.path}: line 1")
+    columns = len(table.rows[0][1]) if table.rows else len(arm.driven)
+    first = np.array(table.numbers([0]))
+    rising = len(first) > 1 and bool(np.all(np.diff(first[:, 0]) > 0.0))
+    return table_header.no_header(columns, arm, f"{table.path}: line 1", rising)
+
+
+def _notes(table: NumberTable, header: Header, arm: Arm) -> tuple[str, ...]:
+    notes = []
+    if table.header is None:
+        notes.append(f"no header: the columns were taken as {table_header.expected(arm)}")
+    if header.unused:
+        notes.append(f"columns that were not used: {', '.join(header.unused)}")
+    return tuple(notes)
+
+
+def _angles(table: NumberTable, header: Header, arm: Arm, radians: bool | None) -> Array:
+    """The driven joints' angles, degrees (n, J)."""
+    points = np.array(table.numbers([column.index for column in header.angles]))
+    if radians is None and all(column.unit == "" for column in header.angles):
+        moving = np.ptp(points, axis=0) > 0.0
+        spans = np.array([joint.range_deg[1] - joint.range_deg[0] for joint in arm.driven])
+        if np.abs(points).max() < _RADIANS and moving.any() and spans[moving].min() > _WIDE_DEG:
+            raise InputError(
+                f"{table.path}: no angle is beyond {np.abs(points).max():.3g}: degrees or radians?",
+                "give --degrees or --radians, or name the unit in the header: joint 1 (rad)",
+            )
+    return np.column_stack(
+        [_degrees(points[:, n], column, radians, table) for n, column in enumerate(header.angles)]
+    )
+
+
+def _degrees(values: Array, column: Column, radians: bool | None, table: NumberTable) -> Array:
+    own = table_header.is_radians(column)
+    if own is not None and radians is not None and own != radians:
+        asked = "--radians" if radians else "--degrees"
+        raise InputError(
+            f"{table.path}: line 1: its header has other units than {asked}", f"leave {asked} out"
+        )
+    return np.degrees(values) if own or (own is None and radians) else values
+
+
+def _check_resting(table: NumberTable, header: Header, arm: Arm, radians: bool | None) -> None:
+    """Refuse angles of joints without a motor other than their home angle."""
+    for index, column in header.resting.items():
+        joint = arm.joints[index]
+        angles = _degrees(np.array(table.numbers([column.index]))[:, 0], column, radians, table)
+        for (line, _), angle in zip(table.rows, angles, strict=True):
+            if abs(angle - joint.home_deg) > _RESTS_DEG:
+                raise InputError(
+                    f"{table.path}: line {line}: {joint.name} at {angle:g} degrees has no motor, it stays at "
+                    f"{joint.home_deg:g}",
+                    "leave its column out, or give it a motor in the arm file",
+                )
+
+
+def _check_ranges(table: NumberTable, angles: Array, arm: Arm, allowed_deg: float) -> None:
+    for joint, column in zip(arm.driven, angles.T, strict=True):
+        low, high = joint.range_deg
+        for (line, _), angle in zip(table.rows, column.tolist(), strict=True):
+            if not low - allowed_deg <= angle <= high + allowed_deg:
+                raise InputError(
+                    f"{table.path}: line {line}: {joint.name} at {angle:g} degrees is outside of its range {low:g} to "
+                    f"{high:g}",
+                    "correct the table, or range_deg in the arm file",
+                )
+
+
+def _poses(
+    table: NumberTable, header: Header, radians: bool | None, tolerance_deg: float | None
+) -> ImportedPath:
+    """Via points from columns of positions and orientations."""
+    if header.time is not None or tolerance_deg is not None:
+        raise InputError(
+            f"{table.path}: poses are not thinned: every line becomes a via point, and times are planned anew",
+            "leave the time and --tolerance-deg out, and give only the poses to pass",
+        )
+    columns = {key: np.array(table.numbers([column.index]))[:, 0] for key, column in header.pose.items()}
+    position = np.column_stack([columns[key] for key in table_header.POSITION])
+    units = [header.pose[key].unit for key in table_header.POSITION]
+    if not any(units) and np.abs(position).max() < _METRES:
+        raise InputError(
+            f"{table.path}: no position is beyond {np.abs(position).max():.3g}: mm or metres?",
+            "name the unit in the header: x_mm,y_mm,z_mm or x_m,y_m,z_m",
+        )
+    position = position * [table_header.mm(header.pose[key]) for key in table_header.POSITION]
+    turned = {
+        f"{key}_deg": _degrees(columns[key], header.pose[key], radians, table)
+        for key in WHOLE
+        if key in columns
+    }
+    quaternion = [columns[key] for key in table_header.QUATERNION if key in columns]
+    poses = []
+    for number, row in enumerate(position.tolist()):
+        pose: dict[str, Sequence[float] | float] = {"position_mm": row}
+        pose |= {key: float(values[number]) for key, values in turned.items()}
+        if quaternion:
+            pose["quaternion"] = [float(values[number]) for values in quaternion]
+        poses.append(pose)
+    return ImportedPath(np.empty((0, 0)), len(poses), tuple(poses))
+
+
+def _times(table: NumberTable, header: Header) -> Array | None:
+    """The time of each line in seconds, (n,), which must increase; None if there is none."""
+    if header.time is None:
         return None
-    times = np.array(table.numbers([table.header.index(TIME_COLUMN)]))[:, 0]
+    times = np.array(table.numbers([header.time.index]))[:, 0] * table_header.seconds(header.time)
     for (line, _), step in zip(table.rows[1:], np.diff(times), strict=True):
         if not step > 0.0:
             raise InputError(
-                f"{table.path}: line {line}: {TIME_COLUMN} does not increase",
-                f"put the lines in order, or leave the column {TIME_COLUMN} out",
+                f"{table.path}: line {line}: the time does not increase",
+                "put the lines in order, or leave the column of times out",
             )
     return times
 
 
-def _columns(table: NumberTable, arm: Arm) -> list[int]:
-    names = table.header
-    if names is None:
-        return list(range(len(arm.driven)))
-    if names[0].startswith(_ROS):
-        raise InputError(
-            f"{table.path}: is a ROS message, not a table", "export the trajectory as CSV and import that"
-        )
-    found = []
-    for number, joint in enumerate(arm.driven, 1):
-        wanted = [name for name in (joint.name, f"j{number}_{CSV_COLUMNS[0]}") if name in names]
-        if wanted:
-            found.append(names.index(wanted[0]))
-    if not found and len(names) == len(arm.driven):
-        return list(range(len(names)))
-    if len(found) != len(arm.driven):
-        expected = ", ".join(joint.name for joint in arm.driven)
-        raise InputError(
-            f"{table.path}: line 1: the header does not name a column for each driven joint",
-            f"name a column for each of {expected}",
-        )
-    return found
+def unwrapped(
+    angles_deg: Array, times_s: Array, arm: Arm, where: Sequence[str]
+) -> tuple[Array, tuple[str, ...]]:
+    """A recording (n, J) with its jumps of a turn taken out, and a note for each joint that had some.
 
-
-def thinned(points_deg: Array, tolerance_deg: float, times_s: Array | None = None) -> Array:
-    """A subset of the points (n, J) such that a cubic spline through it passes all others within ``tolerance_deg``.
-
-    The spline rests at both ends. Its parameter is ``times_s`` (n,), increasing, else the square root of the
-    distance between points. The first and the last point are kept. Raises InputError for a tolerance outside
-    (0, LARGEST_DEG], and if more points are needed than a motion can have.
+    A joint that moves by more than half a turn between two points, faster than its speed limit, has been recorded
+    within a turn: it goes on by the short way. Raises InputError, with ``where`` of the point, if it is faster than its
+    limit that way too, or leaves its range. ``times_s``: (n,), increasing.
     """
-    if not 0.0 < tolerance_deg <= LARGEST_DEG:
-        raise InputError(
-            f"a tolerance of {tolerance_deg:g} degrees is not allowed",
-            f"give one above 0, at most {LARGEST_DEG:g}",
-        )
-    places, points = (times_s, points_deg) if times_s is not None else _centripetal(points_deg)
-    kept = _enough(places, points, tolerance_deg)
-    for index in kept[1:-1]:
-        fewer = kept[kept != index]
-        if _errors_deg(places, points, fewer).max() <= tolerance_deg:
-            kept = fewer
-    return points[kept]
-
-
-def _enough(places: Array, points: Array, tolerance_deg: float) -> NDArray[np.int64]:
-    """Indices of enough points; each step adds the point with the largest error."""
-    kept = np.array([0, len(points) - 1])
-    while (errors := _errors_deg(places, points, kept)).max() > tolerance_deg:
-        kept = np.sort(np.append(kept, int(errors.argmax())))
-        if len(kept) > MAX_SEGMENTS + 1:
+    found = angles_deg.copy()
+    notes = []
+    for number, joint in enumerate(arm.driven):
+        column = found[:, number]
+        steps = np.diff(column)
+        limit = joint.limits.speed_deg_s * np.diff(times_s) * _SPEED_MARGIN
+        jumps = np.flatnonzero((np.abs(steps) > 180.0) & (np.abs(steps) > limit))
+        for jump in jumps.tolist():
+            turn = -360.0 * round(steps[jump] / 360.0)
+            if abs(steps[jump] + turn) > limit[jump]:
+                raise InputError(
+                    f"{where[jump + 1]}: {joint.name} jumps from {angles_deg[jump, number]:g} to "
+                    f"{angles_deg[jump + 1, number]:g} degrees, faster than its speed limit",
+                    "correct the line, or leave the time out: then every line is a via point",
+                )
+            column[jump + 1 :] += turn
+        low, high = joint.range_deg
+        if not jumps.size:
+            continue
+        if (outside := np.flatnonzero((column < low) | (column > high))).size:
             raise InputError(
-                f"more than {MAX_SEGMENTS + 1} via points are needed to keep within {tolerance_deg:g} degrees",
-                "allow more with --tolerance-deg, or cut the table into several motions",
+                f"{where[int(outside[0])]}: {joint.name} is recorded within a turn, and goes on to "
+                f"{column[outside[0]]:g} degrees, outside of its range {low:g} to {high:g}",
+                "widen range_deg if the joint can turn that far, or cut the recording before that",
             )
-    return kept
-
-
-def _errors_deg(places: Array, points: Array, kept: NDArray[np.int64]) -> Array:
-    """Distance of each point from the spline through the kept points, the largest over its joints: (n,)."""
-    from scipy.interpolate import CubicSpline  # imported here, because that takes longer than a plan
-
-    spline = CubicSpline(places[kept], points[kept], bc_type="clamped")
-    return np.asarray(np.abs(spline(places) - points).max(axis=1))
-
-
-def _centripetal(points: Array) -> tuple[Array, Array]:
-    """Centripetal parameters, (m,), and the points, (m, J), without repeated ones."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    moved = np.append(True, steps > 0.0)
-    return np.append(0.0, np.cumsum(np.sqrt(steps[moved[1:]]))), points[moved]
+        notes.append(
+            f"{joint.name}: recorded within a turn; it goes on from {column[jumps[0]]:g} to {column[-1]:g} degrees"
+        )
+    return found, tuple(notes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,6 +21,9 @@ from armtempo.new_arm.urdf_bodies import Body
 
 MM = 1000.0
 """Millimetres in the URDF's unit, the metre."""
+
+DOUBTFUL_DEG = 720.0
+"""Ranges beyond this, either way, were probably written in degrees."""
 
 CONTINUOUS_DEG = (-180.0, 180.0)
 """Range of a continuous joint, which has none in a URDF."""
@@ -64,6 +67,17 @@ class Chain:
     """(4, 4): the tip link's frame in the base link's, all joints at 0; lengths in mm."""
     model: Any
     """The reader's own robot, for its forward kinematics."""
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Joints whose limits are probably in degrees."""
+        return tuple(
+            "joint {!r}: its limits, {:.4g} to {:.4g} rad, are {:.5g} to {:.5g} degrees: are they in degrees?".format(
+                joint.name, *map(math.radians, joint.range_deg), *joint.range_deg
+            )
+            for joint in self.joints
+            if max(map(abs, joint.range_deg)) > DOUBTFUL_DEG
+        )
 
     def poses(self, angles_rad: Array) -> Array:
         """The tip's poses by the reader's forward kinematics: (K, 4, 4) in mm for angles (K, joints) in rad."""
@@ -278,10 +292,31 @@ def _below(joints: Sequence[Any], first: str) -> Iterator[list[Any]]:
 
 
 def _fingers(joints: Sequence[Any]) -> set[str]:
-    """Names of the joints that slide, mimic another one, or are mimicked: of grippers."""
-    mimicked = {joint.mimic.joint for joint in joints if joint.mimic is not None}
-    slide_or_mimic = {joint.name for joint in joints if joint.type == "prismatic" or joint.mimic is not None}
-    return mimicked | slide_or_mimic
+    """Names of the joints of grippers: side by side, they slide, or one mimics the other.
+
+    A joint that mimics one before it, as a linkage does, and one that slides alone are parts of the arm.
+    """
+    above = {joint.child: joint for joint in joints}
+    slides = [joint.name for joint in joints if joint.type == "prismatic"]
+    found = set()
+    for joint in joints:
+        before = {each.name for each in _before(joint, above)}
+        if joint.mimic is not None and joint.mimic.joint not in before:
+            found |= {joint.name, joint.mimic.joint}
+        if joint.name in slides:
+            after = {each.name for each in joints if joint.name in {up.name for up in _before(each, above)}}
+            if set(slides) - before - after - {joint.name}:
+                found.add(joint.name)
+    return found
+
+
+def _before(joint: Any, above: Mapping[str, Any]) -> list[Any]:
+    """The joints from the root to this one, without it."""
+    found: list[Any] = []
+    while joint.parent in above and len(found) <= len(above):
+        joint = above[joint.parent]
+        found.append(joint)
+    return found
 
 
 def _candidates(ways: Sequence[list[Any]]) -> Iterator[_Candidate]:

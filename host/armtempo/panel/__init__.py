@@ -3,15 +3,21 @@
 ::
 
     operator.py    the panel's board: one command at a time, one client in control, states for all
-    live.py        data from the board: state, samples, inputs, sequence
-    held_jog.py    a jog that lasts while a browser reports that its button is held
+    live.py        data from the board: state, samples, inputs, outputs, sequence
+    press.py       which presses are still meant: number, age, state
+    hold.py        a motion that lasts while a browser reports that its button is held
     access.py      access control of the server
     arm_scene.py   the arm in 3-D
     panel_page.py  common parts of a page's tabs
-    layout.py      header with stop, scene, tabs
-    move_tab.py, plan_tab.py, run_tab.py, sequence_tab.py, board_tab.py
-    desk.py        the job that is planned, and its file
-    sequence_desk.py  the sequence that is edited, and its file
+    layout.py      header with stop, banner, scene, tabs, and what is always in view
+    problem.py     what is wrong, and the button that helps
+    move_tab.py, job_tab.py, run_tab.py, sequence_tab.py, board_tab.py
+    homing.py, teaching.py  dialogs of the tab where the arm is moved
+    job_editor.py  the job that is edited and planned, and its file
+    sequence_editor.py  the sequence that is edited, and its file
+    file_editor.py, file_row.py  what both have: text, undo, file; and its row on the page
+    toml_blocks.py  the tables of a file as blocks of lines with their comments
+    past_runs.py   the recorded runs
     charts.py      curves of all joints
     words.py       all texts
     server.py      the server

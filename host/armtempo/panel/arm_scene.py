@@ -16,15 +16,19 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics.chain import all_angles_deg, outline_mm
 from armtempo.kinematics.forward import all_frames
 from armtempo.kinematics.geometry import Geometry
+from armtempo.kinematics.of_arm import forward
 from armtempo.model import mesh_files
 from armtempo.model.arm import Arm
 from armtempo.model.room import FAR_MM
 from armtempo.planning.room_check import Bodies
 
 COLOUR, GHOST, PATH, RUN, VIA, ROOM = "#4477aa", "#999999", "#228833", "#ee6677", "#ccbb44", "#aa3377"
+WAY = "#66ccee"
 """Paul Tol's bright scheme, which is safe for colour-blind users."""
 _THICK = 0.03
 """Default radius of a link, as a fraction of the arm's reach."""
+_DOT = 0.022
+"""Radius of a via point's ball."""
 _SHORT_MM = 1e-6
 _OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25
@@ -66,6 +70,13 @@ class ArmShape:
             zero = now * np.cos(angle) - np.cross(axis, now) * np.sin(angle)
             numbers = (*poses[joint, :3, 3] / self.reach_mm, *zero, *axis, angle)
             found.append([round(float(number), 5) for number in numbers])
+        return found
+
+    def frame(self, angles_deg: Array) -> list[float]:
+        """The tool's frame: directions of its x, y and z, then its place, 12 numbers."""
+        pose = forward(self.arm, np.asarray(angles_deg))
+        pose[:3, 3] /= self.reach_mm
+        found: list[float] = pose[:3].T.ravel().round(5).tolist()
         return found
 
     @cached_property
@@ -141,7 +152,8 @@ class ArmScene:
             )
             self._ghost = self._capsules(GHOST, _GHOST_OPACITY)
             self._room()
-        self._dots: list[Object3D] = []
+        self._dots: list[tuple[Object3D, Object3D]] = []
+        """A ball for each via point, and its name."""
         self.look("free")
 
     def _capsules(self, colour: str, opacity: float) -> list[str]:
@@ -196,13 +208,17 @@ class ArmScene:
         """Draw a ball at each via point, (N, 3), that can be clicked and dragged."""
         points = (np.asarray(points_mm) / self._shape.reach_mm).tolist()
         while len(self._dots) > len(points):
-            self._dots.pop().delete()
+            for one in self._dots.pop():
+                one.delete()
         with self.scene:
             while len(self._dots) < len(points):
-                ball = self.scene.sphere(1.3 * _THICK, 16, 12).material(VIA)
-                self._dots.append(ball.with_name(f"{_VIA_NAME}{len(self._dots)}").draggable())
-        for dot, point in zip(self._dots, points, strict=True):
-            dot.move(*point)
+                number = len(self._dots)
+                ball = self.scene.sphere(_DOT, 16, 12).material(VIA).with_name(f"{_VIA_NAME}{number}")
+                label = self.scene.text(f"P{number}", "font-size: 0.75rem; pointer-events: none;")
+                self._dots.append((ball.draggable(), label))
+        for (dot, name), (x, y, z) in zip(self._dots, points, strict=True):
+            dot.move(x, y, z)
+            name.move(x, y, z + 2 * _DOT)
         ui.run_javascript("armtempo.changes += 1")
 
     def _clicked(self, event: SceneClickEventArguments) -> None:

@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nicegui import background_tasks, run, ui
 
 from armtempo.basics.errors import LinkError
-from armtempo.deploy import deploy
 from armtempo.deploy.firmware import image, write
 from armtempo.link.board_messages import StoredMotion
 from armtempo.panel import words
 from armtempo.panel.live import Lines
 from armtempo.panel.operator import Needs
-from armtempo.robot.board import Board
+from armtempo.panel.panel_page import named
 
 if TYPE_CHECKING:
     from armtempo.diagnosis.selftest.result import SelfTest
     from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
 
 _SHOWN = (
     "port",
@@ -61,16 +62,12 @@ class BoardTab:
                 (words.FLASH, words.SURE_FLASH, self._flash, Needs.IDLE),
                 (words.SELFTEST, words.SURE_SELFTEST, self._selftest, Needs.COMMAND),
             ):
-                button = ui.button(text).props("outline no-caps")
-                button.on_click(lambda text=text, sure=sure, call=call: self._if_sure(text, sure, call))
-                page.control(button, needs)
+                page.button(text, partial(self._if_sure, text, sure, call), needs)
         ui.label(words.LOG).classes("text-subtitle2")
         self._log = _Shown(operator.log)
         with ui.row():
             ui.label(words.TRAFFIC).classes("text-subtitle2")
-            ui.switch(on_change=lambda event: self._monitor(event.value)).props(
-                f'aria-label="{words.TRAFFIC}"'
-            )
+            named(ui.switch(on_change=lambda event: self._monitor(event.value)), words.TRAFFIC)
         self._traffic = _Shown(operator.traffic)
         self._traffic.log.set_visibility(False)
         columns = [{"name": key, "label": key, "field": key, "align": "left"} for key in words.VERDICT_KEYS]
@@ -129,63 +126,49 @@ class BoardTab:
         with ui.row():
             kind = words.A_SEQUENCE if motion.sequence else f"{motion.duration_s:.3f} s"
             ui.label(f"{name} · {kind}{words.BY_BUTTON if motion.default else ''}")
-            button = ui.button(words.RUN, on_click=lambda: page.do(name, run_it)).props(
-                "outline dense no-caps"
-            )
-            page.control(button)
+            page.button(words.RUN, lambda press: page.do(press, name, run_it), look="outline dense")
             for text, call in (
-                (words.RENAME, lambda: self._rename(name)),
-                (words.REMOVE, lambda: self._remove(name)),
+                (words.RENAME, lambda _: self._rename(name)),
+                (words.REMOVE, lambda _: self._remove(name)),
             ):
-                button = ui.button(text, on_click=call).props("flat dense no-caps")
-                page.control(button, Needs.COMMAND)
+                page.button(text, call, Needs.COMMAND, look="flat dense")
 
-    async def _remove(self, name: str) -> None:
-        sure = words.SURE_REMOVE.format(name=name)
-        await self._if_sure(words.REMOVE, sure, lambda: self._change(words.REMOVE, Board.remove, name))
+    def _remove(self, name: str) -> None:
+        def remove(press: Press) -> None:
+            self._change(press, words.REMOVE, lambda: self._operator.board.remove(name))
 
-    async def _rename(self, name: str) -> None:
-        with ui.dialog() as asked, ui.card():
+        self._page.ask(words.SURE_REMOVE.format(name=name), words.REMOVE, remove)
+
+    def _rename(self, name: str) -> None:
+        def rename(press: Press) -> None:
+            if wanted := new.value:
+                self._change(press, words.RENAME, lambda: self._operator.board.rename(name, wanted))
+
+        with self._page.ask("", words.RENAME, rename).place:
             new = ui.input(words.NEW_NAME, value=name)
-            with ui.row():
-                ui.button(words.RENAME, on_click=lambda: asked.submit(new.value))
-                ui.button(words.CANCEL, on_click=lambda: asked.submit(None)).props("flat")
-        if wanted := await asked:
-            self._change(words.RENAME, Board.rename, name, wanted)
 
-    def _change(self, text: str, call: Callable[..., object], *names: str) -> None:
-        self._page.do(text, lambda: call(self._operator.board, *names), Needs.COMMAND)
+    def _change(self, press: Press, text: str, call: Callable[[], object]) -> None:
+        self._page.do(press, text, call, Needs.COMMAND)
 
     # the board's program
 
-    async def _if_sure(self, text: str, sure: str, call: Callable[[], object]) -> None:
-        with ui.dialog() as asked, ui.card():
-            ui.label(sure)
-            with ui.row():
-                ui.button(text, on_click=lambda: asked.submit(True))
-                ui.button(words.CANCEL, on_click=lambda: asked.submit(False)).props("flat")
-        if await asked:
-            call()
+    def _if_sure(self, text: str, sure: str, call: Callable[[Press], object], _: Press) -> None:
+        self._page.ask(sure, text, call)
 
-    def _deploy(self) -> None:
-        operator, port = self._operator, self._operator.port
+    def _deploy(self, press: Press) -> None:
+        self._page.do(press, words.DEPLOY, self._operator.deploy, Needs.IDLE)
 
-        def work() -> None:
-            operator.without_board(lambda: deploy(port, tell=operator.say, progress=operator.part))
+    def _selftest(self, press: Press) -> None:
+        self._page.do(press, words.SELFTEST, self._operator.selftest, Needs.COMMAND)
 
-        self._page.do(words.DEPLOY, work, Needs.IDLE)
-
-    def _selftest(self) -> None:
-        self._page.do(words.SELFTEST, self._operator.selftest, Needs.COMMAND)
-
-    def _flash(self) -> None:
+    def _flash(self, press: Press) -> None:
         operator, port = self._operator, self._operator.port
 
         def work() -> None:
             found = image.find(Path())
             operator.without_board(lambda: write.flash(found, port, None, operator.say, operator.part))
 
-        self._page.do(words.FLASH, work, Needs.IDLE)
+        self._page.do(press, words.FLASH, work, Needs.IDLE)
 
 
 class _Shown:

@@ -37,8 +37,11 @@ class CurveChart:
             "yAxis": {"type": "value", "scale": True, "splitLine": _GRID},
             "series": [],
         }
-        ui.label(title).classes("text-caption")
-        self.chart = ui.echart(options, renderer="svg").classes("armtempo-chart")
+        self._place = ui.element("div").classes("full-width")
+        self._place.set_visibility(False)  # until there is something to show
+        with self._place:
+            ui.label(title).classes("text-caption")
+            self.chart = ui.echart(options, renderer="svg").classes("armtempo-chart")
 
     def show(self, times_s: Array, values: Array, reference: Array | None = None) -> None:
         """A curve for each joint: times (N,), values (N, J); ``reference``, (N, J), is dotted."""
@@ -46,8 +49,15 @@ class CurveChart:
         series = [self._curve(number, times_s, values[:, number]) for number in joints]
         if reference is not None:
             series += [self._curve(number, times_s, reference[:, number], of_plan=True) for number in joints]
+        self._place.set_visibility(True)
         self.chart.options["series"] = series
         self.chart.update()
+
+    def mark(self, time_s: float) -> None:
+        """Show a cursor at a time of the plan."""
+        self.chart.run_chart_method(
+            "setOption", {"xAxis": {"axisPointer": {"value": time_s, "status": "show"}}}, timeout=0.0
+        )
 
     def _curve(self, number: int, times_s: Array, values: Array, of_plan: bool = False) -> dict[str, object]:
         points = np.column_stack((times_s, values)).round(4).tolist()

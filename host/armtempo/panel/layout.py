@@ -1,9 +1,10 @@
-"""The layout of a page: header with stop, the arm, tabs; and the message sent to it ten times per second."""
+"""The layout of a page: header with stop, banner, the arm, tabs, and below them what is always in view."""
 
 from __future__ import annotations
 
 import json
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -14,14 +15,18 @@ from nicegui import ui
 from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import tool_path_mm
 from armtempo.kinematics.of_arm import forward
-from armtempo.panel import arm_scene, board_tab, move_tab, plan_tab, run_tab, sequence_tab, words
+from armtempo.model.pose import to_rpy_deg
+from armtempo.panel import arm_scene, board_tab, job_tab, move_tab, problem, run_tab, sequence_tab, words
 from armtempo.panel.arm_scene import ArmShape
-from armtempo.panel.held_jog import ButtonHold
+from armtempo.panel.hold import ButtonHold
 from armtempo.panel.operator import Needs, Operator
-from armtempo.panel.panel_page import LOOK_S, PanelPage
+from armtempo.panel.panel_page import LOOK_S, PanelPage, named
+from armtempo.panel.press import Press
 from armtempo.robot.board import Board
 
 TELL_S = 0.1
+OLD_S = 0.5
+"""A state that is older than this is shown with its age."""
 _POINTS = 200
 _PRIMARY = "#2b5f8f"
 """Contrast with white: 6.6 to 1 (4.5 is required)."""
@@ -37,37 +42,102 @@ def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     ui.add_body_html(f"<script>{_SCRIPT}</script>")
     ui.dark_mode(None)
     ui.colors(primary=_PRIMARY)
-    _header(page)
     with ui.element("div").classes("armtempo-page"):
-        with ui.column().classes("armtempo-half"):
-            page.picture = ui.element("div").classes("armtempo-scene")
-            _below_scene(page)
-        page.on_look(Paths(page).look)
-        with ui.column().classes("armtempo-half"):
-            _tabs(page)
+        _header(page)
+        problem.build(page)
+        with ui.element("div").classes("armtempo-main"):
+            with ui.element("div").classes("armtempo-picture"):
+                page.picture = ui.element("div").classes("armtempo-scene")
+                _views(page)
+            with ui.element("div").classes("armtempo-tabs"):
+                _tabs(page)
+        _dock(page)
+    page.on_look(Paths(page).look)
     _events(page)
     ui.timer(0.0, lambda: page.scene, once=True)
     ui.timer(LOOK_S, page.refresh)
     return page
 
 
-def _below_scene(page: PanelPage) -> None:
-    """Views, speed and position of the arm, visible on every tab."""
-    with ui.row():
-        for view, text in words.VIEWS.items():
-            ui.button(text, on_click=lambda view=view: page.scene.look(view)).props("flat dense")
-        for text, call in (
-            (words.PAUSE, Board.pause),
-            (words.RESUME, Board.resume),
-        ):
-            button = ui.button(text, on_click=lambda call=call: page.at_once(call, Needs.PAUSE))
-            page.control(button.props("outline dense no-caps").classes("armtempo-pause"), Needs.PAUSE)
-        speed = ui.slider(min=1, max=100, value=100).props(f'label aria-label="{words.SPEED_OF_MOTION}"')
-        speed.on("change", lambda event: page.at_once(lambda board: board.speed(float(event.args) / 100)))
-        ui.label(words.SPEED_OF_MOTION).classes("text-caption")
-        page.control(speed.classes("armtempo-speed"), Needs.BOARD)
-    ui.label("").props('id="armtempo-where"')
-    ui.label("").props('id="armtempo-said" role="status"')
+def _header(page: PanelPage) -> None:
+    operator = page.operator
+    with ui.element("header").classes("armtempo-header"):
+        stop = ui.button(
+            words.STOP, icon="front_hand", color="negative", on_click=lambda: _aside(operator.stop)
+        )
+        stop.classes("armtempo-stop").props("no-caps").tooltip(words.STOP_HINT)
+        freeze = ui.button(words.FREEZE, icon="ac_unit", on_click=lambda: _aside(operator.freeze))
+        freeze.classes("armtempo-freeze").props('no-caps outline id="armtempo-freeze"').tooltip(
+            words.FREEZE_HINT
+        )
+        with ui.element("div").classes("armtempo-title"):
+            ui.label(f"{words.TITLE} · {words.plain(operator.arm.name)}").classes("armtempo-name-of-arm")
+            ui.label("").props('id="armtempo-state" role="status"')
+        take = ui.button(words.TAKE_CONTROL).props("outline color=white no-caps").classes("armtempo-take")
+
+        def taken(press: Press, _: object) -> None:
+            operator.presses.take(page.client, press)
+            operator.take_control(page.client)
+
+        page.on_press(take, "click", taken)
+
+    def look() -> None:
+        mine = operator.holder == page.client
+        take.set_text(words.IN_CONTROL if mine else words.TAKE_CONTROL)
+        take.set_enabled(not mine)
+
+    page.on_look(look)
+
+
+def _views(page: PanelPage) -> None:
+    """The views of the arm; the chosen one is marked."""
+    with ui.element("div").classes("armtempo-views"):
+        views = ui.toggle(
+            words.VIEWS, value="free", on_change=lambda event: page.scene.look(str(event.value))
+        )
+        named(views.props("dense no-caps unelevated"), words.VIEW)
+    ui.label(words.UNKNOWN).classes("armtempo-unknown")
+
+
+def _dock(page: PanelPage) -> None:
+    """Position, last message, pause and speed: in view on every tab."""
+    with ui.element("footer").classes("armtempo-dock"):
+        ui.label("").props('id="armtempo-where"')
+        ui.label("").props('id="armtempo-said" role="status"')
+        with ui.element("div").classes("armtempo-speeds"):
+            for text, icon, call in (
+                (words.PAUSE, "pause", Board.pause),
+                (words.RESUME, "play_arrow", Board.resume),
+            ):
+                give = partial(page.at_once, call=call, needs=Needs.PAUSE)
+                page.button(text, give, Needs.PAUSE, look=f"outline dense icon={icon}")
+            _speed(page)
+
+
+def _speed(page: PanelPage) -> None:
+    """The board's speed, as it says; what is set here is shown once the board has it."""
+    operator = page.operator
+    ui.label(words.SPEED_OF_MOTION).classes("text-caption")
+    slider = ui.slider(min=1, max=100, value=100)
+    named(slider.classes("armtempo-speed"), words.SPEED_OF_MOTION)
+    value = ui.label("").classes("armtempo-percent")
+    page.control(slider, Needs.BOARD)
+    shown: list[float | None] = [None]
+
+    async def set_speed(press: Press, wanted: Any) -> None:
+        shown[0] = None  # the board's is shown again, if this is refused
+        await page.at_once(press, lambda board: board.speed(float(wanted) / 100))
+
+    page.on_press(slider, "change", set_speed)
+
+    def look() -> None:
+        state = operator.live.state
+        if state is not None and state.speed_percent and state.speed_percent != shown[0]:
+            shown[0] = state.speed_percent
+            slider.set_value(state.speed_percent)
+            value.set_text(f"{state.speed_percent:g} %")
+
+    page.on_look(look)
 
 
 class Paths:
@@ -81,7 +151,7 @@ class Paths:
     def look(self) -> None:
         """Draw what has changed."""
         operator, scene = self._page.operator, self._page.scene
-        if (plan := operator.desk.plan) is not None and plan is not self._plan:
+        if (plan := operator.jobs.plan) is not None and plan is not self._plan:
             self._plan = plan
             times = np.linspace(0.0, plan.total_s, _POINTS)
             scene.draw("plan", tool_path_mm(plan.arm, plan.trajectory, times), arm_scene.PATH)
@@ -91,39 +161,19 @@ class Paths:
             scene.draw("run", path, arm_scene.RUN)
 
 
-def _header(page: PanelPage) -> None:
-    operator = page.operator
-    with ui.header().classes("items-center no-wrap"):
-        stop = ui.button(words.STOP, icon="front_hand", color="negative", on_click=lambda: _stop(operator))
-        stop.classes("armtempo-stop").tooltip(words.STOP_HINT)
-        with ui.column().classes("armtempo-title"):
-            ui.label(f"{words.TITLE} · {operator.arm.name}").classes("text-subtitle1 ellipsis")
-            ui.label("").props('id="armtempo-state" role="status"')
-        take = ui.button(words.TAKE_CONTROL, on_click=lambda: operator.take_control(page.client)).props(
-            "outline color=white"
-        )
-
-    def look() -> None:
-        mine = operator.holder == page.client
-        take.set_text(words.IN_CONTROL if mine else words.TAKE_CONTROL)
-        take.set_enabled(not mine)
-
-    page.on_look(look)
-
-
 def _tabs(page: PanelPage) -> None:
     parts = {
         words.TAB_MOVE: move_tab.build,
-        words.TAB_PLAN: plan_tab.build,
+        words.TAB_JOB: job_tab.build,
         words.TAB_RUN: run_tab.build,
         words.TAB_SEQUENCE: sequence_tab.build,
         words.TAB_BOARD: board_tab.build,
     }
-    with ui.tabs().classes("full-width") as tabs:
+    with ui.tabs().classes("full-width").props("no-caps dense") as tabs:
         for name in parts:
             ui.tab(name)
     with ui.tab_panels(tabs, value=words.TAB_MOVE, animated=False, keep_alive=True).classes(
-        "full-width"
+        "armtempo-panels"
     ) as shown:
         places = {name: ui.tab_panel(name) for name in parts}
 
@@ -139,9 +189,9 @@ def _tabs(page: PanelPage) -> None:
     show(words.TAB_MOVE)
 
 
-def _stop(operator: Operator) -> None:
+def _aside(call: Any) -> None:
     """Stop in a separate thread, so that no page waits for a silent board."""
-    Thread(target=operator.stop, name="armtempo panel: stop", daemon=True).start()
+    Thread(target=call, name="armtempo panel: stop", daemon=True).start()
 
 
 def _events(page: PanelPage) -> None:
@@ -149,44 +199,70 @@ def _events(page: PanelPage) -> None:
     operator, hold = page.operator, page.hold
 
     def press(event: Any) -> None:
-        number = event.args
-        if type(number) is int and 0 <= number < len(page.jogs):
-            page.attempt(lambda: hold.press(page.client, page.jogs[number], page.jog_percent / 100))
+        press, number = Press.of(event.args), event.args.get("hold")
+        if type(number) is int and 0 <= number < len(page.holds):
+            page.holds[number](press)
 
-    ui.on("armtempo-stop", lambda: _stop(operator))
-    ui.on("armtempo-press", press)
-    ui.on("armtempo-held", lambda: hold.alive(page.client))
-    ui.on("armtempo-release", lambda: hold.release(page.client))
-    lost = json.dumps(words.LOST)
-    ui.run_javascript(f"document.body.dataset.lost = {lost}; armtempo.begin()")
+    def released(event: Any) -> None:
+        if type(number := event.args) is int:
+            hold.release(page.client, number)
+
+    ui.on("armtempo-stop", lambda: _aside(operator.stop))
+    ui.on("armtempo-press", lambda event: page.answer(event.args, page.refusal(lambda: press(event))))
+    ui.on("armtempo-held", lambda event: page.attempt(lambda: hold.alive(page.client, Press.of(event.args))))
+    ui.on("armtempo-release", released)
+    texts = json.dumps({"lost": words.LOST})
+    ui.run_javascript(f"armtempo.begin({texts})")
 
 
 def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
     """The message to all pages: poses of the arm, and numbers that change during a motion."""
+    live = operator.live
+    angles, target = live.angles_deg, live.target_deg
+    said = operator.log.last[-1] if operator.log.last else ""
+    texts = {
+        "armtempo-state": words.plain(state_line(operator)),
+        "armtempo-where": position(operator) if live.known else words.UNKNOWN,
+        "armtempo-said": words.plain(said),
+    }
+    for number, angle in enumerate(angles, 1):
+        texts[f"armtempo-angle-{number}"] = f"{angle:.2f}°" if live.known else "?"
+    poses = shape.poses(angles)
+    return {
+        "clock_s": operator.presses.clock(),
+        "state": operator.presses.state,
+        "links": poses if live.known else None,
+        "dials": shape.dials(angles),
+        "tool": shape.frame(angles) if live.known else None,
+        "ghost": poses if not live.known else None if target is None else shape.poses(target),
+        "unknown": not live.known,
+        "freeze": operator.can_freeze,
+        "texts": texts,
+    }
+
+
+def position(operator: Operator) -> str:
+    """Where the tool and the joints are."""
     angles = operator.live.angles_deg
     where = "  ".join(f"{angle:.2f}°" for angle in angles)
     with suppress(InputError):
-        x, y, z = forward(operator.arm, angles)[:3, 3]
-        where = f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  {where}"
-    said = operator.live.fault or (operator.log.last[-1] if operator.log.last else "")
-    texts = {"armtempo-state": state_line(operator), "armtempo-where": where, "armtempo-said": said}
-    for number, angle in enumerate(angles, 1):
-        texts[f"armtempo-angle-{number}"] = f"{angle:.2f}°"
-    target = operator.live.target_deg
-    ghost = None if target is None else shape.poses(target)
-    return {"links": shape.poses(angles), "dials": shape.dials(angles), "ghost": ghost, "texts": texts}
+        pose = forward(operator.arm, angles)
+        x, y, z = pose[:3, 3]
+        roll, pitch, yaw = to_rpy_deg(pose)
+        return f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  roll {roll:.1f}  pitch {pitch:.1f}  yaw {yaw:.1f}°  ·  {where}"
+    return where
 
 
 def state_line(operator: Operator) -> str:
-    """The board's state in a line."""
-    if operator.trouble:
-        return operator.trouble
+    """The board's state in a line, with its age if that is more than OLD_S."""
     doing = f" · {operator.busy}" if operator.busy else ""
     if operator.busy and operator.progress:
         doing += f" {operator.progress:.0%}"
     state = operator.live.state
     if state is None:  # its program is being deployed
         return f"{operator.port}{doing}"
+    age_s = operator.live.age_s
+    old = f" · {words.OLD_STATE.format(age=age_s)}" if age_s > OLD_S else ""
     kind = f" ({words.VIRTUAL})" if state.virtual else ""
     if state.moving and state.speed_percent != 100:
         speed = (
@@ -194,4 +270,4 @@ def state_line(operator: Operator) -> str:
         )
         doing = f" {speed}{doing}"
     fault = f" · {state.fault}" if state.fault else ""
-    return f"{state.state}{doing} · {state.port}{kind}{fault}"
+    return f"{state.state}{doing}{old} · {state.port}{kind}{fault}"

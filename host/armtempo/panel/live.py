@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -99,11 +100,29 @@ class LiveArm:
         """Of the tool, by ``curves``; another object whenever it has changed."""
         self.inputs: dict[str, bool] = {}
         """Whether each input of the arm is active."""
+        self.outputs: dict[str, str | float] = {}
+        """The state that the board last set of each output of the arm, or the value if it is none, in its unit."""
+        self.heard_s = time.monotonic()
+        """When the board last said where the arm is."""
+        self.guided = False
+        """Whether it is guided by hand."""
+        self.doubt = ""
+        """Text: why the arm may be elsewhere than the board says; "" after it was homed."""
         self.sequence: SequenceState | None = None
         """State of the sequence that was started last."""
         self._seen = (-1, 0)
         self._jogs: tuple[Array, dict[JogMove, str]] = (np.empty(0), {})
         """Angles, (J,), and the answers of ``why_no_jog`` for them."""
+
+    @property
+    def age_s(self) -> float:
+        """How long ago the board last said where the arm is."""
+        return time.monotonic() - self.heard_s
+
+    @property
+    def known(self) -> bool:
+        """Whether the board knows where the arm is, or its encoders tell while it is guided by hand."""
+        return self.guided or self.state is None or all(joint.known for joint in self.state.joints)
 
     @property
     def fault(self) -> str:
@@ -123,6 +142,7 @@ class LiveArm:
     def take_event(self, event: Event) -> None:
         """Handle an event of the board."""
         if isinstance(event, Sample):
+            self.heard_s = time.monotonic()
             sample = sample_json(event, self.arm)
             if "commanded_deg" in sample:
                 if sample["run"] != self.curves.run:
@@ -144,10 +164,16 @@ class LiveArm:
     def ask(self, board: Board) -> None:
         """Read the board's state and inputs; raises LinkError if it does not answer."""
         state = board.state(self.arm)
-        if self.arm.inputs and state.arm:
+        if (self.arm.inputs or self.arm.outputs) and state.arm:
             levels = board.client.levels()
             self.inputs = {one.name: levels.active(n) for n, one in enumerate(self.arm.inputs)}
+            self.outputs = {
+                one.name: one.state(levels.outputs[n]) or one.value(levels.outputs[n])
+                for n, one in enumerate(self.arm.outputs)
+            }
         angles = [joint.angle_deg for joint in state.joints]
-        if all(angle is not None for angle in angles):
-            self.angles_deg = np.array(angles, dtype=float)
-        self.state = state
+        # Of joints that are not known the steps say nothing
+        known = all(joint.known for joint in state.joints) and None not in angles
+        if not self.guided:
+            self.angles_deg = np.array(angles if known else self.arm.home_deg, dtype=float)
+        self.state, self.heard_s = state, time.monotonic()

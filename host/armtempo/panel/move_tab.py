@@ -1,97 +1,224 @@
-"""Moving by hand: buttons to hold, postures, home, outputs and inputs."""
+"""Moving by hand: homing, jogs that are held or make a step, targets, teaching, outputs and inputs."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Awaitable
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
 from nicegui import ui
 
-from armtempo.panel import words
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.kinematics.of_arm import forward
+from armtempo.model.pose import to_rpy_deg
+from armtempo.panel import homing, teaching, words
+from armtempo.panel.hold import SHOWN_S
 from armtempo.panel.operator import Needs
+from armtempo.panel.panel_page import PanelPage, named
 from armtempo.planning.jog.jog_motion import JogMove
+from armtempo.robot.goto import MovePace, Where, posture_deg
 
 if TYPE_CHECKING:
-    from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
 
 AXES = ("x", "y", "z")
-_CLEAR = Needs.COMMAND | Needs.FAULT
+HOLD, SMALLEST = "hold", 0.1
+STEPS = {HOLD: words.HOLD, 0.1: "0.1", 1.0: "1", 10.0: "10"}
+"""Lengths of a jog, in mm and degrees."""
+_TOOL = "tool-"
+FRAMES = {"joints": words.JOINTS, "": words.BASE_FRAME, _TOOL: words.TOOL_FRAME}
 
 
-def build(page: PanelPage) -> None:
-    """The tab."""
-    _jog(page)
-    _postures(page)
-    _home(page)
-    _outputs(page)
+class MoveTab:
+    """The tab of one page."""
 
+    def __init__(self, page: PanelPage) -> None:
+        self._page = page
+        self._operator = page.operator
+        self._step: str | float = HOLD
+        self._jogs()
+        self._targets()
+        self._home_and_teach()
+        _outputs(page)
+        _inputs(page)
 
-def _hold_button(page: PanelPage, move: JogMove, sign: str, name: str) -> None:
-    """A button that moves the arm while it is held; the page's script finds it by its number."""
-    made = ui.button(sign).classes("armtempo-touch")
-    made.props(f'unelevated aria-label="{name} {sign}" data-jog={len(page.jogs)}')
-    page.control(made, more=lambda: page.operator.live.why_no_jog(move), is_held=True)
-    page.jogs.append(move)
+    # jogs
 
-
-def _pair(page: PanelPage, name: str, move: JogMove) -> None:
-    """Minus, name, plus."""
-    _hold_button(page, replace(move, by=-move.by), "−", name)
-    ui.label(name).classes("armtempo-name ellipsis")
-    _hold_button(page, move, "+", name)
-
-
-def _jog(page: PanelPage) -> None:
-    with ui.row().classes("armtempo-apart"):
-        with ui.column():
-            ui.label(words.JOINTS).classes("text-subtitle2")
+    def _jogs(self) -> None:
+        page = self._page
+        with ui.row().classes("armtempo-choices"):
+            frames = ui.toggle(FRAMES, value="joints")
+            named(frames.props("dense no-caps unelevated"), words.FRAME)
+            steps = ui.toggle(STEPS, value=HOLD, on_change=lambda event: setattr(self, "_step", event.value))
+            named(steps.props("dense no-caps unelevated"), words.STEP_OF_JOG)
+        with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value="joints"):
             for number, joint in enumerate(page.operator.arm.driven):
                 low, high = joint.range_deg
-                with ui.row().classes("no-wrap"):
-                    _pair(page, joint.name, JogMove(math.inf, joint=number))
+                with ui.element("div").classes("armtempo-jog"):
+                    self._pair(joint.name, JogMove(math.inf, joint=number))
                     ui.label("").classes("armtempo-number").props(f'id="armtempo-angle-{number + 1}"')
                     ui.label(f"{low:g}° … {high:g}°").classes("armtempo-note")
-        with ui.column():
-            ui.label(words.TOOL).classes("text-subtitle2")
-            for axis in AXES:
-                with ui.row().classes("no-wrap armtempo-tool"):
-                    _pair(page, axis, JogMove(math.inf, axis=axis))
-                    _pair(page, f"⟳ {axis}", JogMove(math.inf, axis=axis, about=True))
-    ui.label(words.HOLD_HINT).classes("armtempo-note")
-    ui.label(words.SPEED_OF_JOG).classes("text-caption")
-    slider = ui.slider(min=1, max=100, value=page.jog_percent).props("label").classes("armtempo-slider")
-    slider.on_value_change(lambda event: setattr(page, "jog_percent", float(event.value)))
+        for frame in ("", _TOOL):
+            with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value=frame):
+                for axis in AXES:
+                    with ui.element("div").classes("armtempo-jog"):
+                        name = f"{words.OWN} {axis}" if frame else axis
+                        self._pair(name, JogMove(math.inf, axis=frame + axis))
+                        self._pair(f"⟳ {name}", JogMove(math.inf, axis=frame + axis, about=True))
+        with ui.element("div").classes("armtempo-slide"):
+            ui.label(words.SPEED_OF_JOG).classes("text-caption")
+            slider = ui.slider(min=1, max=100, value=page.jog_percent)
+            named(slider.classes("armtempo-slider"), words.SPEED_OF_JOG)
+            percent = ui.label(f"{page.jog_percent:g} %").classes("armtempo-percent")
 
+            def set_percent(value: float) -> None:
+                page.jog_percent = float(value)
+                percent.set_text(f"{value:g} %")
 
-def _postures(page: PanelPage) -> None:
-    operator = page.operator
-    names = ["home", *(posture.name for posture in operator.arm.postures)]
-    with ui.row():
-        ui.label(words.POSTURES).classes("text-subtitle2")
-        for name in names:
-            go = ui.button(name).props("outline no-caps")
-            go.on_click(lambda name=name: page.do(name, lambda: operator.go(name)))
-            page.control(go)
+            slider.on_value_change(lambda event: set_percent(event.value))
 
+    def _pair(self, name: str, move: JogMove) -> None:
+        """Minus, name, plus."""
+        self._jog(replace(move, by=-move.by), "−", name)
+        ui.label(words.plain(name)).classes("armtempo-name ellipsis")
+        self._jog(move, "+", name)
 
-def _home(page: PanelPage) -> None:
-    operator = page.operator
+    def _jog(self, move: JogMove, sign: str, name: str) -> None:
+        page, operator = self._page, self._operator
+        why_not = partial(operator.live.why_no_jog, move)
+        made = page.hold_button(sign, partial(self._begin, move), why_not, "unelevated", f"{name} {sign}")
+        made.classes("armtempo-touch")
 
-    async def home() -> None:
-        with ui.dialog() as sure, ui.card():
-            ui.label(words.SURE)
+    def _begin(self, move: JogMove, press: Press) -> None:
+        """A jog while the button is held, or a step."""
+        page, operator, fraction = self._page, self._operator, self._page.jog_percent / 100
+        joint = None if move.joint is None else move.joint + 1
+        if isinstance(self._step, str):
+            way = int(math.copysign(1, move.by))
+            page.hold.press(
+                page.client,
+                press,
+                words.JOG,
+                lambda: operator.board.held_jog(joint, move.axis or None, way, move.about, fraction),
+            )
+            return
+        by = math.copysign(self._step, move.by)
+        by_deg, by_mm = (by, None) if move.unit == "deg" else (None, by)
+        page.do(
+            press,
+            words.JOG_STEP,
+            lambda: operator.board.jog(joint, by_deg, move.axis or None, by_mm, fraction),
+        )
+
+    # targets
+
+    def _targets(self) -> None:
+        page, arm = self._page, self._operator.arm
+        with ui.row():
+            ui.label(words.GO_TO).classes("text-subtitle2")
+            one_click = ui.switch(words.ONE_CLICK)
+        self._one_click = one_click
+        self._posture_buttons()
+        with ui.expansion(words.TYPED_TARGET).props("dense").classes("armtempo-expansion"):
             with ui.row():
-                ui.button(words.HOME, on_click=lambda: sure.submit(True))
-                ui.button(words.CANCEL, on_click=lambda: sure.submit(False)).props("flat")
-        if await sure:
-            page.do(words.HOME, lambda: operator.board.home(operator.arm), Needs.COMMAND)
+                kind = ui.toggle({"angles": words.ANGLES, "pose": words.POSE}, value="angles")
+                named(kind.props("dense no-caps unelevated"), words.TYPED_TARGET)
+                line = ui.switch(words.IN_A_LINE)
+                ui.button(words.TAKE_PRESENT, on_click=self._take_present).props("flat dense no-caps")
+            with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="angles"):
+                self._angles = [
+                    _number(joint.name, angle) for joint, angle in zip(arm.driven, arm.home_deg, strict=True)
+                ]
+            with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="pose"):
+                self._pose = {name: _number(name, 0.0) for name in words.POSE_FIELDS}
+                if len(arm.driven) < len(words.POSE_FIELDS):
+                    ui.label(words.FEW_JOINTS.format(joints=len(arm.driven))).classes("armtempo-note")
+            with ui.row():
+                ui.button(
+                    words.SHOW, on_click=lambda: page.attempt(lambda: self._show_typed(kind.value))
+                ).props("outline no-caps")
 
-    with ui.row():
-        page.control(ui.button(words.HOME, on_click=home).props("outline no-caps"), Needs.COMMAND)
-        clear = ui.button(words.CLEAR).props("outline no-caps")
-        clear.on_click(lambda: page.do(words.CLEAR, lambda: operator.board.clear(), _CLEAR))
-        page.control(clear, _CLEAR)
+                def begin(press: Press) -> None:
+                    self._go(words.TYPED_TARGET, self._typed(kind.value), line.value, press)
+
+                page.hold_button(words.GO, begin, look="unelevated", name=f"{words.GO}: {words.TYPED_TARGET}")
+        ui.label(words.TARGET_HINT).classes("armtempo-note")
+
+    @ui.refreshable_method
+    def _posture_buttons(self) -> None:
+        page, arm = self._page, self._operator.arm
+        with ui.row().classes("armtempo-postures"):
+            for name in ["home", *(posture.name for posture in arm.postures)]:
+                begin = partial(self._go, name, name, False)
+                page.hold_button(words.plain(name), begin, name=f"{words.GO_TO} {name}")
+
+    def _go(self, what: str, where: Where, line: bool, press: Press) -> None:
+        """Show the target; go there while the button is held, or with one click."""
+        page, operator = self._page, self._operator
+        pace = MovePace(page.jog_percent / 100, line)
+        target_deg = posture_deg(where, operator.arm)
+        self._show(target_deg)
+        if self._one_click.value:
+            page.do(press, what, lambda: operator.go(target_deg, pace))
+            return
+        page.hold.press(page.client, press, what, lambda: operator.held_move(target_deg, pace), SHOWN_S)
+
+    def _show(self, target_deg: Array) -> None:
+        """The ghost at a target, and the tool's path to it."""
+        self._page.show_ghost(target_deg)
+        with suppress(ArmtempoError):
+            self._page.show_way(target_deg)
+
+    def _show_typed(self, kind: str) -> None:
+        self._show(posture_deg(self._typed(kind), self._operator.arm))
+
+    def _typed(self, kind: str) -> Where:
+        """The typed target as angles; raises ArmtempoError if it is none, or no posture reaches it."""
+        if kind == "angles":
+            return np.array([_value(field) for field in self._angles])
+        position = [_value(self._pose[name]) for name in words.POSE_FIELDS[:3]]
+        turns = [_value(self._pose[name]) for name in words.POSE_FIELDS[3:]]
+        return teaching.nearest(self._operator.arm, position, turns, self._operator.live.angles_deg)
+
+    def _take_present(self) -> None:
+        """Fill the fields with where the arm is."""
+        angles = self._operator.live.angles_deg
+        for field, angle in zip(self._angles, angles, strict=True):
+            field.set_value(round(float(angle), 3))
+        pose = forward(self._operator.arm, angles)
+        values = [*pose[:3, 3], *to_rpy_deg(pose)]
+        for field, value in zip(self._pose.values(), values, strict=True):
+            field.set_value(round(float(value), 2) + 0.0)
+
+    # homing and teaching
+
+    def _home_and_teach(self) -> None:
+        page = self._page
+        with ui.row():
+            page.button(words.HOMING, partial(homing.ask, page), Needs.COMMAND, look="outline icon=home")
+            page.button(words.TEACH, self._teach, Needs.MOVE, look="outline icon=push_pin")
+            page.button(
+                words.BY_HAND, partial(teaching.by_hand, page), Needs.MOVE, look="outline icon=back_hand"
+            )
+
+    def _teach(self, _: Press) -> None:
+        teaching.ask(self._page, self._posture_buttons.refresh)
+
+
+def _number(name: str, value: float) -> ui.number:
+    field = ui.number(words.plain(name), value=value, format="%.3f").props("dense outlined")
+    return field.classes("armtempo-value")
+
+
+def _value(field: ui.number) -> float:
+    if field.value is None:
+        raise InputError(f"{field.props['label']}: no number is given", "type one")
+    return float(field.value)
 
 
 def _outputs(page: PanelPage) -> None:
@@ -99,25 +226,49 @@ def _outputs(page: PanelPage) -> None:
     if operator.arm.outputs:
         ui.label(words.OUTPUTS).classes("text-subtitle2")
     for output in operator.arm.outputs:
+        buttons: dict[str | float, ui.button] = {}
         with ui.row():
-            ui.label(output.name)
+            ui.label(words.plain(output.name))
             for state in [name for name, _ in output.states] or output.range:
-                button = ui.button(f"{state:g}" if isinstance(state, float) else state).props(
-                    "outline no-caps"
-                )
-                button.on_click(
-                    lambda name=output.name, state=state: page.at_once(
-                        lambda board: board.output(name).set(state)
-                    )
-                )
-                page.control(button, Needs.BOARD)
-    if operator.arm.inputs:
-        ui.label(words.INPUTS).classes("text-subtitle2")
-        lamps = {one.name: ui.badge(one.name, color="grey") for one in operator.arm.inputs}
+                text = f"{state:g}" if isinstance(state, float) else words.plain(state)
+                call = partial(_set_output, page, output.name, state)
+                name = f"{output.name}: {text}"
+                buttons[state] = page.button(text, call, Needs.BOARD, look="outline", name=name)
 
-        def look() -> None:
-            for name, lamp in lamps.items():
-                active = operator.live.inputs.get(name)
-                lamp.props(f"color={'green' if active else 'grey'}")
+        def look(name: str = output.name, buttons: dict[str | float, ui.button] = buttons) -> None:
+            """Mark the state that the board says."""
+            for state, button in buttons.items():
+                button.props(
+                    f"aria-pressed={'true' if operator.live.outputs.get(name) == state else 'false'}"
+                )
 
         page.on_look(look)
+
+
+def _inputs(page: PanelPage) -> None:
+    operator = page.operator
+    if not operator.arm.inputs:
+        return
+    ui.label(words.INPUTS).classes("text-subtitle2")
+    with ui.row():
+        lamps = {
+            one.name: ui.chip(words.plain(one.name)).props("dense outline color=primary")
+            for one in operator.arm.inputs
+        }
+
+    def look() -> None:
+        for name, lamp in lamps.items():
+            active = operator.live.inputs.get(name)
+            lamp.props(f"icon={'radio_button_checked' if active else 'radio_button_unchecked'}")
+            named(lamp, f"{name}: {words.text(bool(active))}")
+
+    page.on_look(look)
+
+
+def _set_output(page: PanelPage, name: str, state: float | str, press: Press) -> Awaitable[object]:
+    return page.at_once(press, lambda board: board.output(name).set(state))
+
+
+def build(page: PanelPage) -> None:
+    """The tab."""
+    MoveTab(page)

@@ -11,21 +11,28 @@ from threading import Event as ThreadEvent
 from threading import Lock, Thread
 
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError, PortInUseError
+from armtempo.deploy import deploy
 from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link.traffic import Chunk, Sink
+from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.panel import words
-from armtempo.panel.desk import Desk
+from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.live import Lines, LiveArm
-from armtempo.panel.sequence_desk import SequenceDesk
+from armtempo.panel.press import Press, Presses
+from armtempo.panel.sequence_editor import SequenceEditor
+from armtempo.planning import brake_time
+from armtempo.planning.jog.jog_motion import JogMotion
+from armtempo.robot import goto
 from armtempo.robot.board import Board
-from armtempo.robot.goto import Where, posture_deg
+from armtempo.robot.goto import MovePace, Where, posture_deg
+from armtempo.robot.jog import HeldJog
 from armtempo.robot.stop_request import Stopped
 
 LOOK_S = 0.25
 """Interval of status requests while there are no samples."""
-FREEZE_AFTER_S = 5.0
-"""A second press of stop within this time freezes the outputs instead of braking."""
+FREEZE_AFTER_S = 0.5
+"""An arm that is not at rest this long after a stop can be frozen: a double press of stop does not do it."""
 _LOG = logging.getLogger("armtempo")
 
 
@@ -42,7 +49,7 @@ class Needs(Flag):
     """Something moves."""
     COMMAND = IDLE | BOARD
     PLAN = auto()
-    """A motion is planned."""
+    """A motion is planned, and the job was not changed since."""
     FAULT = auto()
     """A fault is pending."""
     CONTROL = 0
@@ -57,19 +64,25 @@ class Operator:
     Commands run one at a time in separate threads; ``stop`` does not wait for them.
     """
 
-    def __init__(self, connect: Callable[[Sink], Board], port: str, desk: Desk, runs: Path) -> None:
+    def __init__(
+        self,
+        connect: Callable[[Sink, Callable[[str], object]], Board],
+        port: str,
+        jobs: JobEditor,
+        runs: Path,
+    ) -> None:
         """``connect`` opens the board's ``port``.
 
         A board that does not answer, or runs another program, is ``trouble``: the panel can deploy the program.
         Raises InputError or PortInUseError if the port cannot be used, LinkError for a board of another arm.
         """
-        self.arm, self.desk = desk.arm, desk
+        self.arm, self.jobs = jobs.arm, jobs
         self.port, self.runs = port, runs
         """Where run folders go."""
-        self.live = LiveArm(desk.arm)
+        self.live = LiveArm(jobs.arm)
         self.ended = 0
         """Number of ended commands."""
-        self.sequences = SequenceDesk(desk.arm, desk.folder)
+        self.sequences = SequenceEditor(jobs.arm, jobs.folder)
         self.tested: SelfTest | None = None
         """The last self-test."""
         self.traffic = Lines()
@@ -85,9 +98,17 @@ class Operator:
         self.log = Lines()
         self.holder = ""
         """The client that has control; "" for none."""
+        self.presses = Presses(self._situation)
+        """Which presses of the pages are still meant."""
         self._lock = Lock()
         self._closed = ThreadEvent()
-        self._stopped_s = -FREEZE_AFTER_S
+        self.failure = ""
+        """Text: why the last command failed; "" after the next one has begun."""
+        self.guiding = False
+        """Whether the arm is guided by hand."""
+        self._stop_s: float | None = None
+        """When a stop was asked for, until the arm is known to rest."""
+        self._stop_sent_s = 0.0
         self._connect = connect
         self._board: Board | None = None
         self._open()
@@ -101,13 +122,24 @@ class Operator:
             raise LinkError(self.trouble or words.NO_BOARD, words.NO_BOARD_HINT)
         return self._board
 
+    @property
+    def has_board(self) -> bool:
+        """Whether a board with the program answered."""
+        return self._board is not None
+
+    def arm_changed(self, arm: Arm) -> None:
+        """Take another version of the arm that differs in its postures alone."""
+        self.arm = self.live.arm = self.jobs.arm = self.sequences.arm = arm
+        if self._board is not None:
+            self._board.arm = arm
+
     def _open(self) -> None:
         try:
-            board = self._connect(self._take_traffic)
+            board = self._connect(self._take_traffic, self._tell)
         except PortInUseError:
             raise
         except LinkError as error:
-            self.trouble = str(error)
+            self.trouble = words.of_error(error)
             self.say(self.trouble)
             return
         try:
@@ -115,8 +147,7 @@ class Operator:
         except BaseException:
             board.close()
             raise
-        board.client.session.listeners.append(self.live.take_event)
-        board.client.session.tell = self._tell
+        board.client.session.listen(self.live.take_event)
         self._board, self.trouble = board, ""
 
     def _tell(self, text: str) -> None:
@@ -136,7 +167,7 @@ class Operator:
             try:
                 self._open()
             except LinkError as error:
-                self.trouble = str(error)
+                self.trouble = words.of_error(error)
                 raise
 
     def close(self) -> None:
@@ -149,6 +180,17 @@ class Operator:
             self._board.close()
 
     # control
+
+    def _situation(self) -> object:
+        """What a command depends on."""
+        state = self.live.state
+        seen = state and (
+            state.moving,
+            state.fault,
+            not state.speed_percent,
+            [one.known for one in state.joints],
+        )
+        return self.holder, self.busy, self.trouble, id(self.jobs.plan), seen
 
     def take_control(self, client: str) -> None:
         """Give ``client`` control; a motion of the previous client continues, its held jog ends."""
@@ -167,8 +209,8 @@ class Operator:
             return words.OTHER_IN_CONTROL if self.holder else words.NOBODY_IN_CONTROL
         if self.busy and Needs.IDLE in needs:
             return words.BUSY.format(what=self.busy)
-        if Needs.PLAN in needs and self.desk.plan is None:
-            return words.NO_PLAN
+        if Needs.PLAN in needs and (self.jobs.plan is None or self.jobs.plan_is_old):
+            return words.PLAN_IS_OLD if self.jobs.plan else words.NO_PLAN
         state, fault = self.live.state, self.live.fault
         if Needs.MOTION in needs and (state is None or not state.moving):
             return words.AT_REST
@@ -178,30 +220,63 @@ class Operator:
             return ""
         if fault:
             return fault
-        if not all(joint.known for joint in state.joints):
+        if not self.live.known:
             return words.NOT_HOMED
         return words.MOVING if state.moving else ""
 
     # commands
 
-    def do(self, what: str, client: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
-        """Run ``call`` in a separate thread; raises InputError, with the reason, if that is not possible now.
+    def check(self, client: str, press: Press, needs: Needs) -> None:
+        """Raise InputError, with the reason, if a press of ``client`` is not meant any more, or not possible now."""
+        self.presses.take(client, press)
+        if reason := self.why_not(client, needs):
+            raise InputError(reason, words.WAIT)
 
-        Its errors go to the log and to all clients.
+    def do(
+        self,
+        what: str,
+        client: str,
+        press: Press,
+        call: Callable[[], object],
+        needs: Needs = Needs.MOVE,
+        before: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Run ``call`` in a separate thread; raises InputError as ``check``.
+
+        ``before`` is called first, if it is possible. Errors of ``call`` go to the log and to all clients.
         """
         with self._lock:
-            if reason := self.why_not(client, needs):
-                raise InputError(reason, words.WAIT)
-            self.busy, self.progress = what, 0.0
+            self.check(client, press, needs)
+            before()
+            self.busy, self.progress, self.failure = what, 0.0, ""
+            self.live.plan = None
         Thread(target=self._work, args=(what, call), name=f"armtempo panel: {what}", daemon=True).start()
 
-    def go(self, where: Where) -> None:
+    def go(self, where: Where, pace: MovePace | None = None) -> None:
         """Go to a posture, which is ``target_deg`` meanwhile."""
+        pace = pace or MovePace()
         self.live.target_deg = posture_deg(where, self.arm)
         try:
-            self.board.goto(where, progress=self.part)
+            self.board.goto(where, progress=self.part, speed=pace.speed, line=pace.line)
         finally:
             self.live.target_deg = None
+
+    def held_move(self, where: Where, pace: MovePace) -> HeldJog:
+        """A move to a posture that lasts while it is held; errors as those of ``Board.goto``."""
+        here_deg, target_deg = self.board.posture_deg(), posture_deg(where, self.arm)
+        trajectory = goto.motion(self.arm, here_deg, target_deg, pace)
+        brakes = brake_time.of_motion(trajectory, [joint.limits for joint in self.arm.driven])
+        return HeldJog(self.board.client, self.arm, JogMotion(trajectory, brakes, ""))
+
+    def home(self, where: Where | None = None) -> None:
+        """Declare where the arm is; default: at home."""
+        self.board.home(self.arm, where)
+        self.live.doubt = ""
+
+    def home_to_switches(self) -> None:
+        """Home the joints that have switches."""
+        self.board.home_to_switches(self.arm)
+        self.live.doubt = ""
 
     def _work(self, what: str, call: Callable[[], object]) -> None:
         try:
@@ -210,13 +285,17 @@ class Operator:
         except Stopped as stopped:
             self.say(words.STOPPED.format(what=what, why=stopped))
         except ArmtempoError as error:
-            self.say(f"{what}: {error}")
+            self._fail(f"{what}: {words.of_error(error)}")
         except Exception as error:  # a bug: reported, and the panel continues
             _LOG.exception("panel: %s", what)
-            self.say(f"{what}: {type(error).__name__}: {error}")
+            self._fail(f"{what}: {type(error).__name__}: {error}")
         finally:
             self.busy = ""
             self.ended += 1
+
+    def _fail(self, text: str) -> None:
+        self.failure = text
+        self.say(text)
 
     def upload(self, plan: Plan) -> None:
         """Store a plan on the board, in the place of another one of its name."""
@@ -228,8 +307,14 @@ class Operator:
         self.live.plan = plan
         self.board.run(plan, times, self.runs, self.part).report()
 
+    def deploy(self) -> None:
+        """Put this version's program on the board."""
+        self.without_board(lambda: deploy(self.port, tell=self.say, progress=self.part))
+
     def selftest(self) -> None:
         """Let the board measure itself."""
+        if self.board.info.virtual:  # its drivers hold no arm, and it has no reset button to switch them off
+            self.board.client.drivers(False)
         self.tested = self.board.selftest(self.part)
 
     def part(self, done: float, whole: float) -> None:
@@ -237,15 +322,36 @@ class Operator:
         self.progress = done / whole if whole else 0.0
 
     def stop(self, by: str = words.PANEL) -> None:
-        """Brake along the path; a second time within FREEZE_AFTER_S: freeze. Allowed for all clients."""
-        now_s = time.monotonic()
-        freeze = now_s - self._stopped_s < FREEZE_AFTER_S
-        self._stopped_s = now_s
+        """Brake along the path. Allowed for all clients."""
+        if self._stop_s is None:
+            self._stop_s = time.monotonic()
         try:
-            if self.board.request_stop(freeze, by):
-                self.say(words.FREEZING if freeze else words.BRAKING)
+            if self.board.request_stop(False, by):
+                self.say(words.BRAKING)
+            else:
+                self._stop_s = None
         except ArmtempoError as error:
-            self.say(str(error))
+            self._fail(words.of_error(error))
+        self._stop_sent_s = time.monotonic()
+
+    @property
+    def can_freeze(self) -> bool:
+        """Whether a stop was asked for, and the arm does not rest yet."""
+        return self._stop_s is not None and time.monotonic() - self._stop_s > FREEZE_AFTER_S
+
+    def freeze(self, by: str = words.PANEL) -> None:
+        """Freeze the outputs of an arm that does not come to rest after a stop. Allowed for all clients."""
+        if not self.can_freeze:
+            return
+        try:
+            if self.board.request_stop(True, by):
+                blind = [joint.name for joint in self.arm.driven if joint.encoder is None]
+                self.live.doubt = (
+                    words.FROZEN_BLIND.format(joints=", ".join(blind)) if blind else words.FROZEN
+                )
+                self.say(self.live.doubt)
+        except ArmtempoError as error:
+            self._fail(words.of_error(error))
 
     def say(self, text: str) -> None:
         """Append a line to the log."""
@@ -267,10 +373,13 @@ class Operator:
                 with board.client.session.in_a_hurry(LOOK_S) as mine:
                     if not mine:
                         continue
+                    asked_s = time.monotonic()
                     self.live.ask(board)
                     self.trouble = ""
+                    if self.live.state and not self.live.state.moving and asked_s > self._stop_sent_s:
+                        self._stop_s = None
             except ArmtempoError as error:
                 if board is self._board:
-                    self.trouble = str(error)
+                    self.trouble = words.of_error(error)
             except Exception:  # a bug: logged, and states continue
                 _LOG.exception("panel: the board's state")

@@ -9,9 +9,16 @@ window.armtempo = {
   changes: 0,
   since: 0,
   heard: performance.now(),
-  held: null,
+  offsets_ms: [], // of this page's clock to the server's, by the last messages of this connection
+  OFFSETS: 50,
+  state: 0, // the number of the state that is shown
+  number: 0, // of the presses
+  answered: null, // the number of the last press that the server has seen, and why it was refused
+  held: null, // the number of the press of the button that is held
   lines: {}, // three.js objects by name
   dials: [], // ranges of the joints
+  tool: null, // its frame
+  framed: undefined,
   follow: false,
   THREE: null,
   SMOOTH_MS: 100,
@@ -25,12 +32,18 @@ window.armtempo = {
     setInterval(() => this.draw(), 50); // as often as the scene is drawn: at each frame it would cost twice as much
   },
 
-  begin() {
+  begin(texts) {
+    this.texts = texts;
+    document.body.dataset.lost = texts.lost;
+    const send = socket.emit.bind(socket);
+    // Nothing is kept: socket.io would send it after a reconnection, when nobody means it any more
+    socket.emit = (name, ...rest) => (name !== "event" || socket.connected ? send(name, ...rest) : socket);
+    socket.on("disconnect", () => this.unconnected());
     setInterval(() => this.look(), this.LOOK_MS);
     addEventListener("keydown", (event) => this.key(event), true); // before a button takes the space bar for itself
     addEventListener("keyup", (event) => event.key === "Enter" && this.release(), true);
     addEventListener("pointerdown", (event) => event.button === 0 && this.press(event), true);
-    addEventListener("contextmenu", (event) => event.target.closest("[data-jog]") && event.preventDefault());
+    addEventListener("contextmenu", (event) => event.target.closest("[data-hold]") && event.preventDefault());
     addEventListener("pointermove", (event) => event.buttons && (this.changes += 1)); // perhaps a via point is dragged
     for (const gone of ["pointerup", "pointercancel", "blur"]) addEventListener(gone, () => this.release());
     document.addEventListener("visibilitychange", () => document.hidden && this.release());
@@ -39,8 +52,14 @@ window.armtempo = {
   // a message of the server, about ten a second
   hear(message) {
     this.heard = performance.now();
+    if (!socket.connected) return;
+    this.state = message.state;
+    this.offsets_ms = [...this.offsets_ms.slice(1 - this.OFFSETS), this.heard - 1000 * message.clock_s];
     document.body.classList.remove("lost"); // which covers the page
     this.target = message.ghost;
+    document.body.classList.toggle("unknown", message.unknown); // the arm is then drawn as its ghost
+    document.body.classList.toggle("freezes", message.freeze);
+    if (JSON.stringify(message.tool) !== JSON.stringify(this.tool)) this.tool = message.tool;
     if (JSON.stringify(message.dials) !== JSON.stringify(this.angles)) this.angles = message.dials;
     if (JSON.stringify(message.links) !== JSON.stringify(this.to)) {
       this.from = this.now();
@@ -72,7 +91,25 @@ window.armtempo = {
       this.place(scene, this.parts.links, this.now());
       this.place(scene, this.parts.ghost, this.ghost || this.target);
       this.turn(scene);
+      this.axes(scene);
     }
+  },
+
+  // x, y and z of the base and of the tool: red, green, blue
+  axes(scene) {
+    if (!this.THREE || this.tool === this.framed) return;
+    this.framed = this.tool;
+    this.changes += 1;
+    const T = this.THREE;
+    if (!this.frames) {
+      this.frames = [0.2, 0.12].map((length) => new T.AxesHelper(length));
+      this.frames.forEach((frame) => scene.scene.add(frame));
+      this.frames[1].matrixAutoUpdate = false;
+    }
+    this.frames[1].visible = Boolean(this.tool);
+    if (!this.tool) return;
+    const columns = [0, 3, 6, 9].map((at) => new T.Vector3(...this.tool.slice(at, at + 3)));
+    this.frames[1].matrix.makeBasis(...columns.slice(0, 3)).setPosition(columns[3]);
   },
 
   // The scene draws 20 times a second; what has not changed is drawn once a second, which spares a tablet's battery.
@@ -164,22 +201,42 @@ window.armtempo = {
     } else if (event.key === "Enter" && !event.repeat) this.press(event);
   },
 
+  // what the server needs to know of a press: see press.py
+  stamp(number, at = performance.now()) {
+    return { number, state: this.state, made_s: (at - Math.min(...this.offsets_ms)) / 1000 };
+  },
+
+  // a command: a press, or another event with its value
+  command(event, emit) {
+    if (!this.offsets_ms.length || !socket.connected) return this.unconnected();
+    const at = (event instanceof Event ? event : window.event)?.timeStamp;
+    emit(this.stamp(++this.number, at), event instanceof Event ? null : event);
+  },
+
+  unconnected() {
+    this.held = null;
+    this.offsets_ms = [];
+    document.body.classList.add("lost");
+  },
+
   press(event) {
-    const button = event.target.closest("[data-jog]:not([disabled])");
+    const button = event.target.closest("[data-hold]:not([disabled])");
     if (!button || this.held !== null) return;
     event.preventDefault();
-    this.held = Number(button.dataset.jog);
-    emitEvent("armtempo-press", this.held);
+    if (!this.offsets_ms.length) return;
+    this.held = ++this.number;
+    emitEvent("armtempo-press", { ...this.stamp(this.held, event.timeStamp), hold: Number(button.dataset.hold) });
   },
 
   release() {
     if (this.held === null) return;
+    const number = this.held;
     this.held = null;
-    emitEvent("armtempo-release");
+    emitEvent("armtempo-release", number);
   },
 
   look() {
-    if (this.held !== null) emitEvent("armtempo-held");
+    if (this.held !== null) emitEvent("armtempo-held", this.stamp(this.held));
     if (performance.now() - this.heard > this.SILENT_MS) {
       this.held = null;
       document.body.classList.add("lost");

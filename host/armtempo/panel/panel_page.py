@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
+import numpy as np
 from nicegui import run, ui
 from nicegui.element import Element
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import ArmtempoError, InputError
-from armtempo.panel import words
+from armtempo.basics.errors import ArmtempoError
+from armtempo.kinematics.chain import chains_mm
+from armtempo.panel import arm_scene, words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
-from armtempo.panel.held_jog import ButtonHold
+from armtempo.panel.hold import ButtonHold
 from armtempo.panel.operator import Needs, Operator
-from armtempo.planning.jog.jog_motion import JogMove
+from armtempo.panel.press import Press
 from armtempo.robot.board import Board
 
 T = TypeVar("T")
+_WAY_POINTS = 40
 LOOK_S = 0.25
 """Interval at which a page updates, except for moving parts."""
 
@@ -48,6 +51,15 @@ class _Control:
                 hint.set_visibility(bool(reason))
 
 
+@dataclass(frozen=True)
+class Asked:
+    """A dialog."""
+
+    dialog: ui.dialog
+    place: ui.column
+    """Between the question and the buttons."""
+
+
 @dataclass
 class PanelPage:
     """A browser's page: common parts of its tabs."""
@@ -62,9 +74,10 @@ class PanelPage:
     """The tab that is shown."""
     listeners: list[tuple[str, Callable[[], None]]] = field(default_factory=list)
     """Called every LOOK_S while their tab is shown; without a tab, always."""
-    jogs: list[JogMove] = field(default_factory=list)
-    """Moves of the hold buttons, by number."""
+    holds: list[Callable[[Press], None]] = field(default_factory=list)
+    """What the hold buttons begin, by number."""
     jog_percent: float = 25.0
+    """Speed of jogs and of moves to a target, percent of the limits."""
     picture: Element = field(init=False)
     """The place of the scene."""
 
@@ -82,7 +95,7 @@ class PanelPage:
         needs: Needs | None = Needs.MOVE,
         more: Callable[[], str] = str,
         is_held: bool = False,
-    ) -> Any:
+    ) -> Element:
         """An element that is disabled, with the reason as its hint, while it cannot be used.
 
         ``needs``: None if a page without control can use it too. ``more``: a further reason, "" if there is none.
@@ -98,32 +111,115 @@ class PanelPage:
         self.controls.append(control)
         return element
 
+    def button(
+        self,
+        text: str,
+        call: Callable[[Press], object],
+        needs: Needs | None = Needs.MOVE,
+        more: Callable[[], str] = str,
+        look: str = "outline",
+        name: str = "",
+    ) -> ui.button:
+        """A button that gives a command: ``call`` gets what the page says of the press.
+
+        ``look``: how Quasar draws it, and its icon; ``name``: for screen readers, if it has no text.
+        """
+        made = ui.button(text).props(f"{look} no-caps")
+        if name:
+            named(made, name)
+        self.on_press(made, "click", lambda press, _: call(press))
+        self.control(made, needs, more)
+        return made
+
+    def on_press(self, element: Element, event: str, call: Callable[[Press, Any], object]) -> None:
+        """Call ``call`` with what the page says of a press, and with the value of the event, if it has one."""
+
+        def pressed(event: Any) -> Any:
+            said, value = event.args
+            found: list[object] = []
+            self.answer(said, self.refusal(lambda: found.append(call(Press.of(said), value))))
+            return found[0] if found else None
+
+        element.on(event, pressed, js_handler="(event) => armtempo.command(event, emit)")
+
+    def answer(self, said: Any, refusal: str) -> None:
+        """Tell the page why its last press was refused; "" if it was taken."""
+        number = said.get("number") if isinstance(said, dict) else None
+        ui.run_javascript(f"armtempo.answered = {json.dumps([number, refusal])}")
+
+    def hold_button(
+        self,
+        text: str,
+        begin: Callable[[Press], None],
+        more: Callable[[], str] = str,
+        look: str = "outline",
+        name: str = "",
+    ) -> ui.button:
+        """A button that moves the arm while it is held; the page's script finds it by its number."""
+        made = ui.button(text).props(f"{look} no-caps data-hold={len(self.holds)}").classes("armtempo-hold")
+        if name:
+            named(made, name)
+        self.control(made, more=more, is_held=True)
+        self.holds.append(begin)
+        return made
+
+    def ask(
+        self,
+        question: str,
+        text: str,
+        call: Callable[[Press], object],
+        closed: Callable[[], object] = lambda: None,
+    ) -> Asked:
+        """Ask, and give a command with the button ``text`` of the dialog; ``closed`` is called when it is gone."""
+        with ui.dialog() as asked, ui.card():
+            if question:
+                ui.label(question)
+            place = ui.column()
+            with ui.row():
+                yes = ui.button(text).props("no-caps")
+                ui.button(words.CANCEL, on_click=asked.close).props("flat no-caps")
+
+        def answered(press: Press, _: object) -> object:
+            found = call(press)
+            asked.close()
+            return found
+
+        def hidden() -> None:
+            closed()
+            asked.delete()
+
+        self.on_press(yes, "click", answered)
+        asked.on("hide", hidden)
+        asked.open()
+        return Asked(asked, place)
+
     def on_look(self, listener: Callable[[], None]) -> None:
         """Call ``listener`` every LOOK_S while the tab that is being built is shown."""
         self.listeners.append((self.shown, listener))
 
-    def do(self, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
-        """Start a command of the operator; show a refusal."""
-        self.attempt(lambda: self.operator.do(what, self.client, call, needs))
+    def do(self, press: Press, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
+        """Start a command of the operator; raises InputError if it is refused."""
+        self.operator.do(what, self.client, press, call, needs)
 
     def attempt(self, call: Callable[[], object]) -> bool:
         """Call something; show the library's error and return False if it fails."""
+        return not self.refusal(call)
+
+    def refusal(self, call: Callable[[], object]) -> str:
+        """Call something; show and return the library's error; "" if there is none."""
         try:
             call()
-            return True
         except ArmtempoError as error:
             _say(error)
-            return False
+            return words.of_error(error)
+        return ""
 
-    def check(self, needs: Needs) -> None:
-        """Raise InputError, with the reason, if the requirements are not met."""
-        if reason := self.operator.why_not(self.client, needs):
-            raise InputError(reason, words.WAIT)
-
-    async def at_once(self, call: Callable[[Board], object], needs: Needs = Needs.BOARD) -> None:
-        """Call something on the board at once, also during a command."""
-        if self.attempt(lambda: self.check(needs)):
-            await self.threaded(lambda: call(self.operator.board))
+    def at_once(
+        self, press: Press, call: Callable[[Board], object], needs: Needs = Needs.BOARD
+    ) -> Awaitable[object]:
+        """Call something on the board at once, also during a command; raises InputError if it is refused."""
+        self.operator.check(self.client, press, needs)
+        return self.threaded(lambda: call(self.operator.board))
 
     async def threaded(self, call: Callable[[], T]) -> T | None:
         """Run ``call`` in a thread, so that no page waits; show an error."""
@@ -133,10 +229,18 @@ class PanelPage:
             _say(error)
             return None
 
-    def show_ghost(self, angles_deg: Array) -> None:
-        """Show a ghost of the arm at these angles, (J,), on this page only."""
-        poses = json.dumps(self.shape.poses(angles_deg))
+    def show_ghost(self, angles_deg: Array | None) -> None:
+        """Show a ghost of the arm at these angles, (J,), on this page only; None: none."""
+        poses = json.dumps(None if angles_deg is None else self.shape.poses(angles_deg))
         ui.run_javascript(f"armtempo.ghost = {poses}")
+
+    def show_way(self, target_deg: Array) -> None:
+        """Draw the way of the tool from where the arm is to these angles, (J,), on this page only."""
+        arm, here_deg = self.operator.arm, self.operator.live.angles_deg
+        parts = np.linspace(0.0, 1.0, _WAY_POINTS)[:, None]
+        self.scene.draw(
+            "way", chains_mm(arm, here_deg + parts * (target_deg - here_deg))[:, -1], arm_scene.WAY
+        )
 
     def refresh(self) -> None:
         """Disable controls that cannot be used now, with the reason."""
@@ -150,6 +254,12 @@ class PanelPage:
                 listener()
 
 
+def named(element: Element, name: str) -> Element:
+    """An element with its name for screen readers: as a value, which a name from a file cannot leave."""
+    element.props["aria-label"] = words.plain(name)
+    return element
+
+
 def _say(error: ArmtempoError) -> None:
     """Show an error on this page."""
-    ui.notify(str(error), type="negative", multi_line=True, timeout=8000)
+    ui.notify(words.of_error(error), type="negative", multi_line=True, timeout=8000)

@@ -1,7 +1,8 @@
-"""Running: the plan on the board, live curves, past runs with their reports."""
+"""Running: the plan on the board with its progress, live curves, past runs with their reports."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -12,17 +13,24 @@ import numpy as np
 from nicegui import ui
 
 from armtempo import pipeline
-from armtempo.panel import words
+from armtempo.basics.errors import InputError
+from armtempo.panel import past_runs, words
 from armtempo.panel.charts import CurveChart
 from armtempo.panel.operator import Needs
+from armtempo.panel.panel_page import named
+from armtempo.panel.past_runs import REPORT_PAGE, PastRun
+from armtempo.robot.board import MOST_REPETITIONS
 
 if TYPE_CHECKING:
     from armtempo.model.plan import Plan
     from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
 
-REPORT_PAGE = "report.html"
 _MOST_RUNS = 30
-_MOST_POINTS = 300
+_MOST_POINTS = 150
+_CURVES_S = 0.5
+"""Interval at which the curves are drawn anew: they take a browser most of its time."""
+_ADDRESS = "/runs"
 
 
 class RunTab:
@@ -32,42 +40,77 @@ class RunTab:
         self._page = page
         self._operator = operator = page.operator
         self._shown = (-1, 0)
-        self._ended = page.operator.ended
+        self._drawn_s = 0.0
+        self._known: list[PastRun] = []
+        self._plan = ui.label("").classes("text-subtitle2")
         with ui.row():
-            for text, call, needs in (
-                (words.TO_START, operator.go, Needs.MOVE),
-                (words.RUN, self._run, Needs.MOVE),
-                (words.UPLOAD, operator.upload, Needs.COMMAND),
+            for text, call, needs, icon, look in (
+                (words.TO_START, operator.go, Needs.MOVE, "start", "outline"),
+                (words.RUN, self._run, Needs.MOVE, "play_arrow", ""),
+                (words.UPLOAD, operator.upload, Needs.COMMAND, "upload", "outline"),
             ):
-                button = ui.button(text).on_click(partial(self._do, text, call, needs))
-                page.control(button, needs | Needs.PLAN)
-            self._repeat = ui.number(words.REPEAT, value=1, precision=0).props("dense outlined")
+                give = partial(self._do, text, call, needs)
+                page.button(text, give, needs | Needs.PLAN, look=f"{look} icon={icon}")
+            self._repeat = ui.number(words.REPEAT, value=1, precision=0, min=1, max=MOST_REPETITIONS)
+            self._repeat.props("dense outlined").classes("armtempo-option")
+        self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
+        self._left = ui.label("").classes("armtempo-note")
+        self._angles = CurveChart(operator.arm, words.ANGLE, 0)
+        self._speeds = CurveChart(operator.arm, words.SPEED, 1)
+        self._errors = CurveChart(operator.arm, words.ERROR, 0)
         ui.label(words.DOTTED).classes("armtempo-note")
-        self._angles = CurveChart(self._operator.arm, words.ANGLE, 0)
-        self._speeds = CurveChart(self._operator.arm, words.SPEED, 1)
-        self._errors = CurveChart(self._operator.arm, words.ERROR, 0)
         ui.label(words.PAST_RUNS).classes("text-subtitle2")
         self._past()
         page.on_look(self._look)
 
-    def _do(self, text: str, call: Callable[[Plan], object], needs: Needs) -> None:
+    def _do(self, text: str, call: Callable[[Plan], object], needs: Needs, press: Press) -> None:
         """Start a command with the plan."""
-        if (plan := self._operator.desk.plan) is not None:
-            self._page.do(text, lambda: call(plan), needs)
+        if (plan := self._operator.jobs.plan) is not None:
+            self._page.do(press, text, lambda: call(plan), needs | Needs.PLAN)
 
     def _run(self, plan: Plan) -> None:
-        self._operator.run(plan, int(self._repeat.value or 0))
+        times = int(self._repeat.value or 0)
+        if not 1 <= times <= MOST_REPETITIONS:
+            raise InputError(
+                words.WRONG_REPEAT.format(times=times), words.RIGHT_REPEAT.format(most=MOST_REPETITIONS)
+            )
+        self._operator.run(plan, times)
 
     def _look(self) -> None:
-        operator = self._operator
-        if self._ended != operator.ended:  # perhaps a run, with a new report
-            self._ended = operator.ended
+        self._look_at_plan()
+        found = past_runs.listed(self._operator.runs)[:_MOST_RUNS]
+        if found != self._known:  # also those of the command line
+            self._known = found
             self._past.refresh()
+        self._look_at_curves()
+
+    def _look_at_plan(self) -> None:
+        operator, jobs = self._operator, self._operator.jobs
+        if jobs.plan is None:
+            self._plan.set_text(words.NO_PLAN)
+        elif jobs.plan_is_old:
+            self._plan.set_text(words.PLAN_IS_OLD)
+        else:
+            file = jobs.file.name if jobs.file else words.NOT_SAVED
+            self._plan.set_text(
+                words.PLANNED.format(name=jobs.plan.job.name, total=jobs.plan.total_s, file=file)
+            )
+        running = operator.live.plan
+        self._bar.set_visibility(running is not None)
+        self._left.set_visibility(running is not None)
+        if running is not None and operator.busy:
+            left_s = max(0.0, (1.0 - operator.progress) * running.total_s)
+            self._bar.set_value(operator.progress)
+            self._left.set_text(words.LEFT.format(name=running.job.name, part=operator.progress, left=left_s))
+
+    def _look_at_curves(self) -> None:
+        operator = self._operator
         curves = operator.live.curves
         state = (curves.run, len(curves.time_s))
-        if state == self._shown or state[1] < 2:
+        now_s = time.monotonic()
+        if state == self._shown or state[1] < 2 or (operator.busy and now_s - self._drawn_s < _CURVES_S):
             return
-        self._shown = state
+        self._shown, self._drawn_s = state, now_s
         live, plan = curves.thinned(_MOST_POINTS), operator.live.plan
         planned = [plan.trajectory(live.path_s, order) if plan else None for order in (0, 1)]
         self._angles.show(live.time_s, live.angle_deg, planned[0])
@@ -76,21 +119,35 @@ class RunTab:
 
     @ui.refreshable_method
     def _past(self) -> None:
-        folders = past_runs(self._operator.runs)
         chosen: list[Path] = []
-        for folder in folders[:_MOST_RUNS]:
-            with ui.row():
-                ui.checkbox(
-                    folder.name, on_change=lambda event, folder=folder: _choose(chosen, folder, event.value)
+        if not self._known:
+            ui.label(words.NO_RUNS).classes("armtempo-note")
+            return
+        with ui.element("div").classes("armtempo-runs"):
+            for text in ("", *words.RUN_COLUMNS):
+                ui.label(text).classes("text-caption")
+            for run in self._known:
+                box = ui.checkbox(
+                    on_change=lambda event, run=run: _choose(chosen, run.folder, bool(event.value))
                 )
-                if (folder / REPORT_PAGE).is_file():
-                    ui.link(words.REPORT, _address(folder / REPORT_PAGE), new_tab=True)
-        if len(folders) > 1:
+                named(box.props("dense"), f"{words.COMPARE}: {run.folder.name}")
+                for text in (run.folder.name, run.date, run.duration, run.ending):
+                    ui.label(words.plain(text))
+                report = ui.button(words.REPORT, on_click=partial(self._report, run.folder))
+                named(report.props("flat dense no-caps"), f"{words.REPORT}: {run.folder.name}")
+        if len(self._known) > 1:
             ui.button(words.COMPARE, on_click=lambda: self._compare(chosen)).props("outline no-caps")
 
+    async def _report(self, folder: Path) -> None:
+        """Open the report of a run, which is made if there is none yet."""
+        file = folder / REPORT_PAGE
+        made = file if file.is_file() else await self._page.threaded(lambda: past_runs.report(folder))
+        if made is not None:
+            ui.navigate.to(f"{_ADDRESS}/{quote(folder.name)}/{REPORT_PAGE}", new_tab=True)
+
     async def _compare(self, folders: list[Path]) -> None:
-        if page := await self._page.threaded(lambda: pipeline.compare(folders)):
-            ui.navigate.to(_address(page), new_tab=True)
+        if page := await self._page.threaded(lambda: pipeline.compare(sorted(folders))):
+            ui.navigate.to(f"{_ADDRESS}/{quote(page.name)}", new_tab=True)
 
 
 def _choose(chosen: list[Path], folder: Path, wanted: bool) -> None:
@@ -98,19 +155,6 @@ def _choose(chosen: list[Path], folder: Path, wanted: bool) -> None:
         chosen.append(folder)
     elif folder in chosen:
         chosen.remove(folder)
-
-
-def _address(file: Path) -> str:
-    """The panel's path of a file of a run folder."""
-    return f"/runs/{quote(file.parent.name)}/{quote(file.name)}"
-
-
-def past_runs(folder: Path) -> list[Path]:
-    """The run folders in ``folder``, the newest first."""
-    if not folder.is_dir():
-        return []
-    found = [path.parent for path in folder.glob("*/run.json")]
-    return sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
 def build(page: PanelPage) -> None:

@@ -1,22 +1,30 @@
-"""Sequences: a table of the steps; save, plan and run, with the current step highlighted."""
+"""Sequences: a table of the steps; plan, play and run them, with the current step highlighted."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+import asyncio
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from nicegui import ui
+import numpy as np
+from armtempo_shared.sequence import MOVE, WAIT
+from nicegui import run, ui
 
 from armtempo import pipeline
+from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.panel import words
+from armtempo.panel.file_row import FileRow
 from armtempo.panel.operator import Needs
-from armtempo.panel.sequence_desk import KINDS, kind_of
+from armtempo.panel.panel_page import named
+from armtempo.panel.sequence_editor import KINDS, kind_of
 
 if TYPE_CHECKING:
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
 
 _LIT = "armtempo-lit"
+_PLAY_S = 0.05
 
 
 class SequenceTab:
@@ -25,21 +33,23 @@ class SequenceTab:
     def __init__(self, page: PanelPage) -> None:
         self._page = page
         self._operator = page.operator
-        self._desk = page.operator.sequences
-        self._shown = self._desk.version
+        self._editor = page.operator.sequences
+        self._shown = self._editor.version
         self._lit = 0
         self._rows: list[ui.row] = []
-        self._folder_ns = 0
-        self._none = ui.label(words.NO_SEQUENCE)
+        self._times: list[ui.label] = []
+        self._timed: SequencePlan | None = None
+        self._file = FileRow(page, self._editor, words.SEQUENCE_FILE)
         with ui.row():
-            self._files = ui.select([], label=words.SEQUENCE_FILE, on_change=self._open)
-            page.control(self._files.style("min-width: 12rem"), Needs.IDLE)
-            for text, call, needs in (
-                (words.SAVE_SEQUENCE, self._save, Needs.IDLE),
-                (words.TO_START, self._to_start, Needs.MOVE),
-                (words.RUN, self._run, Needs.MOVE),
+            for text, call, needs, look in (
+                (words.PLAN, self._plan_it, Needs.IDLE, "outline icon=insights"),
+                (words.TO_START, self._to_start, Needs.MOVE, "outline icon=start"),
+                (words.RUN, self._run, Needs.MOVE, "icon=play_arrow"),
             ):
-                page.control(ui.button(text, on_click=call).props("outline no-caps"), needs, self._why_not)
+                page.button(text, call, needs, self._why_not, look=look)
+            play = ui.button(words.PLAY, on_click=self._play).props("outline no-caps icon=smart_display")
+            page.control(play, None, self._why_no_play)
+        self._total = ui.label("").props('role="status"')
         self._where = ui.label("").props('role="status"')
         self._table()
         page.on_look(self._look)
@@ -50,67 +60,74 @@ class SequenceTab:
         self._shown = -1
 
     def _why_not(self) -> str:
-        return words.NO_SEQUENCE_OPEN if self._desk.file is None else ""
+        return "" if self._editor.is_open else words.NO_SEQUENCE_OPEN
+
+    def _why_no_play(self) -> str:
+        return "" if self._editor.plan else words.NO_PLAN
+
+    # the table
 
     @ui.refreshable_method
     def _table(self) -> None:
-        self._rows = []
-        steps = self._desk.steps
-        for index, step in enumerate(steps):
-            self._rows.append(self._row(index, step))
-        if self._desk.file is not None:
-            add = ui.button(words.ADD_STEP, on_click=lambda: self._desk.add(len(steps)))
-            self._page.control(add.props("outline no-caps"), Needs.IDLE)
+        self._rows, self._times, self._timed = [], [], None
+        steps = self._editor.steps
+        jobs = self._operator.jobs.files()
+        for index, (step, depth) in enumerate(zip(steps, self._editor.depths, strict=True)):
+            self._rows.append(self._row(index, step, depth, jobs))
+        if self._editor.is_open:
+            with ui.row():
+                add = partial(self._file.change, self._editor.add, len(steps))
+                self._page.button(words.ADD_STEP, add, Needs.CONTROL)
+                self._page.button(words.ADD_HERE, partial(self._add_here, len(steps)), Needs.CONTROL)
 
-    def _row(self, index: int, step: dict[str, str]) -> ui.row:
-        page, desk, kind = self._page, self._desk, kind_of(step)
-        with ui.row().classes("armtempo-step") as row:
+    def _add_here(self, index: int, press: Press) -> None:
+        here_deg = [round(float(angle), 4) + 0.0 for angle in self._operator.live.angles_deg]
+        self._file.change(self._editor.add, index, {"goto": here_deg}, press)
+
+    def _row(self, index: int, step: dict[str, str], depth: int, jobs: list[str]) -> ui.row:
+        page, editor, kind = self._page, self._editor, kind_of(step)
+        with ui.row().classes("armtempo-step").style(f"margin-left: {1.5 * depth}rem") as row:
             ui.label(str(index + 1)).classes("armtempo-number")
-            choice = ui.select(words.STEP_KINDS, value=kind).props(
-                f'dense outlined aria-label="{words.STEP} {index + 1}"'
-            )
-            choice.on_value_change(lambda event: desk.set_kind(index, str(event.value)))
-            page.control(choice, Needs.IDLE)
+            choice = ui.select(words.STEP_KINDS, value=kind).props("dense outlined")
+            named(choice, f"{words.STEP} {index + 1}")
+            choice.on_value_change(lambda event: editor.set_kind(index, str(event.value)))
+            page.control(choice, Needs.CONTROL)
             for key in (kind, *KINDS[kind]):
-                box = ui.input(None if key == kind else words.STEP_KEYS[key], value=step.get(key, ""))
-                box.props(f'dense outlined aria-label="{words.STEP} {index + 1}: {key}"')
-                box.on("change", lambda event, key=key: self._set(index, key, str(event.args or "").strip()))
-                page.control(box.classes("armtempo-value"), Needs.IDLE)
-            for icon, text, call in (
-                ("arrow_upward", words.UP, lambda: desk.move(index, -1)),
-                ("arrow_downward", words.DOWN, lambda: desk.move(index, 1)),
-                ("add", words.ADD_STEP, lambda: desk.add(index)),
-                ("delete", words.DELETE, lambda: desk.delete(index)),
-            ):
-                button = ui.button(icon=icon, on_click=call)
-                page.control(
-                    button.props(f'flat dense aria-label="{text} {words.STEP} {index + 1}"'), Needs.IDLE
+                self._field(
+                    index, key, step.get(key, ""), None if key == kind else words.STEP_KEYS[key], jobs
                 )
+            for icon, text, call in (
+                ("arrow_upward", words.UP, partial(editor.move, index, -1)),
+                ("arrow_downward", words.DOWN, partial(editor.move, index, 1)),
+                ("content_copy", words.COPY, partial(editor.copy, index)),
+                ("delete", words.DELETE, partial(editor.delete, index)),
+            ):
+                name = f"{text} {words.STEP} {index + 1}"
+                change = partial(self._file.change, call)
+                page.button("", change, Needs.CONTROL, look=f"flat dense icon={icon}", name=name)
+            self._times.append(ui.label("").classes("armtempo-note"))
         return row
+
+    def _field(self, index: int, key: str, value: str, label: str | None, jobs: list[str]) -> None:
+        """A field for the value of a key, with what it can name as a list."""
+        box = ui.input(label, value=value, autocomplete=self._editor.choices(key, jobs))
+        named(box.props("dense outlined"), f"{words.STEP} {index + 1}: {key}")
+        box.on("change", lambda event: self._set(index, key, str(event.args or "").strip()))
+        self._page.control(box.classes("armtempo-value"), Needs.CONTROL)
 
     def _set(self, index: int, key: str, text: str) -> None:
         """Set a value; the table is not rebuilt, as the user may already type in the next field."""
-        others = self._desk.version - self._shown
-        self._desk.set(index, key, text)
-        self._shown = self._desk.version - others
-
-    def _look_for_files(self) -> None:
-        """Offer the files of the folder, if that has changed."""
-        now_ns = self._desk.folder.stat().st_mtime_ns
-        if now_ns == self._folder_ns:
-            return
-        self._folder_ns, files = now_ns, self._desk.files()
-        self._none.set_visibility(not files)
-        if files != self._files.options:
-            self._files.set_options(files, value=self._opened)
+        others = self._editor.version - self._shown
+        self._page.attempt(lambda: self._editor.set(index, key, text))
+        self._shown = self._editor.version - others
 
     def _look(self) -> None:
-        self._look_for_files()
-        if self._desk.version != self._shown:
-            self._shown = self._desk.version
-            self._files.set_value(self._opened)  # another page may have opened it
+        self._file.look()
+        if self._editor.version != self._shown:
+            self._shown = self._editor.version
             self._table.refresh()
             self._lit = 0
+        self._look_at_times()
         state = self._operator.live.sequence
         running = state is not None and state.ending == "running"
         step = state.step if state is not None and running else 0
@@ -120,42 +137,60 @@ class SequenceTab:
                     row.classes(add=_LIT) if number == step else row.classes(remove=_LIT)
             self._lit = step
         if state is not None:
-            text = words.STEP_NOW.format(step=state.step, cycle=state.cycle)
+            # Cycles are counted from the first
+            text = words.STEP_NOW.format(step=state.step, cycle=state.cycle + running)
             self._where.set_text(text if running else f"{text}: {state.ending}")
 
-    def _open(self, event: object) -> None:
-        name = getattr(event, "value", None)
-        if name not in (None, self._opened):
-            self._attempt(lambda: self._desk.open(str(name)))
-            self._files.set_value(self._opened)  # the previous one, if it was refused
+    def _look_at_times(self) -> None:
+        """The planned time of each step, and of all."""
+        if (plan := self._editor.plan) is self._timed:
+            return
+        self._timed = plan
+        for index, label in enumerate(self._times, 1):
+            label.set_text("" if plan is None else _time_of(plan, index))
+        if plan is None:
+            self._total.set_text("")
+        elif plan.total is None:
+            cycles = "; ".join(words.CYCLE_TIME.format(time=one.share.total_s) for one in plan.cycles)
+            self._total.set_text(cycles)
+        else:
+            self._total.set_text(words.TOTAL_TIME.format(time=plan.total.total_s))
 
-    @property
-    def _opened(self) -> str | None:
-        """The name of the file whose steps are shown."""
-        return self._desk.file.name if self._desk.file else None
-
-    def _save(self) -> None:
-        self._attempt(lambda: ui.notify(words.SAVED.format(path=self._desk.save().name)))
-
-    def _attempt(self, call: Callable[[], object]) -> None:
-        if self._page.attempt(lambda: self._page.check(Needs.IDLE)):
-            self._page.attempt(call)
+    # plan, play, run
 
     def _planned(self) -> SequencePlan:
         """The plan of the present steps."""
-        if self._desk.plan is None:
-            self._desk.plan = pipeline.plan_sequence(
-                self._desk.arm, self._desk.sequence(), self._operator.part
-            )
-        return self._desk.plan
+        if (plan := self._editor.plan) is None:
+            version = self._editor.version
+            plan = pipeline.plan_sequence(self._operator.arm, self._editor.sequence(), self._operator.part)
+            self._editor.planned(plan, version)
+        return plan
 
-    def _to_start(self) -> None:
-        self._page.do(words.TO_START, lambda: self._operator.go(self._planned()))
+    async def _plan_it(self, press: Press) -> None:
+        try:
+            self._operator.check(self._page.client, press, Needs.IDLE)
+            await run.io_bound(self._planned)
+        except ArmtempoError as error:
+            ui.notify(words.of_error(error), type="negative", multi_line=True, timeout=8000)
 
-    def _run(self) -> None:
+    async def _play(self) -> None:
+        """Play every motion on the model, each once."""
+        if (plan := self._editor.plan) is None:
+            return
+        for row in [row for row in plan.rows if row.op == MOVE]:
+            leg = plan.legs[row.number]
+            for time_s in np.arange(0.0, leg.duration_s, _PLAY_S):
+                self._page.show_ghost(leg(float(time_s)))
+                await asyncio.sleep(_PLAY_S)
+        self._page.show_ghost(None)
+
+    def _to_start(self, press: Press) -> None:
+        self._page.do(press, words.TO_START, lambda: self._operator.go(self._planned()))
+
+    def _run(self, press: Press) -> None:
         operator = self._operator
 
-        def run() -> None:
+        def run_it() -> None:
             plan = self._planned()
             board = operator.board
             operator.live.take_sequence(
@@ -164,7 +199,17 @@ class SequenceTab:
             if (recorded := board.last_sequence) is not None:
                 pipeline.report(recorded)
 
-        self._page.do(words.RUN, run)
+        if not self._editor.is_open:
+            raise InputError(words.NO_SEQUENCE_OPEN)
+        self._page.do(press, words.RUN, run_it)
+
+
+def _time_of(plan: SequencePlan, step: int) -> str:
+    """The planned time of a step, once; "" for one that takes none."""
+    moves = [plan.legs[row.number].duration_s for row in plan.rows if row.step == step and row.op == MOVE]
+    waits = [row.amount / 1000 for row in plan.rows if row.step == step and row.op == WAIT]
+    time_s: Any = sum(moves) + sum(waits)
+    return f"{time_s:.2f} s" if time_s else ""
 
 
 def build(page: PanelPage) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import json
 import logging
 import socket
-from contextlib import suppress
+from collections.abc import Callable
 from typing import Any
 
+import ifaddr
 import uvicorn
 from fastapi import FastAPI
 from nicegui import Client, app, background_tasks, ui
@@ -17,10 +19,11 @@ from starlette.responses import FileResponse, PlainTextResponse
 
 from armtempo.basics.errors import InputError
 from armtempo.panel import layout, words
-from armtempo.panel.access import MOST_BYTES, Access
+from armtempo.panel.access import MOST_BYTES, Access, Policy
 from armtempo.panel.arm_scene import ArmShape
-from armtempo.panel.held_jog import ButtonHold
+from armtempo.panel.hold import ButtonHold
 from armtempo.panel.operator import Operator
+from armtempo.report.comparison import PAGE as COMPARISON
 
 _RECONNECT_S = 60.0
 """Time for which a page is kept after its connection breaks (a busy browser, a sleeping tablet)."""
@@ -28,6 +31,11 @@ _KEPT_MESSAGES = 2000
 """Messages kept for such a page: about 15 per second, for up to 132 s until it is dropped."""
 _NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
 """Files of run folders may come from anybody and must not run scripts."""
+_EVERYWHERE: dict[str, Callable[[ifaddr.IP], bool]] = {
+    "0.0.0.0": lambda ip: ip.is_IPv4,
+    "::": lambda ip: ip.is_IPv6 and not ip.ip[2],  # an address of one link needs its interface's name
+}
+"""Addresses that mean all interfaces, and which of their addresses are meant."""
 _LOG = logging.getLogger("armtempo")
 _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 
@@ -41,9 +49,11 @@ class Panel:
         self._hold = ButtonHold(operator)
         self._api = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         self._api.get("/runs/{name}/{file}")(self._run_file)
+        self._api.get(f"/runs/{COMPARISON}")(self._comparison)
         self._api.get("/mesh/{number}")(self._mesh)
         ui.page("/")(self._page)
         app.on_startup(self._tell)
+        app.add_middleware(Policy)  # before what packs the pages
         ui.run_with(
             self._api,
             title=words.TITLE,
@@ -55,10 +65,9 @@ class Panel:
         )
 
     def serve(self, listening: socket.socket, token: str) -> None:
-        """Serve on a bound socket; a client needs the ``token``, unless that is ""."""
-        host = str(listening.getsockname()[0])
-        hosts = _names(host) if token else {"127.0.0.1", "localhost", "::1"}
-        guarded = Access(self._api, hosts, token)
+        """Serve on a bound socket; a client needs the ``token``."""
+        host, port = listening.getsockname()[:2]
+        guarded = Access(self._api, {*reachable(host), *_names(host)}, token, port)
         config = uvicorn.Config(
             guarded,
             log_level="warning",
@@ -74,13 +83,15 @@ class Panel:
         if holder is None or not holder.has_socket_connection:
             self._operator.take_control(client.id)
         layout.build(self._operator, self._hold, self._shape)
-        client.on_disconnect(lambda: self._hold.release(client.id))
+        client.on_connect(lambda: self._hold.lost(client.id))
+        client.on_disconnect(lambda: self._hold.lost(client.id))
         client.on_delete(lambda: self._gone(client.id))
 
     def _gone(self, client: str) -> None:
         """A page was closed, or did not reconnect."""
         self._operator.release(client)
         self._operator.monitors.discard(client)
+        self._operator.presses.gone(client)
 
     async def _tell(self) -> None:
         background_tasks.create(self._tell_all())
@@ -105,6 +116,13 @@ class Panel:
         file = self._shape.meshes.get(number)
         return FileResponse(file) if file else PlainTextResponse("no such mesh", 404)
 
+    async def _comparison(self) -> Any:
+        """The page that compares runs."""
+        file = self._operator.runs / COMPARISON
+        if not file.is_file():
+            return PlainTextResponse("no such file", 404)
+        return FileResponse(file, headers=_NO_SCRIPTS)
+
     async def _run_file(self, name: str, file: str) -> Any:
         """Serve a file of a run folder, and no other file."""
         runs = self._operator.runs.resolve()
@@ -116,18 +134,40 @@ class Panel:
 
 def listen(host: str, port: int) -> socket.socket:
     """A socket bound to an address; ``port`` 0: any free port. Raises InputError if that fails."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        return socket.create_server((host, port), reuse_port=False)
+        return socket.create_server((host, port), family=family, reuse_port=False)
     except OSError as error:
         raise InputError(
             f"{host}:{port}: {error.strerror or error}", "choose another --web-port, or --host"
         ) from None
 
 
+def reachable(host: str) -> list[str]:
+    """The addresses at which a server that listens on ``host`` is reached; of all interfaces for 0.0.0.0 and ::."""
+    if host not in _EVERYWHERE:
+        return [host]
+    wanted = _EVERYWHERE[host]
+    found = [
+        ip.ip if ip.is_IPv4 else ip.ip[0]
+        for adapter in ifaddr.get_adapters()
+        for ip in adapter.ips
+        if wanted(ip)
+    ]
+    # this machine's own at the end: another one needs the others
+    return sorted(map(str, found), key=lambda address: ipaddress.ip_address(address).is_loopback)
+
+
+def url(address: str, port: int, token: str) -> str:
+    """The page that brings the token."""
+    name = f"[{address}]" if ":" in address else address
+    return f"http://{name}:{port}/?token={token}"
+
+
 def _names(host: str) -> set[str]:
-    """Host names of this machine."""
+    """Host names of a server that listens on ``host``."""
+    local = {"127.0.0.1", "localhost", "::1"}
+    if host not in _EVERYWHERE and ipaddress.ip_address(host).is_loopback:
+        return local
     name = socket.gethostname()
-    found = {host, name, name.split(".")[0], f"{name.split('.')[0]}.local", "127.0.0.1", "localhost"}
-    with suppress(OSError):
-        found |= {str(entry[4][0]) for entry in socket.getaddrinfo(name, None)}
-    return found
+    return {*local, name, name.split(".")[0], f"{name.split('.')[0]}.local"}

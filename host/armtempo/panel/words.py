@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from armtempo.basics.errors import ArmtempoError
+
 PANEL = "the panel"
+PRESS_AGAIN = "press again if it is still meant"
+NO_PRESS = "Not done: the page did not say when that was pressed"
+PRESS_PASSED = "Not done: it was released, or arrived twice or out of order"
+PRESS_LATE = "Not done: it arrived more than 0.3 s after it was pressed"
+PRESS_OTHER_STATE = "Not done: the arm's state changed just before it was pressed"
+JOG = "jog"
 OTHER_IN_CONTROL = "Another page has control; take it to move the arm."
 NOBODY_IN_CONTROL = "Take control to move the arm."
 BUSY = "Wait: {what} is under way."
@@ -16,32 +28,63 @@ WAIT = "try again when that is over"
 DONE = "{what}: done"
 STOPPED = "{what}: stopped: {why}"
 BRAKING = "Stop: the arm brakes along its path."
-FREEZING = "Stop pressed twice: the outputs are frozen."
+FROZEN = "The outputs were frozen: steps may be lost. Compare the arm with its picture, and home it if they differ."
+FROZEN_BLIND = "The outputs were frozen in motion: {joints} may have moved on, unmeasured. Home the arm."
+FIRST_HOME = "Where the arm is, the board does not know. Home it before anything can move."
+OLD_STATE = "last heard {age:.1f} s ago"
+UNKNOWN = "position unknown"
+DISMISS = "Close"
+FREEZE = "Freeze"
+FREEZE_HINT = "The arm does not rest yet: stop the step pulses at once. Steps may be lost."
 
 TITLE = "armtempo"
 STOP = "Stop"
-STOP_HINT = "Brakes along the path (space bar, Escape). A second press within 5 s freezes the outputs."
+STOP_HINT = "Brakes along the path (space bar, Escape)."
 TAKE_CONTROL = "Take control"
 IN_CONTROL = "In control"
-LOST = "The panel's program does not answer. Nothing can be moved from here."
+LOST = (
+    "The panel's program does not answer. Nothing can be moved or stopped from here. "
+    "A held move has ended; a motion that was started with Run goes on to its end: stop it with the E-stop."
+)
 VIRTUAL = "virtual board"
 
-TAB_MOVE, TAB_PLAN, TAB_RUN, TAB_SEQUENCE, TAB_BOARD = "Move", "Plan", "Run", "Sequence", "Board"
+TAB_MOVE, TAB_JOB, TAB_RUN, TAB_SEQUENCE, TAB_BOARD = "Move", "Job", "Run", "Sequence", "Board"
 VIEWS = {"side": "Side", "top": "Top", "free": "Free", "follow": "Follow"}
 
-JOINTS, TOOL, POSTURES, OUTPUTS, INPUTS = "Joints", "Tool", "Postures", "Outputs", "Inputs"
-SPEED_OF_JOG = "Speed of jogs, % of the limits"
-SPEED_OF_MOTION = "Speed, %"
-HOLD_HINT = "Moves while the button, or Enter on it, is held."
+JOINTS, OUTPUTS, INPUTS = "Joints", "Outputs", "Inputs"
+OWN = "own"
+FRAME, BASE_FRAME, TOOL_FRAME = "What is jogged", "Tool, base frame", "Tool, own frame"
+STEP_OF_JOG, HOLD = "Length of a jog, mm or degrees", "While held"
+SPEED_OF_JOG = "Speed of jogs and targets"
+JOG_STEP = "step"
+GO_TO, TYPED_TARGET, ANGLES, POSE = "Go to", "Typed target", "Angles", "Pose"
+POSE_FIELDS = ("x, mm", "y, mm", "z, mm", "roll, deg", "pitch, deg", "yaw, deg")
+FEW_JOINTS = "With {joints} joints the arm takes of the orientation what it can."
+ONE_CLICK, IN_A_LINE, TAKE_PRESENT, SHOW = "With one click", "In a straight line", "Where the arm is", "Show"
+TARGET_HINT = "Pressed, a target is shown in the picture; held, the arm moves there."
+TEACH, TEACH_HINT = "Store…", "Store where the arm is, under a name in the arm file:"
+STORE, NAME_OF_POSTURE, REPLACE = "Store", "Name", "Replace the posture of this name"
+HAS_POSTURE, REPLACE_HINT = "There is a posture {name!r} already", "switch on ‘Replace’, or type another name"
+TAUGHT, ADD_TO_JOB, RENAME_POSTURE = "Stored: {name}", "Add to the job", "Take the name above"
+BY_HAND = "Guide by hand…"
+SURE_BY_HAND = (
+    "The motors' current is switched off: somebody must hold the arm, or it sinks. The encoders are read."
+)
+GUIDING, GUIDED = "Guide the arm. It is held again after:", "The current on"
+VIEW = "View"
+SPEED_OF_MOTION = "Speed"
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
-SURE = "Is the arm in its home posture? Its position is taken as this."
+HOMING = "Home…"
+HOME_BY_SWITCHES = "Home by the switches"
+BY_SWITCHES = "Or let the arm find its switches, in this order: {order}. It moves; clear its room."
+SURE = "Does the arm stand as the grey one in the picture? If so, its joints are at:"
 
 DRAG_HINT = "Drag a via point in the picture, or click it to see the other postures that reach it."
 POSTURES_OF = "P{number}: postures of the arm with the tool there, {count}; the nearest is taken"
 NEW_VIA, FROM_ARM, DELETE = "Add a via point", "Take the arm's posture", "Delete"
 PASTE, PASTE_HINT = "Paste", "Rows of angles from a spreadsheet, one row a via point"
 PASTED = "the pasted rows"
-PLAN, CANCEL, SAVE = "Plan", "Cancel", "Save the job"
+PLAN, CANCEL, SAVE = "Plan", "Cancel", "Save"
 OPTIONS = {
     "path": "Path",
     "corridor_deg": "Corridor, deg",
@@ -49,7 +92,41 @@ OPTIONS = {
     "timing": "Timing",
     "degree": "Degree",
     "refine": "Segments",
+    "speed_mm_s": "Tool speed, mm/s",
+    "acceleration_mm_s2": "Tool acceleration, mm/s²",
+    "holds": "Tool holds",
 }
+VIA_KEYS = {
+    "line": "Straight line to it",
+    "arc_through_mm": "Arc through [x, y, z], mm",
+    "blend_mm": "Corner cut by, mm",
+    "speed_mm_s": "Tool speed, mm/s",
+    "acceleration_mm_s2": "Tool acceleration, mm/s²",
+    "stop": "Stop there",
+    "dwell_s": "Dwell, s",
+    "position_mm": "Position [x, y, z], mm",
+    "rpy_deg": "Roll, pitch, yaw, deg",
+    "quaternion": "Quaternion w, x, y, z",
+    "approach": "Direction of the tool",
+    "roll_deg": "Roll, deg",
+    "pitch_deg": "Pitch, deg",
+    "yaw_deg": "Yaw, deg",
+    "matrix": "Pose, 4 × 4",
+    "posture": "Posture",
+    "posture_deg": "Near the angles, deg",
+    "tolerance_mm": "Tolerance, mm",
+    "tolerance_deg": "Tolerance, deg",
+}
+FORMS = {"angles_deg": "angles", "position_mm": "pose", "matrix": "pose", "posture": "posture"}
+WAYS = {"line": "line", "arc_through_mm": "arc", "blend_mm": "blend", "stop": "stop", "speed_mm_s": "speed"}
+DEFAULT = "default"
+JOB_FILE, NEW, SAVE_AS, UNDO = "Job", "New…", "Save as…", "Undo"
+NOTHING_OPEN = "Choose a file, or make a new one."
+NOTHING_TO_UNDO = "Nothing was changed."
+IS_SAVED, NOT_SAVED = "saved", "changes are not saved"
+MORE, CHANGES, INSERT, COPY = "Line, arc, stop, speed:", "Change", "Insert before", "Copy"
+AS_POSE, AS_ANGLES = "Give it as a pose", "Give it as angles"
+
 CHOICES = {
     "through": "spline through the via points",
     "free": "free between the via points",
@@ -68,14 +145,19 @@ TIME_S, ANGLE, SPEED, ACCELERATION, JERK = (
 SAVED = "Saved: {path}"
 CANCELLED, PLAN_AGAIN = "The planning was cancelled.", "plan again when you like"
 NO_PLAN = "Plan a motion first."
+PLAN_IS_OLD = "The job was changed after it was planned: plan again."
 
 TO_START, RUN, UPLOAD, REPEAT = "Go to the start", "Run", "Upload", "Repetitions"
 ERROR = "following error, deg"
 DOTTED = "Lines: measured, or commanded for a joint without an encoder. Dotted: planned."
-STORED, PAST_RUNS, REPORT, COMPARE = "Stored motions", "Past runs", "Report", "Compare two"
+PLANNED = "{name}: {total:.3f} s · {file}"
+LEFT = "{name}: {part:.0%}, {left:.0f} s left"
+WRONG_REPEAT, RIGHT_REPEAT = "Repetitions: {times} are not possible", "give 1 to {most}"
+NO_RUNS, UNREADABLE = "Nothing was recorded here yet.", "cannot be read"
+RUN_COLUMNS = ("Run", "Date", "Duration", "End", "")
+STORED, PAST_RUNS, REPORT, COMPARE = "Stored motions", "Past runs", "Report", "Compare"
 NO_SEQUENCE_OPEN = "Choose a sequence first."
-NO_SEQUENCE = "The project folder has no sequence: a TOML file with [[step]]."
-SEQUENCE_FILE, SAVE_SEQUENCE = "Sequence", "Save the sequence"
+SEQUENCE_FILE = "Sequence"
 STEP, ADD_STEP, UP, DOWN = "step", "Add a step", "Up", "Down"
 STEP_KINDS = {
     "goto": "go to",
@@ -98,6 +180,8 @@ STEP_KEYS = {
     "on_timeout": "then",
 }
 STEP_NOW = "Step {step}, cycle {cycle}"
+ADD_HERE = "Add where the arm is"
+TOTAL_TIME, CYCLE_TIME = "{time:.2f} s in all, without waits for inputs", "{time:.2f} s a cycle"
 
 STATE_KEYS = {
     "max_rate": "one joint, steps/s",
@@ -121,6 +205,58 @@ SURE_DEPLOY = "Put this version's program on the board? The arm's position is un
 SURE_FLASH = (
     "Write the firmware in the project folder to the board? The arm's position is unknown afterwards."
 )
+
+
+_BUTTONS = {
+    "clear": CLEAR,
+    "home": HOMING,
+    "goto": TO_START,
+    "deploy": DEPLOY,
+    "flash": FLASH,
+    "selftest": SELFTEST,
+    "stop": STOP,
+    "resume": RESUME,
+    "plan": PLAN,
+    "run": RUN,
+    "remove": REMOVE,
+    "upload": UPLOAD,
+    "list": STORED,
+    "status": TAB_BOARD,
+    "jog": TAB_MOVE,
+    "teach": TAB_MOVE,
+}
+"""What the panel has instead of a command."""
+_COMMAND = re.compile(r"'armtempo ([a-z-]+)([^']*)'")
+
+
+def of_error(error: ArmtempoError) -> str:
+    """An error of the library in the words of the panel: buttons instead of commands."""
+    return of_text(str(error))
+
+
+def of_job(error: ArmtempoError) -> str:
+    """An error in the edited job, with the names of its fields instead of those of the file's keys."""
+    text = of_error(error)
+    for key, label in {**VIA_KEYS, **OPTIONS}.items():
+        # A key that is a usual word too is one only where a value follows
+        text = re.sub(rf"\b{key}\b" + ("" if "_" in key else "(?= =| ['\"0-9])"), f"‘{label}’", text)
+    return text
+
+
+def of_text(text: str) -> str:
+    """A text of the library in the words of the panel."""
+    return _COMMAND.sub(_button, text)
+
+
+def _button(command: re.Match[str]) -> str:
+    """The button that does what a command does, or the command as one of the terminal."""
+    name = _BUTTONS.get(command[1])
+    return f"‘{name}’" if name else f"{command[0]} in a terminal"
+
+
+def plain(text: str) -> str:
+    """A text from a file or a board, with what cannot be seen, or turns the direction of a line, as a box."""
+    return "".join(one if one.isprintable() or one in "\n\t" else "\N{WHITE SQUARE}" for one in text)
 
 
 def text(value: object) -> str:

@@ -8,9 +8,10 @@ fixed shape.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from armtempo_shared.limits import TICK_HZ
@@ -36,9 +37,10 @@ EXCESS = 1.25
 limits could brake only very slowly within them, as braking adds to the acceleration and jerk of the path."""
 
 Rates = tuple[tuple[float, float], ...]
+Single = NDArray[np.float32]
 Shapes = NDArray[np.int64]
 """Numbers of RAMP_SHAPES."""
-TO_REST: Rates = ((1.0, 0.0), (0.75, 0.0), (0.5, 0.0), (0.25, 0.0), (0.1, 0.0))
+TO_REST: Rates = ((1.0, 0.0), (0.75, 0.0), (0.5, 0.0), (0.35, 0.0), (0.2, 0.0))
 OTHERS: Rates = (
     (0.0, 1.0),
     (1.0, 0.01),
@@ -55,14 +57,21 @@ _WORST_TO_REST = TO_REST[:3:2]
 _WORST_OTHERS = OTHERS[:2]
 
 LONGEST_S = (RAMP_LENGTH << MOST_RAMP_BITS) / TICK_HZ
-_LONGER = 1.01
-_REST_STARTS, _OTHER_STARTS = 3, 6  # in each part of a table
-_PHASES = 15  # of each piece of a ramp,
-_FEW_PHASES = 8  # and where shapes are compared
+_MOST_S = 2.0 * LONGEST_S
+_LONGER, _MUCH_LONGER = 1.01, 1.1
+_REST_STARTS, _OTHER_STARTS = 2, 4  # in each part of a table
+_FINER = 3  # for the check
+_PHASES = 10  # of each piece of a ramp for the check,
+_SOME_PHASES = 6  # for the search of lengths,
+_FEW_PHASES = 4  # and where shapes are compared
 _SAMPLES = 4000
 _SHORTEST_S = 0.01
+_LESS = 0.3  # than estimated: longer ones may suffice because the motion ends, while less do not
+_SECANTS, _MOST_TRIES = 6, 8
+_CLOSE = 0.015  # below the most allowed
+_NEARLY = 0.9  # of a sufficient length, where shapes are compared
+_ALIKE = 1e-9  # differences of speeds over their largest
 _ROOM = 1.1  # for entries to be lengthened
-_HALVINGS = 7
 _NEGLIGIBLE = 1e-6  # of the unit of lengths
 _SHAPES, _WAYS = np.frombuffer(RAMP_SHAPES, np.uint8), np.frombuffer(RAMP_WAYS, np.uint8)
 
@@ -121,7 +130,7 @@ def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
             f"the motion {trajectory.name!r} goes beyond the arm's acceleration or jerk limits",
             "plan it again",
         )
-    shapes = _best_shapes(ramps.with_few_phases())
+    shapes = _best_shapes(ramps)
     kinds = (
         _Kind(ramps, TO_REST, _WORST_TO_REST, shapes, _REST_STARTS),
         _Kind(ramps, OTHERS, _WORST_OTHERS, np.full(OTHER_ENTRIES - 1, EVEN_RAMP), _OTHER_STARTS),
@@ -138,12 +147,20 @@ def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
 
 
 def _best_shapes(ramps: _Ramps) -> Shapes:
-    """(REST_ENTRIES - 1,): the shapes with the shortest mean time to rest from ends and middle of each part."""
+    """(REST_ENTRIES - 1,): the shapes with the shortest mean time to rest from ends and middle of each part.
+
+    Of all shapes the excess is compared at the same length, in which the motion does not end.
+    """
     starts = np.linspace(0.0, 1.0, 2 * REST_ENTRIES - 1)
-    even_s = ramps.shortest_s(starts, _WORST_TO_REST, np.full(len(starts), _SHORTEST_S), EVEN_RAMP)
-    lengths = np.array(
-        [ramps.shorter_s(starts, _WORST_TO_REST, even_s, shape) for shape in range(len(_SHAPES))]
+    even = np.full(len(starts), EVEN_RAMP)
+    length_s = _NEARLY * np.minimum(
+        ramps.shortest_s(starts, TO_REST[:1], even, _FEW_PHASES),
+        np.maximum((1.0 - starts) * ramps.duration_s, _SHORTEST_S),
     )
+    count = len(_SHAPES)
+    every, shapes = np.tile(starts, count), np.repeat(np.arange(count), len(starts))
+    found = ramps.excess(every, np.tile(length_s, count), TO_REST[:1], shapes, _FEW_PHASES)
+    lengths = length_s * np.sqrt(found.reshape(count, -1))
     return np.asarray(np.argmin(lengths[:, :-2:2] + lengths[:, 1::2] + lengths[:, 2::2], axis=0))
 
 
@@ -154,11 +171,12 @@ class _Kind:
     """
 
     def __init__(self, ramps: _Ramps, rates: Rates, worst: Rates, shapes: Shapes, starts: int) -> None:
-        self._ramps, self._rates, self._shapes = ramps, rates, shapes
+        self._ramps, self._worst, self._shapes = ramps, worst, shapes
+        self._others = tuple(rate for rate in rates if rate not in worst)
         self._starts = starts
         at, shape = self._places(starts)
-        least_s = np.full(at.size, _SHORTEST_S)
-        self.needed_s = ramps.shortest_s(at.ravel(), worst, least_s, shape.ravel()).reshape(at.shape)
+        found_s = ramps.shortest_s(at.ravel(), worst, shape.ravel(), _SOME_PHASES)
+        self.needed_s = found_s.reshape(at.shape)
 
     def _places(self, starts: int) -> tuple[Array, Shapes]:
         """Starts as fractions of the motion's time, and their shapes."""
@@ -173,19 +191,26 @@ class _Kind:
         table[1:] = np.maximum(table[1:], needed[:, -1])
         _lift(table, needed)
         table = np.minimum(np.ceil(table), RAMP_LENGTH)
-        at, shape = self._places(2 * self._starts)
+        at, shape = self._places(_FINER * self._starts)
         length = np.zeros(at.shape)
-        found = np.zeros(at.shape, bool)
+        longer = np.zeros(at.shape)
         while True:
-            before, length = length, _between(table, 2 * self._starts)
+            before, length = length, _between(table, _FINER * self._starts)
             new = length != before
-            excess = self._ramps.excess(at[new], unit_s * length[new], self._rates, shape[new])
-            found[new] = excess > EXCESS
-            found &= length < RAMP_LENGTH - _NEGLIGIBLE
-            if not np.any(found):
+            given = at[new], unit_s * length[new]
+            excess = self._ramps.excess(*given, self._worst, shape[new], _PHASES)
+            others = self._ramps.excess(*given, self._others, shape[new], _SOME_PHASES)
+            longer[new] = _longer(np.maximum(excess, others))
+            longer[length > RAMP_LENGTH - _NEGLIGIBLE] = 0.0
+            if not np.any(longer):
                 return table
-            _lift(table, np.where(found, _LONGER * length, 0.0))
+            _lift(table, longer * length)
             table = np.minimum(np.ceil(table), RAMP_LENGTH)
+
+
+def _longer(excess: Array) -> Array:
+    """The factor for a length with some excess; 0: none."""
+    return np.where(excess > 1.0, np.clip(excess, _LONGER, _MUCH_LONGER), 0.0)
 
 
 def _between(table: Array, starts: int) -> Array:
@@ -208,92 +233,138 @@ def _lift(table: Array, needed: Array) -> None:
 
 
 class _Ramps:
-    """Acceleration and jerk of a motion during changes of its rate, relative to the limits (J, 3)."""
+    """Acceleration and jerk of a motion during changes of its rate, relative to EXCESS times the ``limits`` (J, 3)."""
 
-    def __init__(self, trajectory: Trajectory, allowed: Array) -> None:
-        self._phases = _PHASES
-        self._duration_s = trajectory.duration_s
-        self._allowed = allowed
-        time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
-        # speeds, accelerations and jerks over their limits' units; rest after the end
-        # (3, J, T): the time axis last, which is fastest in NumPy
-        self._motion = np.stack([trajectory(time, order).T for order in (1, 2, 3)])
-        self.worst_of_motion = float(np.max(np.abs(self._motion[1:]) / allowed.T[1:, :, None]))
+    def __init__(self, trajectory: Trajectory, limits: Array) -> None:
+        self.duration_s = trajectory.duration_s
+        motion = _sampled(trajectory)
+        self.worst_of_motion = float(np.max(np.abs(motion[1:]) / limits.T[1:, :, None]))
+        # of each joint: speed, acceleration and jerk, each over the most of the jerk, with their differences; 0 after
+        # the end; and the factor for those of the acceleration
+        self._joints = [
+            (_with_differences(rows / (EXCESS * most[2])), most[2] / most[1])
+            for rows, most in zip(*_essential(motion, limits), strict=True)
+        ]
 
-    def with_few_phases(self) -> _Ramps:
-        """The same, evaluated at fewer points of each ramp."""
-        found = copy(self)
-        found._phases = _FEW_PHASES
-        return found
-
-    def shortest_s(self, starts: Array, rates: Rates, least_s: Array, shapes: Shapes | int) -> Array:
-        """Shortest durations from ``least_s`` on, to 1 %; ``starts``: fractions of the motion, with ``shapes``."""
-        shapes = np.broadcast_to(shapes, starts.shape)
-        low, high = least_s.copy(), least_s.copy()
+    def shortest_s(self, starts: Array, rates: Rates, shapes: Shapes, phases: int) -> Array:
+        """Shortest durations, to 1 %, (N,); ``starts``: fractions of the motion, (N,), with ``shapes``, (N,)."""
+        low, high = np.full(len(starts), _SHORTEST_S), np.full(len(starts), np.inf)
+        below, above = np.full(len(starts), 1.0), np.zeros(len(starts))  # logarithms of the excess there
+        tried = self._estimated_s(starts, shapes)
         left = np.arange(len(starts))
-        while len(left := left[self.excess(starts[left], high[left], rates, shapes[left]) > EXCESS]):
-            low[left], high[left] = high[left], 2.0 * high[left]
-            left = left[high[left] < 2.0 * LONGEST_S]
-        return self._halved(starts, rates, low, high, shapes)
+        tries = 0
+        while len(left):
+            tries += 1
+            length = tried[left]
+            excess = np.log(self.excess(starts[left], length, rates, shapes[left], phases))
+            enough = excess <= 0.0
+            now, later = left[enough], left[~enough]
+            high[now], above[now] = length[enough], excess[enough]
+            low[later], below[later] = length[~enough], excess[~enough]
+            close = (above[left] > -_CLOSE) | (high[left] < _LONGER * low[left])
+            close |= tries >= _MOST_TRIES
+            left = left[~(close & np.isfinite(high[left])) & (low[left] < _MOST_S)]
+            growth = np.clip(below[left], 0.05, math.log(2.0))
+            share = np.clip((below[left] + 0.5 * _CLOSE) / (below[left] - above[left]), 0.15, 0.85)
+            if tries > _SECANTS:
+                share[:] = 0.5
+            between = np.isfinite(high[left])
+            growth[between] = share[between] * np.log(high[left][between] / low[left][between])
+            tried[left] = low[left] * np.exp(growth)
+        return np.asarray(np.minimum(high, _MOST_S))
 
-    def shorter_s(self, starts: Array, rates: Rates, most_s: Array, shape: int) -> Array:
-        """As ``shortest_s``, but between half of ``most_s`` and ``most_s``; twice ``most_s`` if that is not enough."""
-        shapes = np.full(len(starts), shape)
-        enough = self.excess(starts, most_s, rates, shapes) <= EXCESS
-        low = np.where(enough, 0.5 * most_s, most_s)
-        return np.where(enough, self._halved(starts, rates, low, most_s, shapes), 2.0 * most_s)
+    def _estimated_s(self, starts: Array, shapes: Shapes) -> Array:
+        """Durations (N,) of ramps from the speeds at ``starts``, if these were constant."""
+        _, _, slope, bend, _, _ = _ramp(2)
+        slope, bend = np.abs(slope).max(axis=1)[shapes], np.abs(bend).max(axis=1)[shapes]
+        first = np.rint(starts * (_SAMPLES - 1)).astype(np.intp)
+        found = np.full(len(starts), _SHORTEST_S)
+        for rows, factor in self._joints:
+            speed = np.abs(rows[0][0].take(first))
+            np.maximum(found, np.maximum(factor * speed * slope, np.sqrt(speed * bend)), out=found)
+        return np.asarray(np.clip(_LESS * found, _SHORTEST_S, 0.5 * _MOST_S))
 
-    def _halved(self, starts: Array, rates: Rates, low: Array, high: Array, shapes: Shapes) -> Array:
-        """Bisect between ``low``, which is too short, and ``high``, which is long enough."""
-        low, high = low.copy(), high.copy()
-        left = np.flatnonzero(high > low)
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low[left] + high[left])
-            fails = self.excess(starts[left], middle, rates, shapes[left]) > EXCESS
-            low[left] = np.where(fails, middle, low[left])
-            high[left] = np.where(fails, high[left], middle)
-        return high
+    def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Shapes, phases: int) -> Array:
+        """Largest ratio (N,) of acceleration or jerk to the most allowed in changes between ``rates``.
 
-    def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Shapes | int) -> Array:
-        """Largest ratio of acceleration or jerk to its limit in changes between ``rates``, for each start."""
-        worst = np.zeros(len(starts))
-        if not len(starts):
-            return worst
-        length = length_s[:, None]
-        place, rise, slope, bend, way, whole = _ramp(np.atleast_1d(shapes), self._phases)
+        ``starts``: (N,), fractions of the motion; ``length_s`` (N,), ``shapes`` (N,), ``phases`` of each piece.
+        """
+        worst = np.full(len(starts), _NEGLIGIBLE, np.float32)
+        last = _SAMPLES - 1
+        place, rise, slope, bend, way, whole = (part[shapes] for part in _ramp(phases))
+        begin, length = (last * starts[:, None]).astype(np.float32), length_s[:, None].astype(np.float32)
+        slope = slope / length
+        bend = bend / (length * length)
+        length = np.float32(last / self.duration_s) * length
         for before, after in rates:
             least, change = min(before, after), after - before
             rate = least + abs(change) * rise
-            rate1 = change * slope / length
-            rate2 = abs(change) * bend / length**2
             passed = least * place + abs(change) * way
             if change < 0.0:
                 passed = least + abs(change) * whole - passed
-            speed, acceleration, jerk = self._at(self._duration_s * starts[:, None] + length * passed)
-            changed2 = acceleration * rate**2 + speed * rate1
-            changed3 = jerk * rate**3 + 3 * acceleration * rate * rate1 + speed * rate2
-            for changed, limit in ((changed2, self._allowed[:, 1]), (changed3, self._allowed[:, 2])):
-                over = np.max(np.abs(changed), axis=2) / limit[:, None]
-                worst = np.maximum(worst, np.max(over, axis=0))
-        return worst
-
-    def _at(self, time_s: Array) -> tuple[Array, Array, Array]:
-        """Speed, acceleration and jerk at times, each (J, ...)."""
-        place = time_s * ((_SAMPLES - 1) / self._duration_s)
-        before = np.minimum(place.astype(int), _SAMPLES - 2)
-        values = self._motion.take(before, axis=2)
-        values += (place - before) * (self._motion.take(before + 1, axis=2) - values)
-        np.copyto(values, 0.0, where=place > _SAMPLES - 1)
-        return values[0], values[1], values[2]
+            at = np.minimum(begin + length * passed, last + 1.0)
+            first = at.astype(np.int32)
+            share = at - first.astype(np.float32)
+            rate1, rate2, square = change * slope, abs(change) * bend, rate * rate
+            cube, thrice = square * rate, 3.0 * rate * rate1
+            for rows, factor in self._joints:
+                speed, acceleration, jerk = (
+                    values.take(first) + share * steps.take(first) for values, steps in rows
+                )
+                changed = np.abs(acceleration * square + speed * rate1).max(axis=1)
+                np.maximum(worst, factor * changed, out=worst)
+                changed = np.abs(jerk * cube + acceleration * thrice + speed * rate2).max(axis=1)
+                np.maximum(worst, changed, out=worst)
+        return worst.astype(float)
 
 
-def _ramp(shapes: Shapes, phases: int) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """r, S, S', S'' and e (N, 3 * phases) at the ends of each piece and in between, and e(1) (N, 1), of shapes (N,).
+def _sampled(trajectory: Trajectory) -> Array:
+    """Speed, acceleration and jerk of the joints at equidistant times, (3, J, _SAMPLES)."""
+    time = np.linspace(0.0, trajectory.duration_s, _SAMPLES)
+    found = np.zeros((3, len(trajectory.joints), _SAMPLES))
+    for number, joint in enumerate(trajectory.joints):
+        if np.ptp(joint.angle_points_deg) > 0.0:
+            at_s, values = joint.sampled(-(-2 * _SAMPLES // len(joint.time_polynomials)))
+            for order, row in enumerate(values):
+                found[order, number] = np.interp(time, at_s, row, right=0.0)
+    return found
+
+
+def _essential(motion: Array, limits: Array) -> tuple[list[Array], list[Array]]:
+    """The joints (3, T) that matter, with their limits (3,): of those that move in proportion, one for all."""
+    peaks = np.abs(motion[0]).max(axis=1)
+    kept: list[Array] = []
+    most: list[Array] = []
+    for rows, peak, limit in zip(motion.swapaxes(0, 1), peaks, limits, strict=True):
+        if peak == 0.0:
+            continue
+        unit = rows / peak
+        for number, known in enumerate(kept):
+            sign = math.copysign(1.0, float(unit[0] @ known[0]))
+            if np.allclose(unit[0], sign * known[0], rtol=0.0, atol=_ALIKE):
+                most[number] = np.minimum(most[number], limit / peak)
+                break
+        else:
+            kept.append(unit)
+            most.append(limit / peak)
+    return kept, most
+
+
+def _with_differences(rows: Array) -> list[tuple[Single, Single]]:
+    """Each row (T,), followed by zeros, with the differences between its values."""
+    ended = np.pad(rows.astype(np.float32), ((0, 0), (0, 2)))
+    steps = np.pad(np.diff(rows.astype(np.float32)), ((0, 0), (0, 3)))
+    return list(zip(ended, steps, strict=True))
+
+
+@cache
+def _ramp(phases: int) -> tuple[Single, ...]:
+    """r, S, S', S'' and e (N, 3 * phases) at the ends of each piece and in between, and e(1) (N, 1), of all N shapes.
 
     As in ``armtempo_board/stepgen/time_law.py``.
     """
-    second, first = np.divmod(_SHAPES[shapes][:, None], 16)
-    first, second, whole = first / 16.0, second / 16.0, _WAYS[shapes][:, None] / 64.0
+    second, first = np.divmod(_SHAPES[:, None], 16)
+    first, second, whole = first / 16.0, second / 16.0, _WAYS[:, None] / 64.0
     late = 3 * (1 - whole) - first - second
     slopes = (0.0 * first, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0 * first)
     at = np.linspace(0.0, 1.0, phases)
@@ -315,6 +386,6 @@ def _ramp(shapes: Shapes, phases: int) -> tuple[Array, Array, Array, Array, Arra
         start = start + width
         rise, way = pieces[-1][1][:, -1:], pieces[-1][4][:, -1:]
     place, rises, slope, second_slope, ways = (
-        np.concatenate(one, axis=1) for one in zip(*pieces, strict=True)
+        np.concatenate(one, axis=1).astype(np.float32) for one in zip(*pieces, strict=True)
     )
-    return place, rises, slope, second_slope, ways, whole
+    return place, rises, slope, second_slope, ways, whole.astype(np.float32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from armtempo_shared import motion
@@ -20,6 +21,7 @@ from armtempo_shared.limits import (
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
+from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
 from armtempo.model.job import (
     Job,
@@ -76,6 +78,16 @@ def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
         )
 
 
+def hardware_notes(arm: Arm) -> tuple[str, ...]:
+    """Limits of the arm's tables that the driver or the encoder does not allow."""
+    return tuple(
+        f"{joint.name}: {bound.key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: planned with "
+        f"{bound.value:.4g}"
+        for joint in arm.joints
+        for bound in drive_limits.exceeded(joint, arm.driver)
+    )
+
+
 def check_job(arm: Arm, job: Job) -> None:
     """Raise InputError for settings that contradict, or that the board cannot hold."""
     refine = 1 if isinstance(job.refine, str) else job.refine
@@ -107,6 +119,11 @@ def check_job(arm: Arm, job: Job) -> None:
 def leads_tool(job: Job) -> bool:
     """Whether the job has lines or arcs of the tool, or limits its speed."""
     return bool(job.ways) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
+
+
+def has_stretches(job: Job) -> bool:
+    """Whether the job is planned as stretches: it leads the tool, or its spline rests at via points."""
+    return leads_tool(job) or (bool(job.stops) and not is_free(job))
 
 
 def _check_ways(job: Job, where: str) -> None:
@@ -160,11 +177,12 @@ def _check_path(job: Job) -> None:
         )
     if leads_tool(job):
         _check_ways(job, where)
-    elif job.stops and not is_free(job):
+    elif has_stretches(job) and (job.timing != "shared" or job.degree != 5):
         raise InputError(
-            f"{where}: the spline through the via points rests at its ends only",
-            'a stop needs path = "free", or plan the stretches between the stops one by one with --split',
+            f'{where}: a stop needs timing = "shared" and degree 5',
+            "leave timing and degree out, or plan the stretches between the stops one by one with --split",
         )
+    _check_stops(job, where)
     if is_free(job):
         _check_free(job, where)
 
@@ -198,6 +216,11 @@ def _check_free(job: Job, where: str) -> None:
                 f'{where}: {what} needs timing = "shared", where the joints pass via points together',
                 'give timing = "shared" (--timing shared), or leave that out',
             )
+    if together["a corridor"] and any(stop.dwell_s > 0.0 for stop in job.stops):
+        raise InputError(f"{where}: a corridor and a dwell do not go together", "give stops without dwell_s")
+
+
+def _check_stops(job: Job, where: str) -> None:
     inner = range(1, len(job.via) - 1)
     for stop in job.stops:
         if stop.via not in inner or not 0.0 <= stop.dwell_s < math.inf:
@@ -207,8 +230,6 @@ def _check_free(job: Job, where: str) -> None:
             )
     if len({stop.via for stop in job.stops}) < len(job.stops):
         raise InputError(f"{where}: two stops at one via point", "leave one of them out")
-    if together["a corridor"] and any(stop.dwell_s > 0.0 for stop in job.stops):
-        raise InputError(f"{where}: a corridor and a dwell do not go together", "give stops without dwell_s")
 
 
 def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
@@ -223,10 +244,29 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
         raise InputError(
             f"job {job.name!r}: a via angle is not a finite number", "give every angle as a number of degrees"
         )
-    if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE):
+    circles = any(way.circle_through_mm is not None for way in job.ways)
+    if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE) and not circles:
         raise PlanError(
             f"job {job.name!r}: all via points are the same, so nothing moves", "change at least one angle"
         )
+
+
+def long_ways(arm: Arm, via_deg: Array) -> tuple[str, ...]:
+    """Notes: joints that move by more than half a turn between two via points (n + 1, J), where a shorter way ends
+    at the same place."""
+    notes = []
+    for number, joint in enumerate(arm.driven):
+        for via, (start, end) in enumerate(pairwise(via_deg[:, number].tolist()), 1):
+            turn = -360.0 * round((end - start) / 360.0)
+            if turn:
+                low, high = joint.range_deg
+                short = end + turn
+                can = "is in its range too" if low <= short <= high else "is out of its range"
+                notes.append(
+                    f"P{via - 1} to P{via}: {joint.name} goes {abs(end - start):.4g} degrees from {start:.4g} to "
+                    f"{end:.4g}; {short:.4g}, {abs(short - start):.4g} the other way, {can}"
+                )
+    return tuple(notes)
 
 
 def check_ranges(arm: Arm, angle_points_deg: Array, degree: int, hint: str = MOVE_VIAS) -> None:

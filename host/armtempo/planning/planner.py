@@ -42,7 +42,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
     way = around.motion if checks.is_free(job) else through_plan.motion
-    if checks.leads_tool(job):
+    if checks.has_stretches(job):
         from armtempo.planning.line import line_plan  # here, because most jobs need no kinematics
 
         way = line_plan.motion
@@ -54,7 +54,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_reached(arm, reached)
     speeds_deg_s = np.array([each.speed_deg_s for each in reached])
     room_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
-    notes = (*notes, *planned.notes, *_swing_note(arm, job, trajectory))
+    notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, trajectory))
     return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
 
 
@@ -92,7 +92,8 @@ def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:
     else:
         angles, notes = np.array(job.via, dtype=float), ()
     checks.check_via(arm, job, angles)
-    return angles, notes
+    angles = np.array([arm.placed(row) for row in angles])
+    return angles, (*notes, *checks.long_ways(arm, angles))
 
 
 def straight_line(

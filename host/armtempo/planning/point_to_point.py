@@ -7,36 +7,28 @@ from numpy.typing import ArrayLike
 
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
-from armtempo.model.parts import DrivenJoint
-from armtempo.splines import bspline, time_axis
+from armtempo.planning import move_law
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
-DEGREE = 5
-_PEAKS = (1.875, 10.0 / 3.0**0.5, 60.0)
-"""Peak speed, acceleration and jerk of 10 u³ - 15 u⁴ + 6 u⁵ over u in 0..1."""
-SHORTEST_S = 0.05
-"""Shortest duration of a move."""
-_MARGIN = 1.001
-"""Factor on the duration, so that rounding does not exceed the limits."""
+_LEAST_DEG, _LEAST_GAIN = 1e-9, 1e-9
 
 
 def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, speed: float = 1.0) -> Trajectory:
-    """The quintic from rest at ``start_deg`` (J,) to rest at ``end_deg`` (J,), all joints together.
+    """The motion from rest at ``start_deg`` (J,) to rest at ``end_deg`` (J,), all joints together.
 
-    At the fraction ``speed`` of the fastest such move within the limits. Raises InputError if a posture has
+    At the fraction ``speed`` of the arm's speed, by the law of moves by hand. Raises InputError if a posture has
     another number of joints than the arm drives or leaves a joint's range.
     """
     start, end = posture(start_deg, arm), posture(end_deg, arm)
-    duration_s = max(
-        _duration_s(joint, abs(to - here)) for joint, here, to in zip(arm.driven, start, end, strict=True)
+    ways = np.abs(end - start)
+    longest = max(float(ways.max()), _LEAST_DEG)
+    gains = np.maximum(ways / longest, _LEAST_GAIN).tolist()
+    limits = move_law.of_joints([joint.limits for joint in arm.driven], gains, speed)
+    law = move_law.law(longest, limits)
+    return law.trajectory(
+        name, [here + (to - here) / longest * law.way for here, to in zip(start, end, strict=True)]
     )
-    times = time_axis.control_points([duration_s / speed], DEGREE)
-    joints = tuple(
-        JointSpline(DEGREE, 1, bspline.fit([here, to], DEGREE), times)
-        for here, to in zip(start, end, strict=True)
-    )
-    return Trajectory(name, joints, shared=True)
 
 
 def backwards(trajectory: Trajectory, name: str) -> Trajectory:
@@ -57,6 +49,7 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
             f"a posture of arm {arm.name!r} has {len(arm.driven)} angles, not {found.size}",
             "give one angle for each joint with a motor",
         )
+    found = np.array(arm.placed(found))
     for joint, angle in zip(arm.driven, found, strict=True):
         low, high = joint.range_deg
         if not low <= angle <= high:
@@ -76,11 +69,3 @@ def _backwards(joint: JointSpline) -> JointSpline:
         joint.duration_s - joint.time_points_s[::-1],
         None if joint.via_segments is None else tuple(segments - via for via in reversed(joint.via_segments)),
     )
-
-
-def _duration_s(joint: DrivenJoint, distance_deg: float) -> float:
-    needed = [
-        (peak * distance_deg / bound) ** (1.0 / order)
-        for order, (peak, bound) in enumerate(zip(_PEAKS, joint.limits.values, strict=True), start=1)
-    ]
-    return max(SHORTEST_S, _MARGIN * float(max(needed)))

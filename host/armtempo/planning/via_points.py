@@ -113,7 +113,7 @@ def resolve(arm: Arm, job: Job) -> Resolved:
         if number in led and isinstance(via, Pose):
             target = via.exact(where)
             needed = _led(arm, job, number, np.degrees(postures[-1])[setup.driven], setup)
-            notes += _miss_note(setup, target, needed, number)
+            _check_arrival(setup, target, needed, where)
         elif isinstance(via, Pose):
             target = via.exact(where)
             previous = posture if via.posture_deg is None else _preferred(setup, via.posture_deg, where)
@@ -140,13 +140,23 @@ def _led(arm: Arm, job: Job, number: int, before_deg: Array, setup: _Setup) -> A
     return found
 
 
+def _check_arrival(setup: _Setup, target: Pose, needed: Array, where: str) -> None:
+    """Raise PlanError if a line does not end at its pose."""
+    miss = setup.miss(target, needed)
+    if not Constraint.of(target).reached(miss):
+        raise PlanError(
+            f"{where}: the line ends {miss} from the pose, as it keeps less of the orientation",
+            "ask for the whole orientation, for approach, or for position_mm alone; or leave line out",
+        )
+
+
 def posture_deg(arm: Arm, posture: ArmPosture) -> Array:
     """The driven joints' angles of a named posture, degrees (J,); of the solutions of a pose the one nearest to home.
 
     They are the ones that ``resolve`` takes. Raises PlanError if the arm cannot take it.
     """
     if not isinstance(posture.where, Pose):
-        return np.array(posture.where, dtype=float)
+        return np.array(arm.placed(posture.where))
     setup = _Setup.of(arm)
     where = f"posture {posture.name!r}"
     target = posture.where.exact(where)

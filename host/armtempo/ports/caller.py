@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import itertools
-import socket
 import time
 from collections.abc import Iterator
 from enum import Enum
 from typing import Any, Self
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortGivenUpError
-from armtempo.ports import claim as claims
 from armtempo.ports.claim import VERSION, PortClaim
-from armtempo.ports.messages import LineReader, Message, to_line
+from armtempo.ports.line_socket import LineSocket, LongLineError, request_line
+from armtempo.ports.messages import Message, parse
 
 HUNG_S = 2.0
-"""A program that has not answered ``hello`` for this long counts as hanging."""
+"""A program that has neither answered ``hello`` nor given a sign of life in its claim (``claim.beat``) for this
+long counts as hanging; one that gives the sign is busy."""
 _REMEMBERED_S = 5.0
 """Time for which a hanging program is not asked again."""
 _END = "end that process, or let a command that needs the port take it over"
@@ -27,20 +27,22 @@ class Ownership(Enum):
     """The state of a program that has claimed a port."""
 
     ALIVE = "alive"
+    """It answers, or is busy."""
     HUNG = "hung"
     """The process exists and does not answer."""
     DEAD = "dead"
 
 
 def ownership(claim: PortClaim) -> Ownership:
-    """Whether the program that has claimed a port answers, hangs or is gone."""
-    if time.monotonic() < _hung.get(claim.number, 0.0) + _REMEMBERED_S:
+    """Whether the program that has claimed a port is alive, hangs or is gone."""
+    known = time.monotonic() < _hung.get(claim.number, 0.0) + _REMEMBERED_S
+    if known and claim.silent_s() > HUNG_S:
         return Ownership.HUNG
     try:
         Caller(claim).close()
         return Ownership.ALIVE
     except NoAnswerError:
-        return Ownership.HUNG
+        return Ownership.HUNG if claim.silent_s() > HUNG_S else Ownership.ALIVE
     except LinkError:
         return Ownership.DEAD
 
@@ -61,7 +63,6 @@ class Caller:
         self._numbers = itertools.count(1)
         self._published: list[Message] = []
         self._socket = _connect(claim)
-        self._reader = LineReader(self._socket)
         try:
             self.ask("hello", HUNG_S, version=VERSION, token=claim.token)
         except BaseException as error:
@@ -78,7 +79,7 @@ class Caller:
         """
         number = next(self._numbers)
         limit_s = time.monotonic() + timeout_s
-        self._send(to_line({"id": number, "request": request, **fields}))
+        self._send(request_line(number, request, fields))
         while True:
             message = self._receive(max(0.0, limit_s - time.monotonic()))
             if message is None:
@@ -121,8 +122,7 @@ class Caller:
 
     def _send(self, line: bytes) -> None:
         try:
-            self._socket.settimeout(HUNG_S)
-            self._socket.sendall(line)
+            self._socket.send(line, HUNG_S)
         except TimeoutError:
             raise NoAnswerError(
                 f"{self.claim.who} has {self.claim.port} and accepts no requests", _END
@@ -133,15 +133,14 @@ class Caller:
     def _receive(self, timeout_s: float | None) -> Message | None:
         """The next message; None after ``timeout_s``."""
         try:
-            self._socket.settimeout(None if timeout_s is None else max(timeout_s, 1e-3))
-            message = self._reader.read()
+            line = self._socket.line(None if timeout_s is None else max(timeout_s, 1e-3))
         except TimeoutError:
             return None
-        except OSError as error:
+        except (OSError, LongLineError) as error:
             raise self._gone() from error
-        if message is None:
+        if line is None:
             raise self._gone()
-        return message
+        return parse(line)
 
     def _gone(self) -> LinkError:
         return PortGivenUpError(
@@ -149,23 +148,13 @@ class Caller:
         )
 
 
-def _connect(claim: PortClaim) -> socket.socket:
-    kind, address = (
-        (socket.AF_UNIX, claim.address)
-        if claims.LOCAL_SOCKETS
-        else (socket.AF_INET, ("127.0.0.1", int(claim.address)))
-    )
-    found = socket.socket(kind, socket.SOCK_STREAM)
-    found.settimeout(HUNG_S)
+def _connect(claim: PortClaim) -> LineSocket:
     try:
-        found.connect(address)
-    except (TimeoutError, BlockingIOError):
-        found.close()
+        return LineSocket(claim.address, HUNG_S)
+    except TimeoutError:
         raise NoAnswerError(f"{claim.who} has {claim.port} and accepts no connection", _END) from None
     except OSError as error:
-        found.close()
         raise LinkError(f"{claim.who} had {claim.port} and is gone", "try again: the port is free") from error
-    return found
 
 
 def _checked(message: Message) -> Message:

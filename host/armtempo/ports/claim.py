@@ -1,13 +1,15 @@
 """Claims: one file for each port that a program has open, in a folder that only this user can read.
 
-The folder is ``armtempo`` in ``$XDG_RUNTIME_DIR``, else a private folder for temporary files
+The folder is ``armtempo`` in ``$XDG_RUNTIME_DIR``, else one for temporary files, else one in the home folder
 (``claim_file``). A killed program leaves its file, but does not answer at its address.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -50,7 +52,6 @@ class PortClaim(NamedTuple):
 
     def write(self) -> None:
         """Write the claim, replacing an earlier one; raises OSError if that fails."""
-        folder()
         for path in self._files():
             before = _read(path)
             if before is not None and before.number != self.number:
@@ -66,6 +67,22 @@ class PortClaim(NamedTuple):
     def _marker(self, path: Path) -> Path:
         """The file that records who took the port over from this program, kept after that program closes it."""
         return path.with_name(f"{self.number}.taken")
+
+    def beat(self) -> None:
+        """Give a sign of life: the time of the claim's file."""
+        for path in self._files():
+            found = _read(path)
+            if found is not None and found.number == self.number:
+                with suppress(OSError):
+                    os.utime(path)
+
+    def silent_s(self) -> float:
+        """Time since the last ``beat``, or since the claim was written; infinite without a file."""
+        beaten_s = -math.inf
+        for path in self._files():
+            with suppress(OSError):
+                beaten_s = max(beaten_s, path.stat().st_mtime)
+        return max(0.0, time.time() - beaten_s)
 
     def taken_by(self) -> PortClaim | None:
         """The claim of the program that has taken the port over, if any."""
@@ -86,12 +103,13 @@ class PortClaim(NamedTuple):
                 Path(self.address).unlink()
 
     def _files(self) -> list[Path]:
-        """The files of claims to this port: in the folder for new claims, and where an earlier claim is."""
+        """The files of claims to this port: where this claim is to be, and where an earlier claim is."""
         import hashlib
 
         name = hashlib.sha256(self.name.encode()).hexdigest()[:16] + claim_file.SUFFIX
-        first, *others = [Path(place, name) for place in claim_file.folders()]
-        return [first, *(path for path in others if path.exists())]
+        own = folder() / name
+        others = [Path(place, name) for place in claim_file.folders() if claim_file.is_private(place)]
+        return [own, *(path for path in others if path != own and path.exists())]
 
 
 def new(name: str, port: str, device: str) -> PortClaim:
@@ -122,12 +140,18 @@ def claims() -> Iterator[PortClaim]:
 
 
 def folder() -> Path:
-    """The folder of claims and sockets, created if missing; raises OSError if others can access it."""
-    place = Path(next(claim_file.folders()))
-    place.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if not claim_file.is_private(str(place)):
-        raise OSError(None, "others can access it", str(place))
-    return place
+    """The folder for new claims and sockets, created if missing; raises OSError if others can access all of them."""
+    problem = ""
+    for place in map(Path, claim_file.folders()):
+        try:
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        except OSError as error:
+            problem = f"{place}: {error.strerror}"
+            continue
+        if claim_file.is_private(str(place)):
+            return place
+        problem = f"{place}: others can access it"
+    raise OSError(None, problem)
 
 
 def program() -> str:

@@ -22,14 +22,27 @@ _TEMPORARY = ("/tmp", "/var/tmp")
 
 
 def folders() -> Iterator[str]:
-    """The folder for new claims, then the other folder that programs of this user may have used."""
+    """The folders for claims, best first: new ones are in the first that only this user can access."""
     runtime = os.environ.get("XDG_RUNTIME_DIR") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else "")
     if runtime and os.path.isdir(runtime):
-        wanted = os.path.join(runtime, "armtempo")
-        if len(os.fsencode(wanted)) + len("/0123456789abcdef.socket") <= _LONGEST_SOCKET_PATH:
-            yield wanted
+        yield from _short(os.path.join(runtime, "armtempo"))
     user = str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "")
     yield os.path.join(_temporary(), f"armtempo-{user}")
+    # Another user may have made that one
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    yield from _short(os.path.join(cache, "armtempo", _machine()))
+
+
+def _short(folder: str) -> list[str]:
+    """The folder, if the path of a socket in it is not too long."""
+    return (
+        [folder] if len(os.fsencode(folder)) + len("/0123456789abcdef.socket") <= _LONGEST_SOCKET_PATH else []
+    )
+
+
+def _machine() -> str:
+    """Name of this machine: several may share a home folder, but no sockets."""
+    return os.uname().nodename if hasattr(os, "uname") else os.environ.get("COMPUTERNAME", "")
 
 
 def is_private(folder: str) -> bool:

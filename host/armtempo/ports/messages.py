@@ -12,11 +12,10 @@ from armtempo_shared.messages import PERMILLE, RESUME, SLOWEST_PERMILLE
 
 from armtempo.basics.errors import LinkError
 from armtempo.ports.claim import VERSION
+from armtempo.ports.line_socket import LONGEST_LINE, LineStream, LongLineError
 
 Message = dict[str, Any]
 
-LONGEST_LINE = 1 << 20
-_PIECE = 1 << 16
 TOPICS = ("sample", "status", "event", "traffic")
 LONGEST_TEXT = 200
 _SHOWN = 40
@@ -26,8 +25,7 @@ class LineReader:
     """Reads messages from a socket."""
 
     def __init__(self, connection: socket.socket) -> None:
-        self._connection = connection
-        self._data = bytearray()
+        self._lines = LineStream(connection)
 
     def read(self) -> Message | None:
         """The next message; None at the end of the connection.
@@ -35,19 +33,13 @@ class LineReader:
         Raises LinkError for an invalid message, TimeoutError after the socket's time-out, OSError if the
         connection breaks.
         """
-        while b"\n" not in self._data:
-            if len(self._data) > LONGEST_LINE:
-                raise LinkError(
-                    f"a line of more than {LONGEST_LINE} bytes", "send messages of a line of JSON each"
-                )
-            piece = self._connection.recv(_PIECE)
-            if not piece:
-                return None
-            self._data += piece
-        end = self._data.index(b"\n")
-        line = bytes(self._data[:end])
-        del self._data[: end + 1]
-        return _parse(line)
+        try:
+            line = self._lines.read()
+        except LongLineError:
+            raise LinkError(
+                f"a line of more than {LONGEST_LINE} bytes", "send messages of a line of JSON each"
+            ) from None
+        return None if line is None else parse(line)
 
 
 def to_line(message: Message) -> bytes:
@@ -55,9 +47,10 @@ def to_line(message: Message) -> bytes:
     return json.dumps(message, allow_nan=False, separators=(",", ":")).encode() + b"\n"
 
 
-def _parse(line: bytes) -> Message:
+def parse(line: bytes) -> Message:
+    """The message in a line; raises LinkError if it is none."""
     try:
-        found = json.loads(line, parse_constant=_no_number)
+        found = json.loads(line, parse_constant=_no_number)  # the table of fields refuses what is not finite
     except (ValueError, RecursionError):
         found = None
     if not isinstance(found, dict):

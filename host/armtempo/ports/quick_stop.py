@@ -2,7 +2,8 @@
 
 Most of the time from the key press to the brake is the start of Python, so this module imports very little:
 no ``typing``, ``socket`` or ``json`` before the request is sent (``python -m tests.benchmark.stop_latency``).
-Other cases, such as a board that no other program has, are left to the command.
+``line_socket`` does that for other callers, too. Other cases, such as a board that no other program has, are
+left to the command.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import os
 
 from armtempo.ports import claim_file, names
+from armtempo.ports.line_socket import LineSocket, request_line
 
 TYPE_CHECKING = False  # as in "typing"
 if TYPE_CHECKING:
@@ -98,41 +100,36 @@ def _port_of_project() -> str:
 def _pass_on(claim: list[str], now: bool) -> None:
     """Send the request, and keep the answer."""
     name, _, _, program, pid, number, address, token, version = claim
-    said = f'{{"id":1,"request":"hello","version":{version},"token":"{token}"}}\n'
-    asked = f'{{"id":2,"request":"stop","now":{"true" if now else "false"},"by":"{BY}"}}\n'
-    lines = _answers_of(address, said + asked)
-    if not lines:
+    hello = request_line(1, "hello", {"version": int(version), "token": token})
+    stop = request_line(2, "stop", {"now": now, "by": BY})
+    line = _second_answer(address, hello + stop)
+    if line is None:
         from armtempo.ports import caller
 
         caller.remember_hanging(number)
         return
     import json  # the board is braking now
 
-    answer = json.loads(lines[1])
+    answer = json.loads(line)
     if answer.get("ok"):
         _answers[name, now] = StopAnswer(answer["moving"], f"'{program}' (process {pid})")
 
 
-def _answers_of(address: str, requests: str) -> list[bytes]:
-    """The two answered lines; empty if the other program hangs."""
-    import _socket  # part of CPython; its wrapper "socket" takes several ms to import
-
-    local = address.isdecimal()
-    connection = _socket.socket(_socket.AF_INET if local else _socket.AF_UNIX, _socket.SOCK_STREAM)
-    connection.settimeout(_HELLO_S)
-    data = b""
+def _second_answer(address: str, requests: bytes) -> bytes | None:
+    """The line that answers the second request; None if the other program hangs."""
     try:
-        connection.connect(("127.0.0.1", int(address)) if local else address)
-        connection.sendall(requests.encode())
-        while data.count(b"\n") < 2:
-            piece = connection.recv(4096)
-            if not piece:
-                raise OSError("the connection ended before the answer")
-            data += piece
-            connection.settimeout(ANSWER_S)
+        connection = LineSocket(address, _HELLO_S)
     except TimeoutError:
-        if data:
-            raise
+        return None
+    try:
+        connection.send(requests, _HELLO_S)
+        try:
+            answered = connection.line(_HELLO_S)
+        except TimeoutError:
+            return None
+        line = answered and connection.line(ANSWER_S)
     finally:
         connection.close()
-    return data.splitlines()
+    if line is None:
+        raise OSError("the connection ended before the answer")
+    return line

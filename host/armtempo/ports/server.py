@@ -23,7 +23,9 @@ from armtempo.ports.messages import REQUESTS, Fields, LineReader, Message, check
 Handler = Callable[[Message], Message]
 """Answers one request; an ArmtempoError is sent as an answer too."""
 
-_BACKLOG = 16
+_BACKLOG = 128
+BEAT_S = 0.5
+"""Interval of the signs of life in the claim."""
 _FLUSH_S = 0.5
 """Time for a caller to receive the last messages."""
 _CHECK_S = 0.02
@@ -48,6 +50,7 @@ class Server:
         self._checked_s = 0.0
         self._taken_by: PortClaim | None = None
         self._socket = _listen(claim)
+        self._socket.settimeout(BEAT_S)
         self.claim = claim if claim.address else claim._replace(address=str(self._socket.getsockname()[1]))
         self.claim.write()
         self._thread = Thread(target=self._accept, name="armtempo share", daemon=True)
@@ -91,9 +94,15 @@ class Server:
             return list(self._connections)
 
     def _accept(self) -> None:
+        beat_s = time.monotonic()
         while True:
+            if time.monotonic() - beat_s >= BEAT_S:
+                beat_s = time.monotonic()
+                self.claim.beat()
             try:
                 accepted, _ = self._socket.accept()
+            except TimeoutError:
+                continue
             except OSError:
                 return
             connection = _Connection(accepted, self.claim, self._handlers, self._requests)

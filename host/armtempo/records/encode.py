@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from armtempo_shared import armrecord, limits, motion
+from armtempo_shared import armrecord, backwards, limits, motion
 from armtempo_shared.wire import record_crc
 from numpy.typing import NDArray
 
@@ -64,6 +64,14 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
     first = trajectory.joints[0]
     crc = record_crc(arm_record(arm))
     return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc)
+
+
+def way_back(data: bytes, name: str, brakes: BrakeTimes) -> bytes:
+    """The record (layout: ``armtempo_shared.backwards``) of the way back along the motion record ``data``.
+
+    ``name``: of the stored motion; ``brakes``: those of the way back.
+    """
+    return backwards.pack(data, name, _ramps(brakes))
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
@@ -181,6 +189,11 @@ def _max_rate(joint: DrivenJoint) -> int:
             ),
             "check the unit, microsteps and gear_ratio",
         )
+    return with_margin(rate)
+
+
+def with_margin(rate: float) -> int:
+    """What the arm record has for a joint that steps at most at a rate, in steps/s: more, for rounding."""
     return int(rate * 1.01) + 1
 
 

@@ -12,7 +12,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.planning import brake_time
+from armtempo.planning import brake_time, point_to_point
 from armtempo.records import decode, encode
 from armtempo.splines.trajectory import Trajectory
 
@@ -56,6 +56,13 @@ def of_trajectory(trajectory: Trajectory, arm: Arm) -> EncodedMotion:
     """
     brakes = brake_time.of_motion(trajectory, [joint.limits for joint in arm.driven])
     return EncodedMotion(trajectory.name, arm, trajectory, encode.motion_record(trajectory, arm, brakes))
+
+
+def way_back(motion: EncodedMotion) -> bytes:
+    """The record with which the board makes a stored motion backwards."""
+    back = point_to_point.backwards(motion.trajectory, motion.name)
+    brakes = brake_time.of_motion(back, [joint.limits for joint in motion.arm.driven])
+    return encode.way_back(motion.data, motion.name, brakes)
 
 
 def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:

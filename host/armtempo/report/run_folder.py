@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Sequence
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -146,9 +147,38 @@ class RunFolder:
     def begin_repetition(self) -> SampleFile:
         """A new sample file, to be used as a context."""
         repetition = Repetition(f"samples-{len(self.repetitions) + 1:02d}.csv")
+        file = SampleFile(self, repetition)
         self.repetitions.append(repetition)
         self.write()
-        return SampleFile(self, repetition)
+        return file
+
+
+class RowFile:
+    """A new table in a run folder, whose rows are readable as soon as they are added."""
+
+    def __init__(self, path: Path, columns: Iterable[str]) -> None:
+        """Raises RunFolderError if it cannot be written, as ``add`` does."""
+        self._path = path
+        with writing(path):
+            self._file = path.open("x", newline="", encoding="utf-8")
+        self._csv = csv.writer(self._file, lineterminator="\n")
+        self.add(columns)
+
+    def add(self, cells: Iterable[str]) -> None:
+        """Add a row."""
+        with writing(self._path):
+            self._csv.writerow(cells)
+            self._file.flush()
+
+    def close(self) -> None:
+        """Close the file; ``add`` has reported what failed."""
+        with suppress(OSError):
+            self._file.close()
+
+
+def end_without_board(error: type[BaseException] | None) -> str:
+    """The state of what ended before the board said how, by the ``error`` that ended it."""
+    return INTERRUPTED if error is not None and issubclass(error, KeyboardInterrupt) else BROKEN
 
 
 class SampleFile:
@@ -157,21 +187,12 @@ class SampleFile:
     def __init__(self, folder: RunFolder, repetition: Repetition) -> None:
         self.repetition = repetition
         self._folder = folder
-        self._path = folder.path / repetition.file
-        with writing(self._path):
-            self._file = self._path.open("x", newline="", encoding="utf-8")
-        self._csv = csv.writer(self._file, lineterminator="\n")
-        self._line(list(columns(folder.joints)))
+        self._rows = RowFile(folder.path / repetition.file, columns(folder.joints))
 
     def append(self, sample: Sample) -> None:
         """Add a sample; raises RunFolderError if it cannot be written."""
-        self._line(row(sample, self._folder.joints))
+        self._rows.add(row(sample, self._folder.joints))
         self.repetition.samples += 1
-
-    def _line(self, cells: list[str]) -> None:
-        with writing(self._path):
-            self._csv.writerow(cells)
-            self._file.flush()
 
     def __enter__(self) -> Self:
         return self
@@ -179,16 +200,29 @@ class SampleFile:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(OSError):  # the error was reported by append
-            self._file.close()
+        self._rows.close()
         if self.repetition.state == RUNNING:
-            self.repetition.state = INTERRUPTED if kind is KeyboardInterrupt else BROKEN
+            self.repetition.state = end_without_board(kind)
         with unless(value):
             self._folder.write()
 
 
-def new_folder(parent: Path, name: str) -> Path:
-    """A new folder ``parent/name-001`` (or the next free number); raises InputError if it cannot be made."""
+@contextmanager
+def new_folder(parent: Path, name: str) -> Iterator[Path]:
+    """A new folder ``parent/name-001`` (or the next free number), to be filled within this context.
+
+    It is removed again if that fails, for example on a full disk: no folder is left that is none of a run.
+    Raises InputError if it cannot be made.
+    """
+    path = _made(parent, name)
+    try:
+        yield path
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise
+
+
+def _made(parent: Path, name: str) -> Path:
     try:
         for number in range(1, 10_000):
             path = parent / f"{name}-{number:03d}"

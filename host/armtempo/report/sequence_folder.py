@@ -14,8 +14,7 @@ As in ``run_folder`` lines are flushed one by one: after a power failure they sh
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,7 +23,7 @@ from typing import Any, Self
 
 from armtempo.link.board_messages import RowBegun, Sample, SequenceState
 from armtempo.report import run_folder
-from armtempo.report.run_folder import BROKEN, INTERRUPTED, RUNNING, JointScale
+from armtempo.report.run_folder import RUNNING, JointScale, RowFile
 
 FORMAT = "armtempo sequence run"
 VERSION = 1
@@ -80,15 +79,14 @@ class SequenceFolder:
         """Open the files and write their headers."""
         self.write()
         self._files = ExitStack()
-        self._rows = self._begun(ROWS, list(ROW_COLUMNS))
-        self._samples = self._begun(SAMPLES, list(sample_columns(self.joints)))
+        self._rows = self._begun(ROWS, ROW_COLUMNS)
+        self._samples = self._begun(SAMPLES, sample_columns(self.joints))
         return self
 
-    def _begun(self, name: str, head: list[str]) -> _Lines:
-        lines = _Lines(self.path / name)
-        self._files.callback(lines.close)
-        lines.add(head)
-        return lines
+    def _begun(self, name: str, columns: Iterable[str]) -> RowFile:
+        file = RowFile(self.path / name, columns)
+        self._files.callback(file.close)
+        return file
 
     def add_row(self, row: RowBegun, time_s: float) -> None:
         """A row has begun; raises RunFolderError if it cannot be written."""
@@ -130,24 +128,6 @@ class SequenceFolder:
     ) -> None:
         self._files.close()
         if self.state == RUNNING:
-            self.state = INTERRUPTED if kind is KeyboardInterrupt else BROKEN
+            self.state = run_folder.end_without_board(kind)
         with run_folder.unless(value):
             self.write()
-
-
-class _Lines:
-    """A CSV file, flushed line by line."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        with run_folder.writing(path):
-            self._file = path.open("x", newline="", encoding="utf-8")
-        self._csv = csv.writer(self._file, lineterminator="\n")
-
-    def add(self, cells: Sequence[str]) -> None:
-        with run_folder.writing(self._path):
-            self._csv.writerow(cells)
-            self._file.flush()
-
-    def close(self) -> None:
-        self._file.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from armtempo_shared.sequence import MAX_MOTIONS
 from numpy.typing import NDArray
 
 from armtempo.basics.arguments import checked
@@ -17,12 +17,11 @@ from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.basics.text import visible
 from armtempo.records import decode
 from armtempo.report import run_reader
-from armtempo.report.run_folder import META, JointScale
-from armtempo.report.run_reader import RepetitionData
+from armtempo.report.run_folder import JointScale
+from armtempo.report.run_reader import RESTORE, RepetitionData
 from armtempo.report.sequence_folder import FORMAT, ROWS, SAMPLES, VERSION, leg_file
 from armtempo.splines.trajectory import Trajectory
 
-_RESTORE = "restore the folder from a copy, or run again"
 _UNKNOWN = -1
 
 
@@ -66,32 +65,34 @@ class SequenceRun:
     def load(cls, path: Path | str) -> SequenceRun:
         """Read the folder of a recorded sequence; raises RunFolderError if it is none or inconsistent."""
         folder = Path(path)
-        meta = _meta(folder / META)
+        meta = run_reader.description(folder)
+        run_reader.check_version(folder, meta, FORMAT, VERSION)
         try:
-            joints = tuple(run_reader.scale(**joint) for joint in meta["joints"])
+            joints = run_reader.scales(meta)
+            meta |= {key: visible(str(meta[key])) for key in ("name", "started", "state")}
+            meta |= {"rows": [_described(row) for row in meta["rows"]], "ended": _ended(meta["ended"])}
             rows = tuple(_row(cells) for cells in run_reader.whole_lines(folder / ROWS))
             lines = run_reader.whole_lines(folder / SAMPLES)
             samples = run_reader.parsed(folder / SAMPLES, str(meta["state"]), joints, lines)
-            run = np.array([int(line["run"]) for line in lines], dtype=np.int64)
-            row = np.array([int(line["row"] or _UNKNOWN) for line in lines], dtype=np.int64)
-            motions = [int(entry["motion"]) for entry in meta["rows"]]
-            if row.size and row.max() >= len(motions):
+            run = np.array([run_reader.whole(line["run"]) for line in lines], dtype=np.int64)
+            row = np.array([run_reader.whole(line["row"] or _UNKNOWN) for line in lines], dtype=np.int64)
+            if row.size and row.max() >= len(meta["rows"]):
                 raise ValueError("a sample of a row that does not exist")
         except OSError as error:
-            raise RunFolderError(f"{folder}: cannot be read: {error.strerror}", _RESTORE) from error
-        except (KeyError, TypeError, ValueError) as error:
-            raise RunFolderError(f"{folder}: {error} is missing or wrong", _RESTORE) from error
+            raise RunFolderError(f"{folder}: cannot be read: {error.strerror}", RESTORE) from error
+        except (LookupError, TypeError, ValueError) as error:
+            raise run_reader.wrong(folder, error) from error
         return cls(folder, meta, joints, rows, samples, run, row)
 
     @property
     def name(self) -> str:
         """The sequence's name on the board."""
-        return visible(str(self.meta["name"]))
+        return str(self.meta["name"])
 
     @property
     def state(self) -> str:
         """How it ended, by the board; ``interrupted`` or ``broken`` if the host did not receive that."""
-        return visible(str(self.meta["state"]))
+        return str(self.meta["state"])
 
     @property
     def last(self) -> RowPassed | None:
@@ -117,36 +118,45 @@ class SequenceRun:
             try:
                 found.append(decode.trajectory(path.read_bytes(), self.joints, f"motion {number}"))
             except OSError as error:
-                raise RunFolderError(f"{path}: cannot be read: {error.strerror}", _RESTORE) from error
+                raise RunFolderError(f"{path}: cannot be read: {error.strerror}", RESTORE) from error
             except ArmtempoError as error:
-                raise RunFolderError(f"{path}: {error.problem}", _RESTORE) from error
+                raise RunFolderError(f"{path}: {error.problem}", RESTORE) from error
         return tuple(found)
 
 
 def is_sequence_run(folder: Path) -> bool:
     """Whether a folder is that of a recorded sequence; False if it cannot be read."""
     try:
-        return bool(json.loads((folder / META).read_text(encoding="utf-8"))["format"] == FORMAT)
-    except (OSError, ValueError, LookupError, TypeError):
+        return run_reader.description(folder).get("format") == FORMAT
+    except RunFolderError:
         return False
 
 
-def _meta(path: Path) -> dict[str, Any]:
-    try:
-        meta = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise RunFolderError(f"{path}: cannot be read: {error}", _RESTORE) from error
-    if not isinstance(meta, dict) or meta.get("format") != FORMAT:
-        raise RunFolderError(f"{path}: not the description of a recorded sequence", "give a folder of one")
-    if meta.get("version") != VERSION:
-        raise RunFolderError(
-            f"{path}: version {meta.get('version')}; this armtempo reads {VERSION}",
-            "update armtempo, or read it with the version that wrote it",
-        )
-    return meta
+def _described(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of run.json."""
+    found = {"step": run_reader.whole(row["step"]), "motion": run_reader.whole(row["motion"])}
+    if not 0 <= found["motion"] <= MAX_MOTIONS:
+        raise ValueError(f"there is no motion {found['motion']}")
+    return {**found, "words": visible(str(row["words"]))}
+
+
+def _ended(ended: Mapping[str, Any]) -> dict[str, Any]:
+    """The end in run.json; empty if the host did not receive it."""
+    if not ended:
+        return {}
+    return {
+        "step": run_reader.whole(ended["step"]),
+        "cycle": run_reader.whole(ended["cycle"]),
+        "code": visible(str(ended["code"])),
+        "counters": {
+            visible(name): run_reader.whole(value) for name, value in dict(ended["counters"]).items()
+        },
+    }
 
 
 def _row(cells: Mapping[str, str]) -> RowPassed:
-    run, row, step, cycle, value = (int(cells[name]) for name in ("run", "row", "step", "cycle", "value"))
-    time_s, words = float(cells["time_s"]), visible(cells["words"])
-    return RowPassed(int(cells["passed"]), time_s, run, row, step, cycle, value, words)
+    run, row, step, cycle, value = (
+        run_reader.whole(cells[name]) for name in ("run", "row", "step", "cycle", "value")
+    )
+    time_s, words = run_reader.finite(cells["time_s"]), visible(cells["words"])
+    return RowPassed(run_reader.whole(cells["passed"]), time_s, run, row, step, cycle, value, words)

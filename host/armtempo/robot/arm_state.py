@@ -36,6 +36,7 @@ _WORDS = {
     "link_timeout_ms": "link time-out",
     "identity": "geometry, motors, encoders or switches",
 }
+_HALF_STEP = 0.5 + 1e-9
 _KEEPS = "which keeps the position, as only limits, outputs or inputs differ"
 _LOSES = "after which the position is unknown"
 
@@ -88,7 +89,10 @@ def home_unknown(client: Client, arm: Arm) -> None:
 
 
 def posture_deg(client: Client, arm: Arm) -> Array:
-    """Joint angles from the commanded steps, degrees (J,); raises LinkError if a position is unknown."""
+    """Joint angles from the commanded steps, degrees (J,), within the ranges as far as steps can tell.
+
+    Raises LinkError if a position is unknown.
+    """
     status = client.status()
     unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
     if unknown:
@@ -96,7 +100,11 @@ def posture_deg(client: Client, arm: Arm) -> Array:
             f"the position of {', '.join(unknown)} is unknown",
             "move the arm to its home posture and run 'armtempo home'",
         )
-    return np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
+    angles = np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
+    # the end of a range may lie between two steps
+    return np.array(
+        [joint.placed(angle, _HALF_STEP) for joint, angle in zip(arm.driven, angles, strict=True)]
+    )
 
 
 def is_at(client: Client, arm: Arm, target_deg: Array) -> bool:

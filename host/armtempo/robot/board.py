@@ -28,6 +28,7 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.records import encoded_motion, encoded_sequence
 from armtempo.records.encoded_motion import EncodedMotion, MotionKey
+from armtempo.report.run import Run
 from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot import (
     arm_state,
@@ -35,6 +36,7 @@ from armtempo.robot import (
     goto,
     homing,
     jog,
+    kept_position,
     recording,
     sequence_recording,
     sequence_run,
@@ -47,13 +49,12 @@ from armtempo.robot.jog import HeldJog
 from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardInput, BoardOutput
 from armtempo.robot.recording import Watcher
-from armtempo.robot.run import Run
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest, stoppable
 from armtempo.robot.stored_motion import TURN_S
 
-_MOST_REPETITIONS = 99
+MOST_REPETITIONS = 99
 """Their files are numbered with two digits."""
 
 
@@ -94,7 +95,8 @@ class Board:
         One that waits longer, for a cable that is out, finds that the board is closed.
         """
         with self.client.session.in_a_hurry(TURN_S):
-            self.client.session.check = self._closed
+            kept_position.keep(self.client, self.port)
+            self.client.session.guard(self._closed)
             yield
 
     def _closed(self) -> None:
@@ -348,8 +350,8 @@ class Board:
         start, the board has another motion of this name (``upload`` can replace it), or is set up for another
         arm.
         """
-        if not 1 <= repeat <= _MOST_REPETITIONS:
-            raise InputError(f"repeat: {repeat} is not in the range 1<=x<={_MOST_REPETITIONS}", "change it")
+        if not 1 <= repeat <= MOST_REPETITIONS:
+            raise InputError(f"repeat: {repeat} is not in the range 1<=x<={MOST_REPETITIONS}", "change it")
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._stoppable(stop) as wanted:

@@ -45,7 +45,7 @@ class Room:
     def _highest_rate(self, joints: int) -> int:
         """The highest step rate, in whole 1000 steps/s, at which ``joints`` joints fit; 0 if none."""
         for rate in range(limits.MAX_STEP_RATE_SUM // joints // 1000, 0, -1):
-            if self.holds([1000 * rate] * joints):
+            if self.holds([encode.with_margin(1000 * rate)] * joints):
                 return 1000 * rate
         return 0
 

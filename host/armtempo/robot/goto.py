@@ -1,4 +1,4 @@
-"""Temporary motions: to a posture, to a start, and back between repetitions."""
+"""Motions that are run once: to a posture, to a start."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from armtempo_shared import limits
+from armtempo_shared import limits, wire
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
@@ -20,15 +20,18 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import point_to_point, room_check, via_points
 from armtempo.ports.names import is_sim
 from armtempo.records import encoded_motion
-from armtempo.records.encoded_motion import EncodedMotion
+from armtempo.records.encoded_motion import EncodedMotion, MotionKey
 from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import TEMPORARY, SampleSink, raise_fault, replay, store
+from armtempo.robot.stored_motion import SampleSink, put_once, raise_fault, replay
 from armtempo.splines.trajectory import Trajectory
 
 Where = Plan | EncodedMotion | SequencePlan | Path | str | ArrayLike
 """A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
 (or of its file) or sequence."""
+_NAME = "goto"
+_STORED = "tmp-goto"
+"""Name on the board of a move that is larger than its memory."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +60,13 @@ def go_to(
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
         trajectory = motion(arm, here, target_deg, pace or MovePace())
-        move_once(client, encoded_motion.of_trajectory(trajectory, arm), stop, progress)
+        move_once(client, encoded_motion.of_trajectory(trajectory, arm).data, stop, progress)
 
 
 def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Trajectory:
     """The motion from one posture (J,) to another; errors as in ``go_to``."""
-    name = TEMPORARY + "goto"
     if not pace.line:
-        found = point_to_point.straight(name, here_deg, target_deg, arm, pace.speed)
+        found = point_to_point.straight(_NAME, here_deg, target_deg, arm, pace.speed)
         room_check.tell_start(arm, here_deg)
         room_check.check(arm, found, outwards=True)
         return found
@@ -72,25 +74,23 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
 
     target = point_to_point.posture(target_deg, arm)
     trajectory = planner.straight_line(arm, here_deg.tolist(), target.tolist())
-    return replace(planner.slower(trajectory, pace.speed), name=name)
+    return replace(planner.slower(trajectory, pace.speed), name=_NAME)
 
 
-def go_back(client: Client, motion: EncodedMotion, stop: StopRequest) -> None:
-    """Move from the end of a motion along its path to its start."""
-    trajectory = point_to_point.backwards(motion.trajectory, TEMPORARY + "back")
-    move_once(client, encoded_motion.of_trajectory(trajectory, motion.arm), stop)
+def move_once(client: Client, data: bytes, stop: StopRequest, progress: Progress | None = None) -> None:
+    """Run a motion record once, from the board's memory; raises BoardError if a fault ends it.
 
-
-def move_once(
-    client: Client, motion: EncodedMotion, stop: StopRequest, progress: Progress | None = None
-) -> None:
-    """Store a motion, run it and remove it; raises BoardError if a fault ends it."""
-    key = store(client, motion.name, motion.data)
+    One that is larger than that is stored and removed again.
+    """
+    if len(data) <= client.info.once_bytes:
+        raise_fault(replay(client, put_once(client, data), stop, shown(progress)))
+        return
+    client.upload(_STORED, data)
     try:
-        raise_fault(replay(client, key, stop, shown(progress)))
+        raise_fault(replay(client, MotionKey(_STORED, wire.record_crc(data)), stop, shown(progress)))
     finally:
         with suppress(LinkError):  # do not hide the earlier error
-            client.remove(key.name)
+            client.remove(_STORED)
 
 
 def shown(progress: Progress | None) -> SampleSink:

@@ -19,12 +19,16 @@ from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.planning import point_to_point
 from armtempo.records import encoded_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import TEMPORARY, raise_fault, replay, store
+from armtempo.robot.stored_motion import put_once, raise_fault, replay
 
 FAST, SLOW = 0.2, 0.04
 """Fractions of the joint's limits in the first and in the second approach."""
 BACK_DEG = 3.0
 """Distance by which a joint backs off from its switch."""
+MARGIN_DEG = 5.0
+"""How far beyond its range and its switch's angle a joint goes on for it: it may have stood beyond the other end."""
+MOST_PRESSED_DEG = 12.0
+"""Farthest that a joint is taken to have been beyond its switch."""
 _TOLERANCE_DEG = 0.1
 """A motion that stops this close to its end was not stopped by a switch; more than a step of any joint."""
 
@@ -95,24 +99,44 @@ class _GroupHoming:
     def run(self) -> None:
         """Make both approaches, back off, declare the positions, and move the joints home."""
         whole = {
-            index: abs(switch.far_deg - switch.edge_deg) + switch.outside_deg
+            index: abs(switch.far_deg - switch.edge_deg) + switch.outside_deg + MARGIN_DEG
             for index, switch in self.switches.items()
         }
         self._approach(whole, FAST)
-        self._leave(dict.fromkeys(whole, BACK_DEG))
-        for index, way_deg in self._approach(dict.fromkeys(whole, 2 * BACK_DEG), SLOW).items():
-            if not 0.5 * BACK_DEG < way_deg < 1.5 * BACK_DEG:
-                raise LinkError(
-                    (
-                        f"{self.arm.driven[index].name}: its limit switch tripped {way_deg:.2f} degrees after it had "
-                        f"been left by {BACK_DEG:g}"
-                    ),
-                    "check its wiring and that it sits firmly",
-                )
+        self._approach_again()
         away_deg = {index: BACK_DEG + switch.outside_deg for index, switch in self.switches.items()}
         self._leave(away_deg)
         self._declare(away_deg)
         self._go_home()
+
+    def _approach_again(self) -> None:
+        """Back off and approach slowly; a joint whose switch trips at once started on it, and backs off further."""
+        left = dict.fromkeys(self.switches, 0.0)
+        pressed = list(self.switches)
+        while pressed:
+            self._leave(dict.fromkeys(pressed, BACK_DEG))
+            ways = self._approach(dict.fromkeys(pressed, 2 * BACK_DEG), SLOW)
+            pressed = []
+            for index, way_deg in ways.items():
+                left[index] += BACK_DEG - way_deg
+                if way_deg > 1.5 * BACK_DEG:
+                    raise LinkError(
+                        f"{self.arm.driven[index].name}: its limit switch tripped {way_deg:.2f} degrees after it had "
+                        f"been left by {BACK_DEG:g}",
+                        "check its wiring and that it sits firmly",
+                    )
+                if way_deg < 0.5 * BACK_DEG:
+                    pressed.append(index)
+            if stuck := [index for index in pressed if left[index] > MOST_PRESSED_DEG]:
+                self._fail_pressed(stuck)
+
+    def _fail_pressed(self, stuck: list[int]) -> None:
+        levels = ", ".join(f'active = "{self.arm.driven[index].switches.active}"' for index in stuck)
+        raise LinkError(
+            f"{self._names(stuck)}: its limit switch is still pressed {MOST_PRESSED_DEG:g} degrees away from where it "
+            "tripped",
+            f"its level is probably inverted: the arm file has {levels}; or it is stuck, or wired to another pin",
+        )
 
     def _approach(self, ways_deg: dict[int, float], fraction: float) -> dict[int, float]:
         """Move joints towards their switches until all have tripped; returns the distance of each, degrees."""
@@ -128,8 +152,9 @@ class _GroupHoming:
                 del left[tripped]
             elif missed:
                 raise LinkError(
-                    f"{self._names(missed)}: no limit switch tripped within {ways_deg[missed[0]]:.0f} degrees",
-                    "check its wiring and its pin in the arm file",
+                    f"{self._names(missed)}: no limit switch tripped within {ways_deg[missed[0]]:.0f} degrees, its "
+                    "range and a margin",
+                    "check its wiring, its pin and its level ('active') in the arm file, and where the joint stands",
                 )
             elif max(moved.values()) <= _TOLERANCE_DEG:
                 raise LinkError(
@@ -190,12 +215,10 @@ class _GroupHoming:
         for index, (from_deg, to_deg) in ways_deg.items():
             start_deg[index], end_deg[index] = from_deg, to_deg
         slow_arm = _slowed(self.arm, fraction)
-        trajectory = point_to_point.straight(TEMPORARY + "home", start_deg, end_deg, slow_arm)
+        trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
         motion = encoded_motion.of_trajectory(trajectory, self.arm)
-        key = store(self.client, motion.name, motion.data)
-        end = replay(self.client, key, self.stop, flags=START_HOMING)
+        end = replay(self.client, put_once(self.client, motion.data), self.stop, flags=START_HOMING)
         tripped = self.client.status().fault_joint
-        self.client.remove(key.name)
         raise_fault(end)
         self.stop.check()
         steps = end.positions.commanded_steps

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
@@ -17,7 +16,7 @@ from armtempo.basics.errors import BoardError, LinkError
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
 from armtempo.link.refusal import refusal
-from armtempo.link.transport import Transport
+from armtempo.link.session import OnLoss
 from armtempo.model.arm import Arm
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMotion, JogMove
@@ -26,7 +25,7 @@ from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state, goto, stored_motion
 from armtempo.robot.stop_request import StopRequest
 
-NAME = stored_motion.TEMPORARY + "jog"
+NAME = "jog"
 HOLD_S = 0.08
 """Interval of the hold messages of a held jog: three in a row may be lost."""
 BEFORE_BRAKING_S = 0.15
@@ -53,7 +52,7 @@ def step(client: Client, arm: Arm, move: JogMove, speed: float, stop: StopReques
     Raises BoardError if the board refuses or a fault ends it; otherwise as ``plan``.
     """
     motion = plan(client, arm, move, speed)
-    goto.move_once(client, _encoded(motion, arm), stop)
+    goto.move_once(client, _encoded(motion, arm).data, stop)
     return motion
 
 
@@ -80,27 +79,22 @@ class HeldJog:
         self._run = 0
         self._said_s = 0.0
         self._positions: Positions | None = None
-        self._reopen: Callable[[], Transport] | None = None
+        self._ends = ExitStack()
 
     def __enter__(self) -> Self:
         """Upload and start it; raises BoardError if the board refuses."""
         client = self._client
         client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
-        client.upload(encoded.name, encoded.data)
-        # Nothing holds the jog while a broken port is waited for
-        self._reopen, client.session.reopen = (
-            client.session.reopen,
-            None,
-        )
-        try:
-            self._run = client.start(encoded.name, encoded.key.crc, START_HELD).run
-        except BaseException:
-            self._clean_up()
-            raise
-        self.moving = True
-        for _ in range(_FIRST):
-            self._say_so()
+        key = stored_motion.put_once(client, encoded.data)
+        with ExitStack() as ends:
+            # Nothing holds the jog while a broken port is waited for
+            ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
+            self._run = client.start(key.name, key.crc, START_HELD).run
+            self.moving = True
+            for _ in range(_FIRST):
+                self._say_so()
+            self._ends = ends.pop_all()
         return self
 
     @property
@@ -157,12 +151,11 @@ class HeldJog:
         try:
             self._rest()
         except LinkError:
-            self._client.session.reopen = self._reopen
             if value is None:  # do not hide the first error
                 raise
             return
-        with suppress(LinkError):
-            self._clean_up()
+        finally:
+            self._ends.close()
         if self.fault is not None and value is None:
             raise refusal("a fault ended the jog", self.fault.code, self.fault.joint)
 
@@ -180,7 +173,3 @@ class HeldJog:
         self.moving = False
         if status.fault and self.fault is None:
             self.fault = status.as_fault()
-
-    def _clean_up(self) -> None:
-        self._client.session.reopen = self._reopen
-        self._client.remove(self.motion.trajectory.name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from armtempo_shared.limits import TICK_HZ
 
@@ -13,10 +14,12 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.model import arm_json
+from armtempo.model.arm import Arm
+from armtempo.records import encoded_motion
 from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report import run_folder
 from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
-from armtempo.robot.goto import go_back
+from armtempo.robot.goto import move_once
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
 
@@ -60,24 +63,22 @@ class ProgressWatcher(Watcher):
         self._inner.end(repetition)
 
 
+def origin(client: Client, arm: Arm, port: str) -> dict[str, Any]:
+    """The entries of any run.json on arm and board."""
+    return {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
+
+
 def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> RunFolder:
     """A new run folder with everything that is needed to repeat the run."""
-    origin = {
-        "arm": motion.arm.name,
-        "port": port,
-        "virtual": client.info.virtual,
-        "board": vars(client.info),
-        "motion_crc": f"{motion.key.crc:08x}",
-    }
-    folder = RunFolder(
-        run_folder.new_folder(parent, motion.name), motion.name, run_folder.scales(motion.arm), origin
-    )
-    folder.write_motion(motion.data)
-    if motion.plan is not None:
-        motion.plan.save(folder.path / run_folder.TRAJECTORY)
-    else:
-        arm_json.save(motion.arm, folder.path / run_folder.ARM)
-    folder.write()
+    where = {**origin(client, motion.arm, port), "motion_crc": f"{motion.key.crc:08x}"}
+    with run_folder.new_folder(parent, motion.name) as path:
+        folder = RunFolder(path, motion.name, run_folder.scales(motion.arm), where)
+        folder.write_motion(motion.data)
+        if motion.plan is not None:
+            motion.plan.save(path / run_folder.TRAJECTORY)
+        else:
+            arm_json.save(motion.arm, path / run_folder.ARM)
+        folder.write()
     return folder
 
 
@@ -89,13 +90,14 @@ def repeat(
     stop: StopRequest,
     watcher: Watcher,
 ) -> Iterator[Repetition]:
-    """Replay a stored motion ``times`` times into the run folder, and return along the path in between.
+    """Replay a stored motion ``times`` times into the run folder, and backwards in between.
 
     Yields each repetition when it has ended. A stop request ends the series; a fault raises BoardError.
     """
+    back = encoded_motion.way_back(motion) if times > 1 else b""
     for number in range(times):
         if number:
-            go_back(client, motion, stop)
+            move_once(client, back, stop)
         if stop.wanted:
             return
         end = _recorded(client, motion, folder, stop, watcher)

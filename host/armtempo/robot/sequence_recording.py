@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.records import encoded_sequence
 from armtempo.report import run_folder, sequence_folder
 from armtempo.report.sequence_folder import SequenceFolder
+from armtempo.robot.recording import origin
 
 ACKNOWLEDGED = 8
 """Received samples are acknowledged to the board after this many."""
@@ -79,31 +80,27 @@ def fetched(client: Client, name: str, arm: Arm) -> SequenceContent:
 def recorder(client: Client, content: SequenceContent, parent: Path, port: str) -> Iterator[Recorder]:
     """A recorder that writes one run into a new run folder in ``parent``."""
     rows = [content.record.row(index) for index in range(content.record.rows)]
-    path = run_folder.new_folder(parent, content.name)
-    for number, leg in enumerate(content.legs, 1):
-        file = path / sequence_folder.leg_file(number)
-        with run_folder.writing(file):
-            file.write_bytes(leg)
-    if content.plan is not None:
-        content.plan.save(path / sequence_folder.SEQUENCE)
-    else:
-        arm_json.save(content.arm, path / run_folder.ARM)
-    folder = SequenceFolder(
-        path,
-        content.name,
-        run_folder.scales(content.arm),
-        content.words,
-        tuple(row[4] for row in rows),
-        tuple(row[1] + 1 if row[0] == sequence.MOVE else 0 for row in rows),
-        {
-            "arm": content.arm.name,
-            "port": port,
-            "virtual": client.info.virtual,
-            "board": vars(client.info),
-            "motions": [content.record.motion(index)[0] for index in range(content.record.motions)],
-        },
-    )
-    with folder:
+    with ExitStack() as ends:
+        with run_folder.new_folder(parent, content.name) as path:
+            for number, leg in enumerate(content.legs, 1):
+                file = path / sequence_folder.leg_file(number)
+                with run_folder.writing(file):
+                    file.write_bytes(leg)
+            if content.plan is not None:
+                content.plan.save(path / sequence_folder.SEQUENCE)
+            else:
+                arm_json.save(content.arm, path / run_folder.ARM)
+            names = [content.record.motion(index)[0] for index in range(content.record.motions)]
+            folder = SequenceFolder(
+                path,
+                content.name,
+                run_folder.scales(content.arm),
+                content.words,
+                tuple(row[4] for row in rows),
+                tuple(row[1] + 1 if row[0] == sequence.MOVE else 0 for row in rows),
+                {**origin(client, content.arm, port), "motions": names},
+            )
+            ends.enter_context(folder)
         yield _FolderRecorder(client, folder)
 
 

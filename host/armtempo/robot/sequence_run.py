@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from armtempo_shared import sequence as record
 from armtempo_shared import wire
 
-from armtempo.basics.errors import LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.errors import LinkError, OtherBoardError
 from armtempo.basics.progress import Progress
 from armtempo.link import Client
 from armtempo.link.board_messages import SequenceState, StoredMotion
 from armtempo.link.refusal import refusal
-from armtempo.link.session import RECONNECT_S
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.records.encoded_sequence import EncodedSequence
 from armtempo.robot import stored_motion
@@ -93,16 +92,10 @@ def run(
     and the host tries to reconnect for RECONNECT_S. Raises BoardError if the board refuses to start or a
     fault ends the sequence, LinkError if it cannot be reached any more.
     """
-    client.session.stopping = lambda: stop.wanted
-    stop.wake = client.session.wake
-    stop.check()
-    client.start(key.name, key.crc)
-    brake = stored_motion.Brake(client, stop)
-    try:
-        end = _follow(client, key.name, brake, watcher, recorder or Recorder())
-    except KeyboardInterrupt:
-        stored_motion.send_stop(client, now=True)
-        raise
+    with stored_motion.Supervision(client, stop) as supervision:
+        client.start(key.name, key.crc)
+        follow = _Following(client, key.name, supervision, watcher, recorder or Recorder())
+        end = supervision.follow(follow.to_its_end)
     if end.ending == "fault":
         raise refusal(f"a fault ended the sequence {where(end)}", end.code, client.status().fault_joint)
     if end.ending == "refused":
@@ -110,35 +103,46 @@ def run(
     return end
 
 
-def _follow(
-    client: Client, name: str, brake: stored_motion.Brake, watcher: SequenceWatcher, recorder: Recorder
-) -> SequenceState:
-    before = None
-    heard_s = client.session.clock()
-    while True:
-        try:
-            brake()
-            state = client.sequence()
-            heard_s = client.session.clock()
-            if state != before and state.name == name:
-                watcher(state)
-            if state.name != name or state.ending == "none":
-                last = f"; last known state: {where(before)}" if before and before.name == name else ""
-                raise OtherBoardError(
-                    f"the board has restarted during the sequence: positions are unknown{last}",
-                    "move the arm to its home posture and run 'armtempo home'",
-                )
-            before = state
-            _take_events(client, recorder)
-            if state.ending != "running":
-                recorder.end(state)
-                return state
-        except OtherBoardError:
-            raise
-        except NoAnswerError as error:
-            if client.session.stopping() or client.session.clock() - heard_s > RECONNECT_S:
-                raise
-            client.session.reconnect(error)
+class _Following:
+    """Follows a running sequence; continues where it was after the link was lost."""
+
+    def __init__(
+        self,
+        client: Client,
+        name: str,
+        supervision: stored_motion.Supervision,
+        watcher: SequenceWatcher,
+        recorder: Recorder,
+    ) -> None:
+        self._client = client
+        self._name = name
+        self._supervision = supervision
+        self._watcher = watcher
+        self._recorder = recorder
+        self._before: SequenceState | None = None
+
+    def to_its_end(self) -> SequenceState:
+        """The last state."""
+        while (state := self._next_state()).ending == "running":
+            _take_events(self._client, self._recorder)
+        _take_events(self._client, self._recorder)
+        self._recorder.end(state)
+        return state
+
+    def _next_state(self) -> SequenceState:
+        self._supervision.brake()
+        state = self._client.sequence()
+        self._supervision.heard()
+        if state.name != self._name or state.ending == "none":
+            last = f"; last known state: {where(self._before)}" if self._before else ""
+            raise OtherBoardError(
+                f"the board has restarted during the sequence: positions are unknown{last}",
+                "move the arm to its home posture and run 'armtempo home'",
+            )
+        if state != self._before:
+            self._before = state
+            self._watcher(state)
+        return state
 
 
 def _take_events(client: Client, recorder: Recorder) -> None:

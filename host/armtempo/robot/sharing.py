@@ -66,8 +66,8 @@ class Sharing:
             "inputs": self._inputs,
         }
         self._server = Server(claim.new(name, port, device), handlers)
-        session.check = self._server.check
-        session.listeners.append(self._heard)
+        session.guard(self._server.check)
+        session.listen(self._heard)
         Thread(target=self._hand_out_states, name="armtempo states", daemon=True).start()
 
     def close(self) -> None:

@@ -28,8 +28,7 @@ class StopRequest:
         self._wanted = False
         self.by = ""
         """Who asked for the stop; "" for a signal or this program."""
-        self.wake: Callable[[], object] = lambda: None
-        """Called with the request; wakes the call that waits."""
+        self._wakes: list[Callable[[], object]] = []
 
     @property
     def wanted(self) -> bool:
@@ -40,7 +39,17 @@ class StopRequest:
     def wanted(self, wanted: bool) -> None:
         self._wanted = wanted
         if wanted:
-            self.wake()
+            for wake in list(self._wakes):
+                wake()
+
+    @contextmanager
+    def waking(self, wake: Callable[[], object]) -> Iterator[None]:
+        """Within this context ``wake`` is called with the request, so that a call that waits looks at it."""
+        self._wakes.append(wake)
+        try:
+            yield
+        finally:
+            self._wakes.remove(wake)
 
     def ask(self, by: str) -> None:
         """Request the stop; ``by``: who asks, for messages."""

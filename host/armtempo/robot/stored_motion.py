@@ -1,12 +1,13 @@
-"""Start, follow and stop a stored motion."""
+"""Store a motion; start, follow and stop one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
+from typing import Self, TypeVar
 
 from armtempo_shared import wire
-from armtempo_shared.messages import PERMILLE
+from armtempo_shared.messages import ONCE_NAME, PERMILLE
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.basics.progress import Progress
@@ -14,10 +15,11 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.refusal import refusal
-from armtempo.link.session import RECONNECT_S
+from armtempo.link.session import RECONNECT_S, OnLoss
 from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot.stop_request import StopRequest
 
+_End = TypeVar("_End")
 SampleSink = Callable[[Sample, float], object]
 """Called with each sample and the duration of the motion in seconds."""
 
@@ -28,8 +30,6 @@ FREEZE_S = 2.0
 """Longest time that freezing takes."""
 TURN_S = 1.0
 """A request from another thread waits this long for its turn to talk to the board."""
-TEMPORARY = "tmp-"
-"""Prefix of the names of motions that are removed after use."""
 
 
 def store(
@@ -37,19 +37,14 @@ def store(
 ) -> MotionKey:
     """Upload a motion record under ``name``, unless the board already has it.
 
-    Raises LinkError if the board has another motion of this name, unless ``replace`` is true, the name is
-    temporary, or that motion is damaged.
+    Raises LinkError if the board has another motion of this name, unless ``replace`` is true, or that motion is
+    damaged.
     """
     key = MotionKey(name, wire.record_crc(data))
     found = client.find(name)
     if found is not None and found.crc == key.crc:
         return key
-    if (
-        found is not None
-        and (found.joints or found.sequence)
-        and not replace
-        and not name.startswith(TEMPORARY)
-    ):
+    if found is not None and (found.joints or found.sequence) and not replace:
         button = ", which its button starts" if found.default else ""
         raise LinkError(
             f"the board has another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
@@ -59,6 +54,11 @@ def store(
     return key
 
 
+def put_once(client: Client, data: bytes) -> MotionKey:
+    """Put a motion record into the board's memory, to be run once; raises InputError if it is too large."""
+    return MotionKey(ONCE_NAME, client.put_once(data))
+
+
 def replay(
     client: Client,
     motion: MotionKey,
@@ -66,48 +66,86 @@ def replay(
     sink: SampleSink = lambda *_: None,
     flags: int = 0,
 ) -> RunEnd:
-    """Start a stored motion and follow it to its end; a stop request makes the board brake.
+    """Start a motion and follow it to its end; a stop request makes the board brake.
 
     Any error here stops the board. Raises BoardError if the board refuses to start, LinkError if it cannot be
     reached any more, Stopped if the stop was requested before the start.
     """
-    client.session.stopping = lambda: stop.wanted
-    stop.wake = client.session.wake
-    stop.check()
-    started = client.start(motion.name, motion.crc, flags)
-    motion_s = started.duration_s * client.rate / PERMILLE
-    follower = Follower(client, started.run)
-    try:
-        return _follow(client, follower, Brake(client, stop), lambda sample: sink(sample, motion_s))
-    except OtherBoardError as error:
-        raise LinkError(
-            f"{error.problem}; what happened after the last sample is not known",
-            f"{error.hint}",
-        ) from error
+    with Supervision(client, stop) as run:
+        started = client.start(motion.name, motion.crc, flags)
+        motion_s = started.duration_s * client.rate / PERMILLE
+        follower = Follower(client, started.run)
 
+        def follow() -> RunEnd:
+            for sample in follower.samples(run.brake):
+                run.heard()
+                sink(sample, motion_s)
+            return follower.end
 
-def _follow(client: Client, follower: Follower, brake: Brake, take: Callable[[Sample], object]) -> RunEnd:
-    heard_s = client.session.clock()
-    while not follower.ended:
         try:
-            for sample in follower.samples(brake):
-                heard_s = client.session.clock()
-                take(sample)
-        except OtherBoardError:
-            raise
-        except NoAnswerError as error:  # silent although its port exists: treated like a pulled cable
-            if not client.session.stopping():  # otherwise the stop continues until it is abandoned
-                if client.session.clock() - heard_s > RECONNECT_S:
-                    raise
-                client.session.reconnect(error)
-        except BaseException as error:
-            _stop_after(client, error)
-            raise
-    return follower.end
+            return run.follow(follow)
+        except OtherBoardError as error:
+            raise LinkError(
+                f"{error.problem}; what happened after the last sample is not known",
+                f"{error.hint}",
+            ) from error
+
+
+class Supervision:
+    """What stops a run, and what to do if the link is lost meanwhile: a context around its start and ``follow``.
+
+    If the cable is pulled or the board falls silent, it is waited for up to RECONNECT_S, or
+    STOPPING_RECONNECT_S if the stop is wanted. Raises Stopped if the stop was wanted before.
+    """
+
+    def __init__(self, client: Client, stop: StopRequest) -> None:
+        self.brake = Brake(client, stop)
+        """To be called often by what follows the run: sends a requested stop."""
+        self._client = client
+        self._stop = stop
+        self._heard_s = client.session.clock()
+        self._ends = ExitStack()
+
+    def __enter__(self) -> Self:
+        session = self._client.session
+        with ExitStack() as ends:
+            ends.enter_context(session.on_loss(OnLoss(stopping=lambda: self._stop.wanted)))
+            ends.enter_context(self._stop.waking(session.wake))
+            self._stop.check()
+            self._ends = ends.pop_all()
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self._ends.close()
+
+    def heard(self) -> None:
+        """To be called whenever the board has told something new."""
+        self._heard_s = self._client.session.clock()
+
+    def follow(self, follow: Callable[[], _End]) -> _End:
+        """The result of ``follow``, which is called again after the link was lost; any other error stops the run.
+
+        Raises LinkError if the board cannot be reached any more, and what ``follow`` raises.
+        """
+        session = self._client.session
+        self.heard()
+        while True:
+            try:
+                return follow()
+            except OtherBoardError:
+                raise
+            except NoAnswerError as error:  # silent although its port exists: treated like a pulled cable
+                if not self._stop.wanted:  # otherwise the stop continues until it is abandoned
+                    if session.clock() - self._heard_s > RECONNECT_S:
+                        raise
+                    session.reconnect(error)
+            except BaseException as error:
+                _stop_after(self._client, error)
+                raise
 
 
 def _stop_after(client: Client, error: BaseException) -> None:
-    """Stop a motion because of ``error``, if the board can be reached."""
+    """Stop a run because of ``error``, if the board can be reached."""
     if isinstance(error, BoardError) and error.code == wire.ERROR_CODES["no_session"]:
         raise LinkError(
             (
@@ -116,8 +154,7 @@ def _stop_after(client: Client, error: BaseException) -> None:
             ),
             "find the cause, then 'armtempo home'",
         ) from error
-    client.session.reopen = None  # do not wait for a pulled cable
-    with suppress(LinkError):  # do not hide the first error
+    with client.session.on_loss(OnLoss(retry_s=0.0)), suppress(LinkError):  # do not hide the first error
         client.stop(now=isinstance(error, KeyboardInterrupt))
 
 

@@ -21,6 +21,8 @@ _REST_ROWS: dict[int, tuple[tuple[float, ...], ...]] = {
 }
 """Rows of the derivatives that are 0 at rest: the first of the cubic; the second and the first of the quintic."""
 DEGREES = (3, 5)
+REST_PIECES = 8
+"""Segments between two via points of a spline that rests at some of them."""
 
 
 @cache

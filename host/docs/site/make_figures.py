@@ -27,6 +27,7 @@ from matplotlib.figure import Figure
 
 IMAGES = Path(__file__).parents[1] / "images"
 ANIMATE = Path(__file__).parents[2] / "examples" / "animate.py"
+PANEL = Path(__file__).with_name("make_panel_picture.py")
 ARM = armtempo.Arm.paper()
 POSTURE_DEG = np.array([40.0, -50.0, 20.0, 30.0, 40.0, 10.0])
 DPI = 110
@@ -216,6 +217,7 @@ DRAWN: dict[str, Callable[[], Figure]] = {
 }
 BY_COMMAND: dict[str, tuple[Any, ...]] = {
     "arm.gif": ("arm.gif", [str(ANIMATE)]),
+    "panel.png": ("panel.png", [str(PANEL)]),
     "ar4.png": ("ar4.png", [*TOOL, "check", "--arm", "ar4", "--picture", "ar4.png"]),
 }
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from armtempo.basics import json_text
 from armtempo.basics.errors import InputError
 
 ABOUT = "firmware.json"
@@ -48,7 +49,7 @@ def find(here: Path) -> Path:
     found = [path.parent for path in here.glob(f"*/{ABOUT}")] + [*here.glob("armtempo-firmware-*.zip")]
     if len(found) == 1:
         return found[0]
-    get = "download armtempo-firmware-BOARD.zip of a release, or build one with 'armtempo firmware'"
+    get = "build one with 'armtempo firmware'; 'armtempo help firmware' says how"
     if not found:
         raise InputError(
             "no firmware given, and none found here", f"{get}; then: armtempo flash --image FILE"
@@ -79,7 +80,7 @@ def unpacked(path: Path) -> Iterator[Path]:
 def read(folder: Path) -> Image:
     """The firmware in a folder; InputError if there is none, or not a whole one."""
     try:
-        found: dict[str, Any] = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+        found: dict[str, Any] = json_text.loads((folder / ABOUT).read_text(encoding="utf-8"))
         pieces = tuple(
             Piece(Path(piece["file"]).name, int(piece["address"], 16)) for piece in found["pieces"]
         )

@@ -20,9 +20,9 @@ from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import APPROACH, PITCH, ROLL, WHOLE, YAW, Pose
 from armtempo.planning.free.angle_bounds import of_path
-from armtempo.planning.jog.jog_law import DEGREE
 from armtempo.planning.line.deviation import LineDeviation, proven
 from armtempo.planning.line.tool_path import ToolPath, ToolPiece, rotations
+from armtempo.planning.move_law import DEGREE
 from armtempo.planning.tool import Tool
 
 TOLERANCE_MM, TOLERANCE_DEG = 0.02, 0.02

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,21 +15,18 @@ from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
-from armtempo.planning import brake_time, point_to_point, room_check
+from armtempo.planning import brake_time, move_law, point_to_point, room_check
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.planning.jog import jog_law
-from armtempo.planning.jog.jog_law import DEGREE, WayLimits
 from armtempo.planning.jog.jog_line import AXES, STRAY_DEG, STRAY_MM, FollowedLine, ToolLine
+from armtempo.planning.move_law import DEGREE, WayLimits
 from armtempo.splines import bspline, extremes
-from armtempo.splines.trajectory import JointSpline, Trajectory
+from armtempo.splines.trajectory import Trajectory
 
 SPEED = 0.25
 """Default speed, as a fraction of the arm's speed limits."""
 SLOWEST = 0.01
-RAMP = 0.5
-"""Fraction of the acceleration and jerk limits used by a jog: the rest is for braking at any time."""
 LINE_PARTS = (8, 16, 32, 64)
-"""Numbers of parts of a line, increased until the tool stays on it; finally its ramps are divided too."""
+"""Numbers of parts of a line, increased until the tool stays on it."""
 _SHORTER = 0.98
 _TRIES = 6
 _INSIDE_STEPS = 1e-6
@@ -179,13 +175,13 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
     assert move.joint is not None
     joint = arm.driven[move.joint]
     end, ends = _end_deg(joint, start[move.joint], move.by)
-    found = jog_law.law(abs(end - start[move.joint]), _limits(joint, speed))
+    found = move_law.law(abs(end - start[move.joint]), move_law.of_joints([joint.limits], [1.0], speed))
     way = math.copysign(1.0, end - start[move.joint]) * found.way
     rows = [
         start[index] + (way if index == move.joint else np.zeros_like(way))
         for index in range(len(arm.driven))
     ]
-    return _trajectory(name, rows, found.time_s), ends
+    return found.trajectory(name, rows), ends
 
 
 def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
@@ -204,11 +200,6 @@ def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
     if abs(end - here) * scale < _INSIDE_STEPS:
         raise InputError(f"{joint.name} is at the end of its range, {end:g} degrees", "jog it the other way")
     return end, f"{joint.name} is at the end of its range, {edge:g} degrees"
-
-
-def _limits(joint: DrivenJoint, speed: float) -> WayLimits:
-    most = joint.limits
-    return WayLimits(speed * most.speed_deg_s, RAMP * most.acceleration_deg_s2, RAMP * most.jerk_deg_s3)
 
 
 def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
@@ -240,11 +231,11 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
     """The motion along the line; None if a joint would leave its range, or the tool the line."""
     arm = followed.line.arm
     limits = _line_limits(followed, length, speed)
-    for short_ramps, parts in itertools.product((False, True), LINE_PARTS):
-        law = jog_law.law(length, limits, length / parts, short_ramps)
+    for parts in LINE_PARTS:
+        law = move_law.law(length, limits, length / parts)
         angles = followed.at(np.clip(law.at_knots, 0.0, length))
         points = bspline.fit(angles, DEGREE)
-        trajectory = _trajectory(name, list(points.T), law.time_s)
+        trajectory = law.trajectory(name, list(points.T))
         if not _within(trajectory, arm):
             return None
         stray = followed.stray(points, law.way)
@@ -262,12 +253,7 @@ def _line_limits(followed: FollowedLine, length: float, speed: float) -> WayLimi
     if len(ways) < 2:
         angles, ways = np.degrees(followed.angles_rad[:2][:, list(arm.driven_indices)]), followed.ways[:2]
     gains = np.abs(np.diff(angles, axis=0) / np.diff(ways)[:, None]).max(axis=0) + 1e-12
-    rows = [_limits(joint, speed) for joint in arm.driven]
-    return WayLimits(
-        min(row.speed / gain for row, gain in zip(rows, gains, strict=True)),
-        min(row.acceleration / gain for row, gain in zip(rows, gains, strict=True)),
-        min(row.jerk / gain for row, gain in zip(rows, gains, strict=True)),
-    )
+    return move_law.of_joints([joint.limits for joint in arm.driven], gains.tolist(), speed)
 
 
 def _within(trajectory: Trajectory, arm: Arm) -> bool:
@@ -282,17 +268,12 @@ def _slowed(trajectory: Trajectory, arm: Arm, speed: float) -> Trajectory:
     """The motion stretched so that every joint keeps its fraction of the limits."""
     factor = 0.0
     for reached, joint in zip(extremes.of_joints(trajectory.joints), arm.driven, strict=True):
-        limits = _limits(joint, speed)
+        most = joint.limits
         factor = max(
             factor,
-            reached.speed_deg_s / limits.speed,
-            math.sqrt(reached.acceleration_deg_s2 / limits.acceleration),
-            math.cbrt(reached.jerk_deg_s3 / limits.jerk),
+            reached.speed_deg_s / (speed * most.speed_deg_s),
+            math.sqrt(reached.acceleration_deg_s2 / (move_law.ACCELERATION * most.acceleration_deg_s2)),
+            math.cbrt(reached.jerk_deg_s3 / (move_law.JERK * most.jerk_deg_s3)),
         )
     joints = tuple(replace(joint, time_points_s=factor * joint.time_points_s) for joint in trajectory.joints)
     return Trajectory(trajectory.name, joints, shared=True)
-
-
-def _trajectory(name: str, rows: Sequence[Array], time_s: Array) -> Trajectory:
-    ends = (0, len(time_s) - DEGREE)
-    return Trajectory(name, tuple(JointSpline(DEGREE, 1, row, time_s, ends) for row in rows), shared=True)

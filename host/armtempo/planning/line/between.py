@@ -15,10 +15,9 @@ from armtempo.planning.free import around
 from armtempo.planning.line.stretches import Stretch
 from armtempo.planning.lower_bounds import Floor
 from armtempo.splines import bspline
+from armtempo.splines.bspline import REST_PIECES
 
 DEGREE = 5
-PIECES = 8
-"""Segments between two via points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +48,8 @@ def between(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Prog
     own = via_deg[stretch.first : stretch.last + 1]
     if checks.is_free(job) and np.any(np.ptp(own, axis=0) > checks.TOLERANCE):
         return _free(arm, job, stretch, own, progress)
-    points = bspline.refined(bspline.fit(own, DEGREE), PIECES, DEGREE)
-    return Between(points, tuple(PIECES * via for via in range(len(own))))
+    points = bspline.refined(bspline.fit(own, DEGREE), REST_PIECES, DEGREE)
+    return Between(points, tuple(REST_PIECES * via for via in range(len(own))))
 
 
 def _free(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progress) -> Between:
@@ -60,7 +59,7 @@ def _free(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progre
     alone = replace(
         job,
         via=(ends[0], *job.via[stretch.first + 1 : stretch.last], ends[1]),
-        refine=job.refine if isinstance(job.refine, int) else PIECES,
+        refine=job.refine if isinstance(job.refine, int) else REST_PIECES,
         stops=(),
         ways=(),
         speed_mm_s=None,

@@ -119,7 +119,9 @@ def _piece(way: ToolWay, start: Array, end: Array, fixed: tuple[str, ...]) -> To
     elif fixed == (APPROACH,):
         turn = tool_path.turn_of_axis(start[:3, 2], end[:3, 2], where)
     if way.arc_through_mm is not None:
-        return tool_path.arc(start, way.arc_through_mm, end, turn, where)
+        return tool_path.arc(start, way.arc_through_mm, end, turn, where, way.tolerance_mm)
+    if way.circle_through_mm is not None:
+        return tool_path.full_circle(start, way.circle_through_mm, end, turn, where, way.tolerance_mm)
     return tool_path.line(start, end, turn, where)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +16,13 @@ from armtempo.basics.errors import PlanError
 
 _STILL_MM, _STILL_DEG = 1e-6, 1e-6
 """Shorter ways and smaller turns count as 0."""
+_NO_SINE = 1e-12
 _HALF_TURN_DEG = 179.9
 """The direction of a larger turn is not defined."""
 _FLAT = 1e-9
+_ROUNDED_MM = 1e-3
+"""Digits to which positions are typed."""
+_SAMPLES = 33
 _CORNER_BEND = 15.0 / 16.0
 """Largest f'' of ``_corner``."""
 
@@ -136,25 +141,92 @@ def line(start: Array, end: Array, turn: Array, where: str) -> ToolPiece:
     return ToolPiece(start, turned_deg, np.zeros(3), np.zeros(3), turn / turned_deg)
 
 
-def arc(start: Array, through: Sequence[float], end: Array, turn: Array, where: str) -> ToolPiece:
-    """The arc from a pose (4, 4) through a point to another one."""
-    first, middle, last = start[:3, 3], np.array(through), end[:3, 3]
-    one, other = middle - first, last - first
-    normal = np.cross(one, other)
-    size = float(np.linalg.norm(normal))
-    if size <= _FLAT * float(np.linalg.norm(one) * np.linalg.norm(other)) or size == 0.0:
+def arc(
+    start: Array, through: Sequence[float], end: Array, turn: Array, where: str, tolerance_mm: float
+) -> ToolPiece:
+    """The arc from a pose (4, 4) through a point to another one.
+
+    Raises PlanError unless the three points define it within ``tolerance_mm``.
+    """
+    middle, last = np.array(through) - start[:3, 3], end[:3, 3] - start[:3, 3]
+    circle = _circle(middle, last)
+    known = circle is not None and _unsure_mm(circle, middle, last) <= tolerance_mm
+    if circle is None or not known:
         raise PlanError(
-            f"{where}: the three points of the arc are on one line, or two of them are the same",
-            "move arc_through_mm aside, or give line = true",
+            f"{where}: the start, arc_through_mm and the end do not define an arc within {tolerance_mm:g} mm: on one "
+            "line, or two of them nearly the same",
+            "move arc_through_mm to the middle of the arc; for a full circle give circle_through_mm, two points",
         )
-    centre = np.cross(normal, one) * (other @ other) + np.cross(other, normal) * (one @ one)
+    length = circle.radius * circle.angle_to(last)
+    return ToolPiece(start, length, circle.direction, circle.centre / circle.radius**2, turn / length)
+
+
+def full_circle(
+    start: Array, through: Sequence[Sequence[float]], end: Array, turn: Array, where: str, tolerance_mm: float
+) -> ToolPiece:
+    """The circle from a pose (4, 4) through two points, in this order, back to where it began; errors as ``arc``."""
+    away_mm = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+    if away_mm > tolerance_mm:
+        raise PlanError(
+            f"{where}: a full circle ends where it began, but the via points are {away_mm:.4g} mm apart",
+            "give both the same position; for a part of a circle give arc_through_mm, one point",
+        )
+    first, second = (np.array(point) - start[:3, 3] for point in through)
+    circle = _circle(first, second)
+    if circle is None or _unsure_mm(circle, first, second) > tolerance_mm:
+        raise PlanError(
+            f"{where}: the start and circle_through_mm do not define a circle within {tolerance_mm:g} mm: on one line, "
+            "or two of them nearly the same",
+            "give two points a third of the circle apart",
+        )
+    length = 2.0 * np.pi * circle.radius
+    return ToolPiece(start, length, circle.direction, circle.centre / circle.radius**2, turn / length)
+
+
+class _Circle(NamedTuple):
+    """A circle through the origin."""
+
+    centre: Array
+    direction: Array
+    """At the origin."""
+
+    @property
+    def radius(self) -> float:
+        return float(np.linalg.norm(self.centre))
+
+    def angle_to(self, point: Array) -> float:
+        """From the origin along the circle, [0, 2 pi)."""
+        to = point - self.centre
+        return float(np.arctan2(to @ self.direction, to @ (-self.centre / self.radius))) % (2.0 * np.pi)
+
+    def points(self, angle: float) -> Array:
+        """Points up to an angle, evenly: (_SAMPLES, 3)."""
+        steps = np.linspace(0.0, angle, _SAMPLES)[:, None]
+        return self.centre * (1.0 - np.cos(steps)) + self.direction * (self.radius * np.sin(steps))
+
+
+def _circle(middle: Array, last: Array) -> _Circle | None:
+    """The circle through the origin, ``middle`` and ``last``, in this order; None for points on one line."""
+    normal = np.cross(middle, last)
+    size = float(np.linalg.norm(normal))
+    if size <= _FLAT * float(np.linalg.norm(middle) * np.linalg.norm(last)) or size == 0.0:
+        return None
+    centre = np.cross(normal, middle) * (last @ last) + np.cross(last, normal) * (middle @ middle)
     centre /= 2.0 * size**2
-    radius = float(np.linalg.norm(centre))
-    direction = np.cross(normal / size, -centre / radius)
-    to_end = other - centre
-    angle = float(np.arctan2(to_end @ direction, to_end @ (-centre / radius))) % (2.0 * np.pi)
-    length = radius * angle
-    return ToolPiece(start, length, direction, centre / radius**2, turn / length)
+    return _Circle(centre, np.cross(normal, -centre) / (size * np.linalg.norm(centre)))
+
+
+def _unsure_mm(circle: _Circle, middle: Array, last: Array) -> float:
+    """How far the arc moves, to first order, if each of its points is off by _ROUNDED_MM."""
+    own = circle.points(circle.angle_to(last))
+    total = 0.0
+    for offset in _ROUNDED_MM * np.eye(3):
+        for other in (_circle(middle + offset, last), _circle(middle, last + offset)):
+            if other is None:
+                return np.inf
+            end = last if other.angle_to(last) else last + offset
+            total += float(np.abs(other.points(other.angle_to(end)) - own).max())
+    return total
 
 
 def turn_between(start: Array, end: Array, where: str) -> Array:
@@ -194,7 +266,7 @@ def rotations(vectors: Array) -> Array:
 
 
 def rotation_vectors(matrices: Array) -> Array:
-    """Rotation vectors of (N, 3, 3), not for half turns: (N, 3)."""
+    """Rotation vectors of (N, 3, 3): (N, 3); of the two of a half turn, the one with its largest element positive."""
     twist = 0.5 * np.stack(
         [
             matrices[:, 2, 1] - matrices[:, 1, 2],
@@ -204,6 +276,13 @@ def rotation_vectors(matrices: Array) -> Array:
         axis=1,
     )
     sine = np.linalg.norm(twist, axis=1)
-    angle = np.arctan2(sine, 0.5 * (np.trace(matrices, axis1=1, axis2=2) - 1.0))
-    scale = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 1e-12)
-    return np.asarray(twist * scale[:, None])
+    cosine = 0.5 * (np.trace(matrices, axis1=1, axis2=2) - 1.0)
+    angle = np.arctan2(sine, cosine)
+    scale = np.divide(angle, sine, out=np.ones_like(sine), where=sine > _NO_SINE)
+    vectors = twist * scale[:, None]
+    for index in np.flatnonzero((sine <= _NO_SINE) & (cosine < 0.0)):
+        # of a half turn R = 2 a a^T - 1: the columns of R + 1 are along the axis
+        columns = matrices[index] + np.eye(3)
+        axis = columns[:, int(np.argmax(np.diag(columns)))]
+        vectors[index] = np.pi * axis / np.linalg.norm(axis)
+    return np.asarray(vectors)

@@ -22,7 +22,7 @@ from micropython import const
 _SYSTICK_LOAD = const(0xE000E014)
 _LOOKS = const(25)  # of the emulated board at the clock, in a millisecond
 _PSC = const(0x28)
-_EVERY_MS = const(50)  # a command that often while something moves
+_EVERY_MS = const(50)  # a command that often while something moves, if the settings do not say so
 _BEFORE, _BEHIND = const(20), const(40)  # turns between two commands, and at the end
 _LOGGED = const(100)
 _BACKUP_SRAM = const(0x2002F000)  # memory of the emulator's that the chip has not, for what it has not
@@ -223,6 +223,7 @@ class Port:
                 head = file.read(2)
         self._session = len(self._frames) - here["session"]
         self._left = b""
+        self._every_ms = here.get("every_ms", _EVERY_MS)
         self._turns = self._fed_ms = 0
         self._moves = self._fed = self._said = False
 
@@ -263,7 +264,7 @@ class Port:
         self._moves = moves
         self._fed = self._said = False
         if moves:
-            if self._frames and time.ticks_diff(time.ticks_ms(), self._fed_ms) > _EVERY_MS:
+            if self._frames and time.ticks_diff(time.ticks_ms(), self._fed_ms) > self._every_ms:
                 self._feed()
         elif self._frames and self._turns > _BEFORE:
             self._feed()

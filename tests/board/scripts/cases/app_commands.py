@@ -305,6 +305,17 @@ def case_damaged_file_in_flash_is_not_run():
     assert app.controller.board.engine.calls.count("load") == 0
 
 
+def case_a_folder_in_the_place_of_a_motion_is_not_listed():
+    _, host = connected()
+    before = host.ask("list", (0,))
+    for name in ("aa.atm", "zz.atm"):
+        os.mkdir(flash() + "/" + name)
+    assert host.ask("list", (0,)) == before
+    assert host.ask("list", (1,)) == ("error", "not_found", 255, 0)
+    for name in ("aa.atm", "zz.atm"):
+        os.rmdir(flash() + "/" + name)
+
+
 def case_file_that_ends_before_its_size_is_damaged():
     """The folder's entry says more than there is to read."""
     connected()

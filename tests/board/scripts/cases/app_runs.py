@@ -106,11 +106,25 @@ def case_oldest_sample_gives_way_and_is_counted():
     got = samples_of(host)
     queued = got.index(got[-1] - places + 1)  # what had been queued before the host stalled
     assert got[queued:] == list(range(21, 21 + places))
-    assert host.ask("status")[1][8:10] == (places, 21)
+    lost = 21 - queued
+    assert host.ask("status")[1][8:10] == (places, lost)
     assert ends_of(host)[-1] == (
         "done",
-        (1, 8400000 * (places + 20), 8400000 * (places + 20), places + 21, 21),
+        (1, 8400000 * (places + 20), 8400000 * (places + 20), places + 21, lost),
     )
+
+
+def case_what_the_host_has_is_not_lost_though_it_acknowledges_nothing():
+    app, host = connected()
+    start(host)
+    places = app.controller.board.samples._capacity
+    for _ in range(places + 20):
+        app.controller.board.engine.advance(1)
+        host.turn()
+    app.controller.board.engine.finish()
+    host.turn()
+    assert samples_of(host) == list(range(places + 21))
+    assert host.ask("status")[1][8:10] == (places, 0)
 
 
 def case_samples_of_a_run_without_host_are_kept():

@@ -136,12 +136,12 @@ def case_sizes():
 
 
 def case_how_often_rings_are_written():
-    """Every millisecond if each ring lasts 3.15 ms when it is full, else twice as often; TIM6 has 16 bits."""
+    """Every millisecond if each ring lasts 6.3 ms when it is full, else twice as often; TIM6 has 16 bits."""
     for rates, ticks in (
         ([20_000] * 3, 84_000),
-        ([162_000], 84_000),
-        ([163_000], 42_000),
-        ([5_000, 163_000, 5_000], 42_000),
+        ([81_000], 84_000),
+        ([82_000], 42_000),
+        ([5_000, 82_000, 5_000], 42_000),
     ):
         Rig([row(channel=n, max_rate=rate) for n, rate in enumerate(rates)])
         prescaler, period = (mem32[stm.TIM6 + 4 * word] for word in (isr.PSC, isr.ARR))

@@ -1,0 +1,185 @@
+"""A file of the project folder that the panel edits: its text is what is edited, so nothing in it is lost."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from armtempo.basics import toml_table
+from armtempo.basics.atomic_file import replace_text
+from armtempo.basics.errors import InputError
+from armtempo.model.arm import Arm
+from armtempo.model.job import NAME_RULE, is_name
+
+_MOST_UNDONE = 100
+
+
+class FileEditor(ABC):
+    """The edited text and what can be undone; ``folder``: the only folder that is written to."""
+
+    kind = ""
+    """What the file describes, for messages."""
+
+    def __init__(self, arm: Arm, folder: Path) -> None:
+        self.arm, self.folder = arm, folder
+        self.file: Path | None = None
+        """None for what was never saved."""
+        self.version = 0
+        """Incremented at each change."""
+        self.text = ""
+        """The file as it would be written."""
+        self._values: dict[str, Any] = {}
+        self._saved = ""
+        self._undo: list[str] = []
+
+    @abstractmethod
+    def new_text(self, name: str) -> str:
+        """The text of a new file."""
+
+    @abstractmethod
+    def is_one(self, path: Path) -> bool:
+        """Whether a file is of this kind."""
+
+    @abstractmethod
+    def check(self, text: str, file: Path) -> None:
+        """Raise InputError if the text is not valid for ``file``."""
+
+    # files
+
+    def files(self) -> list[str]:
+        """Names of the files of this kind in the folder."""
+        return [path.name for path in sorted(self.folder.glob("*.toml")) if self.is_one(path)]
+
+    def open(self, name: str) -> None:
+        """Edit a file of the folder; raises InputError if it is none of this kind."""
+        if name not in self.files():
+            raise InputError(f"{name}: there is no such {self.kind} in the project folder", "choose another")
+        self.load(self.folder / name)
+
+    def load(self, file: Path) -> None:
+        """Edit a file; raises InputError if it is not valid."""
+        text = _read(file)
+        self.check(text, file)
+        self._set(text)
+        self.file, self._saved = file, text
+
+    def new(self, name: str) -> None:
+        """Edit a new one; raises InputError for a name that is not valid on the board."""
+        self._check_name(name)
+        self._set(self.new_text(name))
+        self.file = None
+
+    def save(self) -> Path:
+        """Write the file, as it is edited; raises InputError, without writing, if it is not valid."""
+        file = self.target
+        if self.file is None and file.exists():
+            raise InputError(f"{file.name} exists already", f"save the {self.kind} under another name")
+        if self.file is not None and _read(file) != self._saved:
+            raise InputError(
+                f"{file.name} was changed by another program since it was opened",
+                f"open it again, or save the {self.kind} under another name",
+            )
+        return self._write(file)
+
+    def save_as(self, name: str) -> Path:
+        """Write it under another name, which becomes the edited one; raises InputError as ``save``."""
+        self._check_name(name)
+        file = self.folder / f"{name}.toml"
+        if file.exists():
+            raise InputError(f"{file.name} exists already", "give another name")
+        self.set_option("name", name)
+        return self._write(file)
+
+    @property
+    def target(self) -> Path:
+        """The file that is written; default: one in the folder."""
+        return self.file or self.folder / f"{self.name}.toml"
+
+    def _write(self, file: Path) -> Path:
+        if not file.resolve().is_relative_to(self.folder.resolve()):
+            raise InputError(
+                f"{file} is outside of the project folder", "copy it there; the panel writes nothing else"
+            )
+        self.check(self.text, file)
+        replace_text(file, self.text)
+        self.file, self._saved = file, self.text
+        return file
+
+    def _check_name(self, name: str) -> None:
+        if not is_name(name):
+            raise InputError(f"{name!r} is not a valid name of a {self.kind}", f"give {NAME_RULE}")
+
+    # the text
+
+    @property
+    def name(self) -> str:
+        """The name in the file."""
+        return self.option("name")
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether the file has every change."""
+        return self.file is not None and self.text == self._saved
+
+    def option(self, key: str) -> str:
+        """The value of a key, as it is typed; "" if it is not given."""
+        return text_of(self._values.get(key))
+
+    def set_option(self, key: str, text: str) -> None:
+        """Set a key; "" removes it."""
+        if text != self.option(key):
+            document = tomlkit.parse(self.text)
+            put(document, key, text)
+            self._change(tomlkit.dumps(document))
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a change to undo."""
+        return bool(self._undo)
+
+    def undo(self) -> None:
+        """Undo the last change."""
+        if self._undo:
+            undone = self._undo[:-1]
+            self._set(self._undo[-1])
+            self._undo = undone
+
+    def _change(self, text: str) -> None:
+        before = [*self._undo[-_MOST_UNDONE:], self.text]
+        self._set(text)
+        self._undo = before
+
+    def _set(self, text: str) -> None:
+        self._values = tomlkit.parse(text).unwrap()
+        self.text = text
+        self._undo = []
+        self.version += 1
+
+
+def put(table: Any, key: str, text: str) -> None:
+    """Set a key of a table to a typed value; "" removes it."""
+    if text:
+        table[key] = toml_table.typed(text)
+    else:
+        table.pop(key, None)
+
+
+def text_of(value: Any) -> str:
+    """A value of a TOML file as it is typed, without the quotes of a text; "" for None."""
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(value)
+
+
+def _read(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: cannot be read: {error}", "check the file") from None

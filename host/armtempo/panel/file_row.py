@@ -1,0 +1,82 @@
+"""The row of a tab that chooses, makes and saves the file that the tab edits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from armtempo.panel import words
+from armtempo.panel.file_editor import FileEditor
+from armtempo.panel.operator import Needs
+from armtempo.panel.panel_page import named
+
+if TYPE_CHECKING:
+    from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
+
+
+class FileRow:
+    """The row; ``look`` shows what has changed, also on another page or in the folder."""
+
+    def __init__(self, page: PanelPage, editor: FileEditor, label: str) -> None:
+        self._page, self._editor = page, editor
+        self._folder_ns = 0
+        with ui.row():
+            self._files = ui.select([], label=label, on_change=self._open).classes("armtempo-file")
+            page.control(named(self._files.props("dense outlined"), label), Needs.CONTROL)
+            for text, call, why_not in (
+                (words.NEW, partial(self._ask_name, words.NEW, editor.new), str),
+                (words.SAVE, self._save, self._why_nothing),
+                (words.SAVE_AS, partial(self._ask_name, words.SAVE_AS, editor.save_as), self._why_nothing),
+                (words.UNDO, partial(self.change, editor.undo), self._why_no_undo),
+            ):
+                page.button(text, call, Needs.CONTROL, why_not)
+        self._state = ui.label("").classes("armtempo-note").props('role="status"')
+
+    def change(self, call: Callable[..., object], *arguments: Any) -> None:
+        """Change what is edited, or its file; the last argument is the press."""
+        *given, press = arguments
+        self._page.operator.check(self._page.client, press, Needs.CONTROL)
+        call(*given)
+
+    def _why_nothing(self) -> str:
+        return "" if self._editor.text else words.NOTHING_OPEN
+
+    def _why_no_undo(self) -> str:
+        return "" if self._editor.can_undo else words.NOTHING_TO_UNDO
+
+    def _open(self, event: Any) -> None:
+        if event.value not in (None, self._opened):
+            if not self._page.operator.why_not(self._page.client, Needs.CONTROL):
+                self._page.attempt(lambda: self._editor.open(str(event.value)))
+            self._files.set_value(self._opened)  # the previous one, if it was refused
+
+    @property
+    def _opened(self) -> str | None:
+        return self._editor.file.name if self._editor.file else None
+
+    def _save(self, press: Press) -> None:
+        self.change(lambda: ui.notify(words.SAVED.format(path=self._editor.save().name)), press)
+
+    def _ask_name(self, text: str, call: Callable[[str], object], _: Press) -> None:
+        def answered(press: Press) -> None:
+            self.change(lambda: call(str(name.value or "").strip()), press)
+
+        with self._page.ask("", text, answered).place:
+            name = ui.input(words.NEW_NAME).props("dense outlined")
+
+    def look(self) -> None:
+        """Show the file, whether it has every change, and the files of the folder."""
+        editor = self._editor
+        now_ns = editor.folder.stat().st_mtime_ns
+        if now_ns != self._folder_ns:
+            self._folder_ns = now_ns
+            self._files.set_options(editor.files(), value=None)
+        opened = self._opened if self._opened in self._files.options else None
+        if self._files.value != opened:
+            self._files.set_value(opened)
+        saved = words.IS_SAVED if editor.is_saved else words.NOT_SAVED
+        self._state.set_text(f"{words.plain(editor.name)} · {saved}" if editor.text else words.NOTHING_OPEN)

@@ -1,0 +1,52 @@
+"""Homing: by the switches, or by saying that the arm is at home, which is drawn and named first."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from nicegui import ui
+
+from armtempo.model.arm import Arm
+from armtempo.panel import words
+from armtempo.panel.operator import Needs
+
+if TYPE_CHECKING:
+    from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
+
+
+def switches(arm: Arm) -> list[str]:
+    """What the switches of an arm home, group by group in its order; empty if it has none of known angle."""
+    fitted = [joint.name for joint in arm.driven if _angle(joint.switches) is not None]
+    named = [name for group in arm.homing for name in group]
+    groups = [*arm.homing, *((name,) for name in fitted if name not in named)]
+    found = [", ".join(name for name in group if name in fitted) for group in groups]
+    return [group for group in found if group]
+
+
+def _angle(switches: object) -> float | None:
+    low, high = getattr(switches, "low_deg", None), getattr(switches, "high_deg", None)
+    return low if low is not None else high
+
+
+def ask(page: PanelPage, _: Press) -> None:
+    """The dialog: the posture of home is drawn while it is open."""
+    operator, arm = page.operator, page.operator.arm
+    home_deg = np.array(arm.home_deg)
+    page.show_ghost(home_deg)
+
+    def declare(press: Press) -> None:
+        page.do(press, words.HOME, operator.home, Needs.COMMAND)
+
+    def seek(press: Press) -> None:
+        asked.dialog.close()
+        page.do(press, words.HOME_BY_SWITCHES, operator.home_to_switches, Needs.COMMAND)
+
+    asked = page.ask(words.SURE, words.HOME, declare, lambda: page.show_ghost(None))
+    with asked.place:
+        angles = [f"{joint.name} {angle:g}°" for joint, angle in zip(arm.driven, arm.home_deg, strict=True)]
+        ui.label(words.plain(", ".join(angles))).classes("text-weight-bold")
+        if groups := switches(arm):
+            ui.label(words.BY_SWITCHES.format(order=words.plain(" → ".join(groups))))
+            page.button(words.HOME_BY_SWITCHES, seek, Needs.COMMAND)

@@ -1,0 +1,316 @@
+"""The job that the panel edits: its via points, their keys, its plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.items import Array
+
+from armtempo.basics import toml_table
+from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.kinematics.of_arm import forward
+from armtempo.model import tool_way
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.plan import Plan
+from armtempo.model.pose import to_rpy_deg
+from armtempo.model.tool_pose import WHOLE
+from armtempo.panel.file_editor import FileEditor, put, text_of
+from armtempo.panel.toml_blocks import TomlBlocks
+from armtempo.planning import planner
+
+_NEW = "panel_job"
+ANGLES, POSE, POSTURE = "angles_deg", "position_mm", "posture"
+FORMS = (ANGLES, POSE, "matrix", POSTURE)
+"""Keys that say where a via point is, one of them."""
+OPTIONS = (
+    "path",
+    "corridor_deg",
+    "corridor_mm",
+    "timing",
+    "degree",
+    "refine",
+    "speed_mm_s",
+    "acceleration_mm_s2",
+    "holds",
+)
+"""Keys of the job that are edited as fields."""
+WAY_KEYS = (*tool_way.KEYS, "stop", "dwell_s")
+"""Keys of a via point that are edited as fields, besides where it is."""
+_PLACES = 4
+"""Decimal places of an angle that is taken from the arm or the picture: 0.0001 deg is less than a step."""
+
+
+@dataclass(frozen=True)
+class Via:
+    """A via point of the table."""
+
+    form: str
+    """The key that says where it is: one of FORMS."""
+    values: dict[str, Any] = field(default_factory=dict)
+    """Its keys in the file."""
+    angles_deg: tuple[float, ...] | None = None
+    """The driven joints' angles, degrees (J,); None while a pose has none."""
+
+    def text(self, key: str) -> str:
+        """The value of a key as it is typed; "" if it is not given."""
+        return text_of(self.values.get(key))
+
+
+class JobEditor(FileEditor):
+    """The edited job and its plan."""
+
+    kind = "job"
+
+    def __init__(self, arm: Arm, folder: Path, job_file: Path | None) -> None:
+        super().__init__(arm, folder)
+        self.plan: Plan | None = None
+        """The last plan."""
+        self._planned = -1
+        self._solved: tuple[int, list[Via]] = (-1, [])
+        if job_file is None:
+            self._set(self.new_text(_NEW))
+        else:
+            self.load(job_file)
+
+    def new_text(self, name: str) -> str:
+        """A job that rests at home."""
+        row = ", ".join(f"{float(angle):g}" for angle in self.arm.home_deg)
+        return f'name = "{name}"\nvia_deg = [\n    [{row}],\n    [{row}],\n]\n'
+
+    def is_one(self, path: Path) -> bool:
+        """Whether a file describes a job."""
+        try:
+            table = toml_table.read(path)
+        except InputError:
+            return False
+        return table.has("name") and (table.has("via") or table.has("via_deg")) and not table.has("joint")
+
+    def check(self, text: str, file: Path) -> None:
+        """Raise InputError if the text is no job."""
+        Job.of_table(toml_table.parse(text, str(file)), self.arm)
+
+    def load(self, file: Path) -> None:
+        """Edit a file; raises InputError if it is no job, PlanError if no posture reaches a pose in it."""
+        planner.via_angles(self.arm, Job.load(file, self.arm))  # told now instead of in the table
+        super().load(file)
+        self.plan = None
+
+    def new(self, name: str) -> None:
+        """Edit a new job."""
+        super().new(name)
+        self.plan = None
+
+    # what is edited
+
+    def job(self) -> Job:
+        """The job; raises InputError as for its file, with via point and key."""
+        return Job.of_table(toml_table.parse(self.text, str(self.target)), self.arm)
+
+    @property
+    def vias(self) -> list[Via]:
+        """The via points; poses with the angles that reach them, if the job is valid."""
+        if self._solved[0] != self.version:
+            self._solved = self.version, self._solve()
+        return self._solved[1]
+
+    def _solve(self) -> list[Via]:
+        found = [_via(values) for values in self._rows()]
+        if all(via.angles_deg is not None for via in found):
+            return found
+        try:
+            angles = planner.via_angles(self.arm, self.job())[0]
+        except ArmtempoError:
+            return found
+        return [
+            Via(via.form, via.values, tuple(map(float, row))) for via, row in zip(found, angles, strict=True)
+        ]
+
+    def _rows(self) -> list[dict[str, Any]]:
+        if "via_deg" in self._values:
+            return [{ANGLES: row} for row in self._values["via_deg"]]
+        return list(self._values.get("via", []))
+
+    # the plan
+
+    def planned(self, plan: Plan, version: int) -> None:
+        """Keep a plan of the job as it was at ``version``."""
+        self.plan, self._planned = plan, version
+
+    @property
+    def plan_is_old(self) -> bool:
+        """Whether the job was changed after it was planned."""
+        return self.plan is not None and self._planned != self.version
+
+    # changes
+
+    def set_angle(self, number: int, joint: int, text: str) -> None:
+        """Set an angle of a via point that is given by angles."""
+        value = toml_table.typed(text) if text else ""
+        if self._is_list:
+            self._change_list(lambda rows: rows[number].__setitem__(joint, value))
+        else:
+            self._change_table(number, lambda table: table[ANGLES].__setitem__(joint, value))
+
+    def set_angles(self, number: int, angles_deg: Sequence[float]) -> None:
+        """Give a via point by these angles, degrees (J,), instead of what it was given by."""
+        values = _rounded(angles_deg)
+        if self._is_list:
+            self._change_list(lambda rows: rows.__setitem__(number, values))
+        else:
+            self._change_table(number, lambda table: _place(table, {ANGLES: values}))
+
+    def set_key(self, number: int, key: str, text: str) -> None:
+        """Set a key of a via point; "" removes it."""
+        if text != self.vias[number].text(key):
+            self._change_table(number, lambda table: put(table, key, text))
+
+    def set_position(self, number: int, position_mm: Sequence[float]) -> None:
+        """Move a via point that is given as a pose with ``position_mm``; its orientation stays."""
+        values = [round(float(value), 3) for value in position_mm]
+        self._change_table(number, lambda table: table.update({POSE: values}))
+
+    def set_pose(self, number: int) -> None:
+        """Give a via point by the pose of the tool there; raises InputError for an arm that has no form of a pose."""
+        angles = self.vias[number].angles_deg
+        if angles is None:
+            raise InputError(f"P{number} has no angles", "correct the job first")
+        pose = pose_values(self.arm, angles)
+        self._change_table(number, lambda table: _place(table, pose))
+
+    def insert(self, number: int, values: dict[str, Any] | Sequence[float] | None = None) -> None:
+        """Insert a via point before ``number``: angles (J,), or keys; default: where the one before it is."""
+        if values is None:
+            before = self.vias[max(0, number - 1)].values if self.vias else {ANGLES: list(self.arm.home_deg)}
+            values = {key: value for key, value in before.items() if key in _WHERE}
+        found = values if isinstance(values, dict) else {ANGLES: _rounded(values)}
+        if self._is_list and set(found) == {ANGLES}:
+            self._change_list(lambda rows: rows.insert(number, found[ANGLES]))
+        else:
+            self._change_blocks(lambda blocks: blocks.insert(number, found))
+
+    def delete(self, number: int) -> None:
+        """Remove a via point, with its keys and comments."""
+        if self._is_list:
+            self._change_list(lambda rows: rows.__delitem__(number))
+        else:
+            self._change_blocks(lambda blocks: blocks.tables.pop(number))
+
+    def copy(self, number: int) -> None:
+        """Repeat a via point, with its keys, after it."""
+        self.insert(number + 1, dict(self.vias[number].values))
+
+    def move(self, number: int, by: int) -> None:
+        """Move a via point ``by`` places, with its keys and comments; not beyond the first or last."""
+        if not 0 <= number + by < len(self.vias):
+            return
+        if self._is_list:
+            rows = [via.values[ANGLES] for via in self.vias]
+            rows.insert(number + by, rows.pop(number))
+            self._change_list(lambda array: [array.__setitem__(at, row) for at, row in enumerate(rows)])
+        else:
+            self._change_blocks(lambda blocks: blocks.move(number, by))
+
+    def set_vias(self, vias: Sequence[dict[str, Any]]) -> None:
+        """Replace all via points by these, given by keys; raises InputError if keys of the others would be lost."""
+        if any(set(via.values) - set(_WHERE) for via in self.vias):
+            raise InputError(
+                "the via points have keys, such as lines, that the pasted rows do not have",
+                "make a new job for the rows",
+            )
+        blocks = TomlBlocks(self.text, "via")
+        blocks.tables.clear()
+        document = tomlkit.parse(blocks.text)
+        document.pop("via_deg", None)
+        if all(set(via) == {ANGLES} for via in vias):
+            rows = tomlkit.array()
+            for via in vias:
+                rows.append(_rounded(via[ANGLES]))
+            document["via_deg"] = rows.multiline(True)
+        blocks = TomlBlocks(tomlkit.dumps(document), "via")
+        for via in vias if "via_deg" not in document else ():
+            blocks.insert(len(blocks.tables), via)
+        self._change(blocks.text)
+
+    @property
+    def _is_list(self) -> bool:
+        """Whether the via points are written as one list of angles."""
+        return "via_deg" in self._values
+
+    def _change_list(self, change: Callable[[Any], object]) -> None:
+        document = tomlkit.parse(self.text)
+        change(document["via_deg"])
+        self._change(tomlkit.dumps(document))
+
+    def _change_table(self, number: int, change: Callable[[Any], object]) -> None:
+        self._change_blocks(lambda blocks: blocks.change(number, change))
+
+    def _change_blocks(self, change: Callable[[TomlBlocks], object]) -> None:
+        blocks = TomlBlocks(self._with_tables(), "via")
+        if len(blocks.tables) != len(self._rows()):
+            raise InputError(
+                "the via points are written in a way that cannot be changed here", "write [[via]] tables"
+            )
+        change(blocks)
+        self._change(blocks.text)
+
+    def _with_tables(self) -> str:
+        """The text with tables [[via]], made of ``via_deg`` if it has that; InputError if comments would be lost."""
+        if not self._is_list:
+            return self.text
+        document = tomlkit.parse(self.text)
+        rows = document.pop("via_deg")
+        if isinstance(rows, Array) and "#" in rows.as_string():
+            raise InputError(
+                "the comments in via_deg would be lost",
+                "write the via points as [[via]] tables in the job's file",
+            )
+        blocks = TomlBlocks(tomlkit.dumps(document), "via")
+        for row in self._rows():
+            blocks.insert(len(blocks.tables), row)
+        return blocks.text
+
+
+def pose_values(arm: Arm, angles_deg: Sequence[float]) -> dict[str, Any]:
+    """The keys of a pose of the tool at these angles, (J,), with as many components as the arm has joints.
+
+    Raises InputError for an arm with too few joints for one.
+    """
+    pose = forward(arm, list(angles_deg))
+    position = [round(float(value), 3) + 0.0 for value in pose[:3, 3]]
+    turns = [round(value, 3) + 0.0 for value in to_rpy_deg(pose)]
+    orientations: dict[int, dict[str, Any]] = {
+        3: {},
+        4: {"pitch_deg": turns[1]},
+        5: {"approach": [round(float(value), 6) + 0.0 for value in pose[:3, 2]]},
+        6: {"rpy_deg": turns},
+    }
+    if (joints := len(arm.driven)) not in orientations:
+        raise InputError(f"an arm with {joints} driven joints has no pose of its own", "give angles")
+    return {POSE: position, **orientations[joints]}
+
+
+_WHERE = (*FORMS, "rpy_deg", "quaternion", "approach", "posture_deg", *(f"{name}_deg" for name in WHOLE))
+"""Keys that say where a via point is."""
+
+
+def _via(values: dict[str, Any]) -> Via:
+    form = next((key for key in FORMS if key in values), ANGLES)
+    angles = values.get(ANGLES)
+    known = form == ANGLES and isinstance(angles, list) and all(type(one) in (int, float) for one in angles)
+    return Via(form, values, tuple(map(float, angles)) if known and angles else None)
+
+
+def _rounded(angles_deg: Sequence[float]) -> list[float]:
+    return [round(float(angle), _PLACES) + 0.0 for angle in angles_deg]
+
+
+def _place(table: Any, values: dict[str, Any]) -> None:
+    """Say where a via point is by other keys."""
+    for key in _WHERE:
+        table.pop(key, None)
+    table.update(values)

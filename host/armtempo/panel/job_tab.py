@@ -1,0 +1,368 @@
+"""The job: its file, a table of via points with what is required on the way to each, options, the plan, its curves."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from nicegui import run, ui
+
+from armtempo import pipeline
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.kinematics.chain import chains_mm
+from armtempo.kinematics.solver import moved_tool_deg
+from armtempo.model import via_table
+from armtempo.model.job import DEGREES, PATHS, TIMINGS
+from armtempo.panel import words
+from armtempo.panel.charts import CurveChart
+from armtempo.panel.file_row import FileRow
+from armtempo.panel.job_editor import ANGLES, OPTIONS, POSE, WAY_KEYS, Via
+from armtempo.panel.operator import Needs
+from armtempo.panel.panel_page import named
+
+if TYPE_CHECKING:
+    from armtempo.model.plan import Plan
+    from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
+
+_POINTS = 200
+_PLAY_S = 0.05
+_CHOICES = {"path": PATHS, "timing": TIMINGS, "degree": DEGREES}
+_SWITCHES = ("line", "stop")
+
+
+class JobTab:
+    """The tab of one page; the job and its plan are the panel's, so that every page has the same."""
+
+    def __init__(self, page: PanelPage) -> None:
+        self._page = page
+        self._operator = page.operator
+        self._jobs = page.operator.jobs
+        self._planning = self._cancelled = False
+        self._played: Plan | None = None
+        self._open: set[int] = set()
+        """Via points whose keys are shown."""
+        self._shown = self._jobs.version
+        page.scene.picked, page.scene.dragged = self._pick, self._drag
+        self._file = FileRow(page, self._jobs, words.JOB_FILE)
+        self._table()
+        ui.label(words.DRAG_HINT).classes("armtempo-note")
+        self._offered = ui.column()
+        self._options()
+        self._plan_row()
+        self._play_row()
+        self._charts = [
+            CurveChart(page.operator.arm, title, order)
+            for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
+        ]
+        self._draw_vias()
+        page.on_look(self._look)
+        # Texts typed while the connection was broken have not arrived
+        ui.context.client.on_connect(self._connected)
+
+    def _connected(self) -> None:
+        self._shown = -1
+
+    # the table
+
+    @ui.refreshable_method
+    def _table(self) -> None:
+        joints = self._operator.arm.driven
+        columns = f"2.2rem 4.6rem repeat({len(joints)}, minmax(4rem, 6rem)) auto"
+        with ui.element("div").classes("armtempo-grid").style(f"grid-template-columns: {columns}"):
+            for text in ("", "", *(joint.name for joint in joints), ""):
+                ui.label(words.plain(text)).classes("text-caption ellipsis")
+            for number, via in enumerate(self._jobs.vias):
+                self._row(number, via)
+        with ui.row():
+            ui.button(
+                words.NEW_VIA, on_click=lambda: self._edit(self._jobs.insert, len(self._jobs.vias))
+            ).props("outline no-caps")
+            ui.button(words.FROM_ARM, on_click=self._take_posture).props("outline no-caps")
+            ui.button(words.PASTE, on_click=self._paste).props("outline no-caps")
+
+    def _row(self, number: int, via: Via) -> None:
+        joints = self._operator.arm.driven
+        ui.label(f"P{number}")
+        form = words.FORMS[via.form]
+        ways = [words.WAYS[key] for key in WAY_KEYS if key in via.values and key in words.WAYS]
+        ui.label(", ".join([form, *ways])).classes("armtempo-note").tooltip(
+            ", ".join(f"{key} = {via.text(key)}" for key in via.values if key != ANGLES) or form
+        )
+        for index, joint in enumerate(joints):
+            value = "" if via.angles_deg is None else f"{via.angles_deg[index]:g}"
+            if via.form == ANGLES and via.angles_deg is None:
+                value = _cell(via, index)
+            box = ui.input(value=value).props("dense outlined inputmode=decimal")
+            named(box, f"P{number} {joint.name}")
+            if via.form == ANGLES:
+                box.on("change", partial(self._typed, self._jobs.set_angle, number, index))
+            else:
+                box.props("readonly")
+        with ui.row().classes("no-wrap armtempo-actions"):
+            more = ui.button(icon="tune", on_click=lambda: self._toggle(number)).props("flat dense")
+            named(more, f"{words.MORE} P{number}")
+            with ui.button(icon="more_vert").props("flat dense") as menu:
+                named(menu, f"{words.CHANGES} P{number}")
+                with ui.menu():
+                    for text, call in (
+                        (words.INSERT, partial(self._jobs.insert, number)),
+                        (words.COPY, partial(self._jobs.copy, number)),
+                        (words.UP, partial(self._jobs.move, number, -1)),
+                        (words.DOWN, partial(self._jobs.move, number, 1)),
+                        (words.AS_POSE, partial(self._jobs.set_pose, number)),
+                        (words.AS_ANGLES, partial(self._as_angles, number)),
+                        (words.DELETE, partial(self._jobs.delete, number)),
+                    ):
+                        ui.menu_item(text, on_click=partial(self._edit, call))
+        if number in self._open:
+            self._keys(number, via)
+
+    def _keys(self, number: int, via: Via) -> None:
+        """The keys of a via point: of its pose, and of the way to it."""
+        shown = [key for key in via.values if key not in (ANGLES, *WAY_KEYS)]
+        with ui.row().classes("armtempo-keys"):
+            for key in (*shown, *WAY_KEYS):
+                text = via.text(key)
+                label = words.VIA_KEYS.get(key, key)
+                if key in _SWITCHES:
+                    switch = ui.switch(label, value=text == "true")
+                    named(switch, f"P{number}: {label}")
+                    switch.on_value_change(
+                        lambda event, key=key: self._edit(
+                            self._jobs.set_key, number, key, "true" if event.value else ""
+                        )
+                    )
+                    continue
+                box = ui.input(label, value=text).props("dense outlined").classes("armtempo-value")
+                named(box, f"P{number}: {label}")
+                box.on("change", partial(self._typed, self._jobs.set_key, number, key))
+
+    def _toggle(self, number: int) -> None:
+        self._open ^= {number}
+        self._table.refresh()
+
+    def _typed(self, call: Callable[..., object], *arguments: Any) -> None:
+        """Take what was typed; the table is not rebuilt, as the user may already type in the next field."""
+        *given, event = arguments
+        others = self._jobs.version - self._shown
+        text = str(event.args or "").strip()
+        self._page.attempt(lambda: call(*given, text))
+        if all(via.form == ANGLES for via in self._jobs.vias) and call == self._jobs.set_angle:
+            self._shown = self._jobs.version - others
+        self._draw_vias()
+
+    def _edit(self, call: Callable[..., object], *arguments: Any) -> None:
+        """Change the table by a button."""
+        self._page.attempt(lambda: call(*arguments))
+        self._look()
+
+    def _as_angles(self, number: int) -> None:
+        angles = self._jobs.vias[number].angles_deg
+        if angles is None:
+            raise InputError(f"P{number}: no posture reaches this pose", "correct the pose first")
+        self._jobs.set_angles(number, angles)
+
+    def _take_posture(self) -> None:
+        angles = [float(angle) for angle in self._operator.live.angles_deg]
+        self._edit(self._jobs.insert, len(self._jobs.vias), angles)
+
+    async def _paste(self) -> None:
+        def take(press: Press) -> None:
+            found = via_table.of_text(str(text.value or ""), words.PASTED, self._operator.arm)
+            poses = [dict(pose) for pose in found.poses]
+            self._file.change(
+                lambda: self._jobs.set_vias(poses or [{ANGLES: row} for row in found.via_deg.tolist()]), press
+            )
+
+        asked = self._page.ask("", words.PASTE, take)
+        with asked.place:
+            text = ui.textarea(words.PASTE_HINT).style("min-width: min(24rem, 80vw)")
+
+    # in 3-D
+
+    def _draw_vias(self) -> None:
+        angles = [via.angles_deg for via in self._jobs.vias]
+        rows = np.array(
+            [row for row in angles if row is not None and len(row) == len(self._operator.arm.driven)]
+        )
+        if len(rows) == len(angles) and len(rows) and np.isfinite(rows).all():
+            self._page.scene.dots(chains_mm(self._operator.arm, rows)[:, -1])
+
+    def _pick(self, number: int) -> None:
+        """Show a via point and the other postures that reach it."""
+        vias = self._jobs.vias
+        if number < len(vias) and (angles := vias[number].angles_deg) is not None:
+            tool_mm = chains_mm(self._operator.arm, np.array(angles))[-1]
+            self._page.attempt(lambda: self._offer(number, tool_mm))
+
+    def _drag(self, number: int, position_mm: Array) -> None:
+        """Move a via point to where it was dragged; back if no posture reaches that."""
+        vias = self._jobs.vias
+        if number < len(vias):
+            if vias[number].form == POSE:
+                self._edit(self._jobs.set_position, number, position_mm.tolist())
+            elif vias[number].form == ANGLES:
+                self._page.attempt(lambda: self._offer(number, position_mm))
+            self._draw_vias()
+
+    def _offer(self, number: int, position_mm: Array) -> None:
+        """Take the posture that is nearest to the via point's, and offer the others."""
+        angles = self._jobs.vias[number].angles_deg
+        postures = moved_tool_deg(self._operator.arm, np.array(angles), position_mm.tolist())
+        texts = [", ".join(f"{angle:.1f}" for angle in posture) + "°" for posture in postures]
+        self._offered.clear()
+        with self._offered:
+            ui.label(words.POSTURES_OF.format(number=number, count=len(postures)))
+            ui.radio(
+                dict(enumerate(texts)),
+                value=0,
+                on_change=lambda event: self._take(number, postures[int(event.value)]),
+            ).props("dense")
+        self._take(number, postures[0])
+
+    def _take(self, number: int, posture_deg: Array) -> None:
+        self._page.show_ghost(posture_deg)
+        if self._jobs.vias[number].form == ANGLES:
+            self._edit(self._jobs.set_angles, number, posture_deg.tolist())
+
+    # options and the plan
+
+    @ui.refreshable_method
+    def _options(self) -> None:
+        with ui.row().classes("armtempo-fields"):
+            for key in OPTIONS:
+                self._option(key)
+
+    def _option(self, key: str) -> None:
+        """The field of a key of the job; an empty one is the default."""
+        value, label = self._jobs.option(key), words.OPTIONS[key]
+        choices: Any = _CHOICES.get(key)
+        if key == "holds":
+            choices = [load.name for load in self._operator.arm.loads]
+            if not choices:
+                return
+        if choices is None:
+            box = ui.input(label, value=value).props("dense outlined").classes("armtempo-value")
+            box.on("change", partial(self._typed, self._jobs.set_option, key))
+            return
+        texts = {"": words.DEFAULT, **{str(one): words.CHOICES.get(str(one), str(one)) for one in choices}}
+        if value not in texts:
+            texts[value] = value
+        chosen = ui.select(texts, value=value, label=label).props("dense outlined").classes("armtempo-option")
+        chosen.on_value_change(lambda event: self._edit(self._jobs.set_option, key, str(event.value or "")))
+
+    def _plan_row(self) -> None:
+        page = self._page
+        with ui.row():
+            page.button(words.PLAN, self._plan, Needs.CONTROL, self._why_no_plan, look=" icon=insights")
+            self._stop = ui.button(words.CANCEL, on_click=self._cancel).props("flat no-caps")
+            self._stop.set_visibility(False)
+            self._result = ui.label("").props('role="status"')
+        self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
+        self._bar.set_visibility(False)
+
+    def _why_no_plan(self) -> str:
+        return words.BUSY.format(what=words.PLAN) if self._planning else ""
+
+    async def _plan(self, press: Press) -> None:
+        try:
+            self._operator.check(self._page.client, press, Needs.CONTROL)
+            job, version = self._jobs.job(), self._jobs.version
+            self._show_planning(True)
+            plan = await run.io_bound(pipeline.plan, self._operator.arm, job, self._progress)
+            if plan is not None:  # it is None if the panel ends meanwhile
+                self._jobs.planned(plan, version)
+        except ArmtempoError as error:
+            ui.notify(words.of_job(error), type="negative", multi_line=True, timeout=8000)
+        except asyncio.CancelledError:
+            pass
+        finally:
+            self._show_planning(False)
+
+    def _show_planning(self, planning: bool) -> None:
+        self._planning, self._cancelled = planning, False
+        self._bar.set_visibility(planning)
+        self._stop.set_visibility(planning)
+        self._page.refresh()
+
+    def _progress(self, done: float, whole: float) -> None:
+        if self._cancelled:
+            raise InputError(words.CANCELLED, words.PLAN_AGAIN)
+        self._bar.value = done / whole if whole else 0.0
+
+    def _cancel(self) -> None:
+        self._cancelled = True
+
+    # the plan on the model
+
+    def _play_row(self) -> None:
+        with ui.row().classes("no-wrap full-width"):
+            play = ui.button(icon="play_arrow", on_click=self._play).props("outline dense")
+            named(play, words.PLAY)
+            self._page.control(play, None, self._why_no_play)
+            self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time)
+            named(self._slider, words.PLAY_TIME)
+            self._page.control(self._slider, None, self._why_no_play)
+            self._time = ui.label("").classes("armtempo-percent")
+
+    def _why_no_play(self) -> str:
+        return "" if self._played else words.NO_PLAN
+
+    def _show_time(self) -> None:
+        if (plan := self._played) is not None:
+            time_s = plan.total_s * self._slider.value / 1000
+            self._time.set_text(f"{time_s:.2f} s")
+            self._page.show_ghost(plan.trajectory(time_s))
+            for chart in self._charts:
+                chart.mark(time_s)
+
+    async def _play(self) -> None:
+        if (plan := self._played) is None:
+            return
+        for time_s in np.arange(0.0, plan.total_s, _PLAY_S):
+            self._slider.set_value(round(1000 * float(time_s) / plan.total_s))
+            await asyncio.sleep(_PLAY_S)
+        self._slider.set_value(1000)
+
+    def _look(self) -> None:
+        """Show what has changed, also on another page."""
+        jobs = self._jobs
+        if jobs.version != self._shown:
+            self._shown = jobs.version
+            self._table.refresh()
+            self._options.refresh()
+            self._draw_vias()
+        self._file.look()
+        self._result.set_text(self._plan_words())
+        plan = jobs.plan
+        if plan is None or plan is self._played:
+            return
+        self._played = plan
+        times = np.linspace(0.0, plan.total_s, _POINTS)
+        for order, chart in enumerate(self._charts):
+            chart.show(times, plan.trajectory(times, order))
+
+    def _plan_words(self) -> str:
+        plan = self._jobs.plan
+        if plan is None:
+            return words.NO_PLAN
+        if self._jobs.plan_is_old:
+            return words.PLAN_IS_OLD
+        floor = max(search.floor_s for search in plan.searches)
+        return words.MOTION_TIME.format(total=plan.total_s, floor=floor)
+
+
+def _cell(via: Via, index: int) -> str:
+    """What is written in the place of an angle."""
+    values = via.values.get(ANGLES)
+    return str(values[index]) if isinstance(values, list) and index < len(values) else ""
+
+
+def build(page: PanelPage) -> None:
+    """The tab."""
+    JobTab(page)

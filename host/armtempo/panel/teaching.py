@@ -1,0 +1,156 @@
+"""Targets and postures: a typed pose, the present posture under a name, the arm guided by hand."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomlkit
+from nicegui import ui
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import replace_text
+from armtempo.basics.errors import InputError
+from armtempo.model import taught
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.pose import from_rpy
+from armtempo.model.posture import name_problem
+from armtempo.model.tool_pose import Pose
+from armtempo.panel import words
+from armtempo.panel.operator import Needs
+from armtempo.planning import planner
+
+if TYPE_CHECKING:
+    from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
+
+_LOOK_S = 0.05
+
+
+def nearest(arm: Arm, position_mm: Sequence[float], rpy_deg: Sequence[float], here_deg: Array) -> Array:
+    """The angles, (J,), nearest to ``here_deg`` (J,) that bring the tool to a pose.
+
+    Of the orientation an arm with less than six joints takes what it can: its direction, its pitch, nothing. Raises
+    PlanError if no posture reaches it.
+    """
+    roll, pitch, yaw = rpy_deg
+    direction = from_rpy(position_mm, rpy_deg)[:3, 2].tolist()
+    pose = {
+        6: lambda: Pose.of_angles(position_mm, {"roll": roll, "pitch": pitch, "yaw": yaw}),
+        5: lambda: Pose.of_approach(position_mm, direction),
+        4: lambda: Pose.of_angles(position_mm, {"pitch": pitch}),
+    }.get(len(arm.driven), lambda: Pose.of_angles(position_mm, {}))()
+    job = Job("target", via=(tuple(map(float, here_deg)), pose))
+    found: Array = planner.via_angles(arm, job)[0][-1]
+    return found
+
+
+def ask(page: PanelPage, changed: Callable[[], object]) -> None:
+    """Store the present posture: under a name in the arm file, or as a via point of the job."""
+    operator = page.operator
+    angles = taught.digits(operator.arm, [float(angle) for angle in operator.live.angles_deg])
+
+    def store(press: Press) -> None:
+        operator.check(page.client, press, Needs.CONTROL)
+        wanted = str(name.value or "").strip()
+        if any(posture.name == wanted for posture in operator.arm.postures) and not replace.value:
+            raise InputError(words.HAS_POSTURE.format(name=wanted), words.REPLACE_HINT)
+        taught.save(_arm_file(operator.arm), operator.arm, wanted, angles, replace.value)
+        _read_again(page, changed)
+        operator.say(words.TAUGHT.format(name=wanted))
+
+    def add(press: Press) -> None:
+        operator.check(page.client, press, Needs.CONTROL)
+        operator.jobs.insert(len(operator.jobs.vias), angles)
+        asked.dialog.close()
+
+    asked = page.ask(words.TEACH_HINT, words.STORE, store)
+    with asked.place:
+        ui.label("  ".join(f"{angle:g}°" for angle in angles)).classes("text-weight-bold")
+        name = ui.input(words.NAME_OF_POSTURE).props("dense outlined")
+        replace = ui.switch(words.REPLACE)
+        page.button(words.ADD_TO_JOB, add, Needs.CONTROL)
+        for posture in operator.arm.postures:
+            with ui.row():
+                ui.label(words.plain(posture.name))
+                gone = posture.name
+
+                def remove(press: Press, gone: str = gone) -> None:
+                    operator.check(page.client, press, Needs.CONTROL)
+                    _change(page, gone, None, changed)
+                    asked.dialog.close()
+
+                def rename(press: Press, gone: str = gone) -> None:
+                    operator.check(page.client, press, Needs.CONTROL)
+                    _change(page, gone, str(name.value or "").strip(), changed)
+                    asked.dialog.close()
+
+                page.button(words.RENAME_POSTURE, rename, Needs.CONTROL, look="flat dense")
+                page.button(
+                    words.REMOVE, remove, Needs.CONTROL, look="flat dense", name=f"{words.REMOVE} {gone}"
+                )
+
+
+def _change(page: PanelPage, name: str, new: str | None, changed: Callable[[], object]) -> None:
+    """Remove a posture from the arm file, or give it another name; its other lines and comments stay."""
+    file = _arm_file(page.operator.arm)
+    content = tomlkit.parse(file.read_text(encoding="utf-8"))
+    postures: Any = content["posture"]
+    found = postures[name]
+    if new is not None:
+        if problem := name_problem(new):
+            raise InputError(f"posture {new!r}: {problem}", "type another name")
+        if new in postures:
+            raise InputError(words.HAS_POSTURE.format(name=new), "type another name")
+        postures[new] = found
+    del postures[name]
+    replace_text(file, tomlkit.dumps(content))
+    _read_again(page, changed)
+
+
+def _read_again(page: PanelPage, changed: Callable[[], object]) -> None:
+    """Take the arm with its new postures, which the board does not know."""
+    page.operator.arm_changed(Arm.read(_arm_file(page.operator.arm)))
+    changed()
+
+
+def _arm_file(arm: Arm) -> Path:
+    """The file of an arm; raises InputError for one that ships, which is no file of the project."""
+    file = Path(arm.source)
+    if not file.is_file() or not file.resolve().is_relative_to(Path().resolve()):
+        raise InputError(
+            f"the arm {arm.name!r} is no file in the project folder",
+            "make a project with its file: 'armtempo new'",
+        )
+    return file
+
+
+def by_hand(page: PanelPage, _: Press) -> None:
+    """Ask, then switch the motors' current off until the dialog's button ends it."""
+    page.ask(words.SURE_BY_HAND, words.BY_HAND, lambda press: _guide(page, press))
+
+
+def _guide(page: PanelPage, press: Press) -> None:
+    operator = page.operator
+
+    def work() -> None:
+        with operator.board.by_hand() as guided:
+            operator.live.guided = True
+            try:
+                while operator.guiding and operator.holder == page.client:
+                    operator.live.angles_deg = np.array(guided.angles_deg())
+                    time.sleep(_LOOK_S)
+            finally:
+                operator.live.guided = False
+
+    operator.guiding = True
+    page.do(press, words.BY_HAND, work, Needs.MOVE)
+
+    def end(press: Press) -> None:
+        operator.guiding = False
+
+    page.ask(words.GUIDING, words.GUIDED, end, lambda: setattr(operator, "guiding", False))

@@ -1,0 +1,81 @@
+"""The record of the way back along a stored motion: sent to be run once, never stored.
+
+The board reads the control points of the stored motion from the last to the first. Those of angles stay as they are;
+those of a time axis are subtracted from its origin, the time at which the stored motion ends. So the path is exactly
+the same, and only the ramps are sent.
+
+::
+
+    offset  type   field
+    0       4s     magic  b"ATB1"
+    4       I      crc32 of the stored motion
+    8       B      lengths of ramps count in 2 ** this ticks
+    9       B      time axes
+    10      H[96]  ramps of the way back, as in the motion record
+    202     q[]    origin of each time axis, ticks / 2**16
+    ..      s      name of the stored motion
+    end     I      crc32 over all before it
+"""
+
+import struct
+from binascii import crc32
+
+from armtempo_shared import motion
+from armtempo_shared.basis import BASIS, FACTORIAL
+from armtempo_shared.limits import MAX_JOINTS
+from armtempo_shared.motion import LEAST_RAMP_BITS, MOST_RAMP_BITS, OTHER_ENTRIES, REST_ENTRIES, MotionError
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_shared.motion import MotionHead, Ramps
+
+MAGIC = b"ATB1"
+ORIGIN_BYTES = 8
+_HEAD = "<4sIBB"
+_RAMPS_AT = struct.calcsize(_HEAD)
+_ORIGINS_AT = _RAMPS_AT + 2 * (REST_ENTRIES + OTHER_ENTRIES)
+_CRC_BYTES = 4
+
+
+def pack(data: bytes, name: str, ramps: "Ramps") -> bytes:
+    """The record of the way back along the motion record ``data``, stored as ``name``; ``ramps``: of the way back."""
+    stored = motion.Motion(data)
+    origins = [_end(stored, axis) for axis in range(1 if stored.shared else stored.joints)]
+    body = struct.pack(_HEAD, MAGIC, stored.crc, ramps[2], len(origins))
+    body += struct.pack("<%dH" % (REST_ENTRIES + OTHER_ENTRIES), *ramps[0], *ramps[1])
+    body += struct.pack("<%dq" % len(origins), *origins) + name.encode()
+    return body + struct.pack("<I", crc32(body))
+
+
+def _end(stored: "MotionHead", joint: int) -> int:
+    """Time at the end of a joint's motion, ticks / 2**16, rounded up."""
+    degree = stored.degree
+    points = stored.points(stored.time_offset(joint) + 8 * stored.segments * stored.refine, degree)
+    total = sum([weight * point for weight, point in zip(BASIS[degree][0], points)])
+    return -(-total // FACTORIAL[degree])
+
+
+class WayBack:
+    """The content of such a record; ``name`` and ``stored_crc`` of the motion, ``ramps`` and ``ramp_bits`` as in it.
+
+    Raises MotionError if the record is incomplete or damaged.
+    """
+
+    def __init__(self, data: "bytes | memoryview") -> None:
+        if len(data) < _ORIGINS_AT + ORIGIN_BYTES + _CRC_BYTES:
+            raise MotionError("too short")
+        self.crc = motion.checked_crc(data)
+        magic, self.stored_crc, self.ramp_bits, axes = struct.unpack_from(_HEAD, data, 0)
+        name_at = _ORIGINS_AT + ORIGIN_BYTES * axes
+        if magic != MAGIC or not LEAST_RAMP_BITS <= self.ramp_bits <= MOST_RAMP_BITS:
+            raise MotionError("not a record of this version")
+        if not 1 <= axes <= MAX_JOINTS or len(data) <= name_at + _CRC_BYTES:
+            raise MotionError("length does not fit the header")
+        self.ramps = bytes(data[_RAMPS_AT:_ORIGINS_AT])
+        self.origins = [
+            bytes(data[at : at + ORIGIN_BYTES]) for at in range(_ORIGINS_AT, name_at, ORIGIN_BYTES)
+        ]
+        try:
+            self.name = bytes(data[name_at:-_CRC_BYTES]).decode()
+        except UnicodeError:
+            raise MotionError("name")

@@ -1,0 +1,126 @@
+"""How close moves by hand come to ruckig's optimum for the same limits: ``python -m tests.benchmark.jogs``.
+
+For every shipped arm, joint and percent of the speed: the way of a held jog after 0.1 to 2 s over that of ruckig's
+velocity interface; the duration of steps of 0.1 to 100 degrees over ruckig's; and the time to rest after a release at
+these times over the shortest, of the same limits too. It needs ruckig. ``--table``: the ways in the tests instead.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+import ruckig
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
+from armtempo.planning import brake_time, move_law
+from armtempo.planning.move_law import WayLimits
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+TIMES_S = (0.1, 0.2, 0.5, 1.0, 2.0)
+PERCENTS = (1, 2, 5, 10, 25, 50, 75, 100)
+STEPS_DEG = (0.1, 1.0, 10.0, 100.0)
+LONG_DEG = 400.0
+
+
+def main() -> None:
+    """Print the ratios, or the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--table", action="store_true")
+    table = parser.parse_args().table
+    for name in shipped.files():
+        arm = Arm.load(name)
+        if table:
+            tabulate(name, arm)
+        else:
+            compare(name, arm)
+
+
+def tabulate(name: str, arm: Arm) -> None:
+    """Print the rows of one arm."""
+    speeds, accelerations, jerks = np.array([joint.limits.values for joint in arm.driven]).T
+    joint = int(np.argmax(speeds * jerks / accelerations**2))
+    print(f'    "{name}": ({joint}, {{')
+    for percent in (1, 5, 25, 100):
+        ways = held_deg(limits_of(arm, joint, percent / 100))
+        print(f"        {percent}: ({', '.join(f'{way:.5g}' for way in ways)}),")
+    print("    }),")
+
+
+def compare(name: str, arm: Arm) -> None:
+    """Print the worst ratios of one arm."""
+    ways, steps, rests = [], [], []
+    for joint, driven in enumerate(arm.driven):
+        for percent in PERCENTS:
+            limits = limits_of(arm, joint, percent / 100)
+            law = move_law.law(LONG_DEG, move_law.of_joints([driven.limits], [1.0], percent / 100))
+            spline = JointSpline(move_law.DEGREE, 1, law.way, law.time_s)
+            ways.append(spline(np.array(TIMES_S)) / held_deg(limits))
+            brakes = brake_time.of_motion(Trajectory(name, (spline,), True), [driven.limits])
+            for time in TIMES_S:
+                shortest_s = rest_s(limits, float(spline(time, 1)), float(spline(time, 2)))
+                rests.append(float(brakes.rest_s(time)) / shortest_s)
+            for step in STEPS_DEG:
+                found = move_law.law(step, move_law.of_joints([driven.limits], [1.0], percent / 100))
+                last_s = JointSpline(move_law.DEGREE, 1, found.way, found.time_s).duration_s
+                steps.append(last_s / max(step_s(limits, step), move_law.SHORTEST_S))
+    low, rest = np.min(ways, axis=0), np.array(rests)
+    print(f"{name}: way over ruckig's at least {', '.join(f'{ratio:.3f}' for ratio in low)};", end=" ")
+    print(f"steps at most {max(steps):.3f};", end=" ")
+    print(
+        f"rest: median {np.median(rest):.2f}, nine in ten {np.quantile(rest, 0.9):.2f}, most {rest.max():.2f}"
+    )
+
+
+def limits_of(arm: Arm, joint: int, speed: float) -> WayLimits:
+    """The limits of a jog, without what its record asks for."""
+    most = arm.driven[joint].limits
+    return WayLimits(
+        speed * most.speed_deg_s,
+        move_law.ACCELERATION * most.acceleration_deg_s2,
+        move_law.JERK * most.jerk_deg_s3,
+    )
+
+
+def _input(limits: WayLimits) -> ruckig.InputParameter:
+    given = ruckig.InputParameter(1)
+    given.max_velocity, given.max_acceleration, given.max_jerk = (
+        [limits.speed],
+        [limits.acceleration],
+        [limits.jerk],
+    )
+    return given
+
+
+def _solved(given: ruckig.InputParameter) -> ruckig.Trajectory:
+    found = ruckig.Trajectory(1)
+    ruckig.Ruckig(1).calculate(given, found)
+    return found
+
+
+def held_deg(limits: WayLimits) -> np.ndarray:
+    """Ruckig's way after TIMES_S from rest to the speed."""
+    given = _input(limits)
+    given.control_interface = ruckig.ControlInterface.Velocity
+    given.target_velocity = [limits.speed]
+    found = _solved(given)
+    return np.array([found.at_time(time)[0][0] for time in TIMES_S])
+
+
+def rest_s(limits: WayLimits, speed: float, acceleration: float) -> float:
+    """Ruckig's shortest time to rest."""
+    given = _input(limits)
+    given.control_interface = ruckig.ControlInterface.Velocity
+    given.current_velocity, given.current_acceleration = [speed], [acceleration]
+    return float(_solved(given).duration)
+
+
+def step_s(limits: WayLimits, step: float) -> float:
+    """Ruckig's time for a step."""
+    given = _input(limits)
+    given.target_position = [step]
+    return float(_solved(given).duration)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+"""What commands print: within the terminal's width, no word broken in two."""
+
+from __future__ import annotations
+
+import random
+import re
+
+import pytest
+from armtempo.basics.text import aligned, wrapped
+from armtempo.cli import main
+from armtempo.cli.commands import COMMANDS
+from armtempo.model import shipped
+from click.testing import CliRunner
+
+from tests.interpreters import ROOT
+
+SEED = 5
+READ_BY_PROGRAMS = {
+    "exchange.py": 1,  # CSV
+    "help.py": 2,  # a page, and a script for a shell
+    "jog_screen.py": 4,  # fits its line to the terminal itself
+    "panel.py": 1,  # an address
+    "results.py": 3,
+    "sequences.py": 2,  # a line that is written again and again
+    "teach.py": 2,  # TOML, and a line that is written again and again
+    "virtual_board.py": 1,  # a path
+}
+"""Files that print without ``results.echo``, and how often."""
+
+
+def test_wrapping_changes_spaces_only() -> None:
+    rng = random.Random(SEED)
+    print(f"seed {SEED}")
+    for _ in range(500):
+        words = ["x" * rng.randint(1, 25) for _ in range(rng.randint(1, 60))]
+        before = rng.choice(["", "board     ", "hint: ", "note:    ", "         -> ", "joint 1  ", "    "])
+        width = rng.randint(40, 120)
+        lines = wrapped(before + " ".join(words), width)
+        assert " ".join(lines).split() == (before + " ".join(words)).split()
+        assert max(map(len, lines)) <= width
+        text = 2 if before in ("", "joint 1  ") else len(before)
+        assert all(line.startswith(" " * text + "x") for line in lines[1:])
+
+
+def test_a_word_that_is_longer_stays_whole() -> None:
+    path = "/a/" + "very-long-" * 12
+    assert wrapped(f"written: {path} and more", 40) == [
+        f"written: {path}",
+        "         and more",
+    ]
+
+
+def test_columns_are_no_wider_than_needed_where_they_would_not_fit() -> None:
+    assert aligned([("a", "b"), ("c", "d")], (3, 6)) == ["a       b", "c       d"]
+    assert aligned([("a", "b"), ("c", "d")], (3, 6), 8) == ["a b", "c d"]
+
+
+def test_commands_print_through_the_function_that_wraps() -> None:
+    found = {
+        path.name: count
+        for path in (ROOT / "host" / "armtempo" / "cli").glob("*.py")
+        if (count := len(re.findall(r"click\.echo|[^.\w]print\(", path.read_text(encoding="utf-8"))))
+    }
+    assert found == READ_BY_PROGRAMS
+
+
+LINES = [
+    *(("check", "--arm", name) for name in shipped.files()),
+    ("fk", "0,-60,40", "--arm", "paper"),
+    ("ik", "--position", "240", "180", "80", "--arm", "paper"),
+    ("ik", "--position", "2400", "180", "80", "--arm", "ar4"),
+    ("config",),
+    ("ports",),
+    ("help",),
+    ("plan", "--corridor-mm", "5", "--path", "free", "--population", "1"),
+    ("plan", "--holds", "something that no arm file names", "--arm", "paper"),
+    ("report", "a/folder/that/is/not/there/and/has/a/long/name/so/that/its/message/does/not/fit/a/line"),
+    *((name, "--help") for name in COMMANDS),
+]
+
+
+@pytest.mark.parametrize("arguments", LINES, ids=" ".join)
+def test_every_line_fits(arguments: tuple[str, ...]) -> None:
+    wide, narrow = (
+        CliRunner(env={"COLUMNS": columns}).invoke(main, list(arguments)).output for columns in ("1000", "80")
+    )
+    assert not [line for line in narrow.splitlines() if len(line) > 80 and " " in line.strip()]
+    if "--help" not in arguments:  # click makes that no wider than 80 in any case
+        assert narrow.split() == wide.split()
