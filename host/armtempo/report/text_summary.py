@@ -49,7 +49,7 @@ def lines(plan: Plan, verbose: bool = False) -> list[str]:
     text += aligned([row[:1] + row[3:] for row in rows] if plan.trajectory.shared else rows, _widths(plan))
     text += _faster(plan)
     if job.timing == "per-joint" and len(plan.searches) > 1:
-        text.append(_separation(plan))
+        text.extend(_separation(plan))
     text.extend(f"note: {note}" for note in plan.notes)
     text.extend(torque_lines([(plan.holding, plan.trajectory)]))
     text.extend(
@@ -186,14 +186,14 @@ def _free_s(plan: Plan) -> float:
         return math.inf
 
 
-def _separation(plan: Plan) -> str:
+def _separation(plan: Plan) -> list[str]:
     """For per-joint timing: differences of the joints' times at the via points, and the tool's deviation."""
     spread = ", ".join(f"{value:.2f}" for value in path_deviation.via_spread_s(plan.trajectory))
     apart = f"joints pass the via points apart by {spread} s"
     if checks.is_free(plan.job):
-        return apart
+        return [apart]
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
-    return f'{apart}, the tool strays up to {stray:.1f} mm; timing = "shared" keeps it on its path'
+    return [apart, f'so the tool strays up to {stray:.1f} mm from its path; timing = "shared" keeps it there']
 
 
 _QUANTITIES = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
