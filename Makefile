@@ -36,7 +36,7 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); test "$$(id -u)" = 0 && apt-get install -qy python3-venv && $(PYTHON) -m venv $(VENV); }
 
 $(VENV)/demo: pyproject.toml | $(BIN)/python
-	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot]'
+	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot,panel]'
 	@touch $@
 
 $(VENV)/test: pyproject.toml | $(BIN)/python

@@ -121,7 +121,7 @@ def load() -> None:
 
     For modules that come later it is imported again.
     """
-    # What functions of each kind begin with; on a virtual board of 64 bits nobody can look at them
+    # What functions of each kind begin with; on a virtual board of 64 bits they cannot be inspected
     kinds = [mem32[id(kind)] for kind in (_swap, _machine_code, _generator)] if not id(_swap) >> 32 else []
     words = _index().decode().split()
     for at in range(0, len(words), 2):

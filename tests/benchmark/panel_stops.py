@@ -157,7 +157,10 @@ async def _watch(address: str) -> None:
         query = {**ast.literal_eval(found.group(1)), "document_id": "d", "tab_id": "t"}
         client = socketio.AsyncClient()
         await client.connect(
-            f"{address}?{urlencode(query)}", transports=["websocket"], socketio_path="_nicegui_ws/socket.io"
+            f"{address}&{urlencode(query)}",
+            headers={"Origin": address.partition("/?")[0]},
+            transports=["websocket"],
+            socketio_path="_nicegui_ws/socket.io",
         )
         clients.append(client)
     await asyncio.sleep(3600)

@@ -51,7 +51,7 @@ FOUND = [
     ("a blind encoder", [("following_error_deg = 2.0", "following_error_deg = 0.05")], "error",
      "less than one count"),
     ("a nervous encoder", [("following_error_deg = 2.0", "following_error_deg = 1.0")], "warning", "a healthy joint"),
-    ("an idle encoder", [("following_error_deg = 2.0", "following_error_deg = 0")], "note", "lets nobody watch it"),
+    ("an idle encoder", [("following_error_deg = 2.0", "following_error_deg = 0")], "note", "lost steps stop nothing"),
     ("a fast encoder", [("counts_per_rev = 4000", "counts_per_rev = 9000000")], "warning",
      "read up to 1e+06 counts/s: motions keep to 40"),
     ("no encoder", [(ENCODER_1, "")], "note", "encoders: no encoder: joint 1"),
@@ -95,7 +95,7 @@ def test_nothing_looks_wrong_about_the_arms_that_ship(name: str) -> None:
     result = run_check("--arm", name)
     assert result.exit_code == 0, result.output
     assert "\n0 errors, 0 warnings, " in result.output
-    assert "steps/s, the board does 240000 (estimated; 'armtempo selftest'" in result.output
+    assert "steps/s; the board supports 240000 (estimated; 'armtempo selftest'" in result.output
     assert all(finding.level is Level.NOTE for finding in check_arm(Arm.load(name)))
 
 

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
+import ast
 import asyncio
 import ipaddress
 import itertools
+import json
 import math
+import os
 import re
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.basics.errors import InputError, LinkError, PortInUseError
+from armtempo.basics import toml_table
+from armtempo.basics.errors import InputError, LinkError, PlanError, PortInUseError, RunFolderError
 from armtempo.kinematics import Geometry, all_frames
 from armtempo.kinematics.chain import all_angles_deg
-from armtempo.link.board_messages import Positions, Sample
+from armtempo.kinematics.of_arm import forward
+from armtempo.link.board_messages import Levels, Positions, Sample
 from armtempo.model import mesh_files, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.room import FAR_MM, ArmRoom, KeepOut
+from armtempo.panel import homing, layout, past_runs, problem, teaching, words
 from armtempo.panel.access import COOKIE, MOST_BYTES, Access, Policy
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
@@ -32,8 +38,10 @@ from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.live import LiveArm
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.press import Press, Presses
+from armtempo.panel.problem import Cure
 from armtempo.panel.sequence_editor import SequenceEditor
 from armtempo.panel.server import listen, reachable
+from armtempo.robot.board_state import BoardState, JointState
 
 ARM = Arm.paper()
 ME, OTHER = "me", "other"
@@ -272,6 +280,7 @@ class Jog:
 
     def __init__(self) -> None:
         self.held = 0
+        self.ends = ""
         self.angles_deg = ARM.home_deg
         self.ended = threading.Event()
 
@@ -419,6 +428,8 @@ def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
         time.sleep(0.01)
     wait(jog.ended.is_set)
     assert how not in ("silent", "late") or time.monotonic() - begin_s > HELD_S / 4
+    wait(lambda: not operator.busy)
+    assert any(words.BROWSER_SILENT in line for line in operator.log.last) == (how in ("silent", "late"))
 
 
 def test_a_release_that_overtakes_its_press_ends_it(operator: Operator) -> None:
@@ -610,3 +621,217 @@ def test_a_fault_of_ours_does_not_end_the_states(
     wait(lambda: len(asked) > 3)
     made.close()
     assert "the board's state" in caplog.text
+
+
+def board_state(**changed: Any) -> BoardState:
+    """What a board at rest says, whose arm is at home."""
+    joints = tuple(
+        JointState(joint.name, True, 0, angle, 0, None)
+        for joint, angle in zip(ARM.driven, ARM.home_deg, strict=True)
+    )
+    found = {field.name: "" for field in fields(BoardState)} | {
+        "virtual": False, "moving": False, "speed_percent": 100.0, "state": "idle", "joints": joints, "sequence": None,
+        "port": "port",
+    }  # fmt: skip
+    return BoardState(**{**found, **changed})
+
+
+def unhomed() -> BoardState:
+    """What a board says that does not know where its arm is."""
+    joints = board_state().joints
+    return board_state(joints=tuple(replace(joint, known=False, angle_deg=0.0) for joint in joints))
+
+
+class Telling:
+    """A board that says where its arm is."""
+
+    def __init__(self, state: BoardState) -> None:
+        self._state = state
+        self.client = type("Client", (), {"levels": lambda _: Levels(0b1, (65535,))})()
+
+    def state(self, arm: Arm) -> BoardState:
+        return self._state
+
+
+def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: Operator) -> None:
+    operator.live.ask(Telling(unhomed()))  # type: ignore[arg-type]
+    shape = ArmShape(ARM)
+    told = layout.message(operator, shape)
+    assert (told["links"], told["tool"], told["unknown"]) == (None, None, True)
+    assert told["ghost"] == shape.poses(np.array(ARM.home_deg))
+    assert told["texts"]["armtempo-where"] == "position unknown"
+    assert told["texts"]["armtempo-angle-1"] == "?"
+    operator.live.ask(Telling(board_state()))  # type: ignore[arg-type]
+    told = layout.message(operator, shape)
+    assert told["links"] == shape.poses(np.array(ARM.home_deg))
+    assert told["texts"]["armtempo-angle-2"] == "-60.00°"
+
+
+def test_a_state_that_is_old_says_how_old(operator: Operator) -> None:
+    operator.live.ask(Telling(board_state(state="moving", moving=True, speed_percent=20.0)))  # type: ignore[arg-type]
+    assert layout.state_line(operator) == "moving at 20 % · port"
+    operator.live.heard_s -= 3.0
+    assert re.fullmatch(r"moving at 20 % · last heard 3\.\d s ago · port", layout.state_line(operator))
+
+
+def test_outputs_and_inputs_are_those_of_the_board() -> None:
+    text = (
+        shipped.arm_path().read_text()
+        + """
+[output.gripper]
+kind = "servo"
+pin = "PB8"
+pulse_us = [500, 2500]
+angles_deg = [0, 180]
+states = { open = 0.0, closed = 180.0 }
+safe = "open"
+
+[input.part]
+pin = "PD0"
+"""
+    )
+    live = LiveArm(Arm.of_table(toml_table.parse(text, "arm.toml")))
+    live.ask(Telling(board_state(arm="paper")))  # type: ignore[arg-type]
+    assert (live.outputs, live.inputs) == ({"gripper": "closed"}, {"part": True})
+
+
+@pytest.mark.parametrize(
+    ("what", "said", "cures", "is_fault"),
+    [
+        ("nothing", "", (), False),
+        ("cable", "the cable is out", (), True),
+        ("no program", "another program runs", (Cure.DEPLOY,), True),
+        ("fault", "E-stop", (Cure.CLEAR,), True),
+        ("frozen", "may have moved on", (Cure.HOME,), True),
+        ("failed", "run: the arm is elsewhere", (Cure.DISMISS,), True),
+        ("unhomed", "Home it", (Cure.HOME,), False),
+    ],
+)
+def test_the_banner_says_what_is_wrong_and_has_the_button_that_helps(
+    operator: Operator, what: str, said: str, cures: tuple[Cure, ...], is_fault: bool
+) -> None:
+    live = operator.live
+    live.state = board_state()
+    if what == "cable":
+        operator.trouble = "the cable is out"
+    elif what == "no program":
+        operator.trouble, operator._board = "another program runs", None
+    elif what == "fault":
+        live.state = board_state(fault="estop")
+    elif what == "frozen":
+        live.doubt = "joint 1 may have moved on"
+    elif what == "failed":
+        operator.failure = "run: the arm is elsewhere"
+    elif what == "unhomed":
+        live.state = unhomed()
+    found = problem.of(operator)
+    assert (found is None) == (what == "nothing")
+    if found is not None:
+        assert said in found.text
+        assert (found.cures, found.is_fault) == (cures, is_fault)
+        assert "'armtempo" not in found.text
+
+
+def test_a_plan_of_another_job_is_not_run(operator: Operator) -> None:
+    plan: Any = object()
+    operator.live.state = board_state()
+    needs = Needs.MOVE | Needs.PLAN
+    assert operator.why_not(ME, needs) == words.NO_PLAN
+    operator.jobs.planned(plan, operator.jobs.version)
+    assert operator.why_not(ME, needs) == ""
+    operator.jobs.set_angle(0, 0, "5")
+    assert operator.why_not(ME, needs) == words.PLAN_IS_OLD
+
+
+def test_what_moves_is_compared_with_no_plan_but_its_own(operator: Operator) -> None:
+    plan: Any = object()
+    operator.live.plan = plan  # of a run that has ended
+    do(operator, "sequence", ME, lambda: None)
+    wait(lambda: not operator.busy)
+    assert operator.live.plan is None
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("remove its cause, then 'armtempo clear'", "remove its cause, then ‘Clear the fault’"),
+        ("move it there with 'armtempo goto'", "move it there with ‘Go to the start’"),
+        ("'armtempo list' shows the names", "‘Stored motions’ shows the names"),
+        ("see 'armtempo help recovery'", "see 'armtempo help recovery' in a terminal"),
+        ("nothing to do", "nothing to do"),
+    ],
+)
+def test_commands_are_the_panels_buttons(text: str, wanted: str) -> None:
+    assert words.of_text(text) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("job.toml: refine = 'banana' is not allowed", "job.toml: ‘Segments’ = 'banana' is not allowed"),
+        (
+            "job.toml: via P1.blend_mm = 0 is not allowed",
+            "job.toml: via P1.‘Corner cut by, mm’ = 0 is not allowed",
+        ),
+        ("no motion along this path is shorter", "no motion along this path is shorter"),
+        ("the stop at P1 is 5 s", "the stop at P1 is 5 s"),
+    ],
+)
+def test_keys_are_the_panels_fields(text: str, wanted: str) -> None:
+    assert words.of_job(InputError(text)) == wanted
+
+
+def test_what_turns_the_direction_of_a_line_is_seen() -> None:
+    assert words.plain("a\u202eb\x1b\u200bc 'ü' <b>") == "a□b□□c 'ü' <b>"
+
+
+def test_texts_are_no_properties() -> None:
+    """A string of properties is code: a name in it could leave its quotes. ``look`` and icons are the panel's own."""
+    allowed = {"look", "len(self.holds)", "number + 1", "icon"}
+    for path in Path(layout.__file__).parent.glob("*.py"):
+        for call in ast.walk(ast.parse(path.read_text())):
+            if not (isinstance(call, ast.Call) and getattr(call.func, "attr", "") == "props"):
+                continue
+            for part in ast.walk(call):
+                if isinstance(part, ast.FormattedValue) and not isinstance(part.value, ast.IfExp):
+                    assert ast.unparse(part.value) in allowed, f"{path.name}: {ast.unparse(part)}"
+
+
+def test_runs_of_the_command_line_are_listed_the_newest_first(tmp_path: Path) -> None:
+    for number, (name, state) in enumerate({"feed-001": "complete", "feed-002": "fault"}.items()):
+        (tmp_path / name).mkdir()
+        made = {"duration_s": 6.8, "fault": "" if state == "complete" else "estop", "state": state}
+        meta = {"format": "armtempo run", "started": "2026-01-02T03:04:05+00:00", "repetitions": [made, made]}
+        (tmp_path / name / "run.json").write_text(json.dumps(meta))
+        os.utime(tmp_path / name / "run.json", (1000 + number, 1000 + number))
+    for name, text in (("damaged", "{"), ("other", "[1]"), ("empty", "{}")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "run.json").write_text(text)
+        os.utime(tmp_path / name / "run.json", (1, 1))
+    rows = past_runs.listed(tmp_path)
+    assert [(row.folder.name, row.duration, row.ending) for row in rows[:2]] == [
+        ("feed-002", "13.6 s", "estop"),
+        ("feed-001", "13.6 s", "complete"),
+    ]
+    assert {row.ending for row in rows[2:]} == {"cannot be read"}
+    with pytest.raises(RunFolderError, match="cannot be read"):
+        past_runs.report(tmp_path / "damaged")
+
+
+def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
+    here = np.array([10.0, -60.0, 40.0])
+    place = forward(ARM, (20.0, -70.0, 50.0))[:3, 3].tolist()
+    found = teaching.nearest(ARM, place, (0.0, 0.0, 0.0), here)
+    assert forward(ARM, found)[:3, 3] == pytest.approx(place, abs=0.1)
+    with pytest.raises(PlanError):
+        teaching.nearest(ARM, [9999.0, 0.0, 0.0], (0.0, 0.0, 0.0), here)
+
+
+def test_what_the_switches_home_is_named_in_its_order() -> None:
+    assert homing.switches(ARM) == []
+    ar4 = Arm.of("ar4")
+    groups = homing.switches(ar4)
+    assert sorted(name for group in groups for name in group.split(", ")) == sorted(
+        joint.name for joint in ar4.driven
+    )
+    assert groups[: len(ar4.homing)] == [", ".join(group) for group in ar4.homing]

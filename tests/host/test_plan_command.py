@@ -48,7 +48,7 @@ def test_plans_the_shipped_job_without_options() -> None:
 def test_what_the_board_has_to_do_and_how_it_was_searched_is_printed_with_v() -> None:
     said = run("--job", "move.toml", "-v").output
     for words in (
-        "steps/s, the board does 240000 (estimated; 'armtempo selftest'",
+        "steps/s; the board supports 240000 (estimated; 'armtempo selftest'",
         "lower bound: ",
         "record: ",
     ):

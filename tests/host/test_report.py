@@ -53,6 +53,24 @@ def test_the_page_and_every_figure_are_written(folder: Path) -> None:
         assert (folder / f"{name}.svg").read_text().lstrip().startswith("<?xml")
 
 
+def test_labels_of_tiny_errors_stay_within_their_figure(folder: Path) -> None:
+    found = evaluate(folder)
+    curves = found.curves
+    off = 1e-4 * np.sin(np.arange(curves.mean.shape[1]))[:, None]
+    figure = plots.errors(
+        replace(curves, mean=curves.theory + off, each=curves.theory + off + 0 * curves.each), found.names
+    )
+    figure.canvas.draw()
+    left = min(axis.yaxis.get_tightbbox().x0 for axis in figure.axes)
+    assert left >= 0.0
+
+
+def test_the_search_shows_where_the_gradient_solver_ended() -> None:
+    figure = plots.convergence({"joint 1": np.array([3.6, 3.5, 3.4])}, {"joint 1": 3.09})
+    (_, end) = figure.axes[0].lines
+    assert (end.get_xdata()[0], end.get_ydata()[0]) == (3, 3.09)
+
+
 def test_nothing_is_fetched_and_no_id_is_used_twice(folder: Path) -> None:
     text = (folder / run_report.PAGE).read_text()
     assert not re.search(r'(src|href)="(?!#)', text.replace('xlink:href="#', ""))
@@ -141,7 +159,7 @@ def test_a_joint_without_an_encoder_is_shown_as_commanded(
     made_runs.draw_nothing(monkeypatch)
     page = run_report.write(path)
     text = words(page)
-    assert "OK as far as it was measured" in text
+    assert "OK in what was measured" in text
     assert "joint 2 has no encoder, so whether the arm made the steps is not known" in text
     assert "an encoder would show lost steps" in text
     assert text.count("not measured") == 2
@@ -174,7 +192,7 @@ def test_an_arm_without_encoders_gets_a_report_of_what_is_known(tmp_path: Path) 
     assert beyond.startswith(
         "Not OK: the commanded motion exceeds the speed or acceleration limit of joint 1, "
     )
-    assert verdict.of(found).summary == "OK as far as it was measured"
+    assert verdict.of(found).summary == "OK in what was measured"
 
 
 def limited(joints: Sequence[Joint], limits: Sequence[Limits]) -> Iterator[Joint]:
@@ -223,7 +241,7 @@ def test_the_verdict_of_a_good_run_is_ok(folder: Path, tmp_path: Path) -> None:
     text = words(run_report.write(whole))
     assert text.index("OK") < text.index("Result")
     lossy = verdict.of(evaluate(folder))
-    assert lossy.line == "OK as far as it was measured: samples-01.csv: samples 5 to 6 are missing"
+    assert lossy.line == "OK in what was measured: samples-01.csv: samples 5 to 6 are missing"
 
 
 def entry(path: Path, number: int, **changes: object) -> None:

@@ -131,6 +131,19 @@ def test_functions_take_few_parameters() -> None:
                 assert count <= MOST_PARAMETERS, f"{path.relative_to(ROOT)}: {function.name} takes {count}"
 
 
+def test_nobody_sets_attributes_of_a_session() -> None:
+    """What a call wants of the link is an argument, or a context with an end: state that others set stays."""
+    for path in modules():
+        for node in ast.walk(tree(path)):
+            targets = node.targets if isinstance(node, ast.Assign) else []
+            for target in (part for one in targets for part in ast.walk(one)):
+                if isinstance(target, ast.Attribute) and isinstance(target.ctx, ast.Store):
+                    owner = ast.unparse(target.value)
+                    assert owner.rpartition(".")[2] != "session", (
+                        f"{path.relative_to(ROOT)}: {ast.unparse(target)}"
+                    )
+
+
 def test_results_of_three_have_names() -> None:
     for path in modules():
         for function in functions(path):

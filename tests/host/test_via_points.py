@@ -478,7 +478,6 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
         ("x,y,z,rx,ry,rz\n200,0,100,0,0,0\n300,0,100,0,0,0\n", "'rx' is not known as part of a pose"),
         ("x,y,z,qw,qx,qy\n200,0,100,1,0,0\n300,0,100,1,0,0\n", "qw, qx, qy are not an orientation"),
         ("t,x,y,z\n0,200,0,100\n1,300,0,100\n", "poses are not thinned"),
-        ("header:\n  stamp: {sec: 0, nanosec: 0}\n", "is a ROS message, not a table; export"),
     ],
 )
 def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text: str, said: str) -> None:

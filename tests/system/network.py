@@ -25,6 +25,7 @@ class Network:
         self._ready = threading.Event()
         self._loop = asyncio.new_event_loop()
         self._open: asyncio.Event
+        self._server: asyncio.Server
         self._writers: set[asyncio.StreamWriter] = set()
         self._port = 0
         self.refuses = False
@@ -62,15 +63,23 @@ class Network:
         asyncio.set_event_loop(self._loop)
         self._loop.run_until_complete(self._begin())
         self._loop.run_forever()
-        for task in asyncio.all_tasks(self._loop):
+        self._loop.run_until_complete(self._end())
+        self._loop.close()
+
+    async def _end(self) -> None:
+        self._server.close()
+        for one in self._writers:
+            one.transport.abort()
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in tasks:
             task.cancel()
-        self._loop.run_until_complete(asyncio.sleep(0))
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _begin(self) -> None:
         self._open = asyncio.Event()
         self._open.set()
-        server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
-        self._port = server.sockets[0].getsockname()[1]
+        self._server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
+        self._port = self._server.sockets[0].getsockname()[1]
         self._ready.set()
 
     async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -202,6 +202,7 @@ def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "
         options = LaunchOptions(
             folder / "flash",
             virtual_time=False,
+            instant_flash=True,
             interpreter=interpreters.starter("cpython"),  # takes the sources
             arm=moved,
             flash_blocks=SOURCES_BLOCKS,
@@ -258,11 +259,15 @@ def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> st
     raise AssertionError(refusal)
 
 
-def answer(page: Any, button: str) -> None:
-    """Press a button of the dialog, and wait until that is gone; again where the press came too late."""
-    dialog = page.get_by_role("dialog")
-    press(page, dialog.get_by_role("button", name=button))
+def answer(page: Any, button: str) -> str:
+    """Press a button of the dialog, and wait until that is gone; why it was refused, which leaves it open."""
+    wanted = page.get_by_role("button", name=button, exact=True)
+    dialog = page.get_by_role("dialog").filter(has=wanted)  # another one may open in its place
+    refusal = press(page, dialog.get_by_role("button", name=button, exact=True))
+    if refusal:
+        dialog.get_by_role("button", name="Cancel").click()
     dialog.wait_for(state="detached")
+    return refusal
 
 
 def home(page: Any) -> None:

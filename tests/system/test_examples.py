@@ -229,5 +229,5 @@ def test_searches_on_a_cluster_give_the_same(tmp_path: Path) -> None:
 def test_none_is_left_out() -> None:
     files = {path.name for path in EXAMPLES.iterdir() if path.suffix in (".py", ".ipynb")}
     page = (EXAMPLES / "README.md").read_text(encoding="utf-8")
-    assert files == set(LEAVES)
+    assert files == {*LEAVES, "ros_bridge.py"}  # which test_ros_bridge.py runs
     assert all(f"({name})" in page for name in files)

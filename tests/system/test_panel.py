@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 import tomlkit
 from armtempo.basics import toml_table
+from armtempo.basics.errors import InputError
+from armtempo.model import shipped
 from armtempo.panel import words
 
 from tests import browser
@@ -325,6 +327,7 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         control = page.get_by_role("button", name=button, exact=True)
         press(page, control, partial(control.press, "Enter"))
         said = refusal(folder, file, tomlkit.dumps(content))
+        said = words.of_job(InputError(said)) if tab == "Job" else said
         page.locator(".q-notification", has_text=said).first.wait_for()
         field.fill(before)
     assert page.evaluate("window.hurt") is None
@@ -367,8 +370,73 @@ def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel) -> None:
     press(page, page.get_by_role("button", name="Run", exact=True))
     page.wait_for_selector(".armtempo-lit:has-text('2')")
     page.keyboard.press("Escape")
-    page.wait_for_selector("text=cycle 0: stopped")
+    page.wait_for_selector("text=cycle 1: stopped")
     assert page.locator(".armtempo-lit").count() == 0
+
+
+def test_a_target_is_shown_then_approached_while_held_and_postures_are_stored(
+    page: Any, panel: Panel
+) -> None:
+    home(page)
+    where = page.inner_text("#armtempo-where")
+    away = page.get_by_role("button", name="Go to away")
+    press(page, away, lambda: away.click())  # it is only shown
+    page.wait_for_function("armtempo.ghost")
+    page.wait_for_timeout(1000)
+    assert page.inner_text("#armtempo-where") == where
+    page.get_by_role("switch", name="With one click").click()
+    press(page, away, lambda: away.click())
+    wait_for(page, "away: done", place="armtempo-said")
+    wait_for(page, "30.0", place="armtempo-where")
+    page.get_by_role("switch", name="With one click").click()
+    page.get_by_role("button", name="1", exact=True).click()
+    plus = page.get_by_label("joint 1 +")
+    press(page, plus, lambda: plus.click())
+    wait_for(page, "step: done", place="armtempo-said")
+    wait_for(page, "31.0", place="armtempo-where")
+    page.get_by_role("button", name="While held").click()
+    page.get_by_role("button", name="Store…").click()
+    page.get_by_role("dialog").get_by_label("Name").fill("tray")
+    assert panels.answer(page, "Store") == ""
+    page.get_by_role("button", name="Go to tray").wait_for()
+    assert "[posture.tray]\nangles_deg = [31" in (panel.folder / "arm.toml").read_text()
+    page.get_by_role("button", name="Guide by hand…").click()
+    assert panels.answer(page, "Guide by hand…") == ""
+    wait_for(page, "unhomed", "Guide by hand…")
+    wait_for(page, "31.", place="armtempo-where")  # the encoders tell
+    assert panels.answer(page, "The current on") == ""
+    wait_for(page, "Guide by hand…: done", place="armtempo-said")
+    wait_for(page, "idle")
+
+
+def test_names_from_files_are_text(chromium: Any, tmp_path: Path) -> None:
+    names = [
+        'j"><img src=x onerror=window.hurt=1>',
+        'k\' :innerHTML="hurt=2" onclick="window.hurt=3"',
+        "`${hurt=4}`",
+    ]
+    text = tmp_path / "own.toml"
+    content = tomlkit.parse(shipped.arm_path().read_text())
+    for joint, name in zip([one for one in content["joint"] if "motor" in one], names, strict=True):  # type: ignore[union-attr]
+        joint["name"] = name
+    text.write_text(tomlkit.dumps(content))
+    with panels.panels(tmp_path, arm=str(text)) as running:
+        window = chromium.new_context(viewport=panels.SMALL)
+        page = panels.opened(window, running().address)
+        home(page)
+        for name in names:
+            assert page.get_by_label(f"{name} +", exact=True).inner_text().strip() == "+"
+            assert page.get_by_text(name, exact=True).first.is_visible()
+        for tab in TABS:
+            show(page, tab)
+            page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
+        page.wait_for_timeout(500)
+        assert page.evaluate("window.hurt") is None
+        blocked = "document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=window.hurt=5>')"
+        page.evaluate(blocked)  # and what would get in all the same is not run
+        page.wait_for_timeout(500)
+        assert page.evaluate("window.hurt") is None
+        window.close()
 
 
 def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> None:
@@ -531,10 +599,10 @@ def test_nothing_moves_that_nobody_means_any_more(
     home(page)
     where = page.inner_text("#armtempo-where")
     button = (
-        page.get_by_label("joint 1 +")
-        if command == "jog"
-        else page.get_by_role("button", name="away", exact=True)
+        page.get_by_label("joint 1 +") if command == "jog" else page.get_by_role("button", name="Go to away")
     )
+    if command == "posture":
+        page.get_by_role("switch", name="With one click").click()
     button.hover()
     if how == "stalls":
         network.stall(True)

@@ -12,7 +12,7 @@ from armtempo.basics.settings import ARM, JOB, RUNS, ProjectSettings, nothing_se
 from armtempo.basics.text import did_you_mean
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import remark
-from armtempo.model import shipped
+from armtempo.model import shipped, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, is_name
 from armtempo.model.tool_pose import Pose
@@ -156,10 +156,26 @@ def is_file(what: str) -> bool:
 
 
 def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan:
-    """The plan of a trajectory file; raises InputError if an arm is set and it does not fit."""
+    """The plan of a trajectory file, or one on the times of a recording; InputError if the arm does not fit."""
     from armtempo import pipeline
 
+    if via_table.is_recording(path):
+        plan = as_recorded(path, load_arm(arm_path), path.stem)
+        for note in plan.notes:
+            remark(f"note: {note}")
+        return plan
     return pipeline.load(path, named_arm(arm_path), altered)
+
+
+def as_recorded(
+    path: Path, arm: Arm, name: str, radians: bool | None = None, tolerance_deg: float | None = None
+) -> Plan:
+    """A plan on the recording's own times; errors as in ``recorded.plan``."""
+    from armtempo.planning import recorded  # here, as it loads the planner
+
+    found = via_table.recorded(path, arm, radians)
+    tolerance = recorded.TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
+    return recorded.plan(arm, name, found.times_s, found.angles_deg, tolerance, found.notes)
 
 
 def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = None) -> SequencePlan:

@@ -36,11 +36,16 @@ from armtempo.new_arm import urdf_reader as reader
     metavar="DEG",
     help="Leave out lines that change the path by less than DEG. Default for a table with a column time_s: 0.1.",
 )
+@click.option(
+    "--own-timing",
+    is_flag=True,
+    help="Write a motion for 'armtempo run' that keeps the recording's times, slowed where the limits ask for it.",
+)
 @options.file(
     "-o",
     "--output",
-    help="Job file to write; without it the job's name with .toml. An existing file with other content is not "
-    "replaced.",
+    help="File to write; without it the name with .toml, or .json with --own-timing. An existing file with other "
+    "content is not replaced.",
 )
 @options.force("an existing FILE with other content")
 @options.as_json
@@ -50,11 +55,12 @@ def import_table(
     name: str | None,
     radians: bool | None,
     tolerance_deg: float | None,
+    own_timing: bool,
     output: Path | None,
     force: bool,
     as_json: bool,
 ) -> None:
-    """Make a job file from the CSV file TABLE: one line per via point, one column per driven joint.
+    """Make a job file from TABLE: one line per via point, one column per driven joint; or a ROS JointTrajectory.
 
     The first line names the columns, in any order: the joints' names or j1, j2, …, with a unit such as (rad); or x, y,
     z and roll, pitch, yaw for poses. Columns are separated by commas, semicolons, tabs or blanks. A file that
@@ -62,8 +68,11 @@ def import_table(
     """
     arm = chosen.load_arm(arm_path)
     title = name or table.stem
-    target = output or Path(f"{title}.toml")
+    target = output or Path(f"{title}.json" if own_timing else f"{title}.toml")
     check_not_input(target, (table, arm.source))
+    if own_timing:
+        _keep_timing(table, arm, title, radians, tolerance_deg, target, force, as_json)
+        return
     found = via_table.read(table, arm, radians, tolerance_deg)
     text = via_table.job_text(title, found)
     Job.of_table(toml_table.parse(text, str(table)), arm)
@@ -77,6 +86,21 @@ def import_table(
         "notes": list(found.notes),
     }
     results.show(as_json, values, _import_lines(target, found))
+
+
+def _keep_timing(
+    table: Path, arm: Arm, name: str, radians: bool | None, tolerance_deg: float | None, target: Path, force: bool,
+    as_json: bool,
+) -> None:  # fmt: skip
+    plan = chosen.as_recorded(table, arm, name, radians, tolerance_deg)
+    plan.save(target, force)
+    values = {
+        "file": str(target),
+        "duration_s": plan.total_s,
+        "notes": list(plan.notes),
+    }
+    lines = [f"{plan.total_s:.3f} s", *(f"note: {note}" for note in plan.notes)]
+    results.show(as_json, values, [*lines, f"written: {target}; run it with: armtempo run {target}"])
 
 
 def _import_lines(target: Path, found: ImportedPath) -> list[str]:

@@ -13,6 +13,7 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import chosen, options, results, state
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
+from armtempo.model import via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -93,7 +94,13 @@ def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions)
 
 def is_named(text: str) -> bool:
     """Whether the text is a name (of a posture, a via point or a trajectory file) instead of angles."""
-    return text == HOME or is_via(text) or text.endswith(".json") or not name_problem(text)
+    return (
+        text == HOME
+        or is_via(text)
+        or text.endswith(".json")
+        or via_table.is_recording(Path(text))
+        or not name_problem(text)
+    )
 
 
 @dataclass(frozen=True)
@@ -113,7 +120,7 @@ class NamedPosture:
         if text.endswith(".json") and is_sequence_plan(Path(text)):
             sequence = chosen.load_sequence_plan(Path(text), arm_path)
             return cls(text, sequence.arm, None, sequence)
-        if text.endswith(".json"):
+        if text.endswith(".json") or via_table.is_recording(Path(text)):
             plan = chosen.load_plan(Path(text), arm_path, altered)
             return cls(text, plan.arm, plan)
         if not is_named(text):

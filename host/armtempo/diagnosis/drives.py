@@ -147,7 +147,7 @@ def _encoder(joint: DrivenJoint) -> list[Finding]:
     limit_deg, count_deg = joint.encoder.following_error_deg, 1.0 / joint.counts_per_deg
     found = []
     if limit_deg == 0.0:
-        text = "its encoder is recorded, but following_error_deg = 0 lets nobody watch it"
+        text = "its encoder is recorded only: with following_error_deg = 0 lost steps stop nothing"
         found.append(
             note(joint.name, text, "give following_error_deg, such as 2.0, to stop when steps are lost")
         )

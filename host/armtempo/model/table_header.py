@@ -15,6 +15,8 @@ from armtempo.model.tool_pose import WHOLE
 POSITION = ("x", "y", "z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 TIME = "time"
+RESTS_DEG = 0.01
+"""Allowed distance from home of a joint without a motor."""
 _TIMES = ("time", "t", "times", "timestamp", "stamp", "timefromstart")
 _ANGLE_WORDS = ("", "angle", "position", "pos")
 _NUMBERED = ("j", "joint", "axis", "q", "theta")

@@ -13,21 +13,18 @@ from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.number_table import NumberTable
-from armtempo.model import table_header, thinning
+from armtempo.model import joint_trajectory, table_header, thinning
 from armtempo.model.arm import Arm
+from armtempo.model.joint_trajectory import Recorded
 from armtempo.model.table_header import Column, Header
 from armtempo.model.tool_pose import WHOLE
 
 TOLERANCE_DEG = 0.1
 """Default tolerance for thinning a sampled motion."""
-_ROS = "header:"
-"""Beginning of a ROS message."""
 _RADIANS, _WIDE_DEG = 7.0, 100.0
 """Angles below this may be radians, if the joints turn further than that many degrees."""
 _METRES = 2.0
 """Positions below this may be in metres."""
-_RESTS_DEG = 0.01
-"""Allowed distance from home of a joint without a motor."""
 _SPEED_MARGIN = 1.05
 """Recordings may be faster than the limit by this factor, as their times scatter."""
 
@@ -58,11 +55,44 @@ def of_text(
     text: str, path: Path | str, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
 ) -> ImportedPath:
     """Via points from the text of a table, as ``via_points``; ``path`` names it in messages."""
-    if text.lstrip("\ufeff \n").startswith(_ROS):
-        raise InputError(
-            f"{path}: is a ROS message, not a table", "export the trajectory as CSV and import that"
-        )
+    if joint_trajectory.is_ros(text):
+        found = joint_trajectory.of_text(text, path, arm)
+        where = [f"{path}: at {time:g} s" for time in found.times_s]
+        angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
+        return _thinned(angles, found.times_s, arm, tolerance_deg, (*found.notes, *notes), where)
     return via_points(number_table.of_text(text, path), arm, radians, tolerance_deg)
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file is a table or a JointTrajectory, by its name, or of JSON by its content."""
+    if path.suffix.lower() != ".json":
+        return path.suffix.lower() in (".csv", ".tsv", ".yaml", ".yml")
+    try:
+        return '"joint_names"' in path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def recorded(path: Path, arm: Arm, radians: bool | None = None) -> Recorded:
+    """A motion with its times, from a table with a time or a JointTrajectory; errors as in ``read``."""
+    text = number_table.text_of(path)
+    if joint_trajectory.is_ros(text):
+        found = joint_trajectory.of_text(text, path, arm)
+        where = [f"{path}: at {time:g} s" for time in found.times_s]
+    else:
+        table = number_table.of_text(text, path)
+        header = _header(table, arm)
+        times = _times(table, header)
+        if times is None or header.pose or len(times) < 2:
+            raise InputError(
+                f"{path}: has no times of a motion of the joints",
+                "give a column time_s, and one for each joint",
+            )
+        _check_resting(table, header, arm, radians)
+        found = Recorded(times, _angles(table, header, arm, radians), _notes(table, header, arm))
+        where = [f"{path}: line {line}" for line, _ in table.rows]
+    angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
+    return Recorded(found.times_s, angles, (*found.notes, *notes))
 
 
 def read(
@@ -91,19 +121,25 @@ def via_points(
     angles = _angles(table, header, arm, radians)
     _check_resting(table, header, arm, radians)
     times, notes = _times(table, header), _notes(table, header, arm)
+    where = [f"{table.path}: line {line}" for line, _ in table.rows]
     if times is not None:
-        angles, jumps = unwrapped(
-            angles, times, arm, [f"{table.path}: line {line}" for line, _ in table.rows]
-        )
+        angles, jumps = _unwound(angles, times, arm, where)
         notes += jumps
     if tolerance_deg is None and times is None:
         return ImportedPath(angles, len(angles), notes=notes)
+    return _thinned(angles, times, arm, tolerance_deg, notes, where)
+
+
+def _thinned(
+    angles: Array, times_s: Array | None, arm: Arm, tolerance_deg: float | None, notes: tuple[str, ...],
+    where: Sequence[str],
+) -> ImportedPath:  # fmt: skip
     tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
-    _check_ranges(table, angles, arm, 0.5 * tolerance)
-    found = thinning.thinned(angles, tolerance, times, np.array([joint.range_deg for joint in arm.driven]))
-    for where, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
+    _check_ranges(where, angles, arm, 0.5 * tolerance)
+    found = thinning.thinned(angles, tolerance, times_s, np.array([joint.range_deg for joint in arm.driven]))
+    for place, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
         if left_out_s:
-            notes += (f"{left_out_s:.3g} s of rest at the {where} are left out",)
+            notes += (f"{left_out_s:.3g} s of rest at the {place} are left out",)
     return ImportedPath(
         found.via_deg, len(angles), thinned_to_deg=found.off_deg, rests_s=found.rests_s, notes=notes
     )
@@ -190,7 +226,7 @@ def _check_resting(table: NumberTable, header: Header, arm: Arm, radians: bool |
         joint = arm.joints[index]
         angles = _degrees(np.array(table.numbers([column.index]))[:, 0], column, radians, table)
         for (line, _), angle in zip(table.rows, angles, strict=True):
-            if abs(angle - joint.home_deg) > _RESTS_DEG:
+            if abs(angle - joint.home_deg) > table_header.RESTS_DEG:
                 raise InputError(
                     f"{table.path}: line {line}: {joint.name} at {angle:g} degrees has no motor, it stays at "
                     f"{joint.home_deg:g}",
@@ -198,14 +234,13 @@ def _check_resting(table: NumberTable, header: Header, arm: Arm, radians: bool |
                 )
 
 
-def _check_ranges(table: NumberTable, angles: Array, arm: Arm, allowed_deg: float) -> None:
+def _check_ranges(where: Sequence[str], angles: Array, arm: Arm, allowed_deg: float) -> None:
     for joint, column in zip(arm.driven, angles.T, strict=True):
         low, high = joint.range_deg
-        for (line, _), angle in zip(table.rows, column.tolist(), strict=True):
+        for place, angle in zip(where, column.tolist(), strict=True):
             if not low - allowed_deg <= angle <= high + allowed_deg:
                 raise InputError(
-                    f"{table.path}: line {line}: {joint.name} at {angle:g} degrees is outside of its range {low:g} to "
-                    f"{high:g}",
+                    f"{place}: {joint.name} at {angle:g} degrees is outside of its range {low:g} to {high:g}",
                     "correct the table, or range_deg in the arm file",
                 )
 
@@ -258,7 +293,7 @@ def _times(table: NumberTable, header: Header) -> Array | None:
     return times
 
 
-def unwrapped(
+def _unwound(
     angles_deg: Array, times_s: Array, arm: Arm, where: Sequence[str]
 ) -> tuple[Array, tuple[str, ...]]:
     """A recording (n, J) with its jumps of a turn taken out, and a note for each joint that had some.

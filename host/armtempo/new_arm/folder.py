@@ -63,6 +63,7 @@ _PAGE = """\
     armtempo plan sequence.toml         # a sequence: the motion, back home, again and again
     armtempo goto home
     armtempo run cycle.json
+    armtempo panel                      # all of this, and more, in a browser
 
 `armtempo.toml` names arm, job and port; the port `sim:board` is a virtual board, its flash in the folder `board`.
 """

@@ -16,7 +16,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.pose import to_rpy_deg
-from armtempo.panel import homing, teaching, words
+from armtempo.panel import arm_scene, homing, teaching, words
 from armtempo.panel.hold import SHOWN_S
 from armtempo.panel.operator import Needs
 from armtempo.panel.panel_page import PanelPage, named
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from armtempo.panel.press import Press
 
 AXES = ("x", "y", "z")
-HOLD, SMALLEST = "hold", 0.1
+HOLD = "hold"
+_THERE_DEG = 0.1
+"""An arm that is this close to a target has arrived."""
 STEPS = {HOLD: words.HOLD, 0.1: "0.1", 1.0: "1", 10.0: "10"}
 """Lengths of a jog, in mm and degrees."""
 _TOOL = "tool-"
@@ -41,11 +43,24 @@ class MoveTab:
         self._page = page
         self._operator = page.operator
         self._step: str | float = HOLD
+        self._target_deg: Array | None = None
+        """What the ghost shows."""
         self._jogs()
         self._targets()
         self._home_and_teach()
         _outputs(page)
         _inputs(page)
+        page.on_look(self._look)
+
+    def _look(self) -> None:
+        """Take the ghost away where the arm has arrived."""
+        target_deg, operator = self._target_deg, self._operator
+        if target_deg is None or operator.busy:
+            return
+        if np.abs(operator.live.angles_deg - target_deg).max() < _THERE_DEG:
+            self._target_deg = None
+            self._page.show_ghost(None)
+            self._page.scene.draw("way", np.empty((0, 3)), arm_scene.WAY)
 
     # jogs
 
@@ -170,6 +185,7 @@ class MoveTab:
 
     def _show(self, target_deg: Array) -> None:
         """The ghost at a target, and the tool's path to it."""
+        self._target_deg = target_deg
         self._page.show_ghost(target_deg)
         with suppress(ArmtempoError):
             self._page.show_way(target_deg)

@@ -323,6 +323,7 @@ class Operator:
 
     def stop(self, by: str = words.PANEL) -> None:
         """Brake along the path. Allowed for all clients."""
+        self.guiding = False
         if self._stop_s is None:
             self._stop_s = time.monotonic()
         try:

@@ -171,7 +171,8 @@ class PanelPage:
         closed: Callable[[], object] = lambda: None,
     ) -> Asked:
         """Ask, and give a command with the button ``text`` of the dialog; ``closed`` is called when it is gone."""
-        with ui.dialog() as asked, ui.card():
+        # A dialog of its own, also where one opens it; seamless, as nothing may cover stop and the picture
+        with ui.context.client, ui.dialog().props("seamless position=right") as asked, ui.card():
             if question:
                 ui.label(question)
             place = ui.column()

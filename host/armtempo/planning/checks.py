@@ -73,7 +73,7 @@ def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
     if rate > MAX_STEP_RATE:
         raise InputError(
             f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
-            f"steps/s, the board does {MAX_STEP_RATE} at most {ESTIMATED}",
+            f"steps/s; the board supports at most {MAX_STEP_RATE} {ESTIMATED}",
             "check the unit, lower the limit, or use fewer microsteps",
         )
 
@@ -306,9 +306,7 @@ def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
 
 def rate_words(rates: float) -> str:
     """Text: a sum of step rates compared with the board's."""
-    return (
-        f"the joints together need up to {rates:.0f} steps/s, the board does {MAX_STEP_RATE_SUM} {ESTIMATED}"
-    )
+    return f"the joints together need up to {rates:.0f} steps/s; the board supports {MAX_STEP_RATE_SUM} {ESTIMATED}"
 
 
 def check_time(trajectory: Trajectory) -> None:

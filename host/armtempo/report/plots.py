@@ -154,12 +154,15 @@ def overlay(runs: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
     return figure
 
 
-def convergence(histories: Mapping[str, Array]) -> Figure:
-    """Best value after each iteration of the search (Fig. 6)."""
+def convergence(histories: Mapping[str, Array], polished_s: Mapping[str, float] | None = None) -> Figure:
+    """Best value after each iteration of the search (Fig. 6), and where the gradient solver ended after it."""
     figure, axes = new_figure(1, 1, 4.8, 2.6)
     axis = axes[0][0]
     for index, (name, history) in enumerate(histories.items()):
-        axis.plot(history, color=COLOURS[index % len(COLOURS)], label=_shown(name))
+        colour = COLOURS[index % len(COLOURS)]
+        axis.plot(history, color=colour, label=_shown(name))
+        if polished_s and name in polished_s:
+            axis.plot(len(history), polished_s[name], "o", color=colour)
     axis.set_xlabel("iteration")
     axis.set_ylabel("best fitness (s)")
     axis.legend(frameon=False)
@@ -182,9 +185,11 @@ def _mark_limits(axis: Axes, limits: Limits, order: int) -> None:
 
 
 def _label(axes: Any, labels: Sequence[str]) -> None:
+    """The labels beside the rows; small numbers get a common power of ten, as they would be longer than the margin."""
     for row, label in zip(axes, labels, strict=False):
         for axis in row:
             axis.set_ylabel(label)
+            axis.ticklabel_format(axis="y", scilimits=(-2, 6))
             theme(axis)
 
 

@@ -59,10 +59,12 @@ def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
         ),
     }
     if found.plan and found.plan.searches:
-        histories = {_serves(names, search.joints): search.history_s for search in found.plan.searches}
+        searches = {_serves(names, search.joints): search for search in found.plan.searches}
+        polished_s = {name: search.total_s for name, search in searches.items() if search.optimum_s}
+        end = "; where the gradient solver ended after it (dot)" if polished_s else ""
         drawn["convergence"] = (
-            plots.convergence(histories),
-            "Best fitness after each iteration of the search.",
+            plots.convergence({name: search.history_s for name, search in searches.items()}, polished_s),
+            f"Best fitness after each iteration of the search{end}.",
         )
     return drawn if found.arm is None else drawn | _of_arm(found.arm, trajectory)
 

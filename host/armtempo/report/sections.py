@@ -163,7 +163,10 @@ def plan_origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, o
         ("optimiser", f"{job.optimiser}, population {job.population}, {job.iterations} iterations"),
         ("seed", job.seed),
         ("degree, timing, refine", f"{job.degree}, {job.timing}, {job.refine}"),
-        *((f"version of {name}", value) for name, value in plan.versions.items()),
+        *(
+            (name if name == "machine" else f"version of {name}", value)
+            for name, value in plan.versions.items()
+        ),
         *others,
     ]
     sheet.table(("what", "value"), [(name, str(value)) for name, value in rows])

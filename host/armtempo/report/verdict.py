@@ -18,7 +18,7 @@ STEPS_OFF = 1
 """Allowed difference of step pulses at the end: an angle halfway between two steps rounds either way."""
 ROUNDED = 1e-3
 """Fraction above a limit that may be rounding of the record."""
-_SUMMARIES = {GOOD: "OK", BAD: "Not OK", OPEN: "OK as far as it was measured"}
+_SUMMARIES = {GOOD: "OK", BAD: "Not OK", OPEN: "OK in what was measured"}
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,164 @@
+"""Trajectories of ROS programs: trajectory_msgs/JointTrajectory as JSON, or as YAML with PyYAML (extra ``ros``)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError, MissingPackageError
+from armtempo.model import table_header
+from armtempo.model.arm import Arm
+
+_KEYS = ("joint_names", "points")
+_INSIDE = ("trajectory", "joint_trajectory", "goal", "msg", "message")
+"""Keys under which other messages have a trajectory: DisplayTrajectory, FollowJointTrajectory's goal."""
+_STEP_S = 0.01
+"""Largest step of the points of a trajectory with speeds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A motion with its times."""
+
+    times_s: Array
+    """(n,), increasing."""
+    angles_deg: Array
+    """(n, J), of the driven joints."""
+    notes: tuple[str, ...] = ()
+
+
+def is_ros(text: str) -> bool:
+    """Whether a text is a message, and no table."""
+    begin = text.lstrip("\ufeff \r\n-")
+    return begin.startswith(("{", "header:", "joint_names:", *(f"{key}:" for key in _INSIDE)))
+
+
+def of_text(text: str, path: Path | str, arm: Arm) -> Recorded:
+    """The JointTrajectory in a text, also within another message, for the driven joints of an arm.
+
+    Joints are found by their names as in tables; others are named in the notes. Between points with speeds the motion
+    is the cubic that controllers follow, given in steps of 10 ms. Raises InputError, with the point, for what is
+    missing or not a number, and MissingPackageError for YAML without PyYAML.
+    """
+    content = _content(text, path)
+    names, points = (content.get(key) for key in _KEYS)
+    if not isinstance(names, list) or not isinstance(points, list) or len(points) < 2:
+        raise InputError(
+            f"{path}: is not a JointTrajectory with at least 2 points", "it has joint_names and points"
+        )
+    header = table_header.read([str(name) for name in names], arm, f"{path}: joint_names")
+    if header.pose or header.time is not None:
+        raise InputError(f"{path}: joint_names are not joints", f"name {table_header.expected(arm)}")
+    columns = [column.index for column in header.angles]
+    times = np.array([_time_s(_entry(point, n, path), n, path) for n, point in enumerate(points)])
+    if np.any(np.diff(times) <= 0.0):
+        late = int(np.flatnonzero(np.diff(times) <= 0.0)[0]) + 1
+        raise InputError(
+            f"{path}: point {late}: time_from_start does not increase", "put the points in order"
+        )
+    angles = np.degrees([_numbers(point, "positions", len(names), n, path) for n, point in enumerate(points)])
+    for index, column in header.resting.items():
+        joint = arm.joints[index]
+        if np.abs(angles[:, column.index] - joint.home_deg).max() > table_header.RESTS_DEG:
+            raise InputError(
+                f"{path}: {joint.name} has no motor, it stays at {joint.home_deg:g} degrees",
+                "leave it out, or give it a motor in the arm file",
+            )
+    notes = (f"joints that were not used: {', '.join(header.unused)}",) if header.unused else ()
+    if all(point.get("velocities") for point in points):
+        speeds = np.degrees(
+            [_numbers(point, "velocities", len(names), n, path) for n, point in enumerate(points)]
+        )
+        times, angles = _between(times, angles[:, columns], speeds[:, columns])
+        return Recorded(times, angles, notes)
+    return Recorded(times, angles[:, columns], notes)
+
+
+def _content(text: str, path: Path | str) -> Mapping[str, Any]:
+    try:
+        found = json.loads(text) if text.lstrip().startswith("{") else _yaml(text)
+    except ValueError as error:
+        raise InputError(f"{path}: is neither JSON nor YAML: {error}", "give a whole message") from None
+    return _trajectory(found, path)
+
+
+def _yaml(text: str) -> Any:
+    try:
+        import yaml  # type: ignore[import-untyped]
+    except ImportError:
+        raise MissingPackageError("reading YAML", "PyYAML", "ros") from None
+    try:
+        return next((each for each in yaml.safe_load_all(text) if each is not None), None)
+    except yaml.YAMLError as error:
+        raise ValueError(str(error).replace("\n", " ")) from None
+
+
+def _trajectory(found: Any, path: Path | str) -> Mapping[str, Any]:
+    for _ in range(4):
+        if isinstance(found, list) and len(found) == 1:
+            found = found[0]
+        if not isinstance(found, Mapping):
+            break
+        if all(key in found for key in _KEYS):
+            return found
+        found = next((found[key] for key in _INSIDE if key in found), None)
+    raise InputError(f"{path}: has no JointTrajectory", "it has joint_names and points")
+
+
+def _entry(point: Any, number: int, path: Path | str) -> Mapping[str, Any]:
+    if not isinstance(point, Mapping):
+        raise InputError(f"{path}: point {number} is no point", "give positions and time_from_start")
+    return point
+
+
+def _time_s(point: Mapping[str, Any], number: int, path: Path | str) -> float:
+    given = point.get("time_from_start")
+    if isinstance(given, Mapping):
+        seconds, nanoseconds = (
+            given.get(one, given.get(other, 0)) for one, other in (("sec", "secs"), ("nanosec", "nsecs"))
+        )
+        if _is_number(seconds) and _is_number(nanoseconds):
+            return float(seconds) + 1e-9 * float(nanoseconds)
+    elif given is not None and _is_number(given):
+        return float(given)
+    raise InputError(
+        f"{path}: point {number}: time_from_start {given!r} is no time", "give {sec: …, nanosec: …}"
+    )
+
+
+def _numbers(point: Mapping[str, Any], key: str, count: int, number: int, path: Path | str) -> list[float]:
+    given = point.get(key)
+    if not isinstance(given, Sequence) or len(given) != count or not all(map(_is_number, given)):
+        raise InputError(
+            f"{path}: point {number}: {key} must be {count} numbers, one for each of joint_names",
+            "correct the point",
+        )
+    return [float(value) for value in given]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _between(times: Array, angles: Array, speeds: Array) -> tuple[Array, Array]:
+    """Times and angles with points between, on the cubics of positions and speeds."""
+    found_s, found = [times[:1]], [angles[:1]]
+    for n, step in enumerate(np.diff(times)):
+        u = np.linspace(0.0, 1.0, max(int(np.ceil(step / _STEP_S)), 1) + 1)[1:, None]
+        cubic = (
+            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * angles[n]
+            + u * (1.0 - u) ** 2 * step * speeds[n]
+            + u**2 * (3.0 - 2.0 * u) * angles[n + 1]
+            - u**2 * (1.0 - u) * step * speeds[n + 1]
+        )
+        found_s.append(times[n] + step * u[:, 0])
+        found.append(cubic)
+    found_s[-1][-1] = times[-1]
+    return np.concatenate(found_s), np.concatenate(found)

@@ -1,0 +1,167 @@
+"""Trajectories of other programs: JointTrajectory messages and timed tables, planned anew or on their own times."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from armtempo.basics.errors import InputError, PlanError
+from armtempo.cli import main
+from armtempo.model import joint_trajectory, shipped, via_table
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.plan import Plan
+from armtempo.planning import point_to_point, recorded
+from click.testing import CliRunner
+
+from tests.host.made_runs import shipped_plan
+from tests.host.problems import faults
+
+ARM = Arm.paper()
+MOVE = point_to_point.straight("move", (0, -60, 40), (60, -90, 10), ARM)
+TIMES = np.linspace(0.0, MOVE.duration_s, 80)
+
+
+def message(
+    times: np.ndarray,
+    angles: np.ndarray,
+    names: tuple[str, ...] = ("joint 1", "joint 2", "joint 3"),
+    **more: Any,
+) -> dict[str, Any]:
+    """A JointTrajectory."""
+    points = [
+        {
+            "positions": np.radians(row).tolist(),
+            "time_from_start": {"sec": int(t), "nanosec": round(1e9 * (t % 1.0))},
+        }
+        for t, row in zip(times, angles, strict=True)
+    ]
+    return {"joint_names": list(names), "points": points, **more}
+
+
+def test_the_message_of_the_export_comes_back() -> None:
+    pytest.importorskip("yaml")
+    plan = shipped_plan()
+    found = joint_trajectory.of_text(plan.to_ros(20.0), "feed.yaml", ARM)
+    np.testing.assert_allclose(found.angles_deg, plan.trajectory(found.times_s), atol=1e-3)
+    assert found.times_s[-1] == pytest.approx(plan.total_s, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "inside", [(), ("trajectory",), ("goal", "trajectory"), ("trajectory", "joint_trajectory")]
+)
+def test_joints_are_found_by_name_in_any_message(inside: tuple[str, ...]) -> None:
+    angles = MOVE(TIMES)
+    content: Any = message(
+        TIMES,
+        np.column_stack([angles[:, 2], 0.0 * TIMES, angles[:, :2]]),
+        ("J3", "gripper", "joint_1", "Joint2"),
+    )
+    for key in reversed(inside):
+        content = {"header": {}, key: content}
+    found = joint_trajectory.of_text(json.dumps(content), "m.json", ARM)
+    np.testing.assert_allclose(found.angles_deg, angles, atol=1e-9)
+    assert found.notes == ("joints that were not used: gripper",)
+
+
+def test_points_with_speeds_are_joined_as_controllers_do() -> None:
+    few = np.linspace(0.0, MOVE.duration_s, 6)
+    content = message(few, MOVE(few))
+    for point, speeds in zip(content["points"], np.radians(MOVE(few, 1)).tolist(), strict=True):
+        point["velocities"] = speeds
+    found = joint_trajectory.of_text(json.dumps(content), "m.json", ARM)
+    assert len(found.times_s) > 100
+    assert np.abs(found.angles_deg - MOVE(found.times_s)).max() < 0.5
+
+
+def spoiled(change: dict[str, Any], point: dict[str, Any] | None = None) -> str:
+    content = message(TIMES[:3], MOVE(TIMES[:3])) | change
+    content["points"][1].update(point or {})
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "is neither JSON nor YAML"),
+        ("{}", "has no JointTrajectory"),
+        (spoiled({}, {"positions": [0.0, 0.0]}), "point 1: positions must be 3 numbers"),
+        (spoiled({}, {"positions": [0.0, 0.0, "x"]}), "point 1: positions must be 3 numbers"),
+        (spoiled({}, {"positions": [0.0, 0.0, float("nan")]}), "point 1: positions must be 3 numbers"),
+        (spoiled({}, {"time_from_start": None}), "point 1: time_from_start None is no time"),
+        (spoiled({}, {"time_from_start": 0.0}), "point 1: time_from_start does not increase"),
+        (spoiled({"joint_names": ["a", "b", "c"]}), "joint_names: the header does not name"),
+        (spoiled({"joint_names": ["joint 1", "j1", "joint 3"]}), "both name joint 1"),
+    ],
+)
+def test_messages_that_will_not_do_say_where(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        joint_trajectory.of_text(text, "m.json", ARM)
+
+
+def test_a_recording_keeps_its_times_and_its_pause() -> None:
+    pause_s = 0.8
+    times = np.arange(0.0, 2.0 * MOVE.duration_s + pause_s, 0.02)
+    there, back = MOVE(times), MOVE(2.0 * MOVE.duration_s + pause_s - times)
+    angles = np.where(times[:, None] < MOVE.duration_s + 0.5 * pause_s, there, back)
+    slow = times * 1.2
+    plan = recorded.plan(ARM, "replay", slow, angles)
+    assert faults(plan) == []
+    assert plan.total_s == pytest.approx(slow[-1])
+    assert not any("slowed" in note for note in plan.notes)
+    assert np.abs(plan.trajectory(slow) - angles).max() <= 0.1
+    assert np.abs(plan.trajectory(1.2 * (MOVE.duration_s + 0.5 * pause_s), 1)).max() < 0.5
+
+
+def test_a_recording_beyond_the_limits_is_slowed_and_says_so(tmp_path: Path) -> None:
+    plan = recorded.plan(ARM, "fast", 0.5 * TIMES, MOVE(TIMES))
+    assert faults(plan) == []
+    (note,) = (note for note in plan.notes if "slowed" in note)
+    assert "slowed to 50" in note or "slowed to 49" in note
+    assert plan.total_s == pytest.approx(MOVE.duration_s, rel=0.03)
+    plan.save(tmp_path / "fast.json")
+    assert Plan.load(tmp_path / "fast.json").notes == plan.notes
+
+
+def test_a_recording_at_the_end_of_a_range_stays_in_it() -> None:
+    first = replace(ARM.joints[0], range_deg=(0.0, 60.0))
+    plan = recorded.plan(replace(ARM, joints=(first, *ARM.joints[1:])), "end", TIMES, MOVE(TIMES))
+    moved = plan.trajectory(np.linspace(0.0, plan.total_s, 3000))[:, 0]
+    assert moved.min() >= -1e-9
+    assert moved.max() <= 60.0 + 1e-9
+
+
+def test_a_recording_that_begins_in_motion_is_slowed_far_down_or_refused() -> None:
+    """Within the tolerance nothing that the limits allow starts so suddenly."""
+    line = np.linspace((0, -60, 40), (60, -90, 10), 40)
+    (note,) = (note for note in recorded.plan(ARM, "moving", TIMES[:40], line).notes if "slowed" in note)
+    assert float(note.split()[2]) < 40.0
+    with pytest.raises(PlanError, match="from rest to rest"):
+        recorded.plan(ARM, "moving", 50.0 * TIMES[:40], line, tolerance_deg=1e-4)
+
+
+def test_the_commands_take_recordings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("move.json").write_text(json.dumps(message(TIMES, MOVE(TIMES))))
+    run = CliRunner(env={"ARMTEMPO_ARM": str(shipped.arm_path())}).invoke
+    made = run(main, ["import", "move.json"])
+    assert made.exit_code == 0, made.output
+    assert Job.load("move.toml", ARM).timing == "shared"
+    kept = run(main, ["import", "move.json", "--own-timing", "-o", "replay.json"])
+    assert kept.exit_code == 0, kept.output
+    assert "follows the recording on its own times" in kept.output
+    assert Plan.load("replay.json").total_s == pytest.approx(MOVE.duration_s, rel=0.02)
+    there = run(main, ["fk", "move.json"])
+    assert there.exit_code == 0, there.output
+    assert "at 0.0000 -60.0000 40.0000" in there.output
+
+
+def test_a_table_without_times_has_no_timing(tmp_path: Path) -> None:
+    table = tmp_path / "via.csv"
+    table.write_text("j1,j2,j3\n0,-60,40\n20,-75,50\n")
+    with pytest.raises(InputError, match="has no times of a motion"):
+        via_table.recorded(table, ARM)
