@@ -148,8 +148,8 @@ TIMES_S at the limits of a jog, by ruckig's velocity interface (``python -m test
 
 
 def held(arm: Arm, joint: int, speed: float) -> Array:
-    """Way of a held jog after TIMES_S, degrees."""
-    found = move_law.law(400.0, move_law.of_joints([arm.driven[joint].limits], [1.0], speed))
+    """Way of a held jog after TIMES_S, degrees, far from its end."""
+    found = move_law.law(3000.0, move_law.of_joints([arm.driven[joint].limits], [1.0], speed))
     return JointSpline(move_law.DEGREE, 1, found.way, found.time_s)(np.array(TIMES_S))
 
 
@@ -164,11 +164,10 @@ def test_a_held_jog_comes_close_to_the_optimum(name: str) -> None:
 
 @pytest.mark.parametrize("name", OPTIMUM_DEG)
 def test_a_held_jog_goes_never_less_far_at_a_higher_speed(name: str) -> None:
-    """To a hundredth of a step: the number of equal steps of a short law is a whole one."""
     arm = Arm.load(name)
     for joint in range(len(arm.driven)):
         ways = np.array([held(arm, joint, percent / 100) for percent in range(1, 101)])
-        assert np.diff(ways, axis=0).min() >= -0.01 / arm.driven[joint].steps_per_deg
+        assert np.diff(ways, axis=0).min() >= -1e-9
 
 
 @pytest.mark.slow

@@ -280,6 +280,7 @@ class Jog:
 
     def __init__(self) -> None:
         self.held = 0
+        self.ends = ""
         self.angles_deg = ARM.home_deg
         self.ended = threading.Event()
 
@@ -427,6 +428,8 @@ def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
         time.sleep(0.01)
     wait(jog.ended.is_set)
     assert how not in ("silent", "late") or time.monotonic() - begin_s > HELD_S / 4
+    wait(lambda: not operator.busy)
+    assert any(words.BROWSER_SILENT in line for line in operator.log.last) == (how in ("silent", "late"))
 
 
 def test_a_release_that_overtakes_its_press_ends_it(operator: Operator) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import select
 import subprocess
 import sys
@@ -106,6 +107,34 @@ def test_the_same_from_python() -> None:
             board.client.stop()
             while held.hold():
                 pass
+
+
+def test_the_shortest_press_moves_a_step_and_what_ends_by_itself_says_why() -> None:
+    with homed() as port, armtempo.connect(port, PAPER) as board:
+        board.configure(PAPER)
+        before = board.posture_deg()
+        with board.held_jog(joint=1, speed=0.01) as held:
+            pass
+        step_deg = 1 / PAPER.driven[0].steps_per_deg
+        assert 0.9 * step_deg < board.posture_deg()[0] - before[0] < 0.5
+        assert not held.ends
+        with board.held_jog(joint=1, speed=0.05) as held:
+            held.hold(0.2)
+            time.sleep(0.8)  # a slow host
+            while held.hold():
+                pass
+        assert re.match(r"this program was busy for \d\.\d s", held.ends)
+        board.jog(joint=1, by_deg=PAPER.driven[0].range_deg[1] - board.posture_deg()[0] - 0.5)
+        with board.held_jog(joint=1) as held:
+            while held.hold():
+                pass
+        assert "joint 1 is at the end of its range" in held.ends
+        with board.held_jog(joint=1, direction=-1) as held:
+            held.hold(0.2)
+            board.client.stop()
+            while held.hold():
+                pass
+        assert "stopped, or no hold reached the board" in held.ends
 
 
 def test_by_hand_the_position_comes_from_the_encoders() -> None:

@@ -158,7 +158,7 @@ def samples_in(folder: Path) -> int:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
-    with launch(LaunchOptions(virtual_time=False)) as board:
+    with launch(LaunchOptions(virtual_time=False, instant_flash=True)) as board:
         armtempo("home", "--arm", "paper", "--port", board.port, folder=tmp_path)
         process = start("run", file, "--port", board.port, folder=tmp_path)
         commandline.wait_for(lambda: samples_in(tmp_path / "runs") > 3, "the first samples")
@@ -180,7 +180,7 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
 
 def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
-    with launch(LaunchOptions(virtual_time=False)) as board:
+    with launch(LaunchOptions(virtual_time=False, instant_flash=True)) as board:
         armtempo("home", "--arm", "paper", "--port", board.port, folder=tmp_path)
         process = start("run", file, "--port", board.port, folder=tmp_path)
         commandline.wait_for(lambda: samples_in(tmp_path / "runs") > 3, "the first samples")
@@ -199,7 +199,8 @@ def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: P
 def board_at_home(*faults: InjectedFault) -> Iterator[simulator.VirtualBoard]:
     """A virtual board in real time whose arm is at home."""
     arm = Arm.paper()
-    with simulator.launch(simulator.LaunchOptions(arm=arm, virtual_time=False, faults=faults)) as process:
+    options = simulator.LaunchOptions(arm=arm, virtual_time=False, instant_flash=True, faults=faults)
+    with simulator.launch(options) as process:
         with open_board(process.port) as board:
             arm_state.configure(board, arm, replace=True)
             arm_state.home(board, arm)

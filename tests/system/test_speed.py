@@ -94,7 +94,7 @@ def test_changes_and_a_pause_while_it_runs(plan: armtempo.Plan, tmp_path: Path) 
 def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) -> None:
     file = tmp_path / "small.json"
     plan.save(file)
-    with launch(LaunchOptions(tmp_path / "flash", virtual_time=False)) as board:
+    with launch(LaunchOptions(tmp_path / "flash", virtual_time=False, instant_flash=True)) as board:
 
         def on_board(*arguments: str | Path, code: int = 0) -> str:
             return commandline.armtempo(*arguments, "--port", board.port, folder=tmp_path, code=code)

@@ -119,7 +119,7 @@ def moving(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A program that runs a long motion on a virtual board in real time, and the port."""
     plan = planner.plan(Arm.paper(), Job("long", (START, (170.0, -10.0, -50.0)), population=5, iterations=5))
     plan.save(folder / "long.json")
-    with launch(LaunchOptions(folder / "flash", virtual_time=False)) as board:
+    with launch(LaunchOptions(folder / "flash", virtual_time=False, instant_flash=True)) as board:
         commandline.ended(start("home", "--arm", "paper", "--port", board.port, folder=folder))
         owner = start("run", "long.json", "--speed", "10", "--port", board.port, folder=folder)
         try:

@@ -203,8 +203,7 @@ class JogScreen:
                 if now_s - shown_s > _IDLE_S:
                     shown_s = now_s
                     self._show(held.angles_deg.tolist())
-            ended = not held.moving
-        self._said = held.motion.ends if ended else ""
+        self._said = held.ends
         self._keys.flush()
 
     def _repeats(self, key: str, within_s: float) -> bool:

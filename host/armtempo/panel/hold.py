@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from armtempo.panel import words
 from armtempo.panel.operator import Needs, Operator
 from armtempo.panel.press import Press
 from armtempo.robot.jog import HeldJog
@@ -51,6 +52,11 @@ class ButtonHold:
             with planned as jog:
                 while self.held(client, number) and jog.hold(_STEP_S):
                     self._operator.live.angles_deg = jog.angles_deg
+                silent = self._is(client, number) and self._presses.clock() - self._said_s >= ALIVE_S
+            if why := jog.ends or (
+                words.BROWSER_SILENT if silent and client == self._operator.holder else ""
+            ):
+                self._operator.say(words.ENDED.format(why=why))
 
     def alive(self, client: str, press: Press) -> None:
         """The browser reports that the button of its press ``press.number`` was held at that time."""

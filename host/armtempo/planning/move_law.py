@@ -39,7 +39,7 @@ _AT_START = np.array([1.0, 11.0, 11.0, 1.0]) / 24.0
 _FIRST = -1.5
 """Time of the first control point of the speed, in h."""
 _FIRST_TIMES = np.abs(np.arange(4) + _FIRST)
-_LEAST_CRUISE = 12
+_LEAST_CRUISE = 9
 """In h; with a shorter one all intervals are equal."""
 _GROWTH = 3.0
 """Largest ratio of neighbouring intervals."""

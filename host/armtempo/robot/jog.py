@@ -31,6 +31,9 @@ HOLD_S = 0.08
 BEFORE_BRAKING_S = 0.15
 """From a stop command until the board brakes: it finishes the steps in its rings, and one more step at low speed."""
 _ANSWER_S = 1.0
+_AT_END_STEPS = 1.5
+_FIRST_STEP_S, _LOOK_S = 1.0, 0.01
+"""Longest time until the first step of a press, and between two looks at the position."""
 _FIRST = 2  # holds sent at the start: a virtual board keeps to real time from then on
 
 
@@ -75,9 +78,13 @@ class HeldJog:
         """Whether it still moves, by the last message of the board."""
         self.fault: Fault | None = None
         """The fault that ended it, if any."""
+        self.ends = ""
+        """Why it ended by itself, known after the context; "" if it did not."""
         self._client = client
+        self._steps_per_deg = np.array([joint.steps_per_deg for joint in arm.driven])
         self._run = 0
         self._said_s = 0.0
+        self._silent_s = 0.0  # the longest time between two holds
         self._positions: Positions | None = None
         self._ends = ExitStack()
 
@@ -92,6 +99,7 @@ class HeldJog:
             ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
             self._run = client.start(key.name, key.crc, START_HELD).run
             self.moving = True
+            self._said_s = client.session.clock()
             for _ in range(_FIRST):
                 self._say_so()
             self._ends = ends.pop_all()
@@ -107,8 +115,7 @@ class HeldJog:
         """Commanded joint angles by the last message of the board, degrees (J,)."""
         if self._positions is None:
             return self.motion.trajectory(0.0)
-        scale = np.array([joint.steps_per_deg for joint in self.arm.driven])
-        return np.asarray(np.array(self._positions.commanded_steps, dtype=float) / scale)
+        return np.asarray(np.array(self._positions.commanded_steps, dtype=float) / self._steps_per_deg)
 
     def hold(self, seconds: float = 0.05) -> bool:
         """Hold the jog for ``seconds`` and read the board's messages; returns False once it has ended.
@@ -128,7 +135,8 @@ class HeldJog:
         return self.moving
 
     def _say_so(self) -> None:
-        self._said_s = self._client.session.clock()
+        now_s = self._client.session.clock()
+        self._silent_s, self._said_s = max(self._silent_s, now_s - self._said_s), now_s
         try:
             self._client.hold(_ANSWER_S)
         except BoardError as error:
@@ -144,12 +152,26 @@ class HeldJog:
             self.fault = event
         self.moving = self.moving and isinstance(event, Sample)
 
+    def _why_ended(self) -> str:
+        """Why it has ended by itself."""
+        if self.fault is not None:
+            return "a fault"
+        if np.all(np.abs(self.angles_deg - self.motion.end_deg) * self._steps_per_deg < _AT_END_STEPS):
+            return self.motion.ends
+        if self._silent_s > HOLD_TIMEOUT_MS / 1000.0:
+            return f"this program was busy for {self._silent_s:.1f} s and did not hold it"
+        return f"stopped, or no hold reached the board for {HOLD_TIMEOUT_MS / 1000:g} s: look at the cable"
+
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Brake and wait for rest; raises BoardError if a fault ended the jog."""
         try:
+            ended = not self.moving
+            if value is None:
+                self._make_a_step()
             self._rest()
+            self.ends = self._why_ended() if ended else ""
         except LinkError:
             if value is None:  # do not hide the first error
                 raise
@@ -158,6 +180,17 @@ class HeldJog:
             self._ends.close()
         if self.fault is not None and value is None:
             raise refusal("a fault ended the jog", self.fault.code, self.fault.joint)
+
+    def _make_a_step(self) -> None:
+        """Go on until a joint has moved by a step: the shortest press moves something."""
+        session = self._client.session
+        start = np.rint(self.motion.trajectory(0.0) * self._steps_per_deg)
+        limit_s = session.clock() + _FIRST_STEP_S
+        while self.moving and session.clock() < limit_s:
+            status = self._client.status()
+            if not status.moving or np.any(np.array(status.positions.commanded_steps) != start):
+                return
+            self.hold(_LOOK_S)
 
     def _rest(self) -> None:
         client = self._client
