@@ -16,7 +16,9 @@ import pytest
 from armtempo.records import encoded_motion
 
 ARM = armtempo.Arm.paper()
-JOB = armtempo.Job("small", via_deg=[(0, -60, 40), (5, -58, 41)], population=4, iterations=1, refine=1)
+JOB = armtempo.Job(
+    "small", via_deg=[(0, -60, 40), (5, -58, 41)], population=4, iterations=1, refine=1, path="through"
+)
 NOWHERE = "/no/such/port"
 WRONG = (
     *(object(), b"x", 1 + 2j, {1}, lambda *_: 0),
