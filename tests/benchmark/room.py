@@ -25,18 +25,21 @@ from armtempo.deploy.firmware import frozen
 from armtempo.deploy.program_files import STM32F4
 from armtempo_shared import armrecord, engine_memory, wire
 from armtempo_shared.limits import MAX_MOTION_BYTES
+from armtempo_shared.messages import MAX_COMMAND, ONCE_NAME
 
+from tests import interpreters
 from tests.benchmark import firmware
 from tests.board import motions
 from tests.board.scripts.rigs.arm_rows import HEAD, row
 
 ARMS = tuple((joints, rate) for joints in (1, 3, 6) for rate in (5_000, 25_000, 80_000))
 ARMS += ((1, 240_000), (2, 120_000), (3, 60_000), (6, 40_000))
+FLASH_CACHE = interpreters.VIRTUAL / "hardware" / "chip" / "flash_cache.py"
 LIMIT_S = 300.0
 _STAGE = 0x8000
 _BLOCK = 512
 _MOST_ARMS = 10  # whose frames the emulated flash has room for; more come from sending them again
-_PIECE = 200
+_PIECE = MAX_COMMAND - 4
 OWN = 2_400
 """Bytes of heap for what this benchmark itself has in it, given next to the chip's: the stack does not need them."""
 _DISK_BLOCKS = firmware.FLASH_BLOCKS
@@ -92,6 +95,11 @@ class Session:
         self.stage("moving")
         self.command("stop", (1,))
         self.command("clear")
+        for at in range(0, len(motion), _PIECE):
+            self.command("put_once", (at, len(motion)), motion[at : at + _PIECE])
+        self.command("start", (0, wire.record_crc(motion)), ONCE_NAME.encode())
+        self.stage("once")
+        self.command("stop", (1,))
 
 
 def arm_record(rates: list[int]) -> bytes:
@@ -118,6 +126,13 @@ class Outcome:
     said: str
 
     @property
+    def erasures(self) -> dict[str, str]:
+        """The sectors erased before each stage, since the one before."""
+        parts = re.findall(r"((?:.*\n)*?)@ (\w+)\r?\nstack", self.said)
+        found = {stage: "".join(re.findall(r"@ erased (\d)", said)) for said, stage in parts}
+        return {stage: sectors for stage, sectors in found.items() if sectors}
+
+    @property
     def refusals(self) -> list[tuple[int, str, int]]:
         """(number of the command, code, value) of what was refused."""
         return [
@@ -129,7 +144,7 @@ class Outcome:
 
 def build(micropython: Path, folder: Path, manifest: Path | None) -> Path:
     """Build a firmware that has what measures in it, so that its names and code take none of the heap."""
-    scripts = {"probe.py": "firmware_heap.py", "host_disk.py": "host_disk.py"}
+    scripts = {"probe.py": "firmware_heap.py", "host_disk.py": "host_disk.py", "flash_cache.py": FLASH_CACHE}
     files = {name: (firmware.SCRIPTS / script).read_text() for name, script in scripts.items()}
     files["manifest.py"] = USUAL + "".join(f'module("{name}")\n' for name in scripts)
     return firmware.build(micropython, folder, manifest, files=files)
@@ -204,7 +219,7 @@ def table(elf: Path, with_library: bool) -> None:
         print(f"{joints} x {rate:>6}: needs {engine_memory.needed_bytes([rate] * joints):>5}")
         for outcome in drive(elf, with_library, session, again):
             cells = "  ".join(f"{name} {used} / {free}" for name, used, free in outcome.stages)
-            print(f"    {cells}; {outcome.refusals}", flush=True)
+            print(f"    {cells}; {outcome.refusals}; sectors erased {outcome.erasures}", flush=True)
 
 
 def blocks(with_library: bool) -> None:

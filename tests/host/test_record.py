@@ -189,6 +189,17 @@ def test_a_file_has_its_content_before_its_name(tmp_path: Path, monkeypatch: pyt
     assert done[2:] in ([], ["sync folder"])
 
 
+def test_a_disk_that_cannot_sync_is_written_to_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cannot(number: int) -> None:
+        raise OSError(errno.EINVAL, "Invalid argument")
+
+    monkeypatch.setattr(os, "fsync", cannot)
+    replace_text(tmp_path / "arm.toml", "four")
+    assert (tmp_path / "arm.toml").read_text() == "four"
+
+
 BAD_VALUES = (
     None,
     "",

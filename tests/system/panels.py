@@ -202,6 +202,7 @@ def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "
         options = LaunchOptions(
             folder / "flash",
             virtual_time=False,
+            instant_flash=True,
             interpreter=interpreters.starter("cpython"),  # takes the sources
             arm=moved,
             flash_blocks=SOURCES_BLOCKS,
@@ -260,7 +261,8 @@ def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> st
 
 def answer(page: Any, button: str) -> str:
     """Press a button of the dialog, and wait until that is gone; why it was refused, which leaves it open."""
-    dialog = page.get_by_role("dialog")
+    wanted = page.get_by_role("button", name=button, exact=True)
+    dialog = page.get_by_role("dialog").filter(has=wanted)  # another one may open in its place
     refusal = press(page, dialog.get_by_role("button", name=button, exact=True))
     if refusal:
         dialog.get_by_role("button", name="Cancel").click()

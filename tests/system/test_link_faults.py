@@ -64,7 +64,7 @@ def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
 
 def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
     with (
-        launch(LaunchOptions(virtual_time=False)) as board,
+        launch(LaunchOptions(virtual_time=False, instant_flash=True)) as board,
         Relay(board.port, tmp_path / "port", clean, clean) as relay,
     ):
         process = begun(relay.port, tmp_path, lines=8)
@@ -81,7 +81,10 @@ def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
 
 
 def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
-    with launch(LaunchOptions(virtual_time=False)) as board, launch(LaunchOptions(seed=1)) as other:
+    with (
+        launch(LaunchOptions(virtual_time=False, instant_flash=True)) as board,
+        launch(LaunchOptions(seed=1)) as other,
+    ):
         armtempo("home", "--arm", "paper", "--port", other.port, folder=tmp_path)
         with Relay(board.port, tmp_path / "port", clean, clean) as relay:
             process = begun(relay.port, tmp_path, lines=5)
@@ -94,7 +97,7 @@ def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
 
 def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
     with (
-        launch(LaunchOptions(virtual_time=False)) as board,
+        launch(LaunchOptions(virtual_time=False, instant_flash=True)) as board,
         Relay(board.port, tmp_path / "port", clean, clean) as relay,
     ):
         process = begun(relay.port, tmp_path, lines=5)

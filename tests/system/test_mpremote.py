@@ -97,7 +97,9 @@ def test_files_while_the_program_runs(flash: Path) -> None:
 
 def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
     """mpremote gives up; the motion comes to its end, if it should; then mpremote is let in."""
-    with launch(LaunchOptions(flash, interpreter=INTERPRETER, virtual_time=False)) as process:
+    with launch(
+        LaunchOptions(flash, interpreter=INTERPRETER, virtual_time=False, instant_flash=True)
+    ) as process:
         with open_board(process.port) as board:
             arm_state.home(board, commandline.ARM)
             started = _start(board)

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 import tomlkit
 from armtempo.basics import toml_table
+from armtempo.basics.errors import InputError
 from armtempo.model import shipped
 from armtempo.panel import words
 
@@ -326,6 +327,7 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         control = page.get_by_role("button", name=button, exact=True)
         press(page, control, partial(control.press, "Enter"))
         said = refusal(folder, file, tomlkit.dumps(content))
+        said = words.of_job(InputError(said)) if tab == "Job" else said
         page.locator(".q-notification", has_text=said).first.wait_for()
         field.fill(before)
     assert page.evaluate("window.hurt") is None
@@ -368,7 +370,7 @@ def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel) -> None:
     press(page, page.get_by_role("button", name="Run", exact=True))
     page.wait_for_selector(".armtempo-lit:has-text('2')")
     page.keyboard.press("Escape")
-    page.wait_for_selector("text=cycle 0: stopped")
+    page.wait_for_selector("text=cycle 1: stopped")
     assert page.locator(".armtempo-lit").count() == 0
 
 

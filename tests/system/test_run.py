@@ -103,7 +103,7 @@ def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> Non
     """A joint far too heavy for its motor: it loses steps, and the encoder's watch ends the run."""
     heavy = shipped.arm_path().read_text().replace("\ninertia_kg_m2 = 0.15", "\ninertia_kg_m2 = 6.0")
     (tmp_path / "heavy.toml").write_text(heavy)
-    job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\niterations = 20\n'
+    job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\npath = "through"\niterations = 20\n'
     (tmp_path / "job.toml").write_text(job)
     armtempo("plan", "--arm", "heavy.toml", "--job", "job.toml", "-o", "throw.json", folder=tmp_path)
     output = armtempo("run", "throw.json", folder=tmp_path, code=1)
@@ -158,7 +158,7 @@ def samples_in(folder: Path) -> int:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
-    with launch(LaunchOptions(virtual_time=False)) as board:
+    with launch(LaunchOptions(virtual_time=False, instant_flash=True)) as board:
         armtempo("home", "--arm", "paper", "--port", board.port, folder=tmp_path)
         process = start("run", file, "--port", board.port, folder=tmp_path)
         commandline.wait_for(lambda: samples_in(tmp_path / "runs") > 3, "the first samples")
@@ -180,7 +180,7 @@ def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
 
 def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
-    with launch(LaunchOptions(virtual_time=False)) as board:
+    with launch(LaunchOptions(virtual_time=False, instant_flash=True)) as board:
         armtempo("home", "--arm", "paper", "--port", board.port, folder=tmp_path)
         process = start("run", file, "--port", board.port, folder=tmp_path)
         commandline.wait_for(lambda: samples_in(tmp_path / "runs") > 3, "the first samples")
@@ -199,7 +199,8 @@ def test_killed_host_leaves_a_readable_folder_and_a_board_to_talk_to(tmp_path: P
 def board_at_home(*faults: InjectedFault) -> Iterator[simulator.VirtualBoard]:
     """A virtual board in real time whose arm is at home."""
     arm = Arm.paper()
-    with simulator.launch(simulator.LaunchOptions(arm=arm, virtual_time=False, faults=faults)) as process:
+    options = simulator.LaunchOptions(arm=arm, virtual_time=False, instant_flash=True, faults=faults)
+    with simulator.launch(options) as process:
         with open_board(process.port) as board:
             arm_state.configure(board, arm, replace=True)
             arm_state.home(board, arm)

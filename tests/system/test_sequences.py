@@ -199,6 +199,22 @@ def test_every_row_and_sample_is_recorded(tmp_path: Path) -> None:
     assert "goto pick" in page
 
 
+def test_an_error_of_the_caller_stops_it(tmp_path: Path) -> None:
+    """Nobody follows it any more; a cable that is out is no such error."""
+    plan = small(tmp_path, "for ever")
+    with launch(options()) as process, armtempo.connect(process.port, ARM) as board:
+        board.home(ARM)
+        with pytest.raises(ZeroDivisionError):
+            board.run_sequence(plan, lambda state: print(1 // (state.row < 1)), out=tmp_path / "runs")
+        while (state := board.client.sequence()).ending == "running":
+            pass
+        assert state.ending == "stopped"
+        assert board.last_sequence
+        assert board.last_sequence.state == "broken"
+        board.goto(plan)
+        assert board.run_sequence(small(tmp_path, 1), replace=True).ending == "finished"
+
+
 def test_after_a_power_failure_the_folder_says_where_it_stood(tmp_path: Path) -> None:
     """The board forgets it: its flash is not written while a sequence runs."""
     plan = small(tmp_path, "for ever")

@@ -94,7 +94,7 @@ def test_changes_and_a_pause_while_it_runs(plan: armtempo.Plan, tmp_path: Path) 
 def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) -> None:
     file = tmp_path / "small.json"
     plan.save(file)
-    with launch(LaunchOptions(tmp_path / "flash", virtual_time=False)) as board:
+    with launch(LaunchOptions(tmp_path / "flash", virtual_time=False, instant_flash=True)) as board:
 
         def on_board(*arguments: str | Path, code: int = 0) -> str:
             return commandline.armtempo(*arguments, "--port", board.port, folder=tmp_path, code=code)
@@ -130,7 +130,11 @@ def test_changes_keep_the_brake_times_limits() -> None:
     for _ in range(2):
         ends = [np.array([30.0, -70.0, 20.0]) + rng.uniform(-25, 25, 3) for _ in range(2)]
         job = armtempo.Job(
-            "any", via_deg=[ends[0], (ends[0] + ends[1]) / 2 + 3, ends[1]], population=5, iterations=5
+            "any",
+            via_deg=[ends[0], (ends[0] + ends[1]) / 2 + 3, ends[1]],
+            population=5,
+            iterations=5,
+            path="through",
         )
         trajectory = armtempo.plan(arm, job).trajectory
         brakes = brake_time.of_motion(trajectory, limits)

@@ -30,15 +30,16 @@ _DEFAULT = "default.txt"
 _NEW = ".new"
 _ENOSPC = const(28)
 _ERRNO = const(0)  # of an exception's arguments
-_ST_SIZE = const(6)  # of os.stat
-_FOLDER = const(0x4000)  # in its first entry
+_ST_MODE = const(0)  # of os.stat
+_FOLDER = const(0x4000)  # a bit of it
+_ST_SIZE = const(6)
 _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
 _SEQUENCE_MAGIC = (
     b"ATS"  # of every version, as in armtempo_shared.sequence, which is loaded for sequences only
 )
-_PIECE = const(512)
+_BLOCK = const(512)
 _0, _9, _A, _Z = const(0x30), const(0x39), const(0x61), const(0x7A)  # letters, small
 _SMALL = const(0x20)
 _MOST_FREE = const(0x3FFFFFFF)
@@ -80,6 +81,8 @@ class Store:
         self._target = ""  # its file name,
         self._size = 0  # bytes announced
         self._received = 0  # and received so far
+        self._block = bytearray(0)  # with the bytes after the last whole block of the flash,
+        self._filled = 0  # as many as these
         if recover:
             self.recover()
 
@@ -114,27 +117,44 @@ class Store:
         self.abandon()
         if size > MAX_MOTION_BYTES:
             raise Refused(codes.TOO_LONG, value=MAX_MOTION_BYTES)
-        if size + _PIECE > self.free():
+        if size + _BLOCK > self.free():
             raise Refused(codes.FLASH_FULL, value=self.free())
         self._other_case(file_name)
         self._file = self._guard(open, self._path(file_name + _NEW), "wb")
         self._target = file_name
         self._size = size
         self._received = 0
+        self._block = bytearray(_BLOCK)
+        self._filled = 0
 
     def write(self, offset: int, data: bytes) -> int:
-        """Add a piece; a repeated one is ignored. Returns the offset of the next."""
+        """Add a piece; a repeated one is ignored. Returns the offset of the next.
+
+        Whole blocks are written: for each part of a block FAT would write its table too, and erase two sectors.
+        """
         if not self._file or not offset <= self._received or offset + len(data) > self._size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
         fresh = data[self._received - offset :]
         if fresh:
             try:
-                self._put(self._file, fresh)
+                self._fill(fresh)
             except Refused:
                 self.abandon()
                 raise
             self._received += len(fresh)
         return self._received
+
+    def _fill(self, data: bytes) -> None:
+        block = self._block
+        for at in range(0, len(data), _BLOCK):
+            part = data[at : at + _BLOCK]
+            taken = min(len(part), _BLOCK - self._filled)
+            block[self._filled : self._filled + taken] = part[:taken]
+            self._filled += taken
+            if self._filled == _BLOCK:
+                self._put(self._file, block)
+                self._filled = len(part) - taken
+                block[: self._filled] = part[taken:]
 
     def commit(self, crc: int) -> str:
         """Check the upload in the flash and rename it; returns the record's name.
@@ -279,6 +299,11 @@ class Store:
         return " " + hexlify(crc).decode()
 
     def _write_default(self, text: str) -> None:
+        try:
+            if self._read(_DEFAULT).decode() == text + "\n":
+                return
+        except (Refused, UnicodeError):
+            pass
         file = self._guard(open, self._path(_DEFAULT + _NEW), "wb")
         try:
             self._put(file, text.encode() + b"\n")
@@ -305,7 +330,7 @@ class Store:
     def _is_folder(self, file_name: str) -> bool:
         """Whether it is a folder, which somebody else made."""
         try:
-            return os.stat(self._path(file_name))[0] & _FOLDER != 0
+            return os.stat(self._path(file_name))[_ST_MODE] & _FOLDER != 0
         except OSError:
             return True
 
@@ -331,7 +356,7 @@ class Store:
         finally:
             file.close()
 
-    def _put(self, file: "Any", data: bytes) -> None:
+    def _put(self, file: "Any", data: "bytes | bytearray | memoryview") -> None:
         if self._guard(file.write, data) != len(data):
             raise Refused(codes.FLASH_FULL)
 
@@ -339,7 +364,11 @@ class Store:
         file = self._file
         self._file = None
         self._received = 0
-        self._guard(file.close)
+        try:
+            if self._filled:
+                self._put(file, memoryview(self._block)[: self._filled])
+        finally:
+            self._guard(file.close)
         self._guard(_sync)
 
     def _check_motion(self, file_name: str, crc: int) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
 from armtempo.basics.errors import InputError
+
+_CANNOT_SYNC = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
 
 
 def replace_text(path: Path, text: str, newline: str | None = None) -> None:
@@ -67,13 +70,22 @@ def _replace(path: Path, text: str, newline: str | None) -> None:
         with aside.open("w", encoding="utf-8", newline=newline) as file:
             file.write(text)
             file.flush()
-            os.fsync(file.fileno())  # otherwise the name may reach the disk before the content does
+            _sync(file.fileno())  # otherwise the name may reach the disk before the content does
         os.replace(aside, path)
         _sync_folder(path.parent)
     except OSError:
         if aside.is_file():
             aside.unlink()
         raise
+
+
+def _sync(file: int) -> None:
+    """Have a file's content on the disk; some file systems, as of network drives, cannot do that."""
+    try:
+        os.fsync(file)
+    except OSError as error:
+        if error.errno not in _CANNOT_SYNC:
+            raise
 
 
 def _sync_folder(folder: Path) -> None:

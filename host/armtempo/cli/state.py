@@ -58,8 +58,17 @@ def lines(state: BoardState) -> list[str]:
         f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
         f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together, {_measured(state)}",
         f"engine    {state.room}",
+        *_wear(state),
         *motion_lines(state),
     ]
+
+
+def _wear(state: BoardState) -> list[str]:
+    """A line for a virtual board whose flash was written."""
+    if not state.erasures:
+        return []
+    counts = ", ".join(f"{sector}: {count}" for sector, count in sorted(state.erasures.items()))
+    return [f"wear      erasures by sector of the flash: {counts}; a chip's is good for 10 000"]
 
 
 def _measured(state: BoardState) -> str:

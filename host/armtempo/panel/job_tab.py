@@ -100,7 +100,7 @@ class JobTab:
             box = ui.input(value=value).props("dense outlined inputmode=decimal")
             named(box, f"P{number} {joint.name}")
             if via.form == ANGLES:
-                box.on("change", partial(self._typed, self._jobs.set_angle, number, index))
+                self._on_typed(box, self._jobs.set_angle, number, index)
             else:
                 box.props("readonly")
         with ui.row().classes("no-wrap armtempo-actions"):
@@ -140,15 +140,18 @@ class JobTab:
                     continue
                 box = ui.input(label, value=text).props("dense outlined").classes("armtempo-value")
                 named(box, f"P{number}: {label}")
-                box.on("change", partial(self._typed, self._jobs.set_key, number, key))
+                self._on_typed(box, self._jobs.set_key, number, key)
 
     def _toggle(self, number: int) -> None:
         self._open ^= {number}
         self._table.refresh()
 
-    def _typed(self, call: Callable[..., object], *arguments: Any) -> None:
+    def _on_typed(self, box: ui.input, call: Callable[..., object], *given: Any) -> None:
+        """Take what is typed into a field."""
+        box.on("change", lambda event: self._typed(event, call, *given))
+
+    def _typed(self, event: Any, call: Callable[..., object], *given: Any) -> None:
         """Take what was typed; the table is not rebuilt, as the user may already type in the next field."""
-        *given, event = arguments
         others = self._jobs.version - self._shown
         text = str(event.args or "").strip()
         self._page.attempt(lambda: call(*given, text))
@@ -248,7 +251,7 @@ class JobTab:
                 return
         if choices is None:
             box = ui.input(label, value=value).props("dense outlined").classes("armtempo-value")
-            box.on("change", partial(self._typed, self._jobs.set_option, key))
+            self._on_typed(box, self._jobs.set_option, key)
             return
         texts = {"": words.DEFAULT, **{str(one): words.CHOICES.get(str(one), str(one)) for one in choices}}
         if value not in texts:

@@ -137,8 +137,9 @@ class SequenceTab:
                     row.classes(add=_LIT) if number == step else row.classes(remove=_LIT)
             self._lit = step
         if state is not None:
-            # Cycles are counted from the first
-            text = words.STEP_NOW.format(step=state.step, cycle=state.cycle + running)
+            # The board counts the cycles that are finished
+            cycle = state.cycle + (state.ending != "finished")
+            text = words.STEP_NOW.format(step=state.step, cycle=cycle)
             self._where.set_text(text if running else f"{text}: {state.ending}")
 
     def _look_at_times(self) -> None:

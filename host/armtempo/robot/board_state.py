@@ -6,7 +6,7 @@ It is sent to other programs as JSON, so it holds plain values only. It imports 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from armtempo.basics.errors import LinkError
@@ -106,6 +106,8 @@ class BoardState:
     """None if none was started since the board's start."""
     tool: ToolPlace | None = None
     """None if the arm or a position is not known."""
+    erasures: dict[str, int] = field(default_factory=dict)
+    """Of a virtual board: how often each sector of its flash was erased; a chip's is good for 10 000."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -188,7 +190,14 @@ def read(client: Client, port: str) -> BoardState:
             for number, (steps, counts) in enumerate(pairs, 1)
         ),
         sequence=_sequence(client),
+        erasures=_erasures(port) if info.virtual else {},
     )
+
+
+def _erasures(port: str) -> dict[str, int]:
+    from armtempo.simulator import wear  # here, as 'armtempo stop' does not need it
+
+    return wear.erasures(port)
 
 
 def _sequence(client: Client) -> SequenceStand | None:

@@ -81,6 +81,8 @@ class LaunchOptions:
     """Run the program in the flash (from ``armtempo deploy``) instead of the installed one."""
     flash_blocks: int | None = None
     """Size of the flash; None: the chip's."""
+    instant_flash: bool = False
+    """The flash is written in no time; otherwise it takes the times of the data sheet, while the chip stands still."""
     button_s: float = 0.0
     """How long the user button is held from power-up on: 0.6 to 1.2 for the safe mode, 1.2 to 1.8 for a new file
     system."""
@@ -104,6 +106,7 @@ class ProcessOptions:
     """Folders with the board program's packages, run as if deployed; empty: only what is in the flash."""
     flash_blocks: int | None
     """Size of the flash; None: that of an STM32F4DISC's file system."""
+    instant_flash: bool
     speed: float
     """Motions run at this multiple of real time; 0: as fast as possible."""
     edge_log: str | None

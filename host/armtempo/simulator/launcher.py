@@ -24,6 +24,8 @@ _HEAP = "4M"
 _START_S = 60.0
 _STOP_S = 1.0
 PREFIX = "armtempo-virtual-"
+FLASH_OF = "flash-of-"
+"""Prefix of a link in it to the flash's folder, before the last part of the port's name."""
 _LOCK = "lock"
 
 
@@ -42,6 +44,7 @@ class VirtualBoard:
             _set_raw(self._slave)
             os.set_blocking(master, False)
             self.port = os.ttyname(self._slave)
+            (folder.path / f"{FLASH_OF}{os.path.basename(self.port)}").symlink_to(flash)
             with self.log_path.open("wb") as log:
                 # in its own session: Ctrl-C in the terminal is handled by the launcher
                 self._process = subprocess.Popen(
@@ -165,6 +168,7 @@ def _process_options(wanted: LaunchOptions, flash: Path, up: Path) -> ProcessOpt
         sources=sources,
         program=[] if wanted.deployed else sources,
         flash_blocks=wanted.flash_blocks,
+        instant_flash=wanted.instant_flash,
         speed=0.0 if wanted.virtual_time else 1.0,
         edge_log=_absolute(wanted.edge_log),
         unique_id=unique_id(wanted.seed),

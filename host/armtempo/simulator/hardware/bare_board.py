@@ -20,6 +20,7 @@ from firmware.usb_serial import SilentPort
 DEFAULTS = {
     "flash": ".",
     "flash_blocks": None,
+    "instant_flash": False,
     "program": [],
     "speed": 0,
     "edge_log": None,

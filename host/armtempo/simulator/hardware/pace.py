@@ -124,6 +124,11 @@ class Pace:
         if self._lead_us > 1000:
             self._serial.wait(int(self._lead_us) // 1000)
 
+    def stall(self, ms):
+        """The processor stands still: in real time, so does this process."""
+        if self._speed:
+            time.sleep(ms / 1000 / self._speed)
+
     def sleep_us(self, us):
         """The program waits."""
         target = self._board.now + us * TICKS_PER_US

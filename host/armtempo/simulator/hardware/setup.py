@@ -86,5 +86,7 @@ def _arm_record():
 
 
 def _stall(ms):
-    """Halt the processor, but not the timers."""
-    machine_state.board.stall(ms * TICKS_PER_MS)
+    """Halt the processor, but not the timers, while the flash is written."""
+    if not machine_state.options["instant_flash"]:
+        machine_state.board.stall(int(ms * TICKS_PER_MS))
+        machine_state.pace.stall(ms)

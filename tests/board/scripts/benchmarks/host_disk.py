@@ -1,6 +1,7 @@
 """A disk on the emulated chip, whose flash cannot be written: a file of the host, by semihosting.
 
-It takes the place of the folder of the store. Small, as it shares the chip's heap with the program.
+It takes the place of the folder of the store. Small, as it shares the chip's heap with the program. Where the chip
+would erase and write a sector, it prints which, and waits as long.
 """
 
 import os
@@ -9,10 +10,12 @@ from array import array
 import micropython
 import pyb
 import uctypes
+from flash_cache import FlashCache
 
 _OPEN, _WRITE, _READ, _SEEK = 1, 5, 6, 10
 _READ_AND_WRITE = 3  # "r+b"
 _BLOCK = 512
+_FLUSH = 3  # MicroPython's MP_BLOCKDEV_IOCTL_SYNC
 
 
 @micropython.asm_thumb
@@ -27,6 +30,7 @@ class Disk:
         self._blocks = blocks
         self._words = array("i", [uctypes.addressof(name), _READ_AND_WRITE, len(name)])
         self._handle = _ask(_OPEN, self._words)
+        self._cache = FlashCache(erased)
 
     def _move(self, what, block, buffer):
         words = self._words
@@ -41,11 +45,21 @@ class Disk:
 
     def writeblocks(self, block, buffer):
         """The same."""
+        for more in range(len(buffer) // _BLOCK):
+            self._cache.write(block + more)
         self._move(_WRITE, block, buffer)
 
     def ioctl(self, what, argument):
-        """Number and size of the blocks."""
+        """Flush; number and size of the blocks."""
+        if what == _FLUSH:
+            self._cache.flush()
         return self._blocks if what == 4 else _BLOCK if what == 5 else 0
+
+
+def erased(sector, ms):
+    """The chip stands still."""
+    print("@ erased", sector)
+    pyb.delay(int(ms))
 
 
 def mount(folder, blocks):

@@ -187,10 +187,11 @@ class World(SilentPort):
         self._sequence = (self._sequence + 1) & 0xFF
         entry = wire.COMMAND[name]
         data = wire.frame(self._sequence, entry[1], wire.encode(entry, values, tail))
+        self.frames.clear()  # a command that was repeated while the flash was written is answered twice
         for _ in range(ANSWERS):
             self.type(data)
             end = machine_state.board.now + REPEAT_MS * TICKS_PER_MS
-            while not self.frames and machine_state.board.now < end:
+            while not self._answered() and machine_state.board.now < end:
                 yield
             if self.frames:
                 break
@@ -200,6 +201,11 @@ class World(SilentPort):
         if kind == "ok":
             fields, rest = wire.decode(wire.ANSWER[name], rest)
         return kind, fields, rest
+
+    def _answered(self):
+        while self.frames and self.frames[0][0] != self._sequence:
+            self.frames.pop(0)
+        return self.frames
 
     def hello(self, session=1):
         """Wait for the program and greet it."""

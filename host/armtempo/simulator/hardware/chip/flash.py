@@ -1,4 +1,4 @@
-"""The board's flash: a folder of the host used as ``/flash``, with the chip's size, write times and failures.
+"""The board's flash: a folder of the host used as ``/flash``, with the chip's size, write times, wear and failures.
 
 A second folder may be used as an SD card, ``/sd``, of unlimited size and without failures.
 
@@ -13,21 +13,23 @@ injected at the n-th one. It leaves
 Then the board restarts.
 """
 
+import json
 import os
 
 from machine_state import Reset
 
-BLOCK = 512
+from chip.fat import BLOCK, Fat, entries_of
+from chip.flash_cache import FlashCache
+
 BLOCKS = 190
 """Blocks for files and folders: an STM32F4DISC's 224 (112 KB) less the 34 of FAT12's boot sector (1), table (1)
 and root folder (32)."""
-_WRITE_MS = 1
-_CLOSE_MS = 60
-_FORMAT_MS = 2000
 _POWER_ON = 1
 _DIRECTORY = 0x4000
 _ENTRY = 32  # bytes in a folder for a short name, and for each 13 characters of a long one
 _EPERM, _ENOENT, _EIO, _EEXIST, _EISDIR, _EINVAL, _ENOSPC = 1, 2, 5, 17, 21, 22, 28
+ERASURES = ".erasures"
+"""Suffix of the file next to the folder with the erasures of each sector."""
 NO_FILE_SYSTEM, UNREADABLE = "no file system", "unreadable"
 """Kinds of damage: the firmware finds no file system, or mounts one in which every access fails."""
 
@@ -40,6 +42,7 @@ class FlashFolder:
     """
 
     def __init__(self, root, size, programs, stall, cut_at=0, damage=""):
+        self.erasures = _counted(root)
         self.root = root
         self.damage = damage
         self.mounts = {"/flash": root}
@@ -47,13 +50,14 @@ class FlashFolder:
         self._programs = programs
         self.cwd = "/flash"
         self.operations = 0
-        self._stall = stall
+        self.stall = stall
         self.busy_ms = 0  # an injected fault: each operation takes longer
         self._cut_at = cut_at
         self._writing = []
         self._unsynced = []
         self.renamed = None
         self.sectors = None
+        self._fat = None  # from the first change on
 
     def real(self, path):
         """The host's path of a path on the board; OSError if nothing is mounted there, or it is unreadable."""
@@ -82,11 +86,58 @@ class FlashFolder:
                 parts.append(part)
         return "/" + "/".join(parts)
 
-    def operation(self, ms=_WRITE_MS):
+    def operation(self):
         """Count a change; True if the power fails during it."""
         self.operations += 1
-        self._stall(ms + self.busy_ms)
+        self.stall(self.busy_ms)
         return self.operations == self._cut_at
+
+    def erased(self, sector, ms):
+        """A sector was erased and written, which takes ``ms``: count it, and stand still."""
+        key = str(sector)
+        self.erasures[key] = self.erasures.get(key, 0) + 1
+        with real_open(self.root + ERASURES, "w") as file:
+            json.dump(self.erasures, file)
+        self.stall(ms)
+
+    def _file_system(self):
+        if self._fat is None:
+            self._fat = Fat(FlashCache(self.erased), self.size)
+            self._learn("")
+        return self._fat
+
+    def _learn(self, path):
+        """Know a file or folder of the host's folder, as if it had long been in the flash."""
+        cache, self._fat.cache = self._fat.cache, _Unwritten()
+        real = self.root + "/" + path if path else self.root
+        if exists(real) and is_folder(real):
+            if path:
+                self._fat.mkdir(path)
+            for name in sorted(os.listdir(real)):
+                self._learn(path + "/" + name if path else name)
+        elif exists(real):
+            self._fat.open(path)
+            self._fat.write(path, os.stat(real)[6])
+            self._fat.close(path)
+        self._fat.cache = cache
+
+    def in_fat(self, real):
+        """A path of the host in the file system; "" if it is on a card."""
+        if not real.startswith(self.root + "/"):
+            return ""
+        self._file_system()
+        path = real[len(self.root) + 1 :]
+        at = path.find("/")
+        while at >= 0:
+            self._know(path[:at])
+            at = path.find("/", at + 1)
+        self._know(path)
+        return path
+
+    def _know(self, path):
+        """What the host has put there since the start."""
+        if not self._fat.knows(path) and exists(self.root + "/" + path):
+            self._learn(path)
 
     def power_fails(self):
         """Empty the files that are open for writing or not synced, and restart the board."""
@@ -103,7 +154,7 @@ class FlashFolder:
         if not is_folder(path):
             return -(-os.stat(path)[6] // BLOCK)
         names = os.listdir(path)
-        own = 0 if path == self.root else 2 * _ENTRY + sum([_entry_bytes(name) for name in names])
+        own = 0 if path == self.root else 2 * _ENTRY + sum([_ENTRY * entries_of(name) for name in names])
         return -(-own // BLOCK) + sum([self.blocks(path + "/" + name) for name in names])
 
     def free_blocks(self):
@@ -125,7 +176,7 @@ class FlashFolder:
 
     def format(self):
         """Make a new, empty file system."""
-        self._stall(_FORMAT_MS)
+        self._file_system().format()
         self.damage = ""
         for name in os.listdir(self.root):
             remove_all(self.root + "/" + name)
@@ -137,20 +188,25 @@ class FlashFolder:
             return real_open(real, mode)
         if self.operation():
             self.power_fails()
-        file = Written(self, real_open(real, mode), real)
+        path = self.in_fat(real)
+        file = Written(self, real_open(real, mode), real, self._fat if path else None, path)
+        if path and ("w" in mode or not self._fat.knows(path)):
+            self._fat.open(path)
         self._writing.append(file)
         return file
 
     def closed(self, file):
         """A written file was closed."""
         if file in self._writing:
-            if self.operation(_CLOSE_MS):
+            if self.operation():
                 self.power_fails()
             self._writing.remove(file)
             self._unsynced.append(file.path)
 
     def sync(self):
         """Make all closed files durable."""
+        if self._fat:
+            self._fat.cache.flush()
         self._unsynced = []
 
     def rename(self, old, new):
@@ -162,11 +218,17 @@ class FlashFolder:
                 raise OSError(_EEXIST)
             if self.operation():
                 self.power_fails()
+            self.in_fat(new)
             os.remove(new)
             self._unsynced = [path for path in self._unsynced if path != new]
         if self.operation():
             self.power_fails()
+        old_path, new_path = self.in_fat(old), self.in_fat(new)
         os.rename(old, new)
+        if old_path and new_path and old != new:
+            if self._fat.knows(new_path):
+                self._fat.remove(new_path)
+            self._fat.rename(old_path, new_path)
         self._unsynced = [new if path == old else path for path in self._unsynced]
         if self.renamed:
             self.renamed()
@@ -178,17 +240,22 @@ class FlashFolder:
             os.stat(real)
         if self.operation():
             self.power_fails()
+        path = self.in_fat(real)
         function(real)
+        if path:
+            (self._fat.mkdir if function is os.mkdir else self._fat.remove)(path)
         self._unsynced = [path for path in self._unsynced if exists(path)]
 
 
 class Written:
     """A file open for writing."""
 
-    def __init__(self, flash, file, path):
+    def __init__(self, flash, file, path, fat, fat_path):
         self._flash = flash
         self._file = file
         self.path = path
+        self._fat = fat  # None: on a card
+        self._fat_path = fat_path
 
     def write(self, data):
         """Write; OSError(ENOSPC) if the flash is full."""
@@ -200,6 +267,8 @@ class Written:
         needed = -(-(size + len(data)) // BLOCK) - -(-size // BLOCK)
         if self.path.startswith(self._flash.root + "/") and needed > self._flash.free_blocks():
             raise OSError(_ENOSPC)
+        if self._fat:
+            self._fat.write(self._fat_path, len(data))
         return self._file.write(data)
 
     def cut(self):
@@ -211,6 +280,9 @@ class Written:
         """Finish the file."""
         self._flash.closed(self)
         self._file.close()
+        if self._fat:
+            self._fat.close(self._fat_path)
+            self._fat = None
 
     def __enter__(self):
         return self
@@ -222,15 +294,26 @@ class Written:
         return getattr(self._file, name)
 
 
+class _Unwritten:
+    """Takes what is in the flash already."""
+
+    def write(self, block):
+        """Nothing to do."""
+
+    def flush(self):
+        """Nothing to do."""
+
+
 real_open = open
 
 
-def _entry_bytes(name):
-    """Bytes of a name in a folder."""
-    base, _, extension = name.partition(".")
-    fits = len(base) <= 8 and len(extension) <= 3 and "." not in extension
-    one_case = all([part in (part.lower(), part.upper()) for part in (base, extension)])
-    return _ENTRY * (1 if fits and one_case else 1 + -(-len(name) // 13))
+def _counted(root):
+    """Erasures by sector until now."""
+    try:
+        with real_open(root + ERASURES) as file:
+            return dict(json.load(file))
+    except (OSError, ValueError, TypeError):
+        return {}
 
 
 def is_folder(path):

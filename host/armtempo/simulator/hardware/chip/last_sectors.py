@@ -14,7 +14,7 @@ _FIRST = 10
 _PG, _SER, _STRT, _LOCK = 1 << 0, 1 << 1, 1 << 16, 1 << 31
 _SNB, _PSIZE, _WORDS = 3, 8, 2  # places in CR; PSIZE for words
 _ERRORS = 1 << 7  # SR: PGSERR
-_ERASE_MS, _WRITE_MS = 1000, 16
+_ERASE_MS, _WRITE_MS = 1000, 16  # of a sector of 128 KB, of a piece
 _PIECE = 1024  # words that are one operation of the flash
 _BLANK = b"\xff" * _PIECE
 
@@ -55,7 +55,8 @@ class Sectors:
             self._save()
 
     def _erase(self, begin):
-        fails = self._flash.operation(_ERASE_MS)
+        fails = self._flash.operation()
+        self._flash.erased(_FIRST + begin // memory.SECTOR_BYTES, _ERASE_MS)
         _fill(begin, memory.SECTOR_BYTES // 2 if fails else memory.SECTOR_BYTES)
         if fails:
             self._save()
@@ -68,9 +69,11 @@ class Sectors:
             memory.poke(self._at + _SR, _ERRORS)
             return
         self._written += 1
-        if self._written % _PIECE == 0 and self._flash.operation(_WRITE_MS):
-            self._save()
-            self._flash.power_fails()
+        if self._written % _PIECE == 0:
+            self._flash.stall(_WRITE_MS)
+            if self._flash.operation():
+                self._save()
+                self._flash.power_fails()
         memory.sectors[at] &= value & memory.MASK
 
     def _save(self):
