@@ -68,7 +68,7 @@ def jog(
             board.jog(joint, None if axis else by, axis or about, along, speed / 100, to_deg=to)
         early = board.last_jog_ends
         if not (early and given.as_json):
-            posture.say_where_it_is(board, given.as_json)
+            posture.print_position(board, given.as_json)
         if early:
             raise ArmtempoError(f"the jog ended early: {early}", "jog less far, or the other way")
 
