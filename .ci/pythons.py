@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PLACE = ROOT / ".cache" / "ci"
 OLDEST = (3, 11)
-WHAT = ["-e", ".[plot,cluster,mpy,urdf,panel,docs]", "-r", "tests/requirements.txt"]
+WHAT = ["-e", ".[plot,cluster,mpy,urdf,ros,panel,docs]", "-r", "tests/requirements.txt"]
 RELEASE = "import sys, venv; sys.version_info.releaselevel == 'final' and print(*sys.version_info[:2])"
 DESCRIBE = """
 from importlib.metadata import version

@@ -15,14 +15,14 @@ _SPARE_ENTRIES = 8  # entries of a ring that are not overwritten, as in isr.py
 PROCESSOR_WORDS = 1024
 """Words (4 bytes) of the chip's backup SRAM, which is not in MicroPython's heap (hardware/backup_sram.py of the board
 program). DMA cannot read them, so they are not used for rings."""
-GENERATOR_PARTS = (78, 78, 20, 20, 12, 12, 49, 27, 224)
+GENERATOR_PARTS = (224, 78, 78, 20, 20, 12, 12, 49, 27)
 """Words of a joint's step generator, in the order of allocation.
 
-Pieces of angle and of time, their control points, their measures; the solver, the time law, the queue of steps.
+The queue of steps; pieces of angle and of time, their control points, their measures; the solver, the time law.
 """
 GENERATOR_WORDS = sum(GENERATOR_PARTS)
 _BLOCK_WORDS = 1026  # for a ring of 1024 entries, or two of 512
-LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 178
+LARGEST_WORDS = 6 * GENERATOR_WORDS - PROCESSOR_WORDS + 1025 + 513 + 257 + 129 + 2 * 65 + 30
 """Words for arms whose highest step rates sum up to 240 000 steps/s; some have short rings then.
 
 The last words are unused at the ends of blocks.
@@ -31,6 +31,8 @@ The last words are unused at the ends of blocks.
 
 ONCE_BYTES = 3072
 """Bytes of heap for a motion that is run once, beside the engine: a line of six joints in 32 segments fits."""
+SHORT_ONCE_BYTES = 1536
+"""The same where the heap does not have enough for every arm: a line of three joints in 16 segments fits."""
 
 
 def ring_words(rate: int, lasts_ms: int) -> int:

@@ -165,3 +165,81 @@ def test_a_table_without_times_has_no_timing(tmp_path: Path) -> None:
     table.write_text("j1,j2,j3\n0,-60,40\n20,-75,50\n")
     with pytest.raises(InputError, match="has no times of a motion"):
         via_table.recorded(table, ARM)
+
+
+def bag(path: Path, kind: str, messages: list[Any], mcap: bool) -> Path:
+    """A recording of one topic."""
+    rosbag2, store = pytest.importorskip("rosbags.rosbag2"), typestore()
+    plugin = rosbag2.StoragePlugin.MCAP if mcap else rosbag2.StoragePlugin.SQLITE3
+    with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
+        connection = writer.add_connection("/topic", kind, typestore=store)
+        for number, one in enumerate(messages):
+            writer.write(connection, number, store.serialize_cdr(one, kind))
+    return path
+
+
+def typestore() -> Any:
+    typesys = pytest.importorskip("rosbags.typesys")
+    return typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+
+
+def types() -> Any:
+    return typestore().types
+
+
+def header(time_s: float) -> Any:
+    stamp = types()["builtin_interfaces/msg/Time"](sec=1000 + int(time_s), nanosec=int(1e9 * (time_s % 1.0)))
+    return types()["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+
+
+def states(names: list[str]) -> list[Any]:
+    state, none = types()["sensor_msgs/msg/JointState"], np.empty(0)
+    gripper = state(header=header(0.0), name=["gripper"], position=np.zeros(1), velocity=none, effort=none)
+    return [
+        gripper,
+        *(
+            state(header=header(t), name=names, position=np.radians(row), velocity=none, effort=none)
+            for t, row in zip(TIMES, MOVE(TIMES), strict=True)
+        ),
+    ]
+
+
+def trajectory() -> Any:
+    point = types()["trajectory_msgs/msg/JointTrajectoryPoint"]
+    duration = types()["builtin_interfaces/msg/Duration"]
+    none = np.empty(0)
+    points = [
+        point(
+            positions=np.radians(row), velocities=none, accelerations=none, effort=none,
+            time_from_start=duration(sec=int(t), nanosec=int(1e9 * (t % 1.0))),
+        )
+        for t, row in zip(TIMES, MOVE(TIMES), strict=True)
+    ]  # fmt: skip
+    names = [joint.name for joint in ARM.driven]
+    return types()["trajectory_msgs/msg/JointTrajectory"](
+        header=header(0.0), joint_names=names, points=points
+    )
+
+
+@pytest.mark.parametrize("mcap", [True, False])
+@pytest.mark.parametrize("kind", ["trajectory_msgs/msg/JointTrajectory", "sensor_msgs/msg/JointState"])
+def test_bags_are_read(tmp_path: Path, kind: str, mcap: bool) -> None:
+    messages = [trajectory()] if "Trajectory" in kind else states(["J1", "J2", "J3"])
+    folder = bag(tmp_path / "bag", kind, messages, mcap)
+    for path in (folder, *folder.glob("*.mcap")):
+        found = via_table.recorded(path, ARM)
+        np.testing.assert_allclose(found.angles_deg, MOVE(TIMES), atol=1e-6)
+        np.testing.assert_allclose(found.times_s, TIMES, atol=1e-6)
+
+
+def test_bags_that_will_not_do_are_refused(tmp_path: Path) -> None:
+    two = bag(tmp_path / "two", "trajectory_msgs/msg/JointTrajectory", [trajectory(), trajectory()], True)
+    with pytest.raises(InputError, match="two: has 2 trajectories"):
+        via_table.recorded(two, ARM)
+    other = bag(tmp_path / "other", "sensor_msgs/msg/JointState", states(["a", "b", "c"]), True)
+    with pytest.raises(InputError, match="neither a JointTrajectory nor JointStates of all driven joints"):
+        via_table.read(other, ARM)
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(b"nothing")
+    with pytest.raises(InputError, match=r"broken\.mcap: cannot be read as a recording of ROS"):
+        via_table.recorded(broken, ARM)

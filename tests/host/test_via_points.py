@@ -175,7 +175,7 @@ def test_plan_prints_the_notes(tmp_path: Path) -> None:
     rows = pose_of(20.0, -75.0, 50.0, 0.0, 30.0, 0.0).matrix
     file = tmp_path / "job.toml"
     file.write_text(
-        'name = "posed"\npopulation = 4\niterations = 5\n'
+        'name = "posed"\npath = "through"\npopulation = 4\niterations = 5\n'
         "[[via]]\nangles_deg = [0.0, -60.0, 40.0]\n"
         f"[[via]]\nmatrix = {[list(map(float, row)) for row in rows]}\n"
     )

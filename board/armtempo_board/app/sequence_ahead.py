@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _OP, _NUMBER = const(0), const(1)  # of a row
 _NONE = const(-1)
-_BESIDE_BYTES = const(13_000)
+_BESIDE_BYTES = const(10_000)
 """Free heap needed: 2 200 bytes for the motions' other needs, the rest for garbage between two collections."""
 
 

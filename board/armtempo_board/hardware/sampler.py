@@ -51,7 +51,7 @@ class Sampler:
     def _interrupt(self, timer: object) -> object:
         # the first pin turns 9 us after the match (see docs/hardware.md)
         while int(isr.serve_compare(self.block, self._timer2, self._directions)):
-            isr.take_sample(self.raw, self.block, self._dma, self._counters)
+            isr.take_sample(self.raw, self.block, self._dma, self._counters, self._timer2)
 
     def joint_at(self, joint: int) -> int:
         """Index of a joint's first word in the block."""
@@ -133,6 +133,5 @@ class Sampler:
     def take_now(self) -> None:
         """Store a raw sample of this moment, the last; the interrupt must be off."""
         block = self.block
-        block[isr.NOW] = mem32[self._timer2 + 4 * isr.CNT] & _LOW32
         block[isr.SAMPLES_LEFT] = 0
-        isr.take_sample(self.raw, block, self._dma, self._counters)
+        isr.take_sample(self.raw, block, self._dma, self._counters, self._timer2)

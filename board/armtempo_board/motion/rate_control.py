@@ -117,8 +117,11 @@ class RateControl:
             if self.stands():
                 end = override.steady_kiticks
             else:
-                start = now + max(_LOOP_KITICKS + 2 * self.margin_kiticks, ahead_kiticks)
-                end = min(override.rest_kiticks(max(start, override.steady_kiticks)), end)
+                # as in ``ramp``, which is called once the last ramp has ended
+                start = max(now, override.steady_kiticks) + max(
+                    _LOOP_KITICKS + 2 * self.margin_kiticks, ahead_kiticks
+                )
+                end = min(override.rest_kiticks(start), end)
         return max(end - now, 0)
 
     def _end_at(self, ticks: int) -> None:

@@ -107,10 +107,10 @@ class StepGenerator:
 
     def __init__(self, memory: Memory) -> None:
         """``memory``: where its words are taken from (``armtempo_shared.engine_memory`` counts them)."""
+        self.queue = memory.take_for_processor(step_queue.QUEUE_SIZE)  # the largest first: less is lost
         self.subintervals = Subintervals(memory)
         self._solver = memory.take_for_processor(newton.SOLVER_SIZE)
         self._law_words = memory.take_for_processor(_LAW_WORDS)
-        self.queue = memory.take_for_processor(step_queue.QUEUE_SIZE)
         self._law: "Any" = None  # JointLaw, while a motion is loaded
         self.direction = 1
         self.at_turn = False

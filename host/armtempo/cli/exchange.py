@@ -60,7 +60,7 @@ def import_table(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Make a job file from TABLE: one line per via point, one column per driven joint; or a ROS JointTrajectory.
+    """Make a job file from TABLE, one line per via point, or from a ROS JointTrajectory.
 
     The first line names the columns, in any order: the joints' names or j1, j2, …, with a unit such as (rad); or x, y,
     z and roll, pitch, yaw for poses. Columns are separated by commas, semicolons, tabs or blanks. A file that
@@ -71,7 +71,9 @@ def import_table(
     target = output or Path(f"{title}.json" if own_timing else f"{title}.toml")
     check_not_input(target, (table, arm.source))
     if own_timing:
-        _keep_timing(table, arm, title, radians, tolerance_deg, target, force, as_json)
+        plan = chosen.as_recorded(table, arm, title, radians, tolerance_deg)
+        plan.save(target, force)
+        _show_timed(plan, target, as_json)
         return
     found = via_table.read(table, arm, radians, tolerance_deg)
     text = via_table.job_text(title, found)
@@ -88,12 +90,7 @@ def import_table(
     results.show(as_json, values, _import_lines(target, found))
 
 
-def _keep_timing(
-    table: Path, arm: Arm, name: str, radians: bool | None, tolerance_deg: float | None, target: Path, force: bool,
-    as_json: bool,
-) -> None:  # fmt: skip
-    plan = chosen.as_recorded(table, arm, name, radians, tolerance_deg)
-    plan.save(target, force)
+def _show_timed(plan: Plan, target: Path, as_json: bool) -> None:
     values = {
         "file": str(target),
         "duration_s": plan.total_s,

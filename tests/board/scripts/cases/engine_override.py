@@ -26,6 +26,7 @@ CHANGES = 6
 BRAKE = -1  # instead of a rate
 LONGEST_STOP_TICKS = 2 * (BRAKE_TICKS + TICK_HZ // 19)
 """A change that has just been asked for begins 50 ms later, and the stop 50 ms after its end."""
+TURN_MS = 3  # of the loop, here
 MOTIONS = int(([word for word in sys.argv[1:] if word.isdigit()] or [4 // FEWER])[0])
 
 
@@ -286,6 +287,7 @@ def case_stops():  # not emulated
         for _ in range(random.randrange(3)):
             if rig.engine.moving:
                 change(rig)
+        announced_ms = rig.engine.rest_ms() if rig.engine.moving else 0
         rig.engine.brake()
         asked = rig.board.now - rig.zero()
         stood = not rig.engine.moving  # in a pause
@@ -293,6 +295,8 @@ def case_stops():  # not emulated
         assert not rig.engine.moving and rig.engine.fault == 0, number
         end = asked if stood else rig.engine.rates.duration_ticks
         assert end - asked < LONGEST_STOP_TICKS, (number, end - asked)
+        late_ms = (end - asked) * 1000 / TICK_HZ - announced_ms
+        assert late_ms <= TURN_MS, (number, late_ms, rig.laws)
         rig.turn()
         counts = check_steps(rig, recorders, expected)
         rest = motion_ticks(rig.laws, end)
