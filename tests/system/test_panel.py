@@ -530,7 +530,7 @@ def test_each_button_is_pressed_once(page: Any, panel: Panel) -> None:
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     opened: list[Any] = []
-    page.context.on("page", opened.append)
+    page.context.on("page", lambda other: opened.append(other))
     home(page)
     pressed: set[str] = set()
     for tab in TABS:
