@@ -327,8 +327,10 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         shown = press(page, control, partial(control.press, "Enter"))
         said = refusal(folder, file, tomlkit.dumps(content))
         said = words.of_job(InputError(said)) if tab == "Job" else said
-        assert said in shown
+        assert said.replace(".0", "") in shown.replace(".0", "")
         field.fill(before)
+        if tab == "Sequence":
+            (folder / file).write_text(_SEQUENCE)  # as it was when it was opened
     assert page.evaluate("window.hurt") is None
 
 
@@ -536,10 +538,9 @@ def test_each_button_is_pressed_once(page: Any, panel: Panel) -> None:
     for tab in TABS:
         show(page, tab)
         page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
-        for name in page.evaluate(_BUTTONS):
+        while left := [name for name in page.evaluate(_BUTTONS) if name not in pressed]:
+            name = left[0]  # others may come and go with it
             button = page.get_by_role("button", name=name, exact=True).first
-            if name in pressed or not button.is_enabled():
-                continue
             pressed.add(name)
             button.dispatch_event("click")  # notifications may cover it
             page.wait_for_timeout(100)
@@ -554,7 +555,7 @@ def test_each_button_is_pressed_once(page: Any, panel: Panel) -> None:
     for other in opened:
         assert "no such" not in other.inner_text("body")
         other.close()
-    assert {"Home…", "Store…", "Plan", "Paste", "Self-test", "home", "joint 1 +", "Side"} <= pressed
+    assert {"Home…", "Store…", "Plan", "Paste", "Self-test", "Go to home", "own x +", "Side"} <= pressed
     assert not errors
     panel.check()
 
