@@ -8,6 +8,8 @@ import shutil
 import signal
 import tempfile
 from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +19,15 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # Started in the background: the commands that the tests start would inherit it and not mind Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+NEEDS = {
+    "board/test_cortex_m4.py": "unicorn",
+    "host/test_docs.py": "docutils",
+    "host/test_job_editor.py": "tomlkit",
+    "host/test_panel.py": "nicegui",
+    "host/test_urdf.py": "trimesh",
+    "system/test_panel.py": "nicegui",
+}
+"""What test modules import that armtempo itself does without: an extra, or a tool of the tests."""
 DEPRECATIONS = ("DeprecationWarning", "PendingDeprecationWarning", "FutureWarning")
 """Errors in the commands that tests start, too; in the tests' own process every warning is one."""
 
@@ -46,6 +57,26 @@ def interpreter(request: pytest.FixtureRequest) -> str:
 def pytest_xdist_auto_num_workers() -> int:
     """Two more than there are cores: a test that waits for its board leaves its core to another."""
     return (os.cpu_count() or 1) + 2
+
+
+class LeftOut(pytest.Module):
+    """A test module that cannot be imported here."""
+
+    def collect(self) -> Iterator[pytest.Item | pytest.Collector]:
+        """Skip it, with the reason."""
+        needed = _missing(self.path)
+        pytest.skip(f"needs {needed}: 'make test' installs it", allow_module_level=True)
+
+
+def _missing(path: Path) -> str:
+    """The package that a test module lacks; "" if it has all, or if nothing may be left out."""
+    needed = NEEDS.get(path.relative_to(Path(__file__).parent).as_posix(), "")
+    return needed if needed and not os.environ.get("CI") and find_spec(needed) is None else ""
+
+
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> pytest.Module | None:
+    """Collect all that can be, without the extras too."""
+    return LeftOut.from_parent(parent, path=module_path) if _missing(module_path) else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

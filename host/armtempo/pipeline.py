@@ -27,8 +27,6 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
-from armtempo.planning.free import corridor_curve as corridors
-from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.records import encode
 from armtempo.report import comparison, sequence_report, text_summary
 from armtempo.report.run import Run
@@ -39,7 +37,6 @@ from armtempo.robot.recording import Watcher
 __all__ = [
     "compare",
     "connect",
-    "corridor_curve",
     "load",
     "plan",
     "plan_sequence",
@@ -89,15 +86,13 @@ def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
     return [planner.plan(arm, one, part(progress, number, len(parts))) for number, one in enumerate(parts)]
 
 
-def corridor_curve(arm: Arm, job: Job, progress: Progress | None = None) -> list[CorridorTime]:
-    """Motion time as a function of the corridor, for a job with a free path; see ``planning.corridor_curve.curve``."""
-    return corridors.curve(arm, job, progress or (lambda _done, _whole: None))
-
-
 @checked
-def summary(plan: Plan) -> list[str]:
-    """A plan in a few lines: motion times next to their lower bounds, extremes next to their limits."""
-    return text_summary.lines(plan)
+def summary(plan: Plan, verbose: bool = False) -> list[str]:
+    """A plan in a few lines: motion time next to its lower bound, extremes next to their limits, what would be faster.
+
+    ``verbose``: also the search, the kind of bound, and what the board has to do for it.
+    """
+    return text_summary.lines(plan, verbose)
 
 
 def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:

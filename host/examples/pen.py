@@ -38,7 +38,7 @@ star_mm = np.array(
     + [corners[-1]]
 )
 via = tuple(armtempo.Pose.of_angles([x, y, 0.0], {}) for x, y in star_mm)  # only the position is asked for
-plan = armtempo.plan(arm, armtempo.Job("star", via=via, timing="shared", iterations=200))
+plan = armtempo.plan(arm, armtempo.Job("star", via=via))
 print("\n".join(armtempo.summary(plan)))
 
 with armtempo.connect(port, arm) as board:

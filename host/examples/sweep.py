@@ -17,7 +17,7 @@ def one(seed: int) -> tuple[int, float, float]:
     arm = armtempo.Arm.paper()
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     ends = np.random.default_rng(seed).uniform(0.9 * low, 0.9 * high, size=(2, len(low)))
-    job = armtempo.Job(f"move-{seed}", via_deg=ends.tolist(), timing="shared", iterations=60, seed=seed)
+    job = armtempo.Job(f"move-{seed}", via_deg=ends.tolist(), seed=seed)
     return seed, float(np.abs(ends[1] - ends[0]).max()), armtempo.plan(arm, job).total_s
 
 

@@ -2,7 +2,7 @@
 
 The board reads the control points of the stored motion from the last to the first. Those of angles stay as they are;
 those of a time axis are subtracted from its origin, the time at which the stored motion ends. So the path is exactly
-the same, and only the ramps are sent.
+the same, and only the ramps are sent. ``way_back.py``, which the board never loads, makes such a record.
 
 ::
 
@@ -18,41 +18,17 @@ the same, and only the ramps are sent.
 """
 
 import struct
-from binascii import crc32
 
 from armtempo_shared import motion
-from armtempo_shared.basis import BASIS, FACTORIAL
 from armtempo_shared.limits import MAX_JOINTS
 from armtempo_shared.motion import LEAST_RAMP_BITS, MOST_RAMP_BITS, OTHER_ENTRIES, REST_ENTRIES, MotionError
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from armtempo_shared.motion import MotionHead, Ramps
-
 MAGIC = b"ATB1"
+HEAD = "<4sIBB"
 ORIGIN_BYTES = 8
-_HEAD = "<4sIBB"
-_RAMPS_AT = struct.calcsize(_HEAD)
+_RAMPS_AT = struct.calcsize(HEAD)
 _ORIGINS_AT = _RAMPS_AT + 2 * (REST_ENTRIES + OTHER_ENTRIES)
 _CRC_BYTES = 4
-
-
-def pack(data: bytes, name: str, ramps: "Ramps") -> bytes:
-    """The record of the way back along the motion record ``data``, stored as ``name``; ``ramps``: of the way back."""
-    stored = motion.Motion(data)
-    origins = [_end(stored, axis) for axis in range(1 if stored.shared else stored.joints)]
-    body = struct.pack(_HEAD, MAGIC, stored.crc, ramps[2], len(origins))
-    body += struct.pack("<%dH" % (REST_ENTRIES + OTHER_ENTRIES), *ramps[0], *ramps[1])
-    body += struct.pack("<%dq" % len(origins), *origins) + name.encode()
-    return body + struct.pack("<I", crc32(body))
-
-
-def _end(stored: "MotionHead", joint: int) -> int:
-    """Time at the end of a joint's motion, ticks / 2**16, rounded up."""
-    degree = stored.degree
-    points = stored.points(stored.time_offset(joint) + 8 * stored.segments * stored.refine, degree)
-    total = sum([weight * point for weight, point in zip(BASIS[degree][0], points)])
-    return -(-total // FACTORIAL[degree])
 
 
 class WayBack:
@@ -65,7 +41,7 @@ class WayBack:
         if len(data) < _ORIGINS_AT + ORIGIN_BYTES + _CRC_BYTES:
             raise MotionError("too short")
         self.crc = motion.checked_crc(data)
-        magic, self.stored_crc, self.ramp_bits, axes = struct.unpack_from(_HEAD, data, 0)
+        magic, self.stored_crc, self.ramp_bits, axes = struct.unpack_from(HEAD, data, 0)
         name_at = _ORIGINS_AT + ORIGIN_BYTES * axes
         if magic != MAGIC or not LEAST_RAMP_BITS <= self.ramp_bits <= MOST_RAMP_BITS:
             raise MotionError("not a record of this version")

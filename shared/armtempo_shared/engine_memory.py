@@ -31,6 +31,8 @@ The last words are unused at the ends of blocks.
 
 ONCE_BYTES = 3072
 """Bytes of heap for a motion that is run once, beside the engine: a line of six joints in 32 segments fits."""
+SHORT_ONCE_BYTES = 1536
+"""The same where the heap does not have enough for every arm: a line of three joints in 16 segments fits."""
 
 
 def ring_words(rate: int, lasts_ms: int) -> int:

@@ -47,7 +47,14 @@ def main() -> None:
     equal = problems.make_arm([[50.0, 50.0, 150.0]] * 3)
     for vias, refine in ((10, 4), (30, 4), (100, 4), *(((300, 1), (500, 1)) if options.large else ())):
         via = np.random.default_rng(1).normal(0, 40, (vias, 3))
-        many = Job("many", tuple(map(tuple, via.tolist())), refine=refine, optimiser="gradient", starts=1)
+        many = Job(
+            "many",
+            tuple(map(tuple, via.tolist())),
+            refine=refine,
+            optimiser="gradient",
+            starts=1,
+            path="through",
+        )
         _print(f"{vias} via points, refine {refine}, gradient", equal, many)
 
 

@@ -95,9 +95,10 @@ class Session:
         self.stage("moving")
         self.command("stop", (1,))
         self.command("clear")
-        for at in range(0, len(motion), _PIECE):
-            self.command("put_once", (at, len(motion)), motion[at : at + _PIECE])
-        self.command("start", (0, wire.record_crc(motion)), ONCE_NAME.encode())
+        once = motion_record(arm, 20)
+        for at in range(0, len(once), _PIECE):
+            self.command("put_once", (at, len(once)), once[at : at + _PIECE])
+        self.command("start", (0, wire.record_crc(once)), ONCE_NAME.encode())
         self.stage("once")
         self.command("stop", (1,))
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-import pytest
 from armtempo_shared import limits
 
 from tests import interpreters, sources
@@ -50,20 +49,20 @@ def package(module: str) -> str:
     return module.rpartition(".")[0]
 
 
-@pytest.mark.parametrize("module", sorted(FILES))
-def test_packages_import_those_below(module: str) -> None:
-    own = package(module)
-    if own == "stepgen":
-        names = {
-            alias.name if isinstance(node, ast.Import) else str(node.module)
-            for node in ast.walk(ast.parse(FILES[module].read_text()))
-            if isinstance(node, ast.Import | ast.ImportFrom)
-            for alias in node.names
-        }
-        assert not names & HARDWARE
-    if module == "app.program":
-        return  # imports the deepest first, to save stack
-    assert {package(other) for other in imported(FILES[module])} <= {own, *BELOW[own]}
+def test_packages_import_those_below() -> None:
+    for module in sorted(FILES):
+        own = package(module)
+        if own == "stepgen":
+            names = {
+                alias.name if isinstance(node, ast.Import) else str(node.module)
+                for node in ast.walk(ast.parse(FILES[module].read_text()))
+                if isinstance(node, ast.Import | ast.ImportFrom)
+                for alias in node.names
+            }
+            assert not names & HARDWARE, module
+        if module == "app.program":
+            continue  # imports the deepest first, to save stack
+        assert {package(other) for other in imported(FILES[module])} <= {own, *BELOW[own]}, module
 
 
 def test_no_module_imports_its_user() -> None:
@@ -101,20 +100,22 @@ def literals(index: ast.AST, allowed: tuple[int, ...] = ()) -> Iterator[int]:
             yield from literals(part, allowed)
 
 
-@pytest.mark.parametrize("path", PATHS, ids=lambda path: str(path.relative_to(BOARD)))
-def test_no_index_is_a_number(path: Path) -> None:
-    found = [
-        f"line {node.lineno}: {ast.unparse(node)}"
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.Subscript)
-        for _ in literals(node.slice)
-    ]
-    assert not found
+def test_no_index_is_a_number() -> None:
+    for path in PATHS:
+        found = [
+            f"line {node.lineno}: {ast.unparse(node)}"
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Subscript)
+            for _ in literals(node.slice)
+        ]
+        assert not found, path
 
 
-@pytest.mark.parametrize("path", PATHS, ids=lambda path: str(path.relative_to(BOARD)))
-def test_constants_of_other_modules_are_written(path: Path) -> None:
-    assert make_constants.written(path) == path.read_text(), "run 'python board/make_constants.py'"
+def test_constants_of_other_modules_are_written() -> None:
+    for path in PATHS:
+        assert make_constants.written(path) == path.read_text(), (
+            f"{path}: run 'python board/make_constants.py'"
+        )
 
 
 def test_they_are_found() -> None:

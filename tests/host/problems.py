@@ -60,7 +60,14 @@ def _problem(entry: dict[str, Any]) -> Problem:
     arm = make_arm(entry.pop("limits"), (low, high), entry.pop("microsteps", 1))
     expect, best_s = entry.pop("expect", "plan"), tuple(entry.pop("best_s", ()))
     via = tuple(tuple(row) for row in entry.pop("via_deg"))
-    settings = {"timing": "per-joint", "refine": 1, "polish": False, "bounds_s": (0.1, 3.0), **entry}
+    settings = {
+        "path": "through",
+        "timing": "per-joint",
+        "refine": 1,
+        "polish": False,
+        "bounds_s": (0.1, 3.0),
+        **entry,
+    }
     return Problem(entry["name"], arm, Job(via=via, **settings), expect, best_s)
 
 
@@ -99,6 +106,7 @@ def random_problem(seed: int) -> tuple[Arm, Job]:
         iterations=1,
         seed=seed,
         bounds_s=(0.1, 3.0),
+        path="through",
     )
     return make_arm(limits.tolist()), job
 

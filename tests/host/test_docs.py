@@ -39,14 +39,14 @@ SOURCES = {
 LINKING = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("*/docs/*.md"))]
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_the_table_says_of_a_command_what_its_docstring_says(name: str) -> None:
-    command = main.get_command(click.Context(main), name)
-    assert command is not None
-    assert command.name == name
-    assert command.help is not None
-    assert command.help.split("\n\n")[0].replace("\n", " ") == COMMANDS[name].summary
-    assert COMMANDS[name].examples
+def test_the_table_says_of_a_command_what_its_docstring_says() -> None:
+    for name in COMMANDS:
+        command = main.get_command(click.Context(main), name)
+        assert command is not None, name
+        assert command.name == name, name
+        assert command.help is not None, name
+        assert command.help.split("\n\n")[0].replace("\n", " ") == COMMANDS[name].summary, name
+        assert COMMANDS[name].examples, name
 
 
 def test_the_help_page_and_the_tab_key_import_no_command() -> None:
@@ -69,20 +69,18 @@ def test_the_help_page_shows_the_groups_and_their_commands() -> None:
         assert line == "COMMAND" or line in COMMANDS
 
 
-@pytest.mark.parametrize("line", [line for entry in COMMANDS.values() for line in entry.examples])
-def test_an_example_is_a_command_that_can_be_given(
-    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    name, *arguments = shlex.split(re.sub(r" >>? .*", "", line))
-    for argument in arguments:  # what must be there is made
-        if argument.startswith("runs/"):
-            (tmp_path / argument).mkdir(parents=True)
-    command = main.get_command(click.Context(main), name)
-    assert command is not None
-    command.make_context(name, arguments)
-    page = CliRunner().invoke(main, [name, "--help"]).output
-    assert f"  armtempo {line}\n" in page
+def test_an_example_is_a_command_that_can_be_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for line in [line for entry in COMMANDS.values() for line in entry.examples]:
+        monkeypatch.chdir(tmp_path)
+        name, *arguments = shlex.split(re.sub(r" >>? .*", "", line))
+        for argument in arguments:  # what must be there is made
+            if argument.startswith("runs/"):
+                (tmp_path / argument).mkdir(parents=True, exist_ok=True)
+        command = main.get_command(click.Context(main), name)
+        assert command is not None, line
+        command.make_context(name, arguments)
+        page = CliRunner().invoke(main, [name, "--help"]).output
+        assert f"  armtempo {line}\n" in page, line
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -133,20 +131,20 @@ def test_there_are_workflows() -> None:
     assert len(LINES) > 10
 
 
-@pytest.mark.parametrize(("file", "line"), LINES)
-def test_what_a_workflow_runs_is_there(file: str, line: str) -> None:
-    program, *arguments = shlex.split(line)
-    if program == "armtempo" and arguments != ["--version"]:
-        command = main.get_command(click.Context(main), arguments[0])
-        assert command is not None, line
-        command.make_context(arguments[0], arguments[1:], resilient_parsing=False)
-    elif program == "make":
-        makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-        assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in arguments)
-    elif "/" in program or (program == "python" and arguments[0].endswith(".py")):
-        script = ROOT / (program if "/" in program else arguments[0])
-        assert script.is_file()
-        assert "/" not in program or script.stat().st_mode & 0o100
+def test_what_a_workflow_runs_is_there() -> None:
+    for file, line in LINES:
+        program, *arguments = shlex.split(line)
+        if program == "armtempo" and arguments != ["--version"]:
+            command = main.get_command(click.Context(main), arguments[0])
+            assert command is not None, line
+            command.make_context(arguments[0], arguments[1:], resilient_parsing=False)
+        elif program == "make":
+            makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+            assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in arguments)
+        elif "/" in program or (program == "python" and arguments[0].endswith(".py")):
+            script = ROOT / (program if "/" in program else arguments[0])
+            assert script.is_file(), f"{file}: {line}"
+            assert "/" not in program or script.stat().st_mode & 0o100, f"{file}: {line}"
 
 
 def test_a_workflow_that_another_one_calls_is_there_and_may_be_called() -> None:
@@ -222,9 +220,9 @@ def row(name: str) -> str:
     return found[0]
 
 
-@pytest.mark.parametrize("name", main.list_commands(click.Context(main)))
-def test_no_command_is_left_out(name: str) -> None:
-    assert row(name)
+def test_no_command_is_left_out() -> None:
+    for name in main.list_commands(click.Context(main)):
+        assert row(name), name
 
 
 def test_examples_are_commands() -> None:
@@ -272,15 +270,15 @@ def test_the_tables_were_found() -> None:
 
 
 @sources.TOGETHER
-@pytest.mark.parametrize(("side", "name"), sorted(set(mentioned())))
-def test_what_the_tour_names_exists(side: str, name: str) -> None:
-    assert name in names(side)
+def test_what_the_tour_names_exists() -> None:
+    for side, name in sorted(set(mentioned())):
+        assert name in names(side), name
 
 
-@pytest.mark.parametrize("page", LINKING, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-        assert "://" in target or (page.parent / target).exists(), target
+def test_links_lead_somewhere() -> None:
+    for page in LINKING:
+        for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert "://" in target or (page.parent / target).exists(), f"{page}: {target}"
 
 
 def test_the_pages_on_arms_and_kinematics_name_modules_that_exist() -> None:

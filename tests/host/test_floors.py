@@ -153,7 +153,15 @@ def random_motion(seed: int, most: int = 25) -> tuple[Arm, Job]:
     if seed % 3 == 0:
         via = np.cumsum(via, axis=0)
     limits = 10.0 ** rng.uniform([0.5, 0.5, 1], [2.5, 3.5, 5], (joints, 3))
-    job = Job("random", tuple(map(tuple, via.tolist())), iterations=5, population=4, refine=1, seed=seed)
+    job = Job(
+        "random",
+        tuple(map(tuple, via.tolist())),
+        iterations=5,
+        population=4,
+        refine=1,
+        seed=seed,
+        path="through",
+    )
     return problems.make_arm(limits.tolist()), job
 
 
@@ -173,7 +181,7 @@ def test_many_via_points_and_jerk_that_hardly_matters() -> None:
     rng = np.random.default_rng(1)
     via = tuple(map(tuple, rng.normal(0, 40, (100, 3)).tolist()))
     arm = problems.make_arm([[50.0, 50.0, 1e5]] * 3)
-    plan = planner.plan(arm, Job("many", via, refine=1, iterations=5, population=4))
+    plan = planner.plan(arm, Job("many", via, refine=1, iterations=5, population=4, path="through"))
     assert 0.85 * plan.total_s <= plan.searches[0].floor_s <= plan.total_s
 
 

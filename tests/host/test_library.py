@@ -54,7 +54,7 @@ def test_the_button_starts_an_uploaded_sequence_only_where_asked(
 @pytest.fixture(scope="module")
 def plan(arm: armtempo.Arm) -> armtempo.Plan:
     """A plan that needs little search."""
-    job = armtempo.Job("small", via_deg=[START_DEG, END_DEG], population=5, iterations=20)
+    job = armtempo.Job("small", via_deg=[START_DEG, END_DEG], population=5, iterations=20, path="through")
     return armtempo.plan(arm, job)
 
 
@@ -78,7 +78,7 @@ def test_a_plan_is_computed_without_plots_and_ports() -> None:
     code = (
         "import armtempo\n"
         "arm = armtempo.Arm.paper()\n"
-        "job = armtempo.Job('x', via_deg=[[0, -60, 40], [1, -60, 40]], population=4, iterations=1)\n"
+        "job = armtempo.Job('x', via_deg=[[0, -60, 40], [1, -60, 40]], population=4, iterations=1, path='through')\n"
         "armtempo.plan(arm, job)"
     )
     assert not modules_after(code) & {"matplotlib", "click", "scipy.interpolate"}
@@ -184,7 +184,7 @@ def test_a_second_run_of_the_same_board_starts_where_it_should(
 
 def test_names_and_files_will_do_for_arm_and_job(tmp_path: Path) -> None:
     (tmp_path / "job.toml").write_text(
-        'name = "go"\nvia_deg = [[0, -60, 40], [5, -58, 41]]\niterations = 1\npopulation = 4\n',
+        'name = "go"\nvia_deg = [[0, -60, 40], [5, -58, 41]]\npath = "through"\niterations = 1\npopulation = 4\n',
         encoding="utf-8",
     )
     plan = armtempo.plan("paper", tmp_path / "job.toml")
@@ -224,7 +224,7 @@ def test_an_arm_and_a_sequence_are_made_in_code() -> None:
     joint = armtempo.Joint("table", 100, 150, 0, 0, (-90, 90), limits=limits, motor=motor)
     gripper = armtempo.Output("gripper", "switch", "PE9", 0.0, states=(("closed", 1.0),))
     arm = armtempo.Arm("mine", (joint,), outputs=(gripper,))
-    swing = armtempo.Job("swing", via_deg=[[45], [0]], iterations=1, population=4)
+    swing = armtempo.Job("swing", via_deg=[[45], [0]], iterations=1, population=4, path="through")
     steps = (armtempo.Goto((45.0,)), armtempo.SetOutput("gripper", "closed"), armtempo.RunMotion(swing))
     sequence = armtempo.Sequence("pick", (armtempo.Repeat(steps, times=2), armtempo.Wait(0.5)))
     planned = armtempo.plan_sequence(arm, sequence)

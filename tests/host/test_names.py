@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,9 @@ from armtempo.diagnosis.finding import Finding, Level
 from armtempo.link import board_messages
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
+from armtempo.model.job import Job
 from armtempo.model.plan import Plan
-from armtempo.planning import lower_bounds
+from armtempo.planning import planner, rest_to_rest
 from armtempo.records import encoded_motion
 from armtempo.report import drawing, plots, run_folder, run_report, text_summary
 from armtempo.report.replayed import results
@@ -157,22 +159,42 @@ def test_a_plan_tells_of_coarse_steps(made: Plan, monkeypatch: pytest.MonkeyPatc
     )
 
 
-def test_a_plan_tells_what_a_free_path_may_save_unless_little_or_the_job_gives_the_path(made: Plan) -> None:
-    floor_s = lower_bounds.of_vias(made.via_deg, [joint.limits for joint in made.arm.driven], {}).time_s
-    said = f'path = "free" may save up to {100 - 100 * floor_s / made.total_s:.0f} %: '
-    assert [line.startswith(said) for line in text_summary.lines(made)].count(True) == 1
-    shorter = replace(
-        made,
-        trajectory=replace(
-            made.trajectory,
-            joints=tuple(
-                replace(joint, time_points_s=joint.time_points_s * (1.02 * floor_s / made.total_s))
-                for joint in made.trajectory.joints
-            ),
-        ),
+def test_a_plan_on_the_spline_tells_what_is_faster_if_it_loses_much_to_it() -> None:
+    """Short approaches, as of a pick, between which the spline swings."""
+    via = [[0, -60, 40], [0, -60, 42], [90, -70, 42], [90, -70, 40]]
+    slow = planner.plan(Arm.paper(), Job("pick", via_deg=via, path="through", optimiser="gradient", starts=1))
+    (told,) = [line for line in text_summary.lines(slow) if "takes" in line]
+    free_s, stopping_s = (float(each) for each in re.findall(r"takes ([\d.]+) s", told))
+    assert told.startswith('path = "free" takes')
+    assert free_s < stopping_s < slow.total_s / 1.03
+    legs = [
+        max(
+            rest_to_rest.floor_s(np.array(ends), joint.limits)
+            for ends, joint in zip(zip(here, there, strict=True), slow.arm.driven, strict=True)
+        )
+        for here, there in pairwise(np.array(via, dtype=float))
+    ]
+    assert stopping_s == pytest.approx(sum(legs), abs=1e-4)
+    free = replace(slow, job=replace(slow.job, path="free"))
+    assert not any("takes" in line for line in text_summary.lines(free))
+
+
+def test_a_path_that_swings_beyond_its_via_points_is_told_with_joint_place_and_degrees() -> None:
+    """Uneven distances: the spline goes the wrong way first."""
+    via = [[20, -60, 40], [21, -60, 40], [120, -60, 40]]
+    arm = Arm.paper()
+    swung = planner.plan(arm, Job("swing", via_deg=via, path="through", optimiser="gradient", starts=1))
+    (note,) = [each for each in swung.notes if "beyond both" in each]
+    assert note.startswith("between P0 and P1 joint 1 reaches ")
+    assert note.endswith('path = "free" helps')
+    reached, beyond = (
+        float(each) for each in re.search(r"reaches (\S+) degrees, (\S+) beyond", note).groups()
     )
-    for other in (shorter, replace(made, job=replace(made.job, path="free"))):
-        assert not any("may save" in line for line in text_summary.lines(other))
+    assert reached == pytest.approx(
+        swung.trajectory(np.linspace(0.0, swung.total_s, 4000))[:, 0].min(), abs=0.01
+    )
+    assert beyond == pytest.approx(20.0 - reached, abs=0.06)
+    assert not any("beyond both" in each for each in planner.plan(arm, Job("free", via_deg=via)).notes)
 
 
 def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:

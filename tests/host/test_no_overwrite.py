@@ -16,7 +16,7 @@ from armtempo.planning import planner
 from click.testing import CliRunner, Result
 
 ARM = Arm.paper()
-JOB = 'name = "keep"\nvia_deg = [[0.0, -60.0, 40.0], [5.0, -58.0, 41.0]]\niterations = 5\n'
+JOB = 'name = "keep"\nvia_deg = [[0.0, -60.0, 40.0], [5.0, -58.0, 41.0]]\npath = "through"\niterations = 5\n'
 
 
 @pytest.fixture(autouse=True)
@@ -25,7 +25,7 @@ def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("keep.toml").write_text(JOB)
     Path("arm.toml").write_text(shipped.arm_path().read_text())
     Path("table.csv").write_text("0,-60,40\n5,-58,41\n")
-    job = Job("keep", ((0.0, -60.0, 40.0), (5.0, -58.0, 41.0)), population=5, iterations=5)
+    job = Job("keep", ((0.0, -60.0, 40.0), (5.0, -58.0, 41.0)), population=5, iterations=5, path="through")
     planner.plan(ARM, job).save("motion.json")
 
 

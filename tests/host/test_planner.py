@@ -163,7 +163,7 @@ def test_other_searches_make_plans_too(fitness: str, optimiser: str) -> None:
 def test_a_tiny_motion_takes_a_hundredth_of_a_second(refine: int, polish: bool) -> None:
     """Limits alone would let it take a tenth of that; a tenth of the time between two samples is the least."""
     arm = problems.make_arm([[100.0, 1e4, 1e8]])
-    job = Job("tiny", ((0.0,), (1e-6,), (2e-6,)), iterations=20, refine=refine, polish=polish)
+    job = Job("tiny", ((0.0,), (1e-6,), (2e-6,)), iterations=20, refine=refine, polish=polish, path="through")
     plan = planner.plan(arm, job)
     assert plan.trajectory.duration_s == pytest.approx(0.01, rel=1e-9)
 
@@ -254,7 +254,7 @@ def test_refuses_sizes_that_cannot_be_computed_with(
     via: tuple[float, ...], limits: tuple[float, ...], bounds_s: tuple[float, float]
 ) -> None:
     arm = problems.make_arm([limits], (-1e160, 1e160))
-    job = Job("far", tuple((angle,) for angle in via), bounds_s=bounds_s, iterations=5)
+    job = Job("far", tuple((angle,) for angle in via), bounds_s=bounds_s, iterations=5, path="through")
     with pytest.raises(PlanError, match="too different in magnitude"):
         planner.plan(arm, job)
 
@@ -264,7 +264,7 @@ def test_refuses_more_steps_than_the_board_makes_together() -> None:
     fast = problems.make_arm([[0.9 * MAX_STEP_RATE / 200 * 360 / 8, 1e9, 1e12]] * 6, microsteps=8)
     via = (tuple([0.0] * 6), tuple([1e6] * 6))
     with pytest.raises(PlanError, match="steps/s"):
-        planner.plan(fast, Job("fast", via, iterations=5))
+        planner.plan(fast, Job("fast", via, iterations=5, path="through"))
 
 
 def exact_ratios(points: np.ndarray, intervals: np.ndarray, degree: int) -> np.ndarray:

@@ -16,7 +16,9 @@ import pytest
 from armtempo.records import encoded_motion
 
 ARM = armtempo.Arm.paper()
-JOB = armtempo.Job("small", via_deg=[(0, -60, 40), (5, -58, 41)], population=4, iterations=1, refine=1)
+JOB = armtempo.Job(
+    "small", via_deg=[(0, -60, 40), (5, -58, 41)], population=4, iterations=1, refine=1, path="through"
+)
 NOWHERE = "/no/such/port"
 WRONG = (
     *(object(), b"x", 1 + 2j, {1}, lambda *_: 0),
@@ -164,28 +166,28 @@ def refusal(call: Callable[..., Any], values: dict[str, Any], several: bool) -> 
 
 @pytest.mark.slow
 @pytest.mark.xdist_group("public calls")
-@pytest.mark.parametrize(("where", "name"), [*public()])
 def test_wrong_types_and_values_are_refused_in_words(
-    where: str, name: str, objects: dict[str, Any], plan: armtempo.Plan, tmp_path: Path, monkeypatch: Any
+    objects: dict[str, Any], plan: armtempo.Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # no other program's board is found
-    call = called(where, name, objects)
-    if call is None:
-        return
-    parameters = inspect.signature(call).parameters.values()
-    needed = {
-        one.name for one in parameters if one.default is one.empty and one.kind is not one.VAR_POSITIONAL
-    }
-    values = {key: value for key, value in good(plan).items() if key in needed}
-    assert needed <= values.keys(), f"no value is known for {needed - values.keys()}"
-    for parameter in parameters:
-        if f"{name}.{parameter.name}" in USERS_OWN:
+    for where, name in public():
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # no other program's board is found
+        call = called(where, name, objects)
+        if call is None:
             continue
-        for number, wrong in enumerate(WRONG):
-            said = refusal(
-                call, {**values, parameter.name: wrong}, parameter.kind is parameter.VAR_POSITIONAL
-            )
-            shown = f"{name}({parameter.name}={wrong!r})"
-            assert said is None or (said.problem and said.hint), f"{shown}: {said}"
-            assert number or said or parameter.annotation in ("Any", "object"), f"{shown} is taken"
+        parameters = inspect.signature(call).parameters.values()
+        needed = {
+            one.name for one in parameters if one.default is one.empty and one.kind is not one.VAR_POSITIONAL
+        }
+        values = {key: value for key, value in good(plan).items() if key in needed}
+        assert needed <= values.keys(), f"no value is known for {needed - values.keys()}"
+        for parameter in parameters:
+            if f"{name}.{parameter.name}" in USERS_OWN:
+                continue
+            for number, wrong in enumerate(WRONG):
+                said = refusal(
+                    call, {**values, parameter.name: wrong}, parameter.kind is parameter.VAR_POSITIONAL
+                )
+                shown = f"{name}({parameter.name}={wrong!r})"
+                assert said is None or (said.problem and said.hint), f"{shown}: {said}"
+                assert number or said or parameter.annotation in ("Any", "object"), f"{shown} is taken"

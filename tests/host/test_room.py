@@ -108,7 +108,9 @@ def test_links_do_not_touch_each_other() -> None:
 
 @pytest.mark.slow
 def test_a_plan_names_link_obstacle_depth_time_and_via_points() -> None:
-    job = Job("over", via_deg=[[20, -60, 40], [90, -60, 40], [160, -60, 40]], refine=1, iterations=2)
+    job = Job(
+        "over", via_deg=[[20, -60, 40], [90, -60, 40], [160, -60, 40]], refine=1, iterations=2, path="through"
+    )
     assert planner.plan(PAPER, job)
     with pytest.raises(PlanError, match=OVER):
         planner.plan(thick(PAPER, 20.0, ArmRoom((FEEDER,))), job)
@@ -139,7 +141,7 @@ def test_a_free_path_goes_around_what_is_between_its_via_points() -> None:
 
 
 @pytest.mark.slow
-def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it() -> None:
+def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it(caplog: pytest.LogCaptureFixture) -> None:
     start = np.array([20.0, -60.0, 40.0])
     arm = thick(PAPER, 20.0, ArmRoom((FEEDER,)))
     with pytest.raises(PlanError, match="inside of feeder"):
@@ -151,7 +153,24 @@ def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it() -> None:
     inside = np.array([90.0, -60.0, 40.0])
     assert room_check.posture_touches(arm, inside)
     out = point_to_point.straight("out", inside, start, arm)
-    assert room_check.touch_of(arm, out) is None
+    assert room_check.touch_of(arm, out) is not None
+    assert room_check.touch_of(arm, out, outwards=True) is None
+    goto.motion(arm, inside, start, goto.MovePace())
+    (told,) = {record.message for record in caplog.records}
+    assert "where it starts; it may move out only" in told
+
+
+def test_a_plan_that_starts_where_it_touches_is_refused_unless_it_says_so_and_never_comes_back() -> None:
+    arm = thick(PAPER, 20.0, ArmRoom((FEEDER,)))
+    inside, outside = (90.0, -60.0, 40.0), (20.0, -60.0, 40.0)
+    out = Job("out", via=(inside, outside), path="through", optimiser="gradient", starts=1)
+    touch = max(room_check.posture_touches(arm, inside), key=lambda each: each.depth_mm)
+    with pytest.raises(PlanError, match=f"out: {touch.words} where it starts"):
+        planner.plan(arm, out)
+    plan = planner.plan(arm, replace(out, start_touches=True))
+    assert dense_least(arm, plan.trajectory, 200) < 0.0
+    with pytest.raises(PlanError, match=r"feeder \(at [1-9]"):
+        planner.plan(arm, replace(out, start_touches=True, via=(inside, outside, inside)))
 
 
 @pytest.mark.slow

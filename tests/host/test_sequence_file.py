@@ -35,7 +35,7 @@ angles_deg = [1, -60, 40]
 [posture.b]
 angles_deg = [2, -60, 40]
 """
-JOB = 'name = "j"\nrefine = 1\npolish = false\niterations = 2\nvia_deg = [[1, -60, 40], [2, -60, 41]]\n'
+JOB = 'name = "j"\npath = "through"\nrefine = 1\niterations = 2\nvia_deg = [[1, -60, 40], [2, -60, 41]]\n'
 
 
 def written(folder: Path, *steps: str, top: str = "", name: str = "seq") -> Path:

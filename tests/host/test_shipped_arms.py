@@ -201,7 +201,7 @@ def test_each_says_where_its_figures_are_from_and_can_be_planned_for(name: str) 
     middle = np.array([np.mean(joint.range_deg) for joint in arm.driven])
     away = home + 0.2 * (middle - home) + 1.0 * (middle == home)
     via = (tuple(home), tuple((home + away) / 2), tuple(away), tuple(home))
-    plan = planner.plan(arm, Job(name="there", via=via, population=4, iterations=4))
+    plan = planner.plan(arm, Job(name="there", via=via, population=4, iterations=4, path="through"))
     assert plan.trajectory.duration_s > 0
 
 

@@ -16,7 +16,7 @@ from zlib import crc32
 
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.report import run_folder
-from armtempo_shared import armrecord, backwards, motion, sequence, wire
+from armtempo_shared import armrecord, motion, sequence, way_back, wire
 
 RAMPS = tuple(range(1000, 65000, 1000)), tuple(range(1, 33)), 14
 KEPT = Path(__file__).with_name("stored_bytes.json")
@@ -46,7 +46,7 @@ def _records() -> Iterator[tuple[str, str]]:
         times = [[100 * (axis + 1) + place for place in range(5)] for axis in range(axes)]
         record = motion.pack(3, [[1, 2, 3, 4, 5], [6, 7, 8, 9, 10]], times, 1, RAMPS, 12)
         yield f"motion record {record[:4].decode()}, time axes {axes}", record.hex()
-        back = backwards.pack(record, "feed", RAMPS)
+        back = way_back.pack(record, "feed", RAMPS)
         yield f"record of the way back {back[:4].decode()}, time axes {axes}", back.hex()
     record = sequence.pack(1, [(2, 3, 4, 5, 6), (7, 8, 9, 10, 11)], [("ä", 12)], ["b"])
     yield f"sequence record {record[:4].decode()}", record.hex()

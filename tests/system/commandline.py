@@ -113,6 +113,7 @@ def small_plan(path: Path, end_deg: tuple[float, ...] = (20.0, -75.0, 50.0), nam
         bounds_s=(0.1, 3.0),
         population=5,
         iterations=20,
+        path="through",
     )
     planner.plan(ARM, job).save(path)
     return path

@@ -160,7 +160,7 @@ def make_flash(flash: Path, away: tuple[tuple[Angles, Angles], ...] = AWAY) -> N
     for number, ends in enumerate(itertools.permutations(postures, 2)):
         via = (ends[0], np.mean(ends, axis=0) + MIDDLE_DEG, ends[1])
         points = tuple(tuple(map(float, point)) for point in via)
-        job = Job(f"leg{number}", points, population=5, iterations=20, refine=1)
+        job = Job(f"leg{number}", points, population=5, iterations=20, refine=1, path="through")
         motions.append(encoded_motion.of_trajectory(planner.plan(quick, job).trajectory, quick))
     places: dict[tuple[float, ...], int] = {tuple(ARM.home_deg): 0}
     rows = []

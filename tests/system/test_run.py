@@ -103,7 +103,7 @@ def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> Non
     """A joint far too heavy for its motor: it loses steps, and the encoder's watch ends the run."""
     heavy = shipped.arm_path().read_text().replace("\ninertia_kg_m2 = 0.15", "\ninertia_kg_m2 = 6.0")
     (tmp_path / "heavy.toml").write_text(heavy)
-    job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\niterations = 20\n'
+    job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\npath = "through"\niterations = 20\n'
     (tmp_path / "job.toml").write_text(job)
     armtempo("plan", "--arm", "heavy.toml", "--job", "job.toml", "-o", "throw.json", folder=tmp_path)
     output = armtempo("run", "throw.json", folder=tmp_path, code=1)

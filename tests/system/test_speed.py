@@ -130,7 +130,11 @@ def test_changes_keep_the_brake_times_limits() -> None:
     for _ in range(2):
         ends = [np.array([30.0, -70.0, 20.0]) + rng.uniform(-25, 25, 3) for _ in range(2)]
         job = armtempo.Job(
-            "any", via_deg=[ends[0], (ends[0] + ends[1]) / 2 + 3, ends[1]], population=5, iterations=5
+            "any",
+            via_deg=[ends[0], (ends[0] + ends[1]) / 2 + 3, ends[1]],
+            population=5,
+            iterations=5,
+            path="through",
         )
         trajectory = armtempo.plan(arm, job).trajectory
         brakes = brake_time.of_motion(trajectory, limits)

@@ -49,7 +49,9 @@ class Two:
             arm = Arm.load(self.arms[host])
             self.crcs[host] = record_crc(arm)
             self.files[host] = str(folder / f"{host}.json")
-            planner.plan(arm, Job("small", (START, END), population=5, iterations=5)).save(self.files[host])
+            planner.plan(arm, Job("small", (START, END), population=5, iterations=5, path="through")).save(
+                self.files[host]
+            )
         self.arm = self.motion = self.default = ""
         self.known = False
 
@@ -117,7 +119,9 @@ def test_two_arms_in_every_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 @contextmanager
 def moving(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A program that runs a long motion on a virtual board in real time, and the port."""
-    plan = planner.plan(Arm.paper(), Job("long", (START, (170.0, -10.0, -50.0)), population=5, iterations=5))
+    plan = planner.plan(
+        Arm.paper(), Job("long", (START, (170.0, -10.0, -50.0)), population=5, iterations=5, path="through")
+    )
     plan.save(folder / "long.json")
     with launch(LaunchOptions(folder / "flash", virtual_time=False, instant_flash=True)) as board:
         commandline.ended(start("home", "--arm", "paper", "--port", board.port, folder=folder))

@@ -55,7 +55,13 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """
     folder = tmp_path_factory.mktemp("flashes")
     postures = (HOME_DEG, *(HOME_DEG + np.array(away) for away in AWAY_DEG), HOME_DEG)
-    job = Job("go", tuple(tuple(map(float, posture)) for posture in postures), population=5, iterations=20)
+    job = Job(
+        "go",
+        tuple(tuple(map(float, posture)) for posture in postures),
+        population=5,
+        iterations=20,
+        path="through",
+    )
     trajectory = planner.plan(ARM, job).trajectory
     for name in ("finish", "stop"):
         arm = replace(ARM, safety=replace(ARM.safety, on_link_loss=name))
@@ -81,7 +87,13 @@ def _add_legs(folder: Path) -> None:
     postures[1][1] = (round(postures[1][1] / half_a_step_deg[1]) | 1) * half_a_step_deg[1]
     ways = [(one, other) for one in postures for other in postures if one is not other]
     for number, way in enumerate(ways):
-        job = Job(f"leg{number}", tuple(tuple(map(float, end)) for end in way), population=5, iterations=20)
+        job = Job(
+            f"leg{number}",
+            tuple(tuple(map(float, end)) for end in way),
+            population=5,
+            iterations=20,
+            path="through",
+        )
         record = encoded_motion.of_trajectory(planner.plan(arm, job).trajectory, arm)
         (folder / f"leg{number}.atm").write_bytes(record.data)
 

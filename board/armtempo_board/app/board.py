@@ -7,7 +7,7 @@ from array import array
 
 import machine
 from armtempo_shared import codes
-from armtempo_shared.engine_memory import ONCE_BYTES
+from armtempo_shared.engine_memory import ONCE_BYTES, SHORT_ONCE_BYTES
 from armtempo_shared.messages import NO_JOINT
 from armtempo_shared.table import offset
 from micropython import const
@@ -39,7 +39,7 @@ class Board:
     def __init__(self, root: str, program_crc: int, fault: int) -> None:
         flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
         self.workspace = room.workspace()  # before anything fragments the heap
-        self.once = Once(ONCE_BYTES)
+        self.once = Once(SHORT_ONCE_BYTES if self.workspace.is_short else ONCE_BYTES)
         self.samples = SampleBuffer(room.sample_bytes(), flags_at)
         self.root = root
         self._store: "Any" = None

@@ -10,7 +10,7 @@ from armtempo_shared import engine_memory
 from armtempo_board.hardware import backup_sram
 from armtempo_board.motion.workspace import Workspace
 
-_RESERVE = 20_000  # bytes of heap for the rest, ONCE_BYTES among them; what is to spare: docs/memory.md
+_RESERVE = 16_300  # bytes of heap for the rest, the motion run once among them; to spare: docs/memory.md
 _USUAL_JOINTS = 3
 _MOST_SAMPLES = 4096  # bytes of the sample buffer at most,
 _LEAST_SAMPLES = 768  # and at least;

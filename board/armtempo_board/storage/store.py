@@ -30,8 +30,9 @@ _DEFAULT = "default.txt"
 _NEW = ".new"
 _ENOSPC = const(28)
 _ERRNO = const(0)  # of an exception's arguments
-_ST_SIZE = const(6)  # of os.stat
-_FOLDER = const(0x4000)  # in its first entry
+_ST_MODE = const(0)  # of os.stat
+_FOLDER = const(0x4000)  # a bit of it
+_ST_SIZE = const(6)
 _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
@@ -329,7 +330,7 @@ class Store:
     def _is_folder(self, file_name: str) -> bool:
         """Whether it is a folder, which somebody else made."""
         try:
-            return os.stat(self._path(file_name))[0] & _FOLDER != 0
+            return os.stat(self._path(file_name))[_ST_MODE] & _FOLDER != 0
         except OSError:
             return True
 

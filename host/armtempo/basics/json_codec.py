@@ -1,6 +1,7 @@
 """Dataclasses to JSON values and back; reading refuses values that do not fit the types.
 
-A missing key is refused, except for a field marked ``ADDED``: files written before it existed get its default.
+A missing key is refused, except for a field marked ``ADDED`` or by ``added_as``: files written before it existed get
+its default, or the value that had been meant.
 """
 
 from __future__ import annotations
@@ -20,6 +21,11 @@ from armtempo.basics.text import did_you_mean, visible
 _AGAIN = "restore the file from a copy, or make it again with the command that wrote it"
 ADDED = {"added": True}
 """Metadata of a dataclass field that older files do not have; they get its default."""
+
+
+def added_as(value: Any) -> dict[str, Any]:
+    """Metadata of such a field whose default differs from what files without it meant: ``value``."""
+    return {**ADDED, "before": value}
 
 
 def encode(value: Any) -> Any:
@@ -109,6 +115,7 @@ def _array(value: Any, where: str) -> Any:
 def _dataclass(kind: Any, value: Any, where: str) -> Any:
     if not isinstance(value, dict):
         raise InputError(f"{where}: {_short(value)} should be a table", _AGAIN)
+    value = {**_before(kind), **value}
     fields = {field.name: field.metadata.get("added", False) for field in dataclasses.fields(kind)}
     missing = {name for name, added in fields.items() if name not in value and not added}
     for what, keys in (("unknown", value.keys() - fields.keys()), ("missing", missing)):
@@ -121,6 +128,15 @@ def _dataclass(kind: Any, value: Any, where: str) -> Any:
         return kind(**found)
     except InputError as error:
         raise InputError(f"{where}: {error.problem}", error.hint) from None
+
+
+def _before(kind: Any) -> dict[str, Any]:
+    """What older files meant without a key, where that is not its default now."""
+    return {
+        field.name: field.metadata["before"]
+        for field in dataclasses.fields(kind)
+        if "before" in field.metadata
+    }
 
 
 _hints: Callable[[Any], dict[str, Any]] = get_type_hints

@@ -90,7 +90,7 @@ def variable_of(name: str) -> str:
     return f"ARMTEMPO_{name.upper()}"
 
 
-def nothing_set(name: str, what: str) -> InputError:
+def missing_setting(name: str, what: str) -> InputError:
     """The error if a needed setting is missing; ``what``: the error's text."""
     return InputError(
         what,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armtempo.basics.errors import InputError, PortGivenUpError
-from armtempo.basics.settings import ARM, JOB, RUNS, ProjectSettings, nothing_set
+from armtempo.basics.settings import ARM, JOB, RUNS, ProjectSettings, missing_setting
 from armtempo.basics.text import did_you_mean
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import remark
@@ -61,7 +61,7 @@ def load_arm(path: Path | None) -> Arm:
     """The arm as in ``named_arm``; raises InputError if none is set."""
     found = named_arm(path)
     if found is None:
-        raise nothing_set(ARM, "which arm?")
+        raise missing_setting(ARM, "which arm?")
     return found
 
 
@@ -79,7 +79,7 @@ def load_job(path: Path | None, arm: Arm) -> Job:
     """The job of ``--job``, the variable or the project folder; raises InputError if none is set."""
     setting = ProjectSettings().get(JOB, path)
     if not setting:
-        raise nothing_set(JOB, "which job?")
+        raise missing_setting(JOB, "which job?")
     return Job.load(setting.path, arm)
 
 
@@ -98,7 +98,7 @@ def arm_and_job(arm_path: Path | None, job_path: Path | None) -> tuple[Arm, Job]
     arm, job = settings.get(ARM, arm_path), settings.get(JOB, job_path)
     if arm or job:
         if not arm:
-            raise nothing_set(ARM, f"no arm is set for job {job.value} ({job.source})")
+            raise missing_setting(ARM, f"no arm is set for job {job.value} ({job.source})")
         loaded = load_arm(arm_path)
         return loaded, load_job(job_path, loaded)
     remark("no arm and no job given; using the shipped feeding job and arm")
@@ -119,7 +119,7 @@ def arm_of_board(board: Board, named: Arm | None) -> Arm:
         remark(f"arm: {paper.name}, which the board is set up for")
         return paper
     has = "an arm other than the paper's" if board.info.arm_crc else "none yet"
-    raise nothing_set(ARM, f"which arm does the board move? It is set up for {has}")
+    raise missing_setting(ARM, f"which arm does the board move? It is set up for {has}")
 
 
 def describe_arm(arm: Arm) -> str:

@@ -12,7 +12,7 @@ from armtempo.basics.errors import ArmtempoError, InputError, MissingPackageErro
 from armtempo.cli import chosen, options, results, sequences
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
-from armtempo.cli.run import run_and_tell
+from armtempo.cli.run import run_and_report
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.sequence import Sequence
@@ -59,7 +59,7 @@ def demo(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | 
     for line in pipeline.summary(plan):
         results.echo(line)
     with chosen.board(BoardOptions(port, log_traffic), plan.arm) as board:
-        run = run_and_tell(board, plan, 1, chosen.runs(out))
+        run = run_and_report(board, plan, 1, chosen.runs(out))
     try:
         page = pipeline.report(run)
         results.echo(_NEXT.format(page=page, uri=page.resolve().as_uri()))
@@ -87,4 +87,4 @@ def _pick_and_place() -> None:
         armtempo.connect(process.port, arm) as board,
     ):
         board.home(arm)
-        sequences.run_and_tell(board, plan, False, None)
+        sequences.run_and_report(board, plan, False, None)

@@ -31,7 +31,7 @@ def deploy(mpy: bool, arm_path: Path | None, port: str | None, as_json: bool) ->
     """
     arm = chosen.named_arm(arm_path)
     with ProgressBar("copying") as progress:
-        info = deployment.deploy(chosen.port(port), mpy, results.teller(as_json), progress)
+        info = deployment.deploy(chosen.port(port), mpy, results.progress_printer(as_json), progress)
     room = engine_room.of_board(info)
     values = {
         "board_id": info.board_id,
@@ -55,7 +55,7 @@ def undeploy(port: str | None, as_json: bool) -> None:
     Stored motions are kept; the backed-up boot.py and main.py are restored.
     """
     name = chosen.port(port)
-    deployment.undeploy(name, results.teller(as_json))
+    deployment.undeploy(name, results.progress_printer(as_json))
     if as_json:
         results.show_json({"port": name, "program": None})
 

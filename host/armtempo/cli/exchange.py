@@ -60,7 +60,7 @@ def import_table(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Make a job file from TABLE: one line per via point, one column per driven joint; or a ROS JointTrajectory.
+    """Make a job file from TABLE, one line per via point, or from a ROS JointTrajectory.
 
     The first line names the columns, in any order: the joints' names or j1, j2, …, with a unit such as (rad); or x, y,
     z and roll, pitch, yaw for poses. Columns are separated by commas, semicolons, tabs or blanks. A file that

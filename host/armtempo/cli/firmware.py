@@ -65,7 +65,7 @@ def firmware(
     folder = out or Path(f"firmware-{Path(board).name}")
     with ProgressBar("building") as progress:
         made = build.build(micropython, board, folder, progress)
-    say = results.teller(as_json)
+    say = results.progress_printer(as_json)
     say(
         f"{folder}: MicroPython {made.micropython} for {made.machine}, with the program {made.program_crc:08x}"
     )
@@ -110,7 +110,7 @@ def flash(given: Path | None, port: str | None, tool: str | None, as_json: bool)
     chosen = given or image.find(Path())
     found = ProjectSettings().get(PORT, port).value or None
     with ProgressBar("flashing") as progress:
-        write.flash(chosen, found, tool, results.teller(as_json), progress)
+        write.flash(chosen, found, tool, results.progress_printer(as_json), progress)
     results.show(
         as_json,
         {"image": str(chosen), "port": found},

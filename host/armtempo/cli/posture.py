@@ -56,9 +56,9 @@ def goto(
             with ProgressBar("moving") as progress:
                 board.goto(target_deg, progress, line=line)
         except Stopped:
-            say_where_it_is(board, given.as_json)
+            print_position(board, given.as_json)
             raise
-        say_where_it_is(board, given.as_json)
+        print_position(board, given.as_json)
 
 
 @click.command("home", cls=options.TakesNumbers)
@@ -89,7 +89,7 @@ def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions)
             board.home_to_switches(arm)
         else:
             board.home(arm, angles_deg)
-        say_where_it_is(board, given.as_json)
+        print_position(board, given.as_json)
 
 
 def is_named(text: str) -> bool:
@@ -156,7 +156,7 @@ def _numbers(text: str) -> list[float]:
         ) from None
 
 
-def say_where_it_is(board: Board, as_json: bool = False) -> None:
+def print_position(board: Board, as_json: bool = False) -> None:
     """Print the arm's position at the end of a command; as JSON like ``status``."""
     found = board.state()
     lines = ["position:", *(f"  {line}" for line in state.joint_lines(found))]

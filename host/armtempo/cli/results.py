@@ -85,7 +85,7 @@ def remark(text: str) -> None:
         echo(text, err=True)
 
 
-def teller(as_json: bool) -> Callable[[str], None]:
+def progress_printer(as_json: bool) -> Callable[[str], None]:
     """The function that prints progress: to stdout, or to stderr if stdout is for the document."""
     return remark if as_json else echo
 

@@ -44,23 +44,23 @@ def run(
         sequence = chosen.load_sequence_plan(Path(what), given.arm_path)
         with chosen.board(given, sequence.arm) as board:
             board.configure(sequence.arm, replace=given.replace_arm)
-            results.teller(given.as_json)(f"arm: {chosen.describe_arm(sequence.arm)}")
+            results.progress_printer(given.as_json)(f"arm: {chosen.describe_arm(sequence.arm)}")
             board.speed(percent / 100)
-            sequences.run_and_tell(board, sequence, force, chosen.runs(out), given.as_json)
+            sequences.run_and_report(board, sequence, force, chosen.runs(out), given.as_json)
         return
     plan = chosen.load_plan(Path(what), given.arm_path, given.altered) if chosen.is_file(what) else None
     named = plan.arm if plan else chosen.named_arm(given.arm_path)
     with chosen.board(given, named) as board:
         arm = chosen.arm_of_board(board, named)
         board.configure(arm, replace=given.replace_arm)
-        results.teller(given.as_json)(f"arm: {chosen.describe_arm(arm)}")
+        results.progress_printer(given.as_json)(f"arm: {chosen.describe_arm(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):
             only_for_motions(repeat, live)
-            sequences.run_and_tell(board, motion, False, chosen.runs(out), given.as_json)
+            sequences.run_and_report(board, motion, False, chosen.runs(out), given.as_json)
             return
-        run_and_tell(board, motion, repeat, chosen.runs(out), live, given.as_json)
+        run_and_report(board, motion, repeat, chosen.runs(out), live, given.as_json)
 
 
 def only_for_motions(repeat: int, live: bool) -> None:
@@ -75,7 +75,7 @@ def _is_sequence(board: Board, name: str) -> bool:
     return found is not None and found.sequence
 
 
-def run_and_tell(
+def run_and_report(
     board: Board,
     motion: Plan | EncodedMotion | str,
     repeat: int,

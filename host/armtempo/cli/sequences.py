@@ -133,7 +133,7 @@ class Shown:
             click.echo(err=True)
 
 
-def run_and_tell(
+def run_and_report(
     board: Board, sequence: SequencePlan | str, replace: bool, out: Path | None, as_json: bool = False
 ) -> SequenceState:
     """Run a sequence, recorded in a run folder in ``out`` (None: not recorded); print its progress and its
@@ -141,7 +141,7 @@ def run_and_tell(
 
     ``as_json``: print the end as JSON. Exit code 1 if the wait for an input timed out.
     """
-    say = results.teller(as_json)
+    say = results.progress_printer(as_json)
     shown = Shown(sequence if not isinstance(sequence, str) else None, say)
     try:
         end = board.run_sequence(sequence, shown, replace=replace, out=out)

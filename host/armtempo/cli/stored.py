@@ -185,7 +185,7 @@ def remove(names: tuple[str, ...], given: BoardOptions) -> None:
     with chosen.board(given) as board:
         for name in names:
             board.remove(name)
-            results.teller(given.as_json)(f"{name}: removed")
+            results.progress_printer(given.as_json)(f"{name}: removed")
     if given.as_json:
         results.show_json({"removed": names})
 

@@ -10,7 +10,7 @@ import click
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
-from armtempo.basics.settings import ARM, ProjectSettings, nothing_set
+from armtempo.basics.settings import ARM, ProjectSettings, missing_setting
 from armtempo.cli import chosen, jog, keys, options, results
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
@@ -77,7 +77,7 @@ def _own_arm_file(arm_path: Path | None, name: str) -> Path:
         raise InputError(f"--posture {name}: {problem}", "choose another name")
     setting = ProjectSettings().get(ARM, arm_path)
     if not setting:
-        raise nothing_set(ARM, "no arm file is set")
+        raise missing_setting(ARM, "no arm file is set")
     found = shipped.find(setting.path)
     if found.ships or found.path.resolve() in [path.resolve() for path in shipped.files().values()]:
         raise InputError(

@@ -213,14 +213,23 @@ class Arm:
         return found[0]
 
     def placed(self, angles_deg: Iterable[float]) -> tuple[float, ...]:
-        """The driven joints' angles, (J,), those that are only by rounding beyond a range at its end."""
-        return tuple(joint.placed(float(angle)) for joint, angle in zip(self.driven, angles_deg, strict=True))
+        """The driven joints' angles, (J,), those that are only by rounding beyond a range at its end.
+
+        Raises InputError if there is not one for each joint.
+        """
+        angles = tuple(angles_deg)
+        if len(angles) != len(self.driven):
+            raise InputError(self._size_problem(len(angles)), "give one for each joint with a motor")
+        return tuple(joint.placed(float(angle)) for joint, angle in zip(self.driven, angles, strict=True))
+
+    def _size_problem(self, count: int) -> str:
+        return f"{count} angles, but {len(self.driven)} joints have a motor"
 
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
         """Why the driven joints cannot be at these angles; "" if they can."""
         angles = tuple(angles_deg)
         if len(angles) != len(self.driven):
-            return f"{len(angles)} angles, but {len(self.driven)} joints have a motor"
+            return self._size_problem(len(angles))
         for joint, angle in zip(self.driven, self.placed(angles), strict=True):
             low, high = joint.range_deg
             if not low <= angle <= high:

@@ -68,8 +68,11 @@ class Job:
     """Limits of the tool for the whole motion."""
     holds: str = field(default="", metadata=json_codec.ADDED)
     """The load of the arm that the tool holds; "": none, and in a sequence what it holds there."""
-    path: str = field(default="through", metadata=json_codec.ADDED)
-    """``"through"``: the spline of Eqs. (13) and (14); ``"free"``: it may bend between the via points."""
+    start_touches: bool = field(default=False, metadata=json_codec.ADDED)
+    """Whether it may start where the arm touches something, to move out."""
+    path: str = field(default="free", metadata=json_codec.added_as("through"))
+    """``"free"``: it may bend between the via points, so it is the fastest; ``"through"``: the spline of Eqs. (13)
+    and (14)."""
     corridor_deg: float | None = field(default=None, metadata=json_codec.ADDED)
     corridor_mm: float | None = field(default=None, metadata=json_codec.ADDED)
     """Largest distance of a free path from the spline through the via points, of any joint or of the tool;
@@ -160,6 +163,7 @@ class Job:
             speed_mm_s=tool_way.limit(top, "speed_mm_s"),
             acceleration_mm_s2=tool_way.limit(top, "acceleration_mm_s2"),
             holds=held(top, arm),
+            start_touches=top.boolean("start_touches", cls.start_touches),
             path=top.choice("path", PATHS, cls.path),
             corridor_deg=_corridor(top, "corridor_deg"),
             corridor_mm=_corridor(top, "corridor_mm"),
@@ -197,6 +201,12 @@ class Job:
         file = Path(path)
         found = via_table.read(file, Arm.of(arm), radians, tolerance_deg)
         return cls.of_table(toml_table.parse(via_table.job_text(file.stem, found), str(path)), Arm.of(arm))
+
+    @classmethod
+    def searching(cls) -> Mapping[str, object]:
+        """The settings of the search for ``path = "through"``, without effect on a free path, and their defaults."""
+        own = ("optimiser", "population", "iterations", "bounds_s", "polish")
+        return {**{name: getattr(cls, name) for name in own}, "parameters": {}}
 
     @classmethod
     def paper(cls, arm: Arm | Path | str | None = None) -> Job:

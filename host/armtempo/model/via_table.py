@@ -155,9 +155,9 @@ def _thinned(
 def job_text(name: str, path: ImportedPath) -> str:
     """The text of a job file through these via points, with default settings.
 
-    A thinned path gets shared timing, as its joints pass the points together.
+    A thinned path is the spline through its points, with shared timing, as its joints pass them together.
     """
-    timing = "" if path.thinned_to_deg is None else 'timing = "shared"\n'
+    timing = "" if path.thinned_to_deg is None else 'path = "through"\ntiming = "shared"\n'
     head = f"name = {json.dumps(name)}\n{timing}"
     if path.poses:
         return head + "".join(

@@ -61,15 +61,15 @@ _MOST_S = 2.0 * LONGEST_S
 _LONGER, _MUCH_LONGER = 1.01, 1.1
 _REST_STARTS, _OTHER_STARTS = 2, 4  # in each part of a table
 _FINER = 3  # for the check
-_PHASES = 10  # of each piece of a ramp for the check,
+_PHASES = 15  # of each piece of a ramp for the check,
 _SOME_PHASES = 6  # for the search of lengths,
 _FEW_PHASES = 4  # and where shapes are compared
 _SAMPLES = 4000
 _SHORTEST_S = 0.01
 _LESS = 0.3  # than estimated: longer ones may suffice because the motion ends, while less do not
-_SECANTS, _MOST_TRIES = 6, 8
+_SECANTS, _MOST_TRIES = 5, 7
 _CLOSE = 0.015  # below the most allowed
-_NEARLY = 0.9  # of a sufficient length, where shapes are compared
+_ABOUT, _NEARLY = 1.2, 0.9  # of the estimated time to rest, and of that to the end: where shapes are compared
 _ALIKE = 1e-9  # differences of speeds over their largest
 _ROOM = 1.1  # for entries to be lengthened
 _NEGLIGIBLE = 1e-6  # of the unit of lengths
@@ -152,11 +152,8 @@ def _best_shapes(ramps: _Ramps) -> Shapes:
     Of all shapes the excess is compared at the same length, in which the motion does not end.
     """
     starts = np.linspace(0.0, 1.0, 2 * REST_ENTRIES - 1)
-    even = np.full(len(starts), EVEN_RAMP)
-    length_s = _NEARLY * np.minimum(
-        ramps.shortest_s(starts, TO_REST[:1], even, _FEW_PHASES),
-        np.maximum((1.0 - starts) * ramps.duration_s, _SHORTEST_S),
-    )
+    left_s = np.maximum((1.0 - starts) * ramps.duration_s, _SHORTEST_S)
+    length_s = np.minimum(_ABOUT * ramps.estimated_s(starts), _NEARLY * left_s)
     count = len(_SHAPES)
     every, shapes = np.tile(starts, count), np.repeat(np.arange(count), len(starts))
     found = ramps.excess(every, np.tile(length_s, count), TO_REST[:1], shapes, _FEW_PHASES)
@@ -194,23 +191,21 @@ class _Kind:
         at, shape = self._places(_FINER * self._starts)
         length = np.zeros(at.shape)
         longer = np.zeros(at.shape)
+        least = 1.0
         while True:
+            least = min(least + _LONGER - 1.0, _MUCH_LONGER)
             before, length = length, _between(table, _FINER * self._starts)
             new = length != before
             given = at[new], unit_s * length[new]
             excess = self._ramps.excess(*given, self._worst, shape[new], _PHASES)
             others = self._ramps.excess(*given, self._others, shape[new], _SOME_PHASES)
-            longer[new] = _longer(np.maximum(excess, others))
+            excess = np.maximum(excess, others)
+            longer[new] = np.where(excess > 1.0, np.clip(excess, least, _MUCH_LONGER), 0.0)
             longer[length > RAMP_LENGTH - _NEGLIGIBLE] = 0.0
             if not np.any(longer):
                 return table
             _lift(table, longer * length)
             table = np.minimum(np.ceil(table), RAMP_LENGTH)
-
-
-def _longer(excess: Array) -> Array:
-    """The factor for a length with some excess; 0: none."""
-    return np.where(excess > 1.0, np.clip(excess, _LONGER, _MUCH_LONGER), 0.0)
 
 
 def _between(table: Array, starts: int) -> Array:
@@ -250,7 +245,7 @@ class _Ramps:
         """Shortest durations, to 1 %, (N,); ``starts``: fractions of the motion, (N,), with ``shapes``, (N,)."""
         low, high = np.full(len(starts), _SHORTEST_S), np.full(len(starts), np.inf)
         below, above = np.full(len(starts), 1.0), np.zeros(len(starts))  # logarithms of the excess there
-        tried = self._estimated_s(starts, shapes)
+        tried = np.maximum(_LESS * self.estimated_s(starts), _SHORTEST_S)
         left = np.arange(len(starts))
         tries = 0
         while len(left):
@@ -273,16 +268,19 @@ class _Ramps:
             tried[left] = low[left] * np.exp(growth)
         return np.asarray(np.minimum(high, _MOST_S))
 
-    def _estimated_s(self, starts: Array, shapes: Shapes) -> Array:
-        """Durations (N,) of ramps from the speeds at ``starts``, if these were constant."""
-        _, _, slope, bend, _, _ = _ramp(2)
-        slope, bend = np.abs(slope).max(axis=1)[shapes], np.abs(bend).max(axis=1)[shapes]
+    def estimated_s(self, starts: Array) -> Array:
+        """The shortest times to rest (N,) from ``starts`` if no joint had to stay on its path."""
         first = np.rint(starts * (_SAMPLES - 1)).astype(np.intp)
         found = np.full(len(starts), _SHORTEST_S)
         for rows, factor in self._joints:
-            speed = np.abs(rows[0][0].take(first))
-            np.maximum(found, np.maximum(factor * speed * slope, np.sqrt(speed * bend)), out=found)
-        return np.asarray(np.clip(_LESS * found, _SHORTEST_S, 0.5 * _MOST_S))
+            speed, acceleration = (rows[order][0].take(first).astype(float) for order in (0, 1))
+            acceleration = np.where(speed < 0.0, -acceleration, acceleration)
+            speed = (
+                np.abs(speed) + 0.5 * acceleration**2
+            )  # when the acceleration is 0, with the most of the jerk, 1
+            phase = np.minimum(np.sqrt(speed), 1.0 / factor)
+            np.maximum(found, phase + speed / np.maximum(phase, _SHORTEST_S) + acceleration, out=found)
+        return np.asarray(np.minimum(found, 0.5 * _MOST_S))
 
     def excess(self, starts: Array, length_s: Array, rates: Rates, shapes: Shapes, phases: int) -> Array:
         """Largest ratio (N,) of acceleration or jerk to the most allowed in changes between ``rates``.

@@ -37,6 +37,9 @@ ESTIMATED = "(estimated; 'armtempo selftest' measures your board)"
 TOLERANCE = 1e-9
 """Allowance for rounding: relative excess over a limit, and excess over a range in degrees."""
 
+MOVE_VIAS = "move the via points away from the end of the range, or add one where it swings out"
+"""Hint of ``check_ranges``."""
+
 FITNESS = ("stretched", "penalised")
 """Values of the job's parameter ``fitness``: ``stretched`` scales each candidate until it just keeps its
 limits, ``penalised`` is Eq. (21) of the paper."""
@@ -266,8 +269,8 @@ def long_ways(arm: Arm, via_deg: Array) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
-    """Raise PlanError if the path leaves a joint's range, also between the via points."""
+def check_ranges(arm: Arm, angle_points_deg: Array, degree: int, hint: str = MOVE_VIAS) -> None:
+    """Raise PlanError, with this hint, if the path leaves a joint's range, also between the via points."""
     low, high = extremes.range_of(np.moveaxis(bspline.polynomials(angle_points_deg, degree), 2, 0))
     for joint, lowest, highest in zip(arm.driven, low, high, strict=True):
         least, most = joint.range_deg
@@ -276,7 +279,7 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int) -> None:
             raise PlanError(
                 f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} degrees, its range is "
                 f"{least:g} to {most:g}",
-                "move the via points away from the end of the range, or add one where it swings out",
+                hint,
             )
 
 

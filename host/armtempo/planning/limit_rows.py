@@ -53,36 +53,16 @@ def gradient(angle: Array, time: Array, limits: Array) -> Array:
     return np.asarray(result / limits.T[:, None, None, :])
 
 
-def curvature(angle: Array, time: Array, limits: Array, weights: Array) -> Array:
-    """Second derivatives by the six derivatives of the sum of ``weights`` (3, P, J) times ratios: (6, 6, P, J)."""
-    q1, q2, q3 = angle
-    t1, t2, t3 = time[:, :, None]
-    i1 = 1.0 / t1
-    i2, i3, i4, i5, i6, i7 = (i1**power for power in range(2, 8))
-    v, a, j = weights / limits.T[:, None, :]
-    result = np.zeros((6, 6, *q1.shape))
-    result[0, 3] = -i2 * v + 3.0 * t2 * i4 * a + (4.0 * t3 * i5 - 15.0 * t2**2 * i6) * j
-    result[0, 4] = -i3 * a + 6.0 * t2 * i5 * j
-    result[0, 5] = -i4 * j
-    result[1, 3] = -2.0 * i3 * a + 12.0 * t2 * i5 * j
-    result[1, 4] = -3.0 * i4 * j
-    result[2, 3] = -3.0 * i4 * j
-    result[3, 4] = 3.0 * q1 * i4 * a + (12.0 * q2 * i5 - 30.0 * q1 * t2 * i6) * j
-    result[3, 5] = 4.0 * q1 * i5 * j
-    result += result.swapaxes(0, 1)
-    result[3, 3] = 2.0 * q1 * i3 * v + (6.0 * q2 * i4 - 12.0 * q1 * t2 * i5) * a
-    result[3, 3] += (12.0 * q3 * i5 - 60.0 * q2 * t2 * i6 + 90.0 * q1 * t2**2 * i7 - 20.0 * q1 * t3 * i6) * j
-    result[4, 4] = 6.0 * q1 * i5 * j
-    return result
-
-
 class LimitRows:
     """1 - ratio > 0 and 1 + ratio > 0 for speed, acceleration and jerk of each joint at each point.
 
     ``points``: P of them, at least one in every segment; ``limits``: (J, 3).
     """
 
+    linear = False
+
     def __init__(self, variables: MotionVariables, points: Points, limits: Array) -> None:
+        self.count = 6 * len(points.u) * len(limits)
         self.limits, self._variables = limits, variables
         self._starts = np.searchsorted(points.segment, np.arange(variables.segments))
         self._bases = angle_basis(variables.degree, points.u)
@@ -125,16 +105,19 @@ class LimitRows:
         return np.concatenate([(1.0 - found).ravel(), (1.0 + found).ravel()])
 
     def assemble(self, local: Array) -> Array:
-        """Entries of the matrix from those by the six derivatives at each point, (6, 6, P, J)."""
-        bases = self._time_bases
-        by_time = np.einsum("pak,abp,pbl->pkl", bases, local[3:, 3:].sum(axis=3), bases, optimize=True)
+        """Entries of the matrix from those by the six derivatives at each point: (P, 6, J, 6)."""
+        bases, (points, _, joints, _) = self._time_bases, local.shape
+        by_time = bases.swapaxes(1, 2) @ (local[:, 3:, :, 3:].sum(axis=2) @ bases)
         entries = [np.add.reduceat(by_time, self._starts).ravel()]
-        half = np.einsum("pac,abpj->jpcb", self._bases, local[:3], optimize=True)
-        own = np.add.reduceat(half[..., :3] @ self._bases, self._starts, axis=1)
-        mixed = np.add.reduceat(half[..., 3:] @ bases, self._starts, axis=1)
-        for joint in range(local.shape[3]):
-            entries.extend([own[joint].ravel(), mixed[joint].ravel()])
-            entries.append(mixed[joint].swapaxes(1, 2).ravel())
+        angles, count = bases.shape[2] + 1, 2 * bases.shape[2] + 1
+        both = np.zeros((points, 6, count))
+        both[:, :3, :angles], both[:, 3:, angles:] = self._bases, bases
+        half = self._bases.swapaxes(1, 2) @ local[:, :3].reshape(points, 3, -1)
+        whole = (half.reshape(points, angles * joints, 6) @ both).reshape(points, angles, joints, count)
+        found = np.add.reduceat(whole, self._starts)
+        for joint in range(joints):
+            own, mixed = found[:, :, joint, :angles], found[:, :, joint, angles:]
+            entries.extend([own.ravel(), mixed.ravel(), mixed.swapaxes(1, 2).ravel()])
         return np.concatenate(entries)
 
     def linearise(self, x: Array) -> LinearisedLimits:
@@ -146,7 +129,7 @@ class LinearisedLimits:
     """Derivatives of the rows at one point; see ``optimise.interior_point.Linearised``."""
 
     def __init__(self, rows: LimitRows, angle: Array, time: Array) -> None:
-        self._rows, self._angle, self._time = rows, angle, time
+        self._rows, self._angle = rows, angle
         self._gradient = gradient(angle, time, rows.limits)
 
     def forward(self, step: Array) -> Array:
@@ -159,13 +142,9 @@ class LinearisedLimits:
         upper, lower = weights.reshape(2, 3, *self._angle.shape[1:])
         return self._rows.gradient(np.einsum("kopj,kpj->opj", self._gradient, lower - upper))
 
-    def hessian(self, weights: Array, multipliers: Array, exact: bool) -> Array:
-        """See there; the entries are at ``LimitRows.rows`` and ``columns``."""
-        rows = self._rows
-        shape = (2, 3, *self._angle.shape[1:])
-        both = weights.reshape(shape).sum(axis=0)
-        local = np.einsum("kapj,kbpj->abpj", self._gradient * both[:, None], self._gradient, optimize=True)
-        if exact:
-            upper, lower = multipliers.reshape(shape)
-            local += curvature(self._angle, self._time, rows.limits, upper - lower)
-        return rows.assemble(local)
+    def hessian(self, weights: Array, _: Array, __: bool) -> Array:
+        """See there, without the second derivatives; the entries are at ``LimitRows.rows`` and ``columns``."""
+        both = weights.reshape(2, 3, *self._angle.shape[1:]).sum(axis=0)
+        return self._rows.assemble(
+            np.einsum("kapj,kbpj->pajb", self._gradient * both[:, None], self._gradient)
+        )

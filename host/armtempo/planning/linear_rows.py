@@ -19,6 +19,8 @@ class LinearRows:
     ``columns`` and ``weights``: (R, w); ``low`` and ``high``: (R,).
     """
 
+    linear = True
+
     def __init__(self, size: int, columns: Index, weights: Array, low: Array, high: Array) -> None:
         self._low, self._high = low, high
         self._lower, self._upper = np.flatnonzero(np.isfinite(low)), np.flatnonzero(np.isfinite(high))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.optimise.interior_point import Linearised
@@ -29,6 +30,9 @@ class Block(Protocol):
 
     rows: Index
     columns: Index
+    count: int
+    linear: bool
+    """Whether all of them are linear."""
 
     def values(self, x: Array) -> Array: ...
 
@@ -66,6 +70,11 @@ class MotionProgram:
         columns = [left, right, right, left, *(block.columns for block in self.blocks)]
         self.kkt = BandedKkt(variables.places, np.concatenate(rows), np.concatenate(columns), equalities)
 
+    @property
+    def linear(self) -> NDArray[np.bool_]:
+        """Whether each inequality is linear."""
+        return np.concatenate([np.full(block.count, block.linear) for block in self.blocks])
+
     def duration(self, x: Array) -> float:
         """Motion time per segment, in the program's unit."""
         return float(self._time @ x)
@@ -86,8 +95,7 @@ class _Linearised:
     def __init__(self, program: MotionProgram, x: Array) -> None:
         self._smoothing = program._smoothing
         self._blocks = [block.linearise(x) for block in program.blocks]
-        sizes = [len(block.values(x)) for block in program.blocks]
-        self._splits = np.cumsum(sizes)[:-1]
+        self._splits = np.cumsum([block.count for block in program.blocks])[:-1]
         steps = 2.0 * self._smoothing * np.diff(program.variables.time_differences(x))
         self.gradient = program._time.copy()
         index = program.variables.difference_index

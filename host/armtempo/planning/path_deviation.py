@@ -1,6 +1,10 @@
-"""Deviations of per-joint timing: joints pass a via point at different times, so the tool leaves the path."""
+"""Deviations of a path: of the tool with per-joint timing, and of joints from the angles between via points."""
 
 from __future__ import annotations
+
+from collections.abc import Collection
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,7 +12,7 @@ from armtempo.kinematics import chain
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
-from armtempo.splines import bspline
+from armtempo.splines import bspline, extremes
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import Trajectory
 
@@ -34,6 +38,37 @@ def tool_stray_mm(arm: Arm, trajectory: Trajectory) -> float:
     times = np.linspace(0.0, trajectory.duration_s, _TIMES)
     path = _tool(arm, _path_deg(trajectory))
     return float(_distance(_tool(arm, trajectory(times)), path[:-1], path[1:]).max())
+
+
+class Swing(NamedTuple):
+    """A joint that leaves the angles between two via points."""
+
+    beyond_deg: float
+    joint: int
+    """Index among the driven joints."""
+    via: int
+    """Number of the via point before it, from 0."""
+    reached_deg: float
+
+
+def widest_swing(trajectory: Trajectory, skipped: Collection[int] = ()) -> Swing:
+    """Where a joint gets farthest beyond the angles of the via points before and after it.
+
+    ``skipped``: numbers of via points before which the path is none of its own choice.
+    """
+    found = [Swing(0.0, 0, 0, 0.0)]
+    for joint, spline in enumerate(trajectory.joints):
+        pieces = bspline.polynomials(spline.angle_points_deg, spline.degree)
+        knots = spline.via_segments or range(len(pieces) + 1)
+        for via, (first, last) in enumerate(pairwise(knots)):
+            if via + 1 in skipped:
+                continue
+            own = pieces[first:last]
+            ends = float(own[0, 0]), float(own[-1].sum())
+            low, high = (float(each[0]) for each in extremes.range_of(own[None]))
+            found.append(Swing(min(ends) - low, joint, via, low))
+            found.append(Swing(high - max(ends), joint, via, high))
+    return max(found)
 
 
 def _path_deg(trajectory: Trajectory) -> Array:

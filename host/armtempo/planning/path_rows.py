@@ -123,7 +123,10 @@ def _reachable(angle: Array, time: Array, limits: Array) -> list[Array]:
 class PathRows:
     """1 - ratio > 0 for each row, a block of a motion program in which only time varies."""
 
+    linear = False
+
     def __init__(self, variables: MotionVariables, points: Points, rows: Rows) -> None:
+        self.count = len(rows.point)
         self.limits = rows
         self._basis = time_basis(variables.degree, points.u)
         self._derived = derivative_matrix(self._basis, points.segment, variables.differences)

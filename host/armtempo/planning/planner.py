@@ -18,11 +18,13 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_way import ToolWay
-from armtempo.planning import checks, room_check, through_plan
+from armtempo.planning import checks, path_deviation, room_check, through_plan
 from armtempo.planning.free import around
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
+_SWING_DEG = 1.0
+"""A joint that goes farther than this beyond the via points on both sides of it is told."""
 _LINE_REFINE = 4
 """Time segments per path segment of a straight line: within 1 % of the fastest, and planned quickly."""
 
@@ -50,9 +52,22 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
-    room_check.check(holding, trajectory, np.array([each.speed_deg_s for each in reached]), through=True)
-    notes = (*checks.hardware_notes(arm), *notes, *planned.notes)
+    speeds_deg_s = np.array([each.speed_deg_s for each in reached])
+    room_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
+    notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, trajectory))
     return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
+
+
+def _swing_note(arm: Arm, job: Job, trajectory: Trajectory) -> list[str]:
+    """A note if a joint leaves the angles between two via points by more than ``_SWING_DEG``."""
+    swing = path_deviation.widest_swing(trajectory, [way.via for way in job.ways if way.line])
+    if swing.beyond_deg <= _SWING_DEG:
+        return []
+    helps = 'path = "free" helps' if job.path == "through" else "a via point or a stop = true there keeps it"
+    return [
+        f"between P{swing.via} and P{swing.via + 1} {arm.driven[swing.joint].name} reaches {swing.reached_deg:.2f} "
+        f"degrees, {swing.beyond_deg:.1f} beyond both; {helps}"
+    ]
 
 
 @cache

@@ -62,10 +62,10 @@ def plan(
     reached = extremes.of_joints(splines)
     checks.check_ranges(arm, points, DEGREE)
     checks.check_reached(arm, reached)
-    room_check.check(arm, trajectory, np.array([each.speed_deg_s for each in reached]))
+    room_check.check(arm, trajectory)
     via = np.stack([points[index : index + DEGREE] for index in range(segments + 1)])
     via_deg = np.einsum("c,scj->sj", bspline.basis(DEGREE)[0, :-1], via)
-    job = Job(name, via_deg=via_deg.tolist(), timing="shared", refine=1, optimiser=GRADIENT)
+    job = Job(name, via_deg=via_deg.tolist(), path="through", timing="shared", refine=1, optimiser=GRADIENT)
     moving = np.flatnonzero(np.ptp(points, axis=0) > checks.TOLERANCE)
     floor = lower_bounds.of_path(
         points[:, moving], DEGREE, [limits[joint] for joint in moving], trajectory.duration_s

@@ -6,6 +6,8 @@ A lower bound for every time law on a path: a joint stands still at its turning 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -63,6 +65,17 @@ def _ramp(speed: float, limits: Limits, from_rest: bool) -> tuple[float, float]:
         return time, speed * time / 2.0
     before = held * peak
     return time, before * held / 2.0 + before * phase + peak * phase**2 / 3.0
+
+
+def stopping_s(via_deg: Array, limits: Sequence[Limits], together: bool = True) -> float:
+    """Least time through via angles (n + 1, J) with a rest at each; ``together``: all joints leave each together."""
+    each = np.array(
+        [
+            [floor_s(np.array(ends), limit) for ends in pairwise(angles)]
+            for angles, limit in zip(via_deg.T.tolist(), limits, strict=True)
+        ]
+    )
+    return float(each.max(axis=0).sum() if together else each.sum(axis=1).max())
 
 
 def needed_s(via_deg: Array, limits: Array) -> Array:

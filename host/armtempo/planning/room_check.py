@@ -7,6 +7,7 @@ the joints' speeds times their reach to it. If something might touch, the interv
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,6 +33,11 @@ _CLOSE_MM = 0.01
 """Smaller distances count as touching: the proof ends there."""
 _DEEPER_MM = 0.5
 """What touches at the start may do so by this much more; less would take many halvings to prove."""
+_APART_MM = 2.0 * _CLOSE_MM
+"""From this distance on a pair has come apart."""
+_TIMES = 2000
+"""Number of times at which that is looked for."""
+LOG = logging.getLogger("armtempo")
 _MOST = 4000
 """Largest number of intervals at a time."""
 
@@ -192,17 +198,23 @@ def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
     ]
 
 
-def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch | None:
+def first_touch(
+    arm: Arm, trajectory: Trajectory, speeds_deg_s: Array, outwards: bool = False
+) -> Touch | None:
     """What touches in a motion, None if it is proven that nothing does.
 
-    ``speeds_deg_s``: the joints' largest speeds in it, (J,). What touches at its start already may stay as deep, or go
-    ``_DEEPER_MM`` deeper: so an arm can be moved out.
+    ``speeds_deg_s``: the joints' largest speeds in it, (J,). If it leads ``outwards``, what touches at its start may do
+    so until it has come apart, by ``_DEEPER_MM`` more at most.
     """
     bodies = Bodies(arm)
     if not bodies.named:
         return None
     start = bodies.distances(trajectory(np.zeros(1)))[0]
-    allowed = np.where(start < 2.0 * _CLOSE_MM, start - _DEEPER_MM, 0.0)
+    if not outwards and start.min() < _CLOSE_MM:
+        what = int(start.argmin())
+        return Touch(*bodies.named[what], -float(start[what]), 0.0)
+    allowed = np.where(start < _APART_MM, start - _DEEPER_MM, 0.0)
+    apart_s = _apart_s(bodies, trajectory, start)
     shrink = bodies.speeds_mm_s(speeds_deg_s)
     count = max(1, int(np.ceil(trajectory.duration_s / _STRETCH_S)))
     half = 0.5 * trajectory.duration_s / count
@@ -213,12 +225,13 @@ def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch 
         still_open = []
         for first in range(0, len(middles), _MOST):
             part = middles[first : first + _MOST]
-            distances = bodies.distances(trajectory(part)) - allowed
+            still = np.where(part[:, None] - half < apart_s, allowed, 0.0)
+            distances = bodies.distances(trajectory(part)) - still
             clear = distances - half * shrink
             close = distances < _CLOSE_MM
             for number in np.flatnonzero(close.any(axis=1))[:1]:
                 what = int(np.argmin(distances[number]))
-                depth = -float(distances[number, what] + allowed[what])
+                depth = -float(distances[number, what] + still[number, what])
                 found = Touch(*bodies.named[what], depth, float(part[number]))
                 touch = found if touch is None or found.time_s < touch.time_s else touch
             still_open.append(part[(clear <= 0.0).any(axis=1) & ~close.any(axis=1)])
@@ -230,29 +243,62 @@ def first_touch(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array) -> Touch 
     return None
 
 
-def touch_of(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None) -> Touch | None:
+def _apart_s(bodies: Bodies, trajectory: Trajectory, start: Array) -> Array:
+    """When each pair that touches at the start has come apart, (M,): 0 for the others, infinite if it does not."""
+    touching = np.flatnonzero(start < _APART_MM)
+    found = np.zeros(len(start))
+    if len(touching):
+        times = np.linspace(0.0, trajectory.duration_s, _TIMES)
+        away = bodies.distances(trajectory(times))[:, touching] >= _APART_MM
+        found[touching] = np.where(away.any(axis=0), times[away.argmax(axis=0)], np.inf)
+    return found
+
+
+def touch_of(
+    arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, outwards: bool = False
+) -> Touch | None:
     """As ``first_touch``; skips arms without a room, and computes unknown speeds."""
     if not has_room(arm):
         return None
     if speeds_deg_s is None:
         speeds_deg_s = np.array([each.speed_deg_s for each in extremes.of_joints(trajectory.joints)])
-    return first_touch(arm, trajectory, speeds_deg_s)
+    return first_touch(arm, trajectory, speeds_deg_s, outwards)
 
 
-def check(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, through: bool = False) -> None:
-    """Raise PlanError if a motion leaves the room, naming both objects and the time.
+def tell_start(arm: Arm, driven_deg: Iterable[float]) -> None:
+    """Log what touches most at a posture (J,) from which the arm moves out."""
+    touches = posture_touches(arm, driven_deg) if has_room(arm) else []
+    if touches:
+        touch = max(touches, key=lambda each: each.depth_mm)
+        LOG.warning(f"{touch.words} where it starts; it may move out only, and not back")
 
-    ``speeds_deg_s``: as for ``first_touch``, if known; ``through``: the message also names via points.
-    """
-    touch = touch_of(arm, trajectory, speeds_deg_s)
+
+def check(arm: Arm, trajectory: Trajectory, outwards: bool = False) -> None:
+    """Raise PlanError if a motion leaves the room, with both objects and time; ``outwards``: see ``first_touch``."""
+    if touch := touch_of(arm, trajectory, None, outwards):
+        raise _refused(trajectory, touch, f"at {touch.time_s:.2f} s")
+
+
+def check_plan(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array, outwards: bool) -> None:
+    """As ``check``, with the joints' largest speeds (J,); the error also names via points."""
+    touch = touch_of(arm, trajectory, speeds_deg_s, outwards)
     if touch is None:
         return
-    via_times_s = trajectory.joints[0].via_times_s if through else ()
     place = f"at {touch.time_s:.2f} s"
-    if len(via_times_s) > 2:
+    via_times_s = trajectory.joints[0].via_times_s
+    if len(via_times_s) > 2 and touch.time_s > 0.0:
         after = int(np.clip(np.searchsorted(via_times_s, touch.time_s), 1, len(via_times_s) - 1))
         place += f", between P{after - 1} and P{after}"
-    raise PlanError(
+    raise _refused(trajectory, touch, place)
+
+
+def _refused(trajectory: Trajectory, touch: Touch, place: str) -> PlanError:
+    if touch.time_s == 0.0:
+        return PlanError(
+            f"{trajectory.name}: {touch.words} where it starts",
+            "start elsewhere: 'armtempo jog' and 'goto' move out; or, in a job that leads out, start_touches = true",
+        )
+    return PlanError(
         f"{trajectory.name}: {touch.words} ({place})",
         "add or move a via point, take another branch with posture_deg, or correct [room] in the arm file",
     )

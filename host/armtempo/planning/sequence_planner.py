@@ -226,7 +226,8 @@ class _Compiler:
         # A plan with another load is accepted if it keeps to the room
         for (known, _), found in self._plans.items():
             arm = self.arm.holding(_job(motion).holds or self._holds)
-            if known == id(motion) and room_check.touch_of(arm, found) is None:
+            outwards = _job(motion).start_touches
+            if known == id(motion) and room_check.touch_of(arm, found, None, outwards) is None:
                 return found
         found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
         return found
@@ -237,7 +238,8 @@ class _Compiler:
                 raise InputError(
                     f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
                 )
-            room_check.check(self.arm.holding(source.job.holds or self._holds), source.trajectory)
+            arm = self.arm.holding(source.job.holds or self._holds)
+            room_check.check(arm, source.trajectory, source.job.start_touches)
             return source.trajectory
         job = replace(source, holds=source.holds or self._holds)
         found = planner.plan(self.arm, job, self.progress).trajectory
@@ -245,7 +247,14 @@ class _Compiler:
         return found
 
     def _straight(self, step: kinds.Goto, start: Angles, end: Angles) -> Trajectory:
-        job = Job("goto", via_deg=[start, end], optimiser=GRADIENT, refine=_REFINE, holds=self._holds)
+        job = Job(
+            "goto",
+            via_deg=[start, end],
+            path="through",
+            optimiser=GRADIENT,
+            refine=_REFINE,
+            holds=self._holds,
+        )
         try:
             return planner.plan(self.arm, job, self.progress).trajectory
         except ArmtempoError as error:

@@ -31,7 +31,9 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     """The motion through via angles (n + 1, J); raises PlanError if the spline leaves a joint's range."""
     limits = checks.limits_of(arm)
     points = bspline.fit(via_deg, job.degree)
-    checks.check_ranges(arm, points, job.degree)
+    checks.check_ranges(
+        arm, points, job.degree, f'take path = "free", which bends within it; or {checks.MOVE_VIAS}'
+    )
     groups = _groups(points, via_deg, limits, job)
     most = time_parameterization.most_refine(job, len(via_deg) - 1, len(limits))
     timed = time_parameterization.axes(groups, job, most, progress)

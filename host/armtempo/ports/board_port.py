@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from armtempo.basics.errors import InputError
-from armtempo.basics.settings import PORT, ProjectSettings, Setting, nothing_set
+from armtempo.basics.settings import PORT, ProjectSettings, Setting, missing_setting
 from armtempo.ports import claim
 from armtempo.ports.caller import Ownership, ownership
 from armtempo.ports.names import SIM
@@ -76,4 +76,4 @@ def _unclear(candidates: list[str]) -> InputError:
         if candidates
         else "none is plugged in ('armtempo ports' lists the ports)"
     )
-    return nothing_set(PORT, f"which board? {seen}. '--port {SIM}' is a virtual one; for a real one")
+    return missing_setting(PORT, f"which board? {seen}. '--port {SIM}' is a virtual one; for a real one")

@@ -8,7 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from armtempo_shared import armrecord, backwards, limits, motion
+from armtempo_shared import armrecord, limits, motion
+from armtempo_shared import way_back as motion_way_back
 from armtempo_shared.wire import record_crc
 from numpy.typing import NDArray
 
@@ -71,7 +72,7 @@ def way_back(data: bytes, name: str, brakes: BrakeTimes) -> bytes:
 
     ``name``: of the stored motion; ``brakes``: those of the way back.
     """
-    return backwards.pack(data, name, _ramps(brakes))
+    return motion_way_back.pack(data, name, _ramps(brakes))
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:

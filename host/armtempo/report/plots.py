@@ -12,9 +12,8 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import MissingPackageError
-from armtempo.basics.text import aligned, visible
+from armtempo.basics.text import visible
 from armtempo.model.parts import Limits
-from armtempo.planning.free.corridor_curve import CorridorTime
 from armtempo.planning.torque import MotorTorques
 from armtempo.report import replayed
 from armtempo.report.analysis import Curves
@@ -206,42 +205,3 @@ def theme(axis: Axes) -> None:
     if legend is not None:
         for text in legend.get_texts():
             text.set_color(PAGE_COLOUR)
-
-
-def corridor_lines(points: Sequence[CorridorTime], unit: str) -> list[str]:
-    """Motion time against corridor as a table, one string a line."""
-    first = points[0].total_s
-    rows = [["corridor", "time", "saved"], [unit, "s", "%"]]
-    for point in points:
-        name = "free" if point.corridor is None else f"{point.corridor:.4g}"
-        rows.append([name, f"{point.total_s:.4f}", f"{100.0 * (1.0 - point.total_s / first):.2f}"])
-    return aligned(rows, (10, 10, 8))
-
-
-def corridor_csv(points: Sequence[CorridorTime], unit: str) -> str:
-    """The same as CSV, a line for each corridor; empty for the free path."""
-    head = f"corridor_{unit},time_s\n"
-    return head + "".join(
-        f"{'' if point.corridor is None else repr(point.corridor)},{point.total_s!r}\n" for point in points
-    )
-
-
-def corridors(points: Sequence[CorridorTime], unit: str, name: str) -> Figure:
-    """The curve, and lines for the spline itself and the free path. Raises MissingPackageError without matplotlib."""
-    drawn, grid = new_figure(1, 1, 6.4, 4.0)
-    axes = grid[0][0]
-    inner = [(point.corridor, point.total_s) for point in points if point.corridor]
-    axes.plot(*zip(*inner, strict=True), marker="o", markersize=3, label="in a corridor")
-    for point in points:
-        if not point.corridor:
-            label = "free" if point.corridor is None else "on the spline"
-            axes.axhline(
-                point.total_s, linestyle=":" if point.corridor is None else "--", label=label, linewidth=1
-            )
-    axes.set_xscale("log")
-    axes.set_xlabel(f"corridor ({'mm, tool' if unit == 'mm' else 'degrees, any joint'})")
-    axes.set_ylabel("motion time (s)")
-    axes.set_title(name)
-    axes.legend()
-    theme(axes)
-    return drawn

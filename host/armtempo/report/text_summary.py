@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
+from armtempo.basics.errors import ArmtempoError
 from armtempo.basics.text import aligned
 from armtempo.diagnosis.figures import findings as coarse_steps
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
-from armtempo.planning import checks, path_deviation, torque
+from armtempo.planning import checks, path_deviation, rest_to_rest, torque
 from armtempo.planning.free import free_plan
 from armtempo.report.replayed import JointResult
 from armtempo.splines.trajectory import Trajectory
 
 _HEAD = (
-    ("joint", "time", "floor", "over", "speed", "acceleration", "jerk"),
-    ("", "s", "s", "%", "deg/s", "deg/s²", "deg/s³"),
+    ("joint", "time", "at least", "speed", "acceleration", "jerk"),
+    ("", "s", "s", "deg/s", "deg/s²", "deg/s³"),
 )
-_WIDTHS = (12, 8, 8, 7, 16, 16, 17)
+_WIDTHS = (12, 8, 10, 16, 16, 17)
 _RESULT_WIDTHS = (11, 11, 12, 12)
-_FLOORS = {
+_BOUNDS = {
     "rests": "from turn to turn of a joint under its speed, acceleration and jerk limits",
     "path": "along the path under the speed, acceleration and jerk limits of all its joints",
     "together": "through the via points under the speed, acceleration and jerk limits of all joints, whatever the path",
@@ -32,29 +35,39 @@ _FLOORS = {
 }
 """Meaning of ``Search.floor_kind``."""
 _WORTH_SAYING = 0.03
-"""A free path is mentioned if it might save more than this fraction of the motion time."""
+"""What is faster than the spline through the via points is told if the spline takes longer by this fraction."""
 
 
-def lines(plan: Plan) -> list[str]:
-    """Lines on a plan: motion times with lower bounds, extremes with limits, notes, joints with coarse steps."""
+def lines(plan: Plan, verbose: bool = False) -> list[str]:
+    """Lines on a plan: motion time with its lower bound, extremes with limits, what would be faster, notes.
+
+    ``verbose``: also how it was searched, what the bound is one of, and what the board has to do for it.
+    """
     job = plan.job
-    text = [f"{job.name}: {plan.trajectory.duration_s:.4f} s, {', '.join(_settings(plan))}"]
-    text.extend(aligned([*_HEAD, *(_row(plan, joint) for joint in range(len(plan.extremes)))], _WIDTHS))
-    for kind in sorted({search.floor_kind for search in plan.searches}):
-        text.append(f"floor: least time {_FLOORS[kind]}")
-    text.extend(_free_path(plan))
-    text.extend(_polished(search) for search in plan.searches if search.optimum_s)
-    text.extend(_started(search) for search in plan.searches if len(search.starts_s))
+    text = [f"{job.name}: {plan.total_s:.4f} s{_at_least(plan)}; {', '.join(_settings(plan, verbose))}"]
+    rows = [*_HEAD, *(_row(plan, joint) for joint in range(len(plan.extremes)))]
+    text += aligned([row[:1] + row[3:] for row in rows] if plan.trajectory.shared else rows, _widths(plan))
+    text += _faster(plan)
     if job.timing == "per-joint" and len(plan.searches) > 1:
         text.extend(_separation(plan))
-    if job.refine == AUTO:
-        text.append(f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes")
     text.extend(f"note: {note}" for note in plan.notes)
     text.extend(torque_lines([(plan.holding, plan.trajectory)]))
     text.extend(
         f"{each.level.value}: {each.where}: {each.what}; {each.next_step}" for each in coarse_steps(plan.arm)
     )
-    return text
+    return [*text, *_details(plan)] if verbose else text
+
+
+def _details(plan: Plan) -> list[str]:
+    """Lines on the search, its bounds and the board."""
+    kinds = sorted({search.floor_kind for search in plan.searches})
+    return [
+        *(f"lower bound: least time {_BOUNDS[kind]}" for kind in kinds),
+        *(_polished(search) for search in plan.searches if search.optimum_s),
+        *(_started(search) for search in plan.searches if len(search.starts_s)),
+        f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes",
+        checks.rate_words(checks.step_rates(plan.arm, plan.extremes)),
+    ]
 
 
 def torque_lines(motions: Iterable[tuple[Arm, Trajectory]]) -> list[str]:
@@ -85,26 +98,33 @@ def record_bytes(plan: Plan) -> int:
     return motion.size(first.degree, len(trajectory.joints), trajectory.shared, segments, first.refine)
 
 
-def _settings(plan: Plan) -> list[str]:
+def _widths(plan: Plan) -> tuple[int, ...]:
+    """Of the table's columns; with shared timing it has none for times."""
+    return (_WIDTHS[0], *_WIDTHS[3:]) if plan.trajectory.shared else _WIDTHS
+
+
+def _at_least(plan: Plan) -> str:
+    """The proven lower bound of the motion time, for the first line."""
+    return f", at least {max(search.floor_s for search in plan.searches):.4f} s" if plan.searches else ""
+
+
+def _settings(plan: Plan, verbose: bool) -> list[str]:
     """Phrases on how the plan was made."""
     job, first = plan.job, plan.trajectory.joints[0]
     auto = " (auto)" if job.refine == AUTO else ""
-    timing = f"{job.timing} timing"
-    if checks.is_free(job):
-        pieces = len(first.angle_points_deg) - first.degree
-        return ["free path", timing, f"{pieces} pieces{auto}", f"{job.starts} starts", f"seed {job.seed}"]
+    pieces = len(first.angle_points_deg) - first.degree
     if checks.has_stretches(job):
-        pieces = len(first.angle_points_deg) - first.degree
-        return [
-            "tool led" if checks.leads_tool(job) else "with stops",
-            timing,
-            f"{pieces} pieces",
-            f"refine {first.refine}{auto}",
-        ]
-    search = f"{job.optimiser}, {job.population} x {job.iterations}"
-    if job.optimiser == GRADIENT:
-        search = f"{job.optimiser}, {job.starts} starts"
-    return [timing, f"degree {job.degree}", f"refine {first.refine}{auto}", search, f"seed {job.seed}"]
+        path = "tool led" if checks.leads_tool(job) else "with stops"
+        more = [f"{pieces} pieces", f"refine {first.refine}{auto}"]
+    elif checks.is_free(job):
+        path, more = "free path", [f"{pieces} pieces{auto}", f"{job.starts} starts", f"seed {job.seed}"]
+    else:
+        search = f"{job.optimiser}, {job.population} x {job.iterations}"
+        if job.optimiser == GRADIENT:
+            search = f"{job.optimiser}, {job.starts} starts"
+        path = "spline through the via points"
+        more = [f"degree {job.degree}", f"refine {first.refine}{auto}", search, f"seed {job.seed}"]
+    return [path, f"{job.timing} timing", *(more if verbose else ())]
 
 
 def _started(search: Search) -> str:
@@ -121,13 +141,10 @@ def _started(search: Search) -> str:
 def _row(plan: Plan, joint: int) -> tuple[str, ...]:
     limits = plan.arm.driven[joint].limits
     time = f"{plan.trajectory.joints[joint].duration_s:.4f}"
-    floor, over = "-", "-"
-    for search in plan.searches:
-        if joint in search.joints:
-            floor, over = f"{search.floor_s:.4f}", f"{100 * (search.total_s / search.floor_s - 1):.2f}"
+    bounds = [f"{search.floor_s:.4f}" for search in plan.searches if joint in search.joints]
     pairs = zip(plan.extremes[joint].values, limits.values, strict=True)
     reached = [f"{value:.2f} / {limit:g}" for value, limit in pairs]
-    return plan.arm.driven[joint].name, time, floor, over, *reached
+    return plan.arm.driven[joint].name, time, (bounds or ["-"])[0], *reached
 
 
 def _polished(search: Search) -> str:
@@ -139,18 +156,34 @@ def _polished(search: Search) -> str:
     )
 
 
-def _free_path(plan: Plan) -> list[str]:
-    """The most that a free path could save; nothing if that is little or the path is given."""
-    job, total_s = plan.job, plan.trajectory.duration_s
+def _faster(plan: Plan) -> list[str]:
+    """What a free path, or stopping at every via point, would take, if the spline through them loses much to either."""
+    job, total_s = plan.job, plan.total_s
     if job.path != "through" or checks.has_stretches(job):
         return []
-    floor_s = free_plan.floor_of(plan.arm, job, plan.via_deg, [*range(len(plan.arm.driven))]).time_s
-    if (saved := 1.0 - floor_s / total_s) <= _WORTH_SAYING:
-        return []
-    return [
-        f'path = "free" may save up to {100.0 * saved:.0f} %: no path through the via points takes less than '
-        f"{floor_s:.4f} s"
-    ]
+    limits = [joint.limits for joint in plan.arm.driven]
+    others = {
+        'path = "free"': _free_s(plan),
+        "stopping at every via point": rest_to_rest.stopping_s(plan.via_deg, limits, job.timing == "shared"),
+    }
+    found = [f"{what} takes {time_s:.4f} s" for what, time_s in others.items() if _loses(total_s, time_s)]
+    return [", ".join(found)] if found else []
+
+
+def _loses(total_s: float, other_s: float) -> bool:
+    return total_s > (1.0 + _WORTH_SAYING) * other_s
+
+
+def _free_s(plan: Plan) -> float:
+    """Motion time of a free path, from one start; infinite if it cannot save much, or there is none."""
+    every = [*range(len(plan.arm.driven))]
+    if not _loses(plan.total_s, free_plan.floor_of(plan.arm, plan.job, plan.via_deg, every).time_s):
+        return math.inf
+    job = replace(plan.job, path="free", degree=5, refine=AUTO, starts=1)
+    try:
+        return free_plan.motion(plan.arm, job, plan.via_deg, lambda _done, _whole: None).trajectory.duration_s
+    except ArmtempoError:
+        return math.inf
 
 
 def _separation(plan: Plan) -> list[str]:
@@ -160,10 +193,7 @@ def _separation(plan: Plan) -> list[str]:
     if checks.is_free(plan.job):
         return [apart]
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
-    return [
-        apart,
-        f'so the tool strays up to {stray:.1f} mm from its path; timing = "shared" keeps it there',
-    ]
+    return [apart, f'so the tool strays up to {stray:.1f} mm from its path; timing = "shared" keeps it there']
 
 
 _QUANTITIES = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")

@@ -67,7 +67,8 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
     """The motion from one posture (J,) to another; errors as in ``go_to``."""
     if not pace.line:
         found = point_to_point.straight(_NAME, here_deg, target_deg, arm, pace.speed)
-        room_check.check(arm, found)
+        room_check.tell_start(arm, here_deg)
+        room_check.check(arm, found, outwards=True)
         return found
     from armtempo.planning import planner  # imported here, because it loads everything that plans
 

@@ -219,22 +219,6 @@ BY_COMMAND: dict[str, tuple[Any, ...]] = {
     "arm.gif": ("arm.gif", [str(ANIMATE)]),
     "panel.png": ("panel.png", [str(PANEL)]),
     "ar4.png": ("ar4.png", [*TOOL, "check", "--arm", "ar4", "--picture", "ar4.png"]),
-    "corridor.png": (
-        "*-corridor.png",
-        [
-            *TOOL,
-            "plan",
-            "--path",
-            "free",
-            "--timing",
-            "shared",
-            "--refine",
-            "6",
-            "--starts",
-            "1",
-            "--corridor-curve",
-        ],
-    ),
 }
 
 

@@ -48,7 +48,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
     """
     first = planned = free_plan.motion(arm, job, via_deg, progress)
     holding = arm.holding(job.holds)
-    touch = room_check.touch_of(holding, first.trajectory)
+    touch = _touch(arm, job, first)
     fixed = job.timing != "shared" or job.corridor_deg is not None or job.corridor_mm is not None
     if touch is None or fixed:
         return first
@@ -76,12 +76,17 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
             planned = free_plan.motion(arm, helped, angles, progress)
         except PlanError:
             break
-        if not (touch := room_check.touch_of(holding, planned.trajectory)):
+        if not (touch := _touch(arm, job, planned)):
             own = set(_places(ways).tolist())
             if nearest:
                 planned = _loosened(arm, helped, angles, own, planned, progress)
             return _without_help(arm, job, via_deg, planned, ways, names)
     return first
+
+
+def _touch(arm: Arm, job: Job, planned: Planned) -> Touch | None:
+    """What a motion touches."""
+    return room_check.touch_of(arm.holding(job.holds), planned.trajectory, None, job.start_touches)
 
 
 def _loosened(
@@ -102,7 +107,7 @@ def _loosened(
         except PlanError:
             continue
         faster = found.trajectory.duration_s < planned.trajectory.duration_s
-        if faster and room_check.touch_of(arm.holding(helped.holds), found.trajectory) is None:
+        if faster and _touch(arm, helped, found) is None:
             return found
     return planned
 

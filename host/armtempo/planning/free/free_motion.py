@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
-from armtempo.optimise import interior_point
-from armtempo.optimise.interior_point import Schedule
+from armtempo.optimise import slack_method
 from armtempo.optimise.kkt import BandedKkt, Equalities
+from armtempo.optimise.slack_method import Goal
 from armtempo.planning import collocation
 from armtempo.planning.collocation import Curve, Points
 from armtempo.planning.free import angle_bounds
@@ -41,10 +41,10 @@ _SMOOTHING, _SMOOTHED = 0.075, 0.1
 _LEAST_STEP = 1e-3
 """Least difference of time control points, as a fraction of their mean: rounding errors of angles are divided
 by its cube."""
-_FIRST = Schedule(first_barrier=1e-2, last_barrier=1e-3, iterations=60, curvature=False)
-"""Mostly 20 to 40 iterations; what needs more is a bad start."""
-_AGAIN = Schedule(first_barrier=1e-3, last_barrier=3e-4, curvature=False)
-"""Begins with a barrier as large as the last excess, if that is between these."""
+_FIRST, _AGAIN = Goal(gap=2e-3, violation=1e-3), Goal(gap=3e-4, violation=1e-4)
+"""Goals of the first solve, whose peaks are added to the points, and of the later ones."""
+_TOOL_KEPT = 0.9995
+"""Fraction of the tool's tolerances that a solve may use: it meets them to about half of the rest."""
 _ROUNDED = 1e-10
 """Relative excess over a bound that is only rounding."""
 _AT_END = 1e-6
@@ -261,6 +261,8 @@ class Improver:
 
     def _inside(self, motion: FreeMotion, within: FreeMotion) -> FreeMotion:
         """The motion, moved towards ``within`` if the exact via points have moved it out of the bounds."""
+        if self._strays(motion):
+            return within
         found, safe = (self._beyond(each) for each in (motion, within))
         out = found > _ROUNDED
         if not out.any():
@@ -270,6 +272,18 @@ class Improver:
             return within
         points = within.angle_points_deg + part * (motion.angle_points_deg - within.angle_points_deg)
         return replace(motion, angle_points_deg=points)
+
+    def _strays(self, motion: FreeMotion) -> bool:
+        """Whether the tool exceeds a tolerance at a point."""
+        rows = self._tool_rows(1.0)
+        x = self.variables.pack(motion.angle_points_deg / self._size, motion.differences_s)
+        return rows is not None and bool(np.any(rows.values(x) < 0.0))
+
+    def _tool_rows(self, part: float) -> ToolRows | None:
+        """Inequalities of the tool, with this part of its tolerances; None without targets."""
+        if self._targets is None or self.demand.tool is None:
+            return None
+        return ToolRows(self.variables, self.demand.tool, self._targets.narrowed(part), self._size)
 
     def _beyond(self, motion: FreeMotion) -> Array:
         """Excess of each Bernstein coefficient over its bounds, relative to the largest angle: (S, 6, J)."""
@@ -292,19 +306,16 @@ class Improver:
         """``stretch``: how much the solve before exceeded the limits, as a factor on time; inf for the first."""
         unit_s = motion.total_s / self.layout.segments
         limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
-        blocks: list[Block] = [LimitRows(self.variables, points, limits), self.angle_rows()]
-        if self._targets is not None and self.demand.tool is not None:
-            blocks.append(ToolRows(self.variables, self.demand.tool, self._targets, self._size))
         first, excess = stretch == np.inf, stretch - 1.0
         smoothing = self._smoothing() * (1.0 if first else _SMOOTHED)
         steps = motion.differences_s / unit_s * (1.0 + min(2.0 * excess + _LEAST_AWAY, _AWAY))
         least = min(_LEAST_STEP, 0.5 * float(steps.min()))
-        program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least)
         start = self.variables.pack(motion.angle_points_deg / self._size, steps)
-        barrier = min(max(excess, _AGAIN.last_barrier), _AGAIN.first_barrier)
-        x = interior_point.minimise(
-            program, start, _FIRST if first else replace(_AGAIN, first_barrier=barrier)
-        ).x
+        blocks: list[Block] = [LimitRows(self.variables, points, limits), self.angle_rows()]
+        if (tool_rows := self._tool_rows(_TOOL_KEPT)) is not None:
+            blocks.append(tool_rows)
+        program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least)
+        x = slack_method.minimise(program, start, program.linear, _FIRST if first else _AGAIN)
         x = met(self.variables, program.equalities, x)
         return replace(
             motion,

@@ -12,7 +12,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.progress import Progress, part
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
+from armtempo.model.job import GRADIENT, Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Search
 from armtempo.model.tool_pose import Pose
@@ -251,11 +251,21 @@ def floor_of(arm: Arm, job: Job, via_deg: Array, joints: list[int], times_s: Arr
     return lower_bounds.of_vias(demand.via_deg, limits, demand.stops, demand.tolerances, times_s)
 
 
+def _unused(job: Job) -> list[str]:
+    """A note on settings of the search for ``path = "through"`` that the job changes in vain."""
+    changed = [
+        name
+        for name, default in Job.searching().items()
+        if getattr(job, name) != default and not (name == "optimiser" and job.optimiser == GRADIENT)
+    ]
+    return [f'of no effect with path = "free": {", ".join(changed)}'] if changed else []
+
+
 def _notes(
     arm: Arm, job: Job, via_deg: Array, groups: list[list[int]], found: list[Shortest]
 ) -> tuple[str, ...]:
     """Notes: proven distance of a path in a corridor from the spline through the via points."""
-    notes = []
+    notes = _unused(job)
     for joints, one in zip(groups, found, strict=True):
         demand = _demand(arm, job, via_deg, joints)
         if job.corridor_deg is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,10 @@ class ToolTargets:
     tolerance_deg: Array
     """Largest rotation from the target: (P,); infinite if it is free."""
 
+    def narrowed(self, part: float) -> ToolTargets:
+        """With this part of the tolerances."""
+        return replace(self, tolerance_mm=part * self.tolerance_mm, tolerance_deg=part * self.tolerance_deg)
+
     def __add__(self, other: ToolTargets) -> ToolTargets:
         """Both."""
         points = Points(
@@ -42,6 +46,8 @@ class ToolRows:
     ``unit_deg``: (J,), degrees per unit of each joint's variables.
     """
 
+    linear = False
+
     def __init__(self, variables: MotionVariables, tool: Tool, targets: ToolTargets, unit_deg: Array) -> None:
         self._size, self._tool, self._targets, self._unit = variables.size, tool, targets, unit_deg
         count = variables.degree + 1
@@ -55,6 +61,7 @@ class ToolRows:
         self.columns = np.tile(flat, (1, flat.shape[1])).ravel()
         self._near = np.flatnonzero(np.isfinite(targets.tolerance_mm))
         self._turned = np.flatnonzero(np.isfinite(targets.tolerance_deg))
+        self.count = len(self._near) + len(self._turned)
         self._room = 1.0 - np.cos(np.radians(targets.tolerance_deg[self._turned]))
 
     def values(self, x: Array) -> Array:

@@ -134,8 +134,9 @@ def _in_room(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> 
     for _ in range(_SHORTENED):
         way = _joint if move.joint is not None else _tool
         trajectory, ends = way(name, arm, start, move, speed)
-        touch = room_check.touch_of(arm, trajectory)
+        touch = room_check.touch_of(arm, trajectory, outwards=True)
         if touch is None:
+            room_check.tell_start(arm, start)
             return trajectory, why or ends
         why = f"{touch.link} would touch {touch.other}"
         part = _NEARER * _passed(arm, trajectory, touch.time_s, move)

@@ -15,7 +15,7 @@ from armtempo_board.stepgen.control_points import WINDOW_WORDS, ControlPoints
 from armtempo_board.storage import store
 from armtempo_board.storage.backwards import Backwards
 from armtempo_board.storage.motion_file import MotionFile
-from armtempo_shared import backwards, engine_memory, messages, motion, wire
+from armtempo_shared import backwards, engine_memory, messages, motion, way_back, wire
 
 SEED = 20261127
 RAMPS = ((5,) * motion.REST_ENTRIES, (7,) * motion.OTHER_ENTRIES, 15)
@@ -108,7 +108,7 @@ def case_after_a_reset_it_is_gone():
 
 def case_the_way_back_needs_the_motion_that_is_meant():
     app, host = connected()
-    back = backwards.pack(host.record, "feed", RAMPS)
+    back = way_back.pack(host.record, "feed", RAMPS)
     store.open = reading
     put(host, back)
     assert start_once(host, back)[0] == "ok"
@@ -119,7 +119,7 @@ def case_the_way_back_needs_the_motion_that_is_meant():
     assert (motion_of.crc, motion_of.ramp_bits) == (wire.record_crc(back), 15)
     assert motion_of.ramp(0, 100, True) == 5
     assert motion_of.ramp(0, 100, False) == 7
-    other = backwards.pack(host.record, "food", RAMPS)
+    other = way_back.pack(host.record, "food", RAMPS)
     put(host, other)
     assert start_once(host, other) == ("error", "not_found", 255, 0)
     host.upload("feed", stand_in.record(stand_in.arm(), segments=9))
@@ -193,7 +193,7 @@ def case_points_are_read_alike_from_memory_and_file_and_backwards():
         plain = motion.Motion(record)
         put(host, record)
         once = host.app.controller.board.once.motion(None)
-        way = backwards.WayBack(backwards.pack(record, "feed", RAMPS))
+        way = backwards.WayBack(way_back.pack(record, "feed", RAMPS))
         back = Backwards(path, len(record), way)
         for offset, count, axis in splines(plain):
             points = plain.points(offset, count)

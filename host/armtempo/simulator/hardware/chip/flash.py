@@ -30,6 +30,8 @@ _ENTRY = 32  # bytes in a folder for a short name, and for each 13 characters of
 _EPERM, _ENOENT, _EIO, _EEXIST, _EISDIR, _EINVAL, _ENOSPC = 1, 2, 5, 17, 21, 22, 28
 ERASURES = ".erasures"
 """Suffix of the file next to the folder with the erasures of each sector."""
+_NO_FOLDER = "."
+"""A board without files of its own (``bare_board``)."""
 NO_FILE_SYSTEM, UNREADABLE = "no file system", "unreadable"
 """Kinds of damage: the firmware finds no file system, or mounts one in which every access fails."""
 
@@ -96,8 +98,9 @@ class FlashFolder:
         """A sector was erased and written, which takes ``ms``: count it, and stand still."""
         key = str(sector)
         self.erasures[key] = self.erasures.get(key, 0) + 1
-        with real_open(self.root + ERASURES, "w") as file:
-            json.dump(self.erasures, file)
+        if self.root != _NO_FOLDER:
+            with real_open(self.root + ERASURES, "w") as file:
+                json.dump(self.erasures, file)
         self.stall(ms)
 
     def _file_system(self):
