@@ -60,6 +60,9 @@ def test_steps_by_the_command_line() -> None:
         assert "is unknown" in jogged(virtual.port, "--joint", "1", "--by", "5", code=1)
     with homed() as port:
         jogged(port, "--joint", "2", "--by", "-5")
+        assert "--to needs --joint, without --by" in jogged(port, "--axis", "x", "--to", "5", code=2)
+        jogged(port, "--joint", "2", "--to", str(PAPER.home_deg[1]))
+        jogged(port, "--joint", "2", "--by", "-5")
         np.testing.assert_allclose(where(port), [0.0, -65.0, 40.0], atol=0.02)
         before = armtempo.forward(PAPER, where(port))[:3, 3]
         jogged(port, "--axis", "z", "--by", "10", "--speed", "100")
@@ -103,6 +106,11 @@ def test_the_same_from_python() -> None:
         assert board.list() == ()
         with pytest.raises(InputError, match="joint by degrees"):
             board.jog(joint=1, by_mm=5)
+        for _ in range(2):  # the second time it is there
+            assert board.jog(joint=2, to_deg=before[1] + 3.0)[1] == pytest.approx(before[1] + 3.0, abs=0.02)
+        board.jog(joint=2, to_deg=before[1])
+        with pytest.raises(InputError, match="needs a joint and no distance"):
+            board.jog(axis="z", to_deg=5)
         with board.held_jog(joint=1) as held:
             board.client.stop()
             while held.hold():

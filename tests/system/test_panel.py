@@ -307,9 +307,8 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         folder = tmp_path
         show(page, tab)
         shutil.copy(panel.folder / "arm.toml", folder)
-        paste(page, wrong := "1;2\n3;4")
-        said = refusal(folder, "the pasted rows", wrong, "import --arm arm.toml")
-        page.locator(".q-notification", has_text=said).wait_for()
+        shown = paste(page, wrong := "1;2\n3;4")
+        assert refusal(folder, "the pasted rows", wrong, "import --arm arm.toml") in shown
         paste(page, "0;-60;40\n20;-75;50")
         good = 'name = "feed"\ntiming = "shared"\nvia_deg = [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]]\n'
     else:
@@ -325,19 +324,19 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         put(content, label, wrong)
         field.fill(wrong)
         control = page.get_by_role("button", name=button, exact=True)
-        press(page, control, partial(control.press, "Enter"))
+        shown = press(page, control, partial(control.press, "Enter"))
         said = refusal(folder, file, tomlkit.dumps(content))
         said = words.of_job(InputError(said)) if tab == "Job" else said
-        page.locator(".q-notification", has_text=said).first.wait_for()
+        assert said in shown
         field.fill(before)
     assert page.evaluate("window.hurt") is None
 
 
-def paste(page: Any, text: str) -> None:
-    """Paste rows of via points."""
+def paste(page: Any, text: str) -> str:
+    """Paste rows of via points; why they were refused."""
     page.get_by_role("button", name="Paste").click()
     page.get_by_label("Rows of angles").fill(text)
-    panels.answer(page, "Paste")
+    return panels.answer(page, "Paste")
 
 
 def open_sequence(page: Any, file: str, last: str) -> None:

@@ -207,6 +207,7 @@ class Controller:
     if features.SEQUENCES:
 
         def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
+            self.board.once.release()
             self.tidy()
             try:
                 from armtempo_board.app import sequence_start  # here, as only sequences need its memory

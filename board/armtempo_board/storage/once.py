@@ -1,7 +1,9 @@
 """The motion that is run once: its record stays in memory, so it costs no erasure of the flash.
 
-It is there until another one is sent, or a reset.
+It is there until another one is sent, a sequence starts, which may need the memory, or a reset.
 """
+
+import gc
 
 from armtempo_shared import codes
 from armtempo_shared.backwards import MAGIC, WayBack
@@ -30,14 +32,28 @@ class Once:
         if size > self.capacity:
             raise Refused(codes.TOO_LONG, value=self.capacity)
         if not offset:
-            self._size = size
-            self._received = 0
+            self._begin(size)
         end = offset + len(piece)
         if size != self._size or offset > self._received or end > size:
             raise Refused(codes.BAD_OFFSET, value=self._received)
         self._data[offset:end] = piece
         self._received = end
         return end
+
+    def _begin(self, size: int) -> None:
+        self._size = size
+        self._received = 0
+        if not self._data:
+            gc.collect()
+            try:
+                self._data = bytearray(self.capacity)
+            except MemoryError:
+                raise Refused(codes.NO_MEMORY)
+
+    def release(self) -> None:
+        """Forget the motion, and give its memory back until another one comes."""
+        self._data = bytearray(0)
+        self._size = self._received = 0
 
     def motion(self, store: "Any") -> "Any":
         """The motion of the record, checked; ``store()``: that of the stored motions.

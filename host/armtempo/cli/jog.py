@@ -26,6 +26,7 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
 @click.option("--axis", type=_AXES, help="Move the tool along this axis by --by mm.")
 @click.option("--about", type=_AXES, help="Turn the tool about this axis by --by degrees.")
 @click.option("--by", type=float, metavar="NUMBER", help="Distance: degrees or mm.")
+@click.option("--to", type=float, metavar="DEG", help="With --joint, the angle to move to, instead of --by.")
 @click.option(
     "--speed",
     type=click.FloatRange(1, 100),
@@ -41,6 +42,7 @@ def jog(
     axis: str | None,
     about: str | None,
     by: float | None,
+    to: float | None,
     speed: float,
     holds: str | None,
     gamepad: bool,
@@ -52,7 +54,9 @@ def jog(
     and --by, the arm moves once. Axes are those of the base, or of the tool at its present orientation
     (tool-x, …). The arm must be homed. Ctrl-C brakes.
     """
-    moves = _one_move(joint, axis, about, by, gamepad, given.as_json)
+    if to is not None and (joint is None or by is not None):
+        raise InputError("--to needs --joint, without --by", "for example --joint 2 --to 30")
+    moves = _one_move(joint, axis, about, by if to is None else to, gamepad, given.as_json)
     arm = chosen.named_arm(given.arm_path)
     with chosen.board(given, arm) as board:
         prepare(board, chosen.arm_of_board(board, arm).holding(holds), given.replace_arm)
@@ -61,7 +65,7 @@ def jog(
                 screen(board, pressed, speed).loop()
         else:
             along = by if axis else None
-            board.jog(joint, None if axis else by, axis or about, along, speed / 100)
+            board.jog(joint, None if axis else by, axis or about, along, speed / 100, to_deg=to)
         early = board.last_jog_ends
         if not (early and given.as_json):
             posture.print_position(board, given.as_json)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.solver import moved_tool_deg
 from armtempo.model import via_table
-from armtempo.model.job import DEGREES, PATHS, TIMINGS
+from armtempo.model.job import DEGREES, PATHS, TIMINGS, Job
 from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
 from armtempo.panel.file_row import FileRow
@@ -272,10 +272,16 @@ class JobTab:
     def _why_no_plan(self) -> str:
         return words.BUSY.format(what=words.PLAN) if self._planning else ""
 
-    async def _plan(self, press: Press) -> None:
+    def _plan(self, press: Press) -> Awaitable[None]:
+        self._operator.check(self._page.client, press, Needs.CONTROL)
         try:
-            self._operator.check(self._page.client, press, Needs.CONTROL)
-            job, version = self._jobs.job(), self._jobs.version
+            job = self._jobs.job()
+        except InputError as error:
+            raise InputError(words.of_job(error)) from None
+        return self._make_plan(job, self._jobs.version)
+
+    async def _make_plan(self, job: Job, version: int) -> None:
+        try:
             self._show_planning(True)
             plan = await run.io_bound(pipeline.plan, self._operator.arm, job, self._progress)
             if plan is not None:  # it is None if the panel ends meanwhile

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 HOLD = "hold"
+_SAME_DEG = 1e-3
 _THERE_DEG = 0.1
 """An arm that is this close to a target has arrived."""
 STEPS = {HOLD: words.HOLD, 0.1: "0.1", 1.0: "1", 10.0: "10"}
@@ -178,6 +179,8 @@ class MoveTab:
         pace = MovePace(page.jog_percent / 100, line)
         target_deg = posture_deg(where, operator.arm)
         self._show(target_deg)
+        if np.abs(operator.live.angles_deg - target_deg).max() < _SAME_DEG:
+            raise InputError(words.IS_THERE, words.OTHER_TARGET)
         if self._one_click.value:
             page.do(press, what, lambda: operator.go(target_deg, pace))
             return

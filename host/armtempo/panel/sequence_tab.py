@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -167,9 +168,12 @@ class SequenceTab:
             self._editor.planned(plan, version)
         return plan
 
-    async def _plan_it(self, press: Press) -> None:
+    def _plan_it(self, press: Press) -> Awaitable[None]:
+        self._operator.check(self._page.client, press, Needs.IDLE)
+        return self._make_plan()
+
+    async def _make_plan(self) -> None:
         try:
-            self._operator.check(self._page.client, press, Needs.IDLE)
             await run.io_bound(self._planned)
         except ArmtempoError as error:
             ui.notify(words.of_error(error), type="negative", multi_line=True, timeout=8000)

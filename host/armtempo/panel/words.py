@@ -63,6 +63,7 @@ GO_TO, TYPED_TARGET, ANGLES, POSE = "Go to", "Typed target", "Angles", "Pose"
 POSE_FIELDS = ("x, mm", "y, mm", "z, mm", "roll, deg", "pitch, deg", "yaw, deg")
 FEW_JOINTS = "With {joints} joints the arm takes of the orientation what it can."
 ONE_CLICK, IN_A_LINE, TAKE_PRESENT, SHOW = "With one click", "In a straight line", "Where the arm is", "Show"
+IS_THERE, OTHER_TARGET = "The arm is there already", "choose another target"
 TARGET_HINT = "Pressed, a target is shown in the picture; held, the arm moves there."
 TEACH, TEACH_HINT = "Store…", "Store where the arm is, under a name in the arm file:"
 STORE, NAME_OF_POSTURE, REPLACE = "Store", "Name", "Replace the posture of this name"

@@ -69,10 +69,7 @@ _SHORTEST_S = 0.01
 _LESS = 0.3  # than estimated: longer ones may suffice because the motion ends, while less do not
 _SECANTS, _MOST_TRIES = 5, 7
 _CLOSE = 0.015  # below the most allowed
-_ABOUT, _NEARLY = (
-    1.2,
-    0.9,
-)  # of the estimated time to rest, and of the time to the end, where shapes are compared
+_ABOUT, _NEARLY = 1.2, 0.9  # of the estimated time to rest, and of that to the end: where shapes are compared
 _ALIKE = 1e-9  # differences of speeds over their largest
 _ROOM = 1.1  # for entries to be lengthened
 _NEGLIGIBLE = 1e-6  # of the unit of lengths

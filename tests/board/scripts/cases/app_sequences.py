@@ -8,11 +8,12 @@ import cases
 import stand_in
 from app_rig import connected, flash, start, state
 from armtempo_board import heap
-from armtempo_shared import armrecord, codes, sequence, wire
+from armtempo_shared import armrecord, codes, messages, sequence, wire
 from sequence_rig import (
     COUNT,
     END,
     INPUT,
+    LEGS,
     MOVE,
     OUTPUT,
     REPEAT,
@@ -442,6 +443,20 @@ def case_the_heap_is_collected_seldom_where_memory_is_not_short():  # emulated
         assert gc.threshold() > 3 * often > 0
     finally:
         gc.threshold(before)
+
+
+def case_it_gets_the_memory_of_the_motion_that_is_run_once():
+    app, host = ready([(MOVE, "there", 0, 0)])
+    record = LEGS["there"]
+    once = (0, wire.record_crc(record))
+    assert host.ask("put_once", (0, len(record)), record)[0] == "ok"
+    assert begin(host)[0] == "ok"
+    host.turn(5)
+    app.controller.board.engine.finish()
+    host.turn(5)
+    assert host.ask("start", once, messages.ONCE_NAME) == ("error", "not_found", 255, 0)
+    assert host.ask("put_once", (0, len(record)), record)[0] == "ok"
+    assert host.ask("start", once, messages.ONCE_NAME)[1] != "not_found"
 
 
 cases.run(globals())
