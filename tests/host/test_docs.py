@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import os
 import re
 import runpy
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import armtempo
 import click
 import pytest
 from armtempo.cli import main
@@ -405,3 +408,28 @@ def test_every_code_of_the_board_is_listed(site: Path) -> None:
 @SITE
 def test_the_top_leads_to_the_first_page(site: Path) -> None:
     assert "host/docs/index.html" in (site / "index.html").read_text(encoding="utf-8")
+
+
+# one word for each thing, in all names that users write
+
+
+def public_names() -> Iterator[str]:
+    """Names of the library, commands and options."""
+    for name in armtempo.__all__:
+        value = getattr(armtempo, name)
+        inner = value.__all__ if inspect.ismodule(value) else vars(value) if inspect.isclass(value) else ()
+        yield from (name, *(f"{name}.{one}" for one in inner if not one.startswith("_")))
+    for name in COMMANDS:
+        command = main.get_command(click.Context(main), name)
+        assert command is not None
+        yield from (name, *(f"{name} {option}" for one in command.params for option in one.opts))
+
+
+def test_no_public_name_uses_another_word_for_the_same_thing() -> None:
+    page = (ROOT / "host" / "docs" / "glossary.md").read_text(encoding="utf-8")
+    rows = [line.strip("|").split("|") for line in page.splitlines() if line.startswith("| ")]
+    assert len(rows) > 20
+    others = {word.strip() for row in rows[1:] for word in row[2].split(",")} - {""}
+    for name in public_names():
+        words = re.split(r"[._ -]+", re.sub(r"([a-z])([A-Z])", r"\1_\2", name).lower())
+        assert not others.intersection(words), name

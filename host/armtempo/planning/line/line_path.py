@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from armtempo_shared import motion as record
@@ -126,18 +127,27 @@ def _places(found: Followed, speeds: Array) -> Array:
     return np.asarray(np.interp(eased, done / done[-1], u))
 
 
-def proven_path(
-    arm: Arm, job: Job, via_deg: Array, led: Mapping[int, Led], others: Mapping[int, Between]
-) -> tuple[LinePath, dict[int, LineDeviation]]:
-    """The spline with the fewest segments that prove the tolerance, and the proven deviation of each stretch.
+class Proven(NamedTuple):
+    """A spline within the tolerance, and the proven deviation of each stretch with lines."""
 
-    Raises PlanError if the board cannot hold them.
+    path: LinePath
+    away: dict[int, LineDeviation]
+
+
+def proven_paths(
+    arm: Arm, job: Job, via_deg: Array, parts: Mapping[int, Led | Between], finest: int
+) -> list[Proven]:
+    """Splines that are proven to keep the tolerance, each with twice as many segments on the lines as the one before.
+
+    From the fewest to ``finest`` a line, if the board holds them: so a wider tolerance only adds splines. At least
+    one. Raises PlanError if the board cannot hold it.
     """
     stretches = cut.of_job(job)
+    led = {number: one for number, one in parts.items() if isinstance(one, Led)}
     most = _most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
     pieces = [
-        _LINE_PIECES * len(stretch.ways) if stretch.ways else others[number].segments
-        for number, stretch in enumerate(stretches)
+        one.segments if isinstance(one, Between) else _LINE_PIECES * len(stretch.ways)
+        for stretch, (_, one) in zip(stretches, sorted(parts.items()), strict=True)
     ]
     if sum(pieces) > most:
         raise PlanError(
@@ -145,18 +155,24 @@ def proven_path(
             f"holds {most}",
             "use fewer via points, or plan the stretches between rests one by one with --split",
         )
+    found: list[Proven] = []
     while True:
-        path = _path(stretches, pieces, via_deg, {**led, **others})
-        found = {number: path.deviation(number, one) for number, one in led.items()}
-        wide = [number for number, one in led.items() if not one.keeps(found[number])]
+        path = _path(stretches, pieces, via_deg, parts)
+        away = {number: path.deviation(number, one) for number, one in led.items()}
+        wide = [number for number, one in led.items() if not one.keeps(away[number])]
         if not wide:
-            return path, found
-        for number in wide:
-            pieces[number] *= 2
+            found.append(Proven(path, away))
+        short = [number for number in led if 2 * pieces[number] <= finest * len(stretches[number].ways)]
+        before, pieces = (
+            pieces,
+            [2 * count if number in (wide or short) else count for number, count in enumerate(pieces)],
+        )
+        if found and (pieces == before or sum(pieces) > most):
+            return found
         if sum(pieces) > most:
             raise PlanError(
-                f"{led[wide[0]].stretch.name}: with {pieces[wide[0]] // 2} segments the tool is only proven to stay "
-                f"within {found[wide[0]].position_mm:.3g} mm and {found[wide[0]].rotation_deg:.3g} deg of its way, and "
+                f"{led[wide[0]].stretch.name}: with {before[wide[0]]} segments the tool is only proven to stay "
+                f"within {away[wide[0]].position_mm:.3g} mm and {away[wide[0]].rotation_deg:.3g} deg of its way, and "
                 f"the board holds {most} in all",
                 "widen tolerance_mm and tolerance_deg, keep away from singular postures, or plan with --split",
             )

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.progress import Progress, stage
+from armtempo.basics.progress import Progress, part, stage
 from armtempo.model import tool_way
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
+from armtempo.model.job import AUTO, Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
@@ -24,18 +24,22 @@ from armtempo.planning.line.between import between
 from armtempo.planning.line.deviation import LineDeviation
 from armtempo.planning.line.dwell import DWELL_SEGMENTS, TimedPath
 from armtempo.planning.line.follow import passed
-from armtempo.planning.line.line_path import DEGREE, Led, LinePath, led_stretches, proven_path
+from armtempo.planning.line.line_path import DEGREE, Led, LinePath, Proven, led_stretches, proven_paths
 from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
 from armtempo.planning.lower_bounds import Floor
 from armtempo.planning.through_plan import Planned
 from armtempo.planning.tool import Tool
-from armtempo.planning.variables import time_points
+from armtempo.planning.variables import Index, time_points
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _GAP, _PAYS = 1e-3, 1e-3
 """Relative gap of a time axis to its local optimum, and least relative saving of a finer axis."""
 _REFINE_FACTOR = 8
+_FINEST = 64
+"""Most segments of a line that are tried where its tolerance needs fewer: with these a path is as good as the line."""
+_TIMED = 128
+"""Most segments of its time axis."""
 
 
 def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
@@ -51,11 +55,42 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
         for number, stretch in enumerate(cut.of_job(job))
         if not stretch.ways
     }
-    path, away = proven_path(arm, job, via_deg, led, others)
+    finest = _FINEST if job.refine == AUTO else 0
+    paths = proven_paths(arm, job, via_deg, {**led, **others}, finest)
+    (path, away), best = _fastest(arm, job, paths, progress)
     checks.check_ranges(arm, path.angle_points_deg, DEGREE)
     notes = [_away(led[number], found) for number, found in away.items()]
     notes += [words for one in led.values() for words in passed(one.followed)]
-    return _timed(arm, job, path, {number: one.floor for number, one in others.items()}, notes, progress)
+    return _timed(arm, job, path, {number: one.floor for number, one in others.items()}, notes, best)
+
+
+def _fastest(arm: Arm, job: Job, paths: Sequence[Proven], progress: Progress) -> tuple[Proven, _Axis]:
+    """The path with the shortest time axis, and that axis, with at most ``_TIMED`` segments a line unless the job
+    says otherwise: the same for the same path, whatever the tolerance."""
+    limits = checks.limits_of(arm)
+    dwells = DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
+    stretches, found = cut.of_job(job), []
+    for number, proven in enumerate(paths):
+        path = proven.path
+        moving = _moving(path)
+        tool = Tool(arm, list(range(len(limits))), path.angle_points_deg[0])
+        finest = max(
+            ((path.knots[led + 1] - path.knots[led]) // len(stretches[led].ways) for led in proven.away),
+            default=1,
+        )
+        most = time_parameterization.most_refine(job, path.knots[-1] + dwells, len(limits))
+        levels = [job.refine] if isinstance(job.refine, int) else _levels(min(most, max(_TIMED // finest, 1)))
+        own = [limits[joint] for joint in moving]
+        watched = partial(_watched, path, tool, _tool_limits(job, path))
+        points = path.angle_points_deg[:, moving]
+        axis = _best_axis(points, own, levels, watched, part(progress, number, len(paths)) or progress)
+        found.append((proven, axis))
+    return min(found, key=lambda one: one[1].found.total_s)
+
+
+def _moving(path: LinePath) -> Index:
+    """The joints that move."""
+    return np.flatnonzero(np.ptp(path.angle_points_deg, axis=0) > checks.TOLERANCE)
 
 
 def _away(led: Led, found: LineDeviation) -> str:
@@ -69,19 +104,15 @@ def _timed(
     path: LinePath,
     floors: Mapping[int, Floor | None],
     notes: list[str],
-    progress: Progress,
+    best: _Axis,
 ) -> Planned:
-    """The shortest time axis on the path within the limits of joints and tool, with its dwells."""
+    """The motion on the path with its time axis, slowed to the tool's limits as proven, and with its dwells."""
     limits = checks.limits_of(arm)
-    moving = np.flatnonzero(np.ptp(path.angle_points_deg, axis=0) > checks.TOLERANCE)
+    moving = _moving(path)
     points, own = path.angle_points_deg[:, moving], [limits[joint] for joint in moving]
     tool = Tool(arm, list(range(len(limits))), path.angle_points_deg[0])
     tool_limits = _tool_limits(job, path)
     dwells_s = {stop.via: stop.dwell_s for stop in job.stops if stop.dwell_s > 0.0}
-    segments = path.knots[-1] + DWELL_SEGMENTS * len(dwells_s)
-    most = time_parameterization.most_refine(job, segments, len(limits))
-    levels = [job.refine] if isinstance(job.refine, int) else _levels(most)
-    best = _best_axis(points, own, levels, partial(_watched, path, tool, tool_limits), progress)
     found = best.found
     stretch = max(1.0, time_parameterization.MIN_DURATION_S / found.total_s)
     if tool_limits.any:
