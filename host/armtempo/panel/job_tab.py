@@ -277,7 +277,7 @@ class JobTab:
         try:
             job = self._jobs.job()
         except InputError as error:
-            raise InputError(words.of_job(error)) from None
+            raise InputError(words.of_job(error.problem), words.of_job(error.hint)) from None
         return self._make_plan(job, self._jobs.version)
 
     async def _make_plan(self, job: Job, version: int) -> None:
@@ -287,7 +287,7 @@ class JobTab:
             if plan is not None:  # it is None if the panel ends meanwhile
                 self._jobs.planned(plan, version)
         except ArmtempoError as error:
-            ui.notify(words.of_job(error), type="negative", multi_line=True, timeout=8000)
+            ui.notify(words.of_job(str(error)), type="negative", multi_line=True, timeout=8000)
         except asyncio.CancelledError:
             pass
         finally:
