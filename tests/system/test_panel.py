@@ -168,7 +168,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     page.wait_for_function("!document.getElementById('armtempo-state').textContent.includes('in a pause')")
     # joint 1
     page.wait_for_function(
-        "parseFloat(document.getElementById('armtempo-where').textContent.split('·')[1]) > 0"
+        "parseFloat(document.getElementById('armtempo-where').textContent.split('·').at(-1)) > 0"
     )
     page.keyboard.press(" ")  # the button just pressed has the focus, and does not take it
     wait_for(page, "idle")
@@ -310,6 +310,7 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         shown = paste(page, wrong := "1;2\n3;4")
         assert refusal(folder, "the pasted rows", wrong, "import --arm arm.toml") in shown
         paste(page, "0;-60;40\n20;-75;50")
+        page.wait_for_selector('[aria-label="P2 joint 1"]', state="detached")  # the table is built anew
         good = 'name = "feed"\ntiming = "shared"\nvia_deg = [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]]\n'
     else:
         good = _SEQUENCE
@@ -323,6 +324,8 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         content = tomlkit.parse(good)
         put(content, label, wrong)
         field.fill(wrong)
+        page.wait_for_timeout(300)
+        assert field.input_value() == wrong  # not lost as what was typed in the field before it is taken
         control = page.get_by_role("button", name=button, exact=True)
         shown = press(page, control, partial(control.press, "Enter"))
         said = refusal(folder, file, tomlkit.dumps(content))

@@ -151,11 +151,11 @@ class JobTab:
         box.on("change", lambda event: self._typed(event, call, *given))
 
     def _typed(self, event: Any, call: Callable[..., object], *given: Any) -> None:
-        """Take what was typed; the table is not rebuilt, as the user may already type in the next field."""
+        """Take what was typed; the fields are not rebuilt, as the user may already type in the next one."""
         others = self._jobs.version - self._shown
         text = str(event.args or "").strip()
         self._page.attempt(lambda: call(*given, text))
-        if all(via.form == ANGLES for via in self._jobs.vias) and call == self._jobs.set_angle:
+        if all(via.form == ANGLES for via in self._jobs.vias) and call != self._jobs.set_key:
             self._shown = self._jobs.version - others
         self._draw_vias()
 
