@@ -179,7 +179,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     page.wait_for_function(
         "document.querySelector('.armtempo-dock .armtempo-percent').textContent == '100 %'"
     )
-    assert slider.get_attribute("aria-valuenow") == "100"
+    page.wait_for_selector('[role=slider][aria-label="Speed"][aria-valuenow="100"]')
     press(page, page.get_by_role("button", name="Go to the start"))  # after a stop a motion only begins anew
     wait_for(page, "moving")
     press(page, page.get_by_role("button", name="Run", exact=True))
@@ -270,7 +270,7 @@ call = "other.toml"
 end = "repeat"
 """
 """Each kind of step, with each of its keys."""
-_DAY = 'name = "day"  # my name\n[[step]]\ngoto = "home"\n[[step]]\nwait_s = 9  # it settles\n'
+_DAY = 'name = "day"  # my name\n\n[[step]]\ngoto = "home"\n\n[[step]]\nwait_s = 9  # it settles\n'
 _MARKUP = "<img src=x onerror=window.hurt=1>"
 _FIELDS = """() => [...document.querySelectorAll('.q-tab-panel input:not([role=combobox])')]
   .filter(one => one.checkVisibility() && one.ariaLabel).map(one => [one.ariaLabel, one.type])"""
