@@ -23,7 +23,7 @@ from armtempo.model import engine_pins
 from armtempo_shared import meanings
 from click.testing import CliRunner
 
-from tests import sources
+from tests import interpreters, sources
 from tests.interpreters import ROOT
 
 FILES = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
@@ -315,9 +315,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-d", str(out / "doctrees")]
     command += ["-c", "host/docs/site", ".", str(out / "html")]
-    # Deprecations between Sphinx and its own extensions are not ours; what the pages do wrong, -W says.
-    own = {name: value for name, value in os.environ.items() if name != "PYTHONWARNINGS"}
-    done = subprocess.run(command, cwd=ROOT, env=own, capture_output=True, text=True)
+    # what the pages do wrong, -W says
+    environment = interpreters.environment_of_others()
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return out / "html"
 
