@@ -57,3 +57,8 @@ def run(name: str, script: Path | str, *arguments: str, timeout: float = 1200.0,
         f"{name} {script} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
     )
     return done.stdout
+
+
+def environment_of_others() -> dict[str, str]:
+    """For a program that is not ours, such as pip: its deprecation warnings are no errors there."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONWARNINGS"}

@@ -40,7 +40,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A freshly built wheel."""
     folder = tmp_path_factory.mktemp("wheel")
     build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
-    done = subprocess.run(build, capture_output=True, text=True)
+    done = subprocess.run(build, capture_output=True, text=True, env=interpreters.environment_of_others())
     assert done.returncode == 0, done.stdout + done.stderr
     (found,) = folder.glob("*.whl")
     return found
@@ -62,7 +62,8 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "--quiet",
         str(wheel),
     ]
-    subprocess.run([sys.executable, *install], check=True, capture_output=True)
+    environment = interpreters.environment_of_others()
+    subprocess.run([sys.executable, *install], check=True, capture_output=True, env=environment)
     (site,) = (folder / "venv").glob("lib/python*/site-packages")
     mine = sysconfig.get_paths()["purelib"]
     # Without its .pth files

@@ -107,10 +107,10 @@ def test_the_same_from_python() -> None:
         with pytest.raises(InputError, match="joint by degrees"):
             board.jog(joint=1, by_mm=5)
         for _ in range(2):  # the second time it is there
-            assert board.jog(joint=2, to_deg=before[1] + 3.0)[1] == pytest.approx(before[1] + 3.0, abs=0.02)
-        board.jog(joint=2, to_deg=before[1])
-        with pytest.raises(InputError, match="needs a joint and no distance"):
-            board.jog(axis="z", to_deg=5)
+            assert board.jog_to(2, before[1] + 3.0)[1] == pytest.approx(before[1] + 3.0, abs=0.02)
+        board.jog_to(2, before[1])
+        with pytest.raises(InputError, match="drives no joint 9"):
+            board.jog_to(9, 5.0)
         with board.held_jog(joint=1) as held:
             board.client.stop()
             while held.hold():

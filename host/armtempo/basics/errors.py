@@ -26,8 +26,6 @@ tree: it is a KeyboardInterrupt, raised after a stop request brought a motion to
 
 from __future__ import annotations
 
-from armtempo.basics import installation
-
 INTERRUPTED = 130
 """Exit code of the command after Ctrl-C."""
 
@@ -63,6 +61,9 @@ class MissingPackageError(ArmtempoError):
     """``what`` needs an optional ``package`` that is not installed; ``extra`` is armtempo's extra that installs it."""
 
     def __init__(self, what: str, package: str, extra: str) -> None:
+        # imported here, as a stop from a second program imports this module
+        from armtempo.basics import installation
+
         super().__init__(
             f"{what} needs {package}, which is not installed",
             f"install it with: {installation.command(package, extra)}",

@@ -60,11 +60,13 @@ def import_table(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Make a job file from TABLE, one line per via point, or from a ROS JointTrajectory.
+    """Make a job file from a table of via points, or from a ROS JointTrajectory.
 
-    The first line names the columns, in any order: the joints' names or j1, j2, …, with a unit such as (rad); or x, y,
-    z and roll, pitch, yaw for poses. Columns are separated by commas, semicolons, tabs or blanks. A file that
-    'armtempo export' wrote becomes a job of few via points along the same path.
+    TABLE: a text file with one line per via point, or the trajectory.
+
+    The first line of a table names the columns, in any order: the joints' names or j1, j2, …, with a unit such as
+    (rad); or x, y, z and roll, pitch, yaw for poses. Columns are separated by commas, semicolons, tabs or blanks. A
+    file that 'armtempo export' wrote becomes a job of few via points along the same path.
     """
     arm = chosen.load_arm(arm_path)
     title = name or table.stem

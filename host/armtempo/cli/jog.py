@@ -63,9 +63,11 @@ def jog(
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 screen(board, pressed, speed).loop()
+        elif joint is not None and to is not None:
+            board.jog_to(joint, to, speed / 100)
         else:
             along = by if axis else None
-            board.jog(joint, None if axis else by, axis or about, along, speed / 100, to_deg=to)
+            board.jog(joint, None if axis else by, axis or about, along, speed / 100)
         early = board.last_jog_ends
         if not (early and given.as_json):
             posture.print_position(board, given.as_json)

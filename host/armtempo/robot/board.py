@@ -286,12 +286,8 @@ class Board:
         by_mm: float | None = None,
         speed: float = SPEED,
         stop: StopRequest | None = None,
-        *,
-        to_deg: float | None = None,
     ) -> Array:
         """Move a joint or the tool: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
-
-        ``to_deg``: instead of ``by_deg``, the angle to which a joint moves; nothing moves if it is there.
 
         ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y",
         "tool-z": the tool moves along it by ``by_mm``, or turns about it by ``by_deg``; ``speed``: fraction
@@ -300,16 +296,22 @@ class Board:
         LinkError if the position is unknown, InputError if no motion in that direction is possible.
         """
         arm = self._known_arm()
-        if to_deg is not None:
-            self._start.home_virtual_arm(arm)
-            by_deg = jog.distance_deg(self.posture_deg(), arm, joint, to_deg, by_deg)
-            if by_deg == 0.0:
-                self.last_jog_ends = ""
-                return self.posture_deg()
         move = move_of(arm, joint, axis, by_deg, by_mm)
         with self._stoppable(stop) as wanted:
             self._start.home_virtual_arm(arm)
             self.last_jog_ends = jog.step(self.client, arm, move, speed, wanted).ends
+        return self.posture_deg()
+
+    def jog_to(
+        self, joint: int | str, angle_deg: float, speed: float = SPEED, stop: StopRequest | None = None
+    ) -> Array:
+        """Move a joint to an angle; nothing moves if it is there. The rest as in ``jog``."""
+        arm = self._known_arm()
+        self._start.home_virtual_arm(arm)
+        by_deg = jog.distance_deg(self.posture_deg(), arm, joint, angle_deg)
+        if by_deg:
+            return self.jog(joint, by_deg, speed=speed, stop=stop)
+        self.last_jog_ends = ""
         return self.posture_deg()
 
     def held_jog(

@@ -12,7 +12,7 @@ from armtempo_shared.limits import HOLD_TIMEOUT_MS
 from armtempo_shared.messages import START_HELD
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import BoardError, InputError, LinkError
+from armtempo.basics.errors import BoardError, LinkError
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
 from armtempo.link.refusal import refusal
@@ -49,15 +49,8 @@ def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog_motion.SPEE
     return jog_motion.plan(NAME, arm, arm_state.posture_deg(client, arm).tolist(), move, speed)
 
 
-def distance_deg(
-    here_deg: Array, arm: Arm, joint: int | str | None, to_deg: float, by_deg: float | None
-) -> float:
-    """The distance of a joint from an angle; 0 for less than half a step.
-
-    Raises InputError without a joint, or with a distance ``by_deg`` as well.
-    """
-    if joint is None or by_deg is not None:
-        raise InputError("a jog to an angle needs a joint and no distance", "give joint and to_deg")
+def distance_deg(here_deg: Array, arm: Arm, joint: int | str, to_deg: float) -> float:
+    """The distance of a joint from an angle; 0 for less than half a step. Raises InputError for an unknown joint."""
     number = jog_motion.number_of_joint(arm, joint)
     found = to_deg - float(here_deg[number])
     return found if abs(found) * arm.driven[number].steps_per_deg >= 0.5 else 0.0
