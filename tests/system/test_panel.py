@@ -133,6 +133,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     press(page, page.get_by_role("button", name="closed"))
     commandline.wait_for(lambda: panels.again(panel.outputs) == {"gripper": "closed"}, "the output")
     page.get_by_role("button", name="Tool, base frame").click()
+    page.get_by_label("⟳ x +").wait_for()
     page.get_by_label("⟳ x +").hover(force=True)
     page.wait_for_selector("text=the arm cannot turn the tool about x from here")
     assert page.get_by_label("⟳ x +").is_disabled()
@@ -463,7 +464,7 @@ _CHUNKED = b"POST / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n
 _LONG = b"X: " + 400_000 * b"x"
 _TOO_LARGE = b"POST / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 1000001\r\n\r\n"
 _REFUSED = {
-    "host": (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", b"403", "this name is not the server's"),
+    "host": (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", b"403", "does not serve the name 'evil.example'"),
     "origin": (b"GET / HTTP/1.1\r\n" + _OTHER, b"403", "a page of another origin"),
     "socket": (b"GET " + _SOCKET + _KEY + _OTHER, b"403", "a page of another origin"),
     "size": (_TOO_LARGE, b"403", "more than 1000000"),
