@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Awaitable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -124,9 +125,9 @@ def _speed(page: PanelPage) -> None:
     page.control(slider, Needs.BOARD)
     shown: list[float | None] = [None]
 
-    async def set_speed(press: Press, wanted: Any) -> None:
+    def set_speed(press: Press, wanted: Any) -> Awaitable[object]:
         shown[0] = None  # the board's is shown again, if this is refused
-        await page.at_once(press, lambda board: board.speed(float(wanted) / 100))
+        return page.at_once(press, lambda board: board.speed(float(wanted) / 100))
 
     page.on_press(slider, "change", set_speed)
 
