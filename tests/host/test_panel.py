@@ -778,7 +778,7 @@ def test_commands_are_the_panels_buttons(text: str, wanted: str) -> None:
     ],
 )
 def test_keys_are_the_panels_fields(text: str, wanted: str) -> None:
-    assert words.of_job(InputError(text)) == wanted
+    assert words.of_job(text) == wanted
 
 
 def test_what_turns_the_direction_of_a_line_is_seen() -> None:

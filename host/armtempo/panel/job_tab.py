@@ -151,11 +151,11 @@ class JobTab:
         box.on("change", lambda event: self._typed(event, call, *given))
 
     def _typed(self, event: Any, call: Callable[..., object], *given: Any) -> None:
-        """Take what was typed; the table is not rebuilt, as the user may already type in the next field."""
+        """Take what was typed; the fields are not rebuilt, as the user may already type in the next one."""
         others = self._jobs.version - self._shown
         text = str(event.args or "").strip()
         self._page.attempt(lambda: call(*given, text))
-        if all(via.form == ANGLES for via in self._jobs.vias) and call == self._jobs.set_angle:
+        if all(via.form == ANGLES for via in self._jobs.vias) and call != self._jobs.set_key:
             self._shown = self._jobs.version - others
         self._draw_vias()
 
@@ -277,7 +277,7 @@ class JobTab:
         try:
             job = self._jobs.job()
         except InputError as error:
-            raise InputError(words.of_job(error)) from None
+            raise InputError(words.of_job(error.problem), words.of_job(error.hint)) from None
         return self._make_plan(job, self._jobs.version)
 
     async def _make_plan(self, job: Job, version: int) -> None:
@@ -287,7 +287,7 @@ class JobTab:
             if plan is not None:  # it is None if the panel ends meanwhile
                 self._jobs.planned(plan, version)
         except ArmtempoError as error:
-            ui.notify(words.of_job(error), type="negative", multi_line=True, timeout=8000)
+            ui.notify(words.of_job(str(error)), type="negative", multi_line=True, timeout=8000)
         except asyncio.CancelledError:
             pass
         finally:

@@ -51,7 +51,8 @@ class RunTab:
             ):
                 give = partial(self._do, text, call, needs)
                 page.button(text, give, needs | Needs.PLAN, look=f"{look} icon={icon}")
-            self._repeat = ui.number(words.REPEAT, value=1, precision=0, min=1, max=MOST_REPETITIONS)
+            # Without limits: the field would put another number in the place of one that is not possible
+            self._repeat = ui.number(words.REPEAT, value=1)
             self._repeat.props("dense outlined").classes("armtempo-option")
         self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
         self._left = ui.label("").classes("armtempo-note")
@@ -69,12 +70,13 @@ class RunTab:
             self._page.do(press, text, lambda: call(plan), needs | Needs.PLAN)
 
     def _run(self, plan: Plan) -> None:
-        times = int(self._repeat.value or 0)
-        if not 1 <= times <= MOST_REPETITIONS:
+        times = self._repeat.value or 0
+        if times not in range(1, MOST_REPETITIONS + 1):
             raise InputError(
-                words.WRONG_REPEAT.format(times=times), words.RIGHT_REPEAT.format(most=MOST_REPETITIONS)
+                words.WRONG_REPEAT.format(times=f"{times:g}"),
+                words.RIGHT_REPEAT.format(most=MOST_REPETITIONS),
             )
-        self._operator.run(plan, times)
+        self._operator.run(plan, int(times))
 
     def _look(self) -> None:
         self._look_at_plan()

@@ -12,7 +12,7 @@ from armtempo_shared.sequence import MOVE, WAIT
 from nicegui import run, ui
 
 from armtempo import pipeline
-from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.basics.errors import ArmtempoError
 from armtempo.panel import words
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.operator import Needs
@@ -204,8 +204,6 @@ class SequenceTab:
             if (recorded := board.last_sequence) is not None:
                 pipeline.report(recorded)
 
-        if not self._editor.is_open:
-            raise InputError(words.NO_SEQUENCE_OPEN)
         self._page.do(press, words.RUN, run_it)
 
 

@@ -237,9 +237,9 @@ def of_error(error: ArmtempoError) -> str:
     return of_text(str(error))
 
 
-def of_job(error: ArmtempoError) -> str:
-    """An error in the edited job, with the names of its fields instead of those of the file's keys."""
-    text = of_error(error)
+def of_job(text: str) -> str:
+    """A text on the edited job, with the names of its fields instead of those of the file's keys."""
+    text = of_text(text)
     for key, label in {**VIA_KEYS, **OPTIONS}.items():
         # A key that is a usual word too is one only where a value follows
         text = re.sub(rf"\b{key}\b" + ("" if "_" in key else "(?= =| ['\"0-9])"), f"‘{label}’", text)
