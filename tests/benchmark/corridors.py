@@ -38,7 +38,11 @@ def random_corridors(seed: int) -> tuple[Arm, Job, list[float]]:
     still[rng.integers(len(still))] = False
     via = middle + half * np.where(still, 0.0, rng.uniform(-0.5, 0.5, (int(rng.integers(3, 9)), len(middle))))
     widths = sorted(10.0 ** rng.uniform(-1.5, 2, 3))
-    return arm, Job(f"random-{seed}", via_deg=via.tolist(), seed=seed), [float(width) for width in widths]
+    return (
+        arm,
+        Job(f"random-{seed}", via_deg=via.tolist(), seed=seed, path="through"),
+        [float(width) for width in widths],
+    )
 
 
 def times(seed: int) -> Iterator[tuple[float, float]]:

@@ -81,7 +81,7 @@ def test_ranges_hold_between_the_via_points() -> None:
     arm = problems.make_arm([[50.0, 50.0, 150.0]] * 2, (-10.0, 100.0))
     via = ((0.0, 0.0), (100.0, 30.0), (100.0, 60.0), (0.0, 90.0))
     with pytest.raises(PlanError, match="its range is -10 to 100"):
-        planner.plan(arm, Job("out", via, refine=1))
+        planner.plan(arm, Job("out", via, refine=1, path="through"))
     plan = planner.plan(arm, Job("out", via, path="free", refine=6, starts=1))
     assert faults(plan) == []
 

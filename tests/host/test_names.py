@@ -125,11 +125,6 @@ def made(request: pytest.FixtureRequest) -> Plan:
     return replace(plan, arm=replace(plan.arm, joints=joints))
 
 
-def ends(line: str) -> list[int]:
-    """Where the words of a line end that two or more spaces, or its end, follow."""
-    return [found.end() for found in re.finditer(r"\S(?=  |$)", line)]
-
-
 def test_rows_are_filled_up_to_the_widths_and_what_is_longer_widens_its_column() -> None:
     assert aligned([("ab", "1"), ("", "23")], (4, 3)) == ["ab    1", "     23"]
     rows = [("joint", "s", "x"), ("a long name", "12345", "1"), ("b", "1", "1")]
@@ -144,8 +139,9 @@ def test_rows_are_filled_up_to_the_widths_and_what_is_longer_widens_its_column()
 def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
     table = text_summary.lines(made)[1:6]
     assert len({len(line) for line in table}) == 1
-    heads, _, *rows = table
-    assert all(ends(row)[1:] == ends(heads)[1:] for row in rows)
+    _, units, *rows = table
+    ends = [found.end() for found in re.finditer(r"\S+", units)]
+    assert all(row[end - 1] != " " and f"{row} "[end] == " " for row in rows for end in ends)
     assert [row[: len(joint.name) + 1] for row, joint in zip(rows, made.arm.driven, strict=True)] == [
         f"{joint.name} " for joint in made.arm.driven
     ]
