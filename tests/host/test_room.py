@@ -135,7 +135,7 @@ def test_a_free_path_goes_around_what_is_between_its_via_points() -> None:
     )
     led = planner.plan(arm, seam)
     assert dense_least(arm, led.trajectory, 2000) > 0.0
-    wall = replace(FEEDER, low_mm=(-50.0, 20.0, -FAR_MM), high_mm=(50.0, FAR_MM, FAR_MM))
+    wall = replace(FEEDER, low_mm=(-20.0, 40.0, -FAR_MM), high_mm=(20.0, FAR_MM, FAR_MM))
     with pytest.raises(PlanError, match=OVER):
         planner.plan(replace(arm, room=ArmRoom((wall,))), job)
 
