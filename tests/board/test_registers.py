@@ -141,7 +141,8 @@ def test_emulated_and_virtual_board_have_the_memory_of_the_chip() -> None:
     memory = firmware.CHIP["memory"]
     assert (firmware.FLASH_AT, firmware.FLASH_BLOCKS) == (0x08004000, 224)
     hardware = interpreters.ROOT / "host" / "armtempo" / "simulator" / "hardware"
-    virtual = _assigned(hardware / "chip" / "flash.py") | _assigned(hardware / "firmware" / "boot.py")
+    modules = ("chip/flash.py", "chip/fat.py", "firmware/boot.py")
+    virtual = {name: value for path in modules for name, value in _assigned(hardware / path).items()}
     root_folder, boot_and_table = 32, 2  # FAT12
     assert virtual["BLOCKS"] == firmware.FLASH_BLOCKS - root_folder - boot_and_table
     assert (virtual["BLOCK"], virtual["_FACTORY_FILES"]) == (firmware.CHIP["block"], firmware.FACTORY_FILES)

@@ -184,6 +184,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     wait_for(page, "moving")
     press(page, page.get_by_role("button", name="Run", exact=True))
     wait_for(page, "moving")
+    wait_for(page, "idle")  # a report is of a whole run
     for run, text in (("feed-002", "joint 1"), (_MARKUP, "of another arm")):
         with page.expect_popup() as popup:
             page.get_by_role("button", name=f"Report: {run}").click()

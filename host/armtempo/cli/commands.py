@@ -64,7 +64,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "import": Entry(
             "exchange:import_table",
-            "Make a job file from TABLE, one line per via point, or from a ROS JointTrajectory.",
+            "Make a job file from a table of via points, or from a ROS JointTrajectory.",
             "import points.csv",
             "import motion.csv --tolerance-deg 0.05 -o back.toml",
         ),
