@@ -115,7 +115,7 @@ _SHIFTS = """() => new Promise(resolve => {
   })).observe({type: 'layout-shift', buffered: true});
   setTimeout(() => resolve(most), 200);
 })"""
-"""How much jumped on the page at once, as browsers count it: within 5 s, without a second of rest; below 0.1 is good."""
+"""How much jumped on the page at once, as browsers count it: within 5 s without a second of rest; 0.1 is too much."""
 
 
 def test_the_whole_way(page: Any, panel: Panel) -> None:
