@@ -127,7 +127,7 @@ def test_a_board_that_does_not_answer(tmp_path: Path) -> None:
 
 
 AWAY_S = 3.0
-SPEED_DEG_S = 6.0
+SPEED_DEG_S = 3.0
 FASTEST = interpreters.starter(interpreters.AVAILABLE[min(1, len(interpreters.AVAILABLE) - 1)])
 
 
