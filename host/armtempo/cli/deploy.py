@@ -16,13 +16,10 @@ from armtempo.robot import engine_room
 
 
 @click.command("deploy")
-@click.option(
-    "--mpy", is_flag=True, help="The core, compiled with mpy-cross, in the last sectors of the chip's flash."
-)
 @options.arm
 @options.port
 @options.as_json
-def deploy(mpy: bool, arm_path: Path | None, port: str | None, as_json: bool) -> None:
+def deploy(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     """Install or update the board program on a board.
 
     mpremote copies the files below /flash/lib that differ, and writes the compiled program to the last two sectors of
@@ -31,7 +28,7 @@ def deploy(mpy: bool, arm_path: Path | None, port: str | None, as_json: bool) ->
     """
     arm = chosen.named_arm(arm_path)
     with ProgressBar("copying") as progress:
-        info = deployment.deploy(chosen.port(port), mpy, results.progress_printer(as_json), progress)
+        info = deployment.deploy(chosen.port(port), results.progress_printer(as_json), progress)
     room = engine_room.of_board(info)
     values = {
         "board_id": info.board_id,
