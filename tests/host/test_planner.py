@@ -89,19 +89,19 @@ def test_problem(problem: problems.Problem) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(4))
-def test_random_jobs_keep_their_limits_or_say_why_not(part: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """800 jobs (``tests.benchmark.random_plans`` takes more); floors have their own test."""
+@pytest.mark.seeds(*range(4))
+def test_random_jobs_keep_their_limits_or_say_why_not(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """200 jobs each; floors have their own test."""
     monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))
     planned = 0
-    for seed in range(200 * part, 200 * part + 200):
-        arm, job = problems.random_problem(seed)
+    for number in range(200 * seed, 200 * seed + 200):
+        arm, job = problems.random_problem(number)
         if np.all(np.ptp(job.via, axis=0) == 0):
             with pytest.raises(PlanError, match="nothing moves"):
                 planner.plan(arm, job)
             continue
         plan = planner.plan(arm, job)
-        (check_thoroughly if seed % 20 == 0 else check)(plan, f"seed {seed}")
+        (check_thoroughly if number % 20 == 0 else check)(plan, f"job {number}")
         planned += 1
     assert planned > 140
 
