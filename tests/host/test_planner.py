@@ -11,10 +11,11 @@ import pytest
 from armtempo.basics import progress
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
+from armtempo.model.job import Job, Stop
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
-from armtempo.planning import lower_bounds, path_deviation, planner
+from armtempo.model.tool_way import ToolWay
+from armtempo.planning import checks, lower_bounds, path_deviation, planner
 from armtempo.planning.fitness import Fitness, stretch_of
 from armtempo.planning.lower_bounds import Floor
 from armtempo.records import encode
@@ -416,3 +417,16 @@ def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan
     assert any("strays up to" in line for line in text)
     assert not any("strays" in line for line in text_summary.lines(together))
     assert all(len(line) <= 110 for line in text)
+
+
+def test_each_job_has_a_planner_of_the_table() -> None:
+    led = replace(JOB, ways=(ToolWay(1, line=True),))
+    asked = {
+        "through": replace(JOB, path="through"),
+        "free": replace(JOB, path="free", stops=(Stop(1),)),
+        "line": replace(JOB, path="through", stops=(Stop(1),)),
+    }
+    assert {name: checks.planner_of(job) for name, job in asked.items()} == {
+        name: name for name in planner.PLANNERS
+    }
+    assert checks.planner_of(led) == checks.planner_of(replace(led, path="free")) == "line"
