@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.run_progress import RunProgress
+from armtempo.encoding import encoded_motion
 from armtempo.kinematics import chain
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.paper import searches
-from armtempo.records import encoded_motion
 from armtempo.report import analysis, arm_picture, drawing, html_page, plots, run_folder, sections
 from armtempo.report.run_folder import RunFolder
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from armtempo.basics import progress
 from armtempo.basics.errors import InputError, PlanError
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.parts import Limits
@@ -18,7 +19,6 @@ from armtempo.model.tool_way import ToolWay
 from armtempo.planning import checks, lower_bounds, path_deviation, planner
 from armtempo.planning.fitness import Fitness, stretch_of
 from armtempo.planning.lower_bounds import Floor
-from armtempo.records import encode
 from armtempo.report import text_summary
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline

@@ -72,7 +72,7 @@ def test_motions_in_random_rooms_agree_with_dense_samples(seed: int) -> None:
     if touch is None:
         assert least > 0.0, f"seed {seed}: accepted, {least:.3f} mm"
     else:
-        assert least < 1.0, f"seed {seed}: {touch.words}, but {least:.3f} mm apart"
+        assert least < 1.0, f"seed {seed}: {touch.description}, but {least:.3f} mm apart"
 
 
 @pytest.mark.slow
@@ -177,7 +177,7 @@ def test_a_plan_that_starts_where_it_touches_is_refused_unless_it_says_so_and_ne
     inside, outside = (90.0, -60.0, 40.0), (20.0, -60.0, 40.0)
     out = Job("out", via=(inside, outside), path="through", optimiser="gradient", starts=1)
     touch = max(room_check.posture_touches(arm, inside), key=lambda each: each.depth_mm)
-    with pytest.raises(PlanError, match=f"out: {touch.words} where it starts"):
+    with pytest.raises(PlanError, match=f"out: {touch.description} where it starts"):
         planner.plan(arm, out)
     plan = planner.plan(arm, replace(out, start_touches=True))
     assert dense_least(arm, plan.trajectory, 200) < 0.0

@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 
 from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, options, results, sequences
+from armtempo.cli import options, resolve, results, sequences
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.run_progress import RunProgress, repetition_line
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import is_sequence_plan
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report import text_summary
 from armtempo.report.run import Run
 from armtempo.robot.board import Board
@@ -34,28 +34,28 @@ def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, g
     path. Ctrl-C, or 'armtempo stop' in another terminal, brakes; 'armtempo speed', 'pause' and 'resume' work
     there too.
     """
-    if chosen.is_file(what) and is_sequence_plan(Path(what)):
+    if resolve.is_file(what) and is_sequence_plan(Path(what)):
         _refuse_repeat(repeat)
-        sequence = chosen.load_sequence_plan(Path(what), given.arm_path)
-        with chosen.board(given, sequence.arm) as board:
+        sequence = resolve.load_sequence_plan(Path(what), given.arm_path)
+        with resolve.board(given, sequence.arm) as board:
             board.configure(sequence.arm, replace=given.replace_arm)
-            results.progress_printer(given.as_json)(f"arm: {chosen.describe_arm(sequence.arm)}")
+            results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(sequence.arm)}")
             board.speed(percent / 100)
-            sequences.run_and_report(board, sequence, force, chosen.runs(out), given.as_json)
+            sequences.run_and_report(board, sequence, force, resolve.runs(out), given.as_json)
         return
-    plan = chosen.load_plan(Path(what), given.arm_path, given.altered) if chosen.is_file(what) else None
-    named = plan.arm if plan else chosen.named_arm(given.arm_path)
-    with chosen.board(given, named) as board:
-        arm = chosen.arm_of_board(board, named)
+    plan = resolve.load_plan(Path(what), given.arm_path, given.altered) if resolve.is_file(what) else None
+    named = plan.arm if plan else resolve.named_arm(given.arm_path)
+    with resolve.board(given, named) as board:
+        arm = resolve.arm_of_board(board, named)
         board.configure(arm, replace=given.replace_arm)
-        results.progress_printer(given.as_json)(f"arm: {chosen.describe_arm(arm)}")
+        results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):
             _refuse_repeat(repeat)
-            sequences.run_and_report(board, motion, False, chosen.runs(out), given.as_json)
+            sequences.run_and_report(board, motion, False, resolve.runs(out), given.as_json)
             return
-        run_and_report(board, motion, repeat, chosen.runs(out), given.as_json)
+        run_and_report(board, motion, repeat, resolve.runs(out), given.as_json)
 
 
 def _refuse_repeat(repeat: int) -> None:
@@ -98,11 +98,13 @@ def fetch(what: str | None, out: Path | None, given: BoardOptions) -> None:
     that the button starts. Waits for the end of a motion that still runs. The samples can be fetched once.
     """
     plan = (
-        chosen.load_plan(Path(what), given.arm_path, given.altered) if what and chosen.is_file(what) else None
+        resolve.load_plan(Path(what), given.arm_path, given.altered)
+        if what and resolve.is_file(what)
+        else None
     )
-    named = plan.arm if plan else chosen.named_arm(given.arm_path)
-    with chosen.board(given, named) as board:
-        board.configure(chosen.arm_of_board(board, named))
-        run = board.fetch(plan or what, chosen.runs(out))
+    named = plan.arm if plan else resolve.named_arm(given.arm_path)
+    with resolve.board(given, named) as board:
+        board.configure(resolve.arm_of_board(board, named))
+        run = board.fetch(plan or what, resolve.runs(out))
         lines = [f"{run.name}: {run.path}", repetition_line(run.entries[-1])]
         results.show(given.as_json, run.to_json(), lines)

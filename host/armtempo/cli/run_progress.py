@@ -12,8 +12,8 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo.basics.arrays import Array
 from armtempo.cli import results
 from armtempo.cli.results import ProgressBar
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link.board_messages import Sample
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report.run_folder import Repetition, RunFolder
 from armtempo.robot.recording import Watcher
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from armtempo.basics.errors import LinkError
-from armtempo.cli import chosen, options
+from armtempo.cli import options, resolve
 from armtempo.simulator import LaunchOptions, launch
 
 _LOOK_S = 0.5
@@ -57,7 +57,7 @@ def virtual_board(
         virtual_time=not real_time,
         edge_log=edge_log,
         interpreter=interpreter,
-        arm=None if ideal else chosen.named_arm(arm_path),
+        arm=None if ideal else resolve.named_arm(arm_path),
         seed=seed,
         deployed=deployed,
     )

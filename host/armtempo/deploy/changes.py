@@ -91,7 +91,7 @@ def check_version(firmware_crc: int | None) -> None:
         raise LinkError(
             f"the firmware must be updated: it contains another version of the program ({firmware_crc:08x}, "
             f"here {own_crc():08x}), and files in the flash do not replace it",
-            "flash one of this version: 'armtempo flash'; or MicroPython's own, then deploy again",
+            "flash one of this version: 'armtempo flash'; or stock MicroPython, then deploy again",
         )
 
 

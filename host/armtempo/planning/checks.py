@@ -296,7 +296,7 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
             )
     rates = step_rates(arm, reached)
     if rates > MAX_STEP_RATE_SUM:
-        raise PlanError(rate_words(rates), "lower the speed limits or use fewer microsteps")
+        raise PlanError(format_rate(rates), "lower the speed limits or use fewer microsteps")
 
 
 def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
@@ -306,7 +306,7 @@ def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
     )
 
 
-def rate_words(rates: float) -> str:
+def format_rate(rates: float) -> str:
     """Text: a sum of step rates compared with the board's."""
     return f"the joints together need up to {rates:.0f} steps/s; the board supports {MAX_STEP_RATE_SUM} {ESTIMATED}"
 

@@ -66,7 +66,7 @@ def _details(plan: Plan) -> list[str]:
         *(_polished(search) for search in plan.searches if search.optimum_s),
         *(_started(search) for search in plan.searches if len(search.starts_s)),
         f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes",
-        checks.rate_words(checks.step_rates(plan.arm, plan.extremes)),
+        checks.format_rate(checks.step_rates(plan.arm, plan.extremes)),
     ]
 
 
@@ -78,7 +78,7 @@ def torque_lines(motions: Iterable[tuple[Arm, Trajectory]]) -> list[str]:
     least = min(found)
     level = "warning" if least.margin < torque.ENOUGH else "torque"
     prudent = f"; {torque.ENOUGH:g} is prudent" if least.margin < torque.ENOUGH else ""
-    return [f"{level}: {least.joint} has the least to spare: {least.words}{prudent}"]
+    return [f"{level}: {least.joint} has the least to spare: {least.description}{prudent}"]
 
 
 def result_lines(results: Iterable[JointResult]) -> list[str]:
