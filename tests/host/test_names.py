@@ -14,13 +14,13 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
 from armtempo.cli import main, stored
 from armtempo.diagnosis.finding import Finding, Level
+from armtempo.encoding import encoded_motion
 from armtempo.link import board_messages
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner, rest_to_rest
-from armtempo.records import encoded_motion
 from armtempo.report import drawing, plots, run_folder, run_report, text_summary
 from armtempo.report.replayed import results
 from armtempo.report.run_folder import Repetition

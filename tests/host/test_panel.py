@@ -36,7 +36,7 @@ from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
 from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.live import LiveArm
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.press import Press, Presses
 from armtempo.panel.problem import Cure
 from armtempo.panel.sequence_editor import SequenceEditor
@@ -50,13 +50,13 @@ HELD_S = 2.0
 _NUMBERS = itertools.count(1)
 
 
-def press(operator: Operator) -> Press:
+def press(operator: PanelBoard) -> Press:
     """One that is made now."""
     return Press(next(_NUMBERS), operator.presses.state, operator.presses.clock())
 
 
 def do(
-    operator: Operator, what: str, client: str, call: Callable[[], object], needs: Needs = Needs.MOVE
+    operator: PanelBoard, what: str, client: str, call: Callable[[], object], needs: Needs = Needs.MOVE
 ) -> None:
     """Start a command with a press that is made now."""
     operator.do(what, client, press(operator), call, needs)
@@ -321,11 +321,11 @@ class Board:
 
 
 @pytest.fixture
-def operator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Operator]:
-    monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 1000.0)  # it is never asked for its state
+def operator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[PanelBoard]:
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)  # it is never asked for its state
     monkeypatch.setattr("armtempo.panel.hold.ALIVE_S", HELD_S)
     board = Board()
-    made = Operator(lambda sink, tell: board, "sim", JobEditor(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type, return-value]
+    made = PanelBoard(lambda sink, tell: board, "sim", JobEditor(ARM, tmp_path, None), tmp_path / "runs")  # type: ignore[arg-type, return-value]
     made.take_control(ME)
     yield made
     made.close()
@@ -339,7 +339,7 @@ def wait(condition: Callable[[], bool]) -> None:
         time.sleep(0.005)
 
 
-def test_one_command_at_a_time_of_who_has_control(operator: Operator) -> None:
+def test_one_command_at_a_time_of_who_has_control(operator: PanelBoard) -> None:
     go = threading.Event()
     do(operator, "wait", ME, go.wait)
     with pytest.raises(InputError, match="wait is under way"):
@@ -353,7 +353,7 @@ def test_one_command_at_a_time_of_who_has_control(operator: Operator) -> None:
         do(operator, "more", ME, go.wait)
 
 
-def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: Operator) -> None:
+def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: PanelBoard) -> None:
     def fail() -> None:
         raise LinkError("the arm is elsewhere", "bring it there")
 
@@ -364,7 +364,7 @@ def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: Operator) ->
 
 
 def test_a_second_stop_brakes_again_and_only_an_arm_that_does_not_rest_is_frozen(
-    operator: Operator, monkeypatch: pytest.MonkeyPatch
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stops = operator.board.stops  # type: ignore[attr-defined]
     operator.freeze()  # nothing was stopped
@@ -372,7 +372,7 @@ def test_a_second_stop_brakes_again_and_only_an_arm_that_does_not_rest_is_frozen
     operator.stop()  # a double click
     operator.freeze()  # at once
     assert [now for now, _ in stops] == [False, False]
-    monkeypatch.setattr("armtempo.panel.operator.FREEZE_AFTER_S", -1.0)
+    monkeypatch.setattr("armtempo.panel.panel_board.FREEZE_AFTER_S", -1.0)
     assert operator.can_freeze
     operator.freeze()
     assert [now for now, _ in stops] == [False, False, True]
@@ -381,24 +381,24 @@ def test_a_second_stop_brakes_again_and_only_an_arm_that_does_not_rest_is_frozen
     assert operator.live.doubt == ""
 
 
-def test_a_stop_of_an_arm_at_rest_is_no_stop_to_freeze_after(operator: Operator) -> None:
+def test_a_stop_of_an_arm_at_rest_is_no_stop_to_freeze_after(operator: PanelBoard) -> None:
     operator.board.moves = False  # type: ignore[attr-defined]
     operator.stop()
     assert not operator.can_freeze
 
 
 def test_a_freeze_says_which_joints_nothing_measures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 1000.0)
-    monkeypatch.setattr("armtempo.panel.operator.FREEZE_AFTER_S", -1.0)
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    monkeypatch.setattr("armtempo.panel.panel_board.FREEZE_AFTER_S", -1.0)
     blind = replace(ARM, joints=tuple(replace(joint, encoder=None) for joint in ARM.joints))
-    made = Operator(lambda sink, tell: Board(), "sim", JobEditor(blind, tmp_path, None), tmp_path)  # type: ignore[arg-type, return-value]
+    made = PanelBoard(lambda sink, tell: Board(), "sim", JobEditor(blind, tmp_path, None), tmp_path)  # type: ignore[arg-type, return-value]
     made.stop()
     made.freeze()
     assert "joint 1, joint 2, joint 3 may have moved on" in made.live.doubt
     made.close()
 
 
-def test_a_held_button_moves_nothing_before_its_target_was_seen(operator: Operator) -> None:
+def test_a_held_button_moves_nothing_before_its_target_was_seen(operator: PanelBoard) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     begun = press(operator)
     hold.press(ME, begun, "home", lambda: jog, after_s=1000.0)
@@ -410,7 +410,7 @@ def test_a_held_button_moves_nothing_before_its_target_was_seen(operator: Operat
 
 
 @pytest.mark.parametrize("how", ["released", "silent", "late", "other in control", "lost"])
-def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
+def test_a_jog_ends_with_its_button(operator: PanelBoard, how: str) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     begun = press(operator)
     hold.press(ME, begun, "jog", lambda: jog)
@@ -432,7 +432,7 @@ def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
     assert any(words.BROWSER_SILENT in line for line in operator.log.last) == (how in ("silent", "late"))
 
 
-def test_a_release_that_overtakes_its_press_ends_it(operator: Operator) -> None:
+def test_a_release_that_overtakes_its_press_ends_it(operator: PanelBoard) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     late = press(operator)
     hold.release(ME, late.number)
@@ -442,7 +442,7 @@ def test_a_release_that_overtakes_its_press_ends_it(operator: Operator) -> None:
     assert not jog.held
 
 
-def test_a_refused_press_of_a_watcher_ends_nobodys_jog(operator: Operator) -> None:
+def test_a_refused_press_of_a_watcher_ends_nobodys_jog(operator: PanelBoard) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     begun = press(operator)
     hold.press(ME, begun, "jog", lambda: jog)
@@ -571,7 +571,7 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
             raise answer
         return answer
 
-    made = Operator(connect, "port", JobEditor(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type]
+    made = PanelBoard(connect, "port", JobEditor(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type]
     made.take_control(ME)
     assert "another program" in made.why_not(ME)
     assert "another program" in made.why_not(ME, Needs.BOARD)
@@ -607,7 +607,7 @@ def test_curves_that_are_read_stay_whole_when_a_run_begins() -> None:
 def test_a_fault_of_ours_does_not_end_the_states(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 0.01)
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 0.01)
     asked: list[int] = []
     board = Board()
 
@@ -617,7 +617,7 @@ def test_a_fault_of_ours_does_not_end_the_states(
         yield 1 // 0
 
     board.client.session.in_a_hurry = fail
-    made = Operator(lambda sink, tell: board, "sim", JobEditor(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type, return-value]
+    made = PanelBoard(lambda sink, tell: board, "sim", JobEditor(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type, return-value]
     wait(lambda: len(asked) > 3)
     made.close()
     assert "the board's state" in caplog.text
@@ -653,7 +653,7 @@ class Telling:
         return self._state
 
 
-def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: Operator) -> None:
+def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: PanelBoard) -> None:
     operator.live.ask(Telling(unhomed()))  # type: ignore[arg-type]
     shape = ArmShape(ARM)
     told = layout.message(operator, shape)
@@ -667,7 +667,7 @@ def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: Operator
     assert told["texts"]["armtempo-angle-2"] == "-60.00°"
 
 
-def test_a_state_that_is_old_says_how_old(operator: Operator) -> None:
+def test_a_state_that_is_old_says_how_old(operator: PanelBoard) -> None:
     operator.live.ask(Telling(board_state(state="moving", moving=True, speed_percent=20.0)))  # type: ignore[arg-type]
     assert layout.state_line(operator) == "moving at 20 % · port"
     operator.live.heard_s -= 3.0
@@ -708,7 +708,7 @@ pin = "PD0"
     ],
 )
 def test_the_banner_says_what_is_wrong_and_has_the_button_that_helps(
-    operator: Operator, what: str, said: str, cures: tuple[Cure, ...], is_fault: bool
+    operator: PanelBoard, what: str, said: str, cures: tuple[Cure, ...], is_fault: bool
 ) -> None:
     live = operator.live
     live.state = board_state()
@@ -732,7 +732,7 @@ def test_the_banner_says_what_is_wrong_and_has_the_button_that_helps(
         assert "'armtempo" not in found.text
 
 
-def test_a_plan_of_another_job_is_not_run(operator: Operator) -> None:
+def test_a_plan_of_another_job_is_not_run(operator: PanelBoard) -> None:
     plan: Any = object()
     operator.live.state = board_state()
     needs = Needs.MOVE | Needs.PLAN
@@ -743,7 +743,7 @@ def test_a_plan_of_another_job_is_not_run(operator: Operator) -> None:
     assert operator.why_not(ME, needs) == words.PLAN_IS_OLD
 
 
-def test_what_moves_is_compared_with_no_plan_but_its_own(operator: Operator) -> None:
+def test_what_moves_is_compared_with_no_plan_but_its_own(operator: PanelBoard) -> None:
     plan: Any = object()
     operator.live.plan = plan  # of a run that has ended
     do(operator, "sequence", ME, lambda: None)

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import ArmtempoError, InputError, RunFolderError
+from armtempo.encoding import encoded_motion
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
-from armtempo.records import encoded_motion
 from armtempo.report import analysis, differentiation, peaks, run_folder, run_reader, run_report
 from armtempo.report.run_reader import RepetitionData
 from armtempo.robot import recording

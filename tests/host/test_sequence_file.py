@@ -12,6 +12,7 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.encoding import encoded_sequence
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
@@ -19,7 +20,6 @@ from armtempo.model.job import Job
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan
 from armtempo.planning import via_points
-from armtempo.records import encoded_sequence
 from armtempo.report import sequence_report
 from armtempo.report.sequence_reader import RowPassed, SequenceRun
 from armtempo.report.sequence_report import LegResult
