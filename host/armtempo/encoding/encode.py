@@ -40,6 +40,13 @@ def step_rates(arm: Arm) -> list[int]:
     return [_max_rate(joint) for joint in arm.driven]
 
 
+def move_limits(arm: Arm) -> list[list[int]]:
+    """Speed, acceleration and jerk of each driven joint in steps, rounded down (``armtempo_shared.rest_to_rest``)."""
+    return [
+        [max(1, int(limit * joint.steps_per_deg)) for limit in joint.limits.values] for joint in arm.driven
+    ]
+
+
 def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = None) -> bytes:
     """The motion record (layout: ``armtempo_shared.motion``), with the checksum of the arm's record.
 
