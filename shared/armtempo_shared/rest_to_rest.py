@@ -117,10 +117,10 @@ def _points(shape: bytes) -> int:
 def _ticks(ways: "list[int]", limits: "Sequence[Sequence[int]]", rate_sum: int, shape: bytes) -> int:
     """The least time of a shape for ways in steps, rounded up."""
     factors = struct.unpack_from(_FACTORS, shape, 0)
-    longest = (sum(ways) * factors[0] * TICK_HZ >> FACTOR_BITS) // rate_sum + 1
+    longest: int = (sum(ways) * factors[0] * TICK_HZ >> FACTOR_BITS) // rate_sum + 1
     for way, most in zip(ways, limits):
         for order in range(3):
-            power = way * factors[order] * TICK_HZ ** (order + 1) // (most[order] << FACTOR_BITS)
+            power = way * factors[order] * int(TICK_HZ ** (order + 1)) // (most[order] << FACTOR_BITS)
             longest = max(longest, _root(power, order + 1) + 1)
     return longest
 
@@ -130,10 +130,10 @@ def _root(value: int, order: int) -> int:
     if order == 1 or not value:
         return value
     root = 1
-    while root**order <= value:
+    while int(root**order) <= value:
         root *= 2
     while True:
-        next_root = int(((order - 1) * root + value // root ** (order - 1)) // order)
-        if next_root >= root:
+        closer = ((order - 1) * root + value // int(root ** (order - 1))) // order
+        if closer >= root:
             return root
-        root = next_root
+        root = closer

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
         def serve(self) -> None:
             """One turn of the board's loop, then ``check``."""
 
+        def serve_if_due(self) -> None:
+            """The same, if the last turn is a millisecond ago."""
+
         def note_line(self, line: int) -> None:
             """The program is at this line."""
 
@@ -187,10 +190,12 @@ class Cell:
 
     # what the marked source calls, see armtempo_shared.program
 
-    def at(self, line: int, value: "Any" = True) -> "Any":
-        """The program is at this line; returns ``value``."""
+    def at(self, line: int, value: "Any" = None) -> "Any":
+        """The program is at this line: in a call of ``value``, the cell, which is returned; or at a loop's head."""
         self._work.note_line(line)
-        self._work.serve()
+        if value is None:
+            self._work.serve_if_due()
+            return True
         return value
 
     def each(self, line: int, values: "Iterable[Any]") -> "Iterable[Any]":
@@ -198,7 +203,6 @@ class Cell:
         for value in values:
             self.at(line)
             yield value
-        self._work.note_line(line)
 
     def _begin(self) -> None:
         """Wait for the end of a motion before the next one."""

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 _PERCENT = const(100)
 _SLOWEST = const(10)
+_MOST_PASSES = const(16)
 _SAID_BYTES = const(240)
 _CHARACTERS = const(60)  # of four bytes, as many as fit
 _SAY_MS = const(500)  # longest wait until a host has taken the text before
@@ -49,7 +50,8 @@ class UserProgram(Sequencer):
         self._app: "Any" = None
         self._turn: "Callable[[], None]" = self._nothing
         self._since_ms: "Any" = 0
-        self._passed_ms = 0
+        self._served_ms: "Any" = 0
+        self._passed_ms = self._passes = 0
 
     def begin(self) -> None:
         """Let the main loop execute it."""
@@ -84,7 +86,7 @@ class UserProgram(Sequencer):
 
     def _execute(self) -> None:
         cell = Cell(self.table, self)
-        armtempo_board.cell = cell  # type: ignore[attr-defined]
+        armtempo_board.cell = cell
         names = {
             "__name__": "__main__",
             "print": self._print,
@@ -98,7 +100,7 @@ class UserProgram(Sequencer):
         try:
             exec(code, names)
         finally:
-            del armtempo_board.cell  # type: ignore[attr-defined]
+            del armtempo_board.cell
 
     def _fail(self, error: "BaseException") -> None:
         """Brake, set a fault, and tell the traceback of the program's own lines."""
@@ -128,7 +130,16 @@ class UserProgram(Sequencer):
     def serve(self) -> None:
         """A turn of the loop."""
         self._turn()
+        self._passes = 0
+        self._served_ms = time.ticks_ms()
         self.check()
+
+    def serve_if_due(self) -> None:
+        """A turn, unless the last one was in this millisecond; but often enough if no time passes."""
+        self._passes += 1
+        if self._passes < _MOST_PASSES and time.ticks_ms() == self._served_ms:
+            return
+        self.serve()
 
     def note_line(self, line: int) -> None:
         """For 'status'."""

@@ -31,8 +31,12 @@ _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 def arm_record(arm: Arm) -> bytes:
     """The arm record (layout: ``armtempo_shared.armrecord``); raises InputError if a value does not fit the board."""
-    joints = [_joint(joint) for joint in arm.driven]
-    return armrecord.pack(_head(arm), joints, outputs(arm), inputs(arm))
+    return armrecord.pack(_head(arm), joint_rows(arm), outputs(arm), inputs(arm))
+
+
+def joint_rows(arm: Arm) -> list[dict[str, Any]]:
+    """Rows of ``armrecord.JOINT``; raises as ``arm_record``."""
+    return [_joint(joint) for joint in arm.driven]
 
 
 def step_rates(arm: Arm) -> list[int]:

@@ -103,6 +103,7 @@ class _Reader:
                 self._known(node)
             if isinstance(node, ast.Call):
                 if isinstance(node.func, ast.Attribute) and _is_name(node.func.value, self.cell):
+                    self._known(node.func)
                     self._check(node, node.func.attr)
                 self._check_sleep(node)
         if len(self.counters) > MAX_COUNTERS:
@@ -215,11 +216,11 @@ class _Marks:
         return b"".join(self._lines).decode()
 
     def _around(self, node: ast.expr, before: str, after: str) -> None:
-        """``before`` of an inner node comes behind that of an outer one, which is visited first, and is closed first."""
+        """Put texts around a node; the marks of an outer one, which is visited first, go around those of an inner."""
         order = len(self._texts) + 1
-        assert node.end_lineno is not None and node.end_col_offset is not None
+        end = node.end_lineno or 0, node.end_col_offset or 0  # None in trees that no parser made
         self._texts.append((node.lineno, node.col_offset, order, before.encode()))
-        self._texts.append((node.end_lineno, node.end_col_offset, -order, after.encode()))
+        self._texts.append((*end, -order, after.encode()))
 
 
 def _visible(tree: ast.AST) -> Iterator[ast.AST]:

@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+from armtempo_shared import program as program_record
 from armtempo_shared.messages import RESUME
 from armtempo_shared.sequence import KIND_BYTES, MAGIC
 
@@ -19,14 +20,16 @@ from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
 from armtempo.diagnosis.selftest import selftest
 from armtempo.diagnosis.selftest.result import SelfTest
-from armtempo.encoding import encoded_motion, encoded_sequence
+from armtempo.encoding import encoded_motion, encoded_program, encoded_sequence
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.user_program import UserProgram
 from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.report.run import Run
 from armtempo.report.sequence_reader import SequenceRun
@@ -37,6 +40,7 @@ from armtempo.robot import (
     homing,
     jog,
     kept_position,
+    program_run,
     recording,
     sequence_recording,
     sequence_run,
@@ -48,6 +52,7 @@ from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardInput, BoardOutput
+from armtempo.robot.program_run import Listener
 from armtempo.robot.recording import Watcher
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
@@ -195,6 +200,8 @@ class Board:
         data = self.client.fetch(self._stored_name(name))
         if data.startswith(MAGIC[:KIND_BYTES]):
             raise InputError(f"{name!r} is a sequence, not a motion", f"run it with: armtempo run {name}")
+        if data.startswith(program_record.MAGIC[:KIND_BYTES]):
+            raise InputError(f"{name!r} is a program, not a motion", f"run it with: armtempo run {name}")
         return encoded_motion.of_record(name, data, self._known_arm() if arm is None else Arm.of(arm))
 
     def _stored_name(self, name: str) -> str:
@@ -403,6 +410,69 @@ class Board:
             with sequence_recording.recorder(self.client, content, Path(out), self.port) as recorder:
                 self._last_sequence = recorder.path
                 return sequence_run.run(self.client, key, wanted, watcher, recorder)
+
+    def encode_program(self, program: UserProgram | Path | str, arm: Arm | Path | str) -> EncodedProgram:
+        """The program of a file for this board, with the motions that it names: NAME.json beside it, or stored ones.
+
+        Raises InputError for one that is neither, and as ``UserProgram.load``.
+        """
+        arm = Arm.of(arm)
+        found = program if isinstance(program, UserProgram) else UserProgram.load(program, arm)
+        motions, stored = [], []
+        for name, line in found.motions.items():
+            file = found.path.parent / f"{name}.json"
+            kept = None if file.is_file() else self.client.find(name)
+            if file.is_file():
+                motions.append(encoded_motion.of_plan(Plan.load(file), name))
+            elif kept is not None and kept.joints:
+                stored.append(MotionKey(name, kept.crc))
+            else:
+                raise InputError(
+                    f"{found.path}, line {line}: no motion {name!r}",
+                    f"plan it as {file}, or store it with 'armtempo upload FILE --name {name}'",
+                )
+        return encoded_program.of_program(found, arm, tuple(motions), tuple(stored))
+
+    def upload_program(
+        self,
+        program: EncodedProgram | UserProgram | Path | str,
+        progress: Progress | None = None,
+        replace: bool = False,
+    ) -> MotionKey:
+        """Store a program with the motions that it names; a program of this name is replaced.
+
+        ``replace``: replace something else of one of the names too. Raises InputError for what is wrong in it,
+        LinkError if the board has too little memory, or something else under one of the names.
+        """
+        if not isinstance(program, EncodedProgram):
+            program = self.encode_program(program, self._known_arm())
+        self.configure(program.arm)
+        return program_run.store(self.client, program, progress, replace)
+
+    def run_program(
+        self,
+        program: EncodedProgram | UserProgram | Path | str,
+        listener: Listener = lambda _: None,
+        watcher: SequenceWatcher = lambda _: None,
+        stop: StopRequest | None = None,
+        replace: bool = False,
+    ) -> SequenceState:
+        """Run a program, or the stored program of that name; returns its last state.
+
+        ``listener`` is called with each line that it prints, ``watcher`` with each new state. The arm must be homed.
+        Raises as ``upload_program``, and BoardError if a fault ends it; its traceback went to ``listener``.
+        """
+        with self._stoppable(stop) as wanted:
+            if isinstance(program, str) and is_name(program):
+                found = self.client.find(program)
+                if found is None or not found.program:
+                    raise InputError(f"the board has no program {program!r}", "see 'armtempo list'")
+                key = MotionKey(found.name, found.crc)
+            else:
+                key = self.upload_program(program, replace=replace)
+            if self.arm is not None:
+                self._start.home_virtual_arm(self.arm)
+            return program_run.run(self.client, key, wanted, listener, watcher)
 
     @property
     def counters(self) -> dict[str, int]:

@@ -227,7 +227,7 @@ def case_marks_serve_a_loop_without_calls_and_tell_its_line():
 
     world = World(
         "total = 0\n"
-        "for i in __each__(3, range(50)):\n"
+        "for i in __each__(3, range(800)):\n"
         "    total += i\n"
         "while __at__(5) and (True):\n"
         "    try:\n"
@@ -237,7 +237,7 @@ def case_marks_serve_a_loop_without_calls_and_tell_its_line():
         script,
     )
     assert world.run()[0] == "stopped"
-    assert lines == [3, 5] and world.turns == 120
+    assert lines == [3, 5] and world.turns == 120, lines
 
 
 def case_a_fault_of_the_board_ends_it():
