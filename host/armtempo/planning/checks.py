@@ -321,11 +321,15 @@ def check_time(trajectory: Trajectory) -> None:
 
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
     """Raise PlanError if a control point exceeds the range of the board's integers."""
-    for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
+    for number, (joint_spline, joint) in enumerate(zip(trajectory.joints, arm.driven, strict=True)):
         where = f"trajectory {trajectory.name!r}, {joint.name}"
-        _check_times(where, joint_spline)
+        if not (number and trajectory.shared):
+            _check_times(where, joint_spline)
         steps = joint_spline.angle_points_deg * joint.steps_per_deg
-        if np.max(np.abs(steps)) >= MOST_STEPS or _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS:
+        stands = bool(np.all(steps == steps[0]))
+        if np.max(np.abs(steps)) >= MOST_STEPS or (
+            not stands and _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS
+        ):
             raise PlanError(f"{where}: more steps than the board can count", "use fewer microsteps")
 
 

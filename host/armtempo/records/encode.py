@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from binascii import crc32
-from dataclasses import asdict
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -64,7 +64,8 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
     checks.check_held(trajectory, arm)
     first = trajectory.joints[0]
     crc = record_crc(arm_record(arm))
-    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc)
+    edge_bits = brakes.edge_bits if brakes else 0
+    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc, edge_bits)
 
 
 def way_back(data: bytes, name: str, brakes: BrakeTimes) -> bytes:
@@ -72,7 +73,7 @@ def way_back(data: bytes, name: str, brakes: BrakeTimes) -> bytes:
 
     ``name``: of the stored motion; ``brakes``: those of the way back.
     """
-    return motion_way_back.pack(data, name, _ramps(brakes))
+    return motion_way_back.pack(data, name, _ramps(brakes), brakes.edge_bits)
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
@@ -120,18 +121,20 @@ def _head(arm: Arm) -> dict[str, Any]:
 
 def _identity(arm: Arm) -> int:
     """A hash of everything that maps joint angles to the arm's position: all except names, limits and models."""
-    joints = [{k: v for k, v in asdict(joint).items() if k not in _NOT_IDENTITY} for joint in arm.joints]
+    joints = [_as_floats(joint) for joint in arm.joints]
     for joint in joints:
+        for name in _NOT_IDENTITY:
+            joint.pop(name, None)
         if joint["encoder"]:
             del joint["encoder"]["following_error_deg"]
-    text = json.dumps(_as_floats(joints), sort_keys=True)
+    text = json.dumps(joints, sort_keys=True)
     return crc32(text.encode())
 
 
 def _as_floats(value: Any) -> Any:
-    """The value with all numbers as floats, as 20 and 20.0 are the same gear ratio."""
-    if isinstance(value, dict):
-        return {key: _as_floats(entry) for key, entry in value.items()}
+    """The value as JSON has it, with all numbers as floats, as 20 and 20.0 are the same gear ratio."""
+    if is_dataclass(value):
+        return {entry.name: _as_floats(getattr(value, entry.name)) for entry in fields(value)}
     if isinstance(value, list | tuple):
         return [_as_floats(entry) for entry in value]
     return float(value) if isinstance(value, int | float) else value

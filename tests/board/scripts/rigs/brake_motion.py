@@ -22,10 +22,10 @@ def whole(values, scale):
     return [round(value * scale) for value in values]
 
 
-def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES):
+def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES, edge_bits=0):
     angles = [whole(points, 1 << 28) for points in control_points]
     times = [whole(time_points, TICK_HZ << 16)]
-    return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0))
+    return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0, edge_bits))
 
 
 def ramp_way(shape, r):
