@@ -27,8 +27,22 @@ NEEDS = {
     "system/test_panel.py": "nicegui",
 }
 """What test modules, or all of a folder, import that armtempo itself does without: an extra, or a tool of the tests."""
+_NONE = (pytest.param(0, marks=pytest.mark.skip("takes long: only with --cases")),)
 DEPRECATIONS = ("DeprecationWarning", "PendingDeprecationWarning", "FutureWarning")
 """Errors in the commands that tests start, too; in the tests' own process every warning is one."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Random tests with other cases than every day's."""
+    parser.addoption("--cases", type=int, metavar="N", help="N random cases for each test that has seeds")
+    parser.addoption("--first", type=int, default=0, metavar="SEED", help="the first of them, default 0")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Give a test marked ``seeds`` a ``seed``: those of the mark, or those of --cases."""
+    if mark := metafunc.definition.get_closest_marker("seeds"):
+        first, count = metafunc.config.getoption("first"), metafunc.config.getoption("cases")
+        metafunc.parametrize("seed", range(first, first + count) if count else mark.args or _NONE)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -14,13 +14,13 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
 from armtempo.cli import main, stored
 from armtempo.diagnosis.finding import Finding, Level
+from armtempo.encoding import encoded_motion
 from armtempo.link import board_messages
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner, rest_to_rest
-from armtempo.records import encoded_motion
 from armtempo.report import drawing, plots, run_folder, run_report, text_summary
 from armtempo.report.replayed import results
 from armtempo.report.run_folder import Repetition
@@ -97,6 +97,7 @@ def test_other_alphabets_are_names(tmp_path: Path) -> None:
     assert Arm.load(path).driven[1].name == "Schulter – плечо 肩"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CONTROL if "\n" not in name])
 def test_a_trajectory_file_with_them_is_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / "x.json"
@@ -148,6 +149,7 @@ def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_plan_tells_of_coarse_steps(made: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = Finding(Level.WARNING, "waist", "a step is 1.8°", "use more microsteps")
     monkeypatch.setattr(text_summary, "coarse_steps", lambda arm: [coarse])
@@ -156,6 +158,7 @@ def test_a_plan_tells_of_coarse_steps(made: Plan, monkeypatch: pytest.MonkeyPatc
     )
 
 
+@pytest.mark.slow
 def test_a_plan_on_the_spline_tells_what_is_faster_if_it_loses_much_to_it() -> None:
     """Short approaches, as of a pick, between which the spline swings."""
     via = [[0, -60, 40], [0, -60, 42], [90, -70, 42], [90, -70, 40]]
@@ -176,6 +179,7 @@ def test_a_plan_on_the_spline_tells_what_is_faster_if_it_loses_much_to_it() -> N
     assert not any("takes" in line for line in text_summary.lines(free))
 
 
+@pytest.mark.slow
 def test_a_path_that_swings_beyond_its_via_points_is_told_with_joint_place_and_degrees() -> None:
     """Uneven distances: the spline goes the wrong way first."""
     via = [[20, -60, 40], [21, -60, 40], [120, -60, 40]]

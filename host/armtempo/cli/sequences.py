@@ -15,7 +15,7 @@ import armtempo
 from armtempo.basics.atomic_file import check_not_input
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError
 from armtempo.basics.text import aligned
-from armtempo.cli import chosen, results
+from armtempo.cli import resolve, results
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.state import counted
 from armtempo.link.board_messages import SequenceState
@@ -31,14 +31,14 @@ from armtempo.robot.stop_request import Stopped
 def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as_json: bool) -> None:
     """Plan a sequence file, print its times, and write it."""
     named = arm_path or arm_named(file)
-    arm = chosen.load_arm(named)
+    arm = resolve.load_arm(named)
     sequence = Sequence.load(file, arm)
     target = output or Path(f"{sequence.name}.json")
     check_not_input(target, (file, arm.source))
     with ProgressBar("planning") as progress:
         planned = armtempo.plan_sequence(arm, sequence, progress)
     planned.save(target, force)
-    found = [f"arm: {chosen.describe_arm(arm)}", *lines(planned), f"written: {target}"]
+    found = [f"arm: {resolve.describe_arm(arm)}", *lines(planned), f"written: {target}"]
     results.show(as_json, {"file": str(target), **values(planned)}, found)
 
 

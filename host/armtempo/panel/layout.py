@@ -20,7 +20,7 @@ from armtempo.model.pose import to_rpy_deg
 from armtempo.panel import arm_scene, board_tab, job_tab, move_tab, problem, run_tab, sequence_tab, words
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.panel_page import LOOK_S, PanelPage, named
 from armtempo.panel.press import Press
 from armtempo.robot.board import Board
@@ -37,7 +37,7 @@ _SCRIPT = Path(__file__).with_name("panel.js").read_text(encoding="utf-8")
 _STYLE = Path(__file__).with_name("panel.css").read_text(encoding="utf-8")
 
 
-def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
+def build(operator: PanelBoard, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     """The page of a client."""
     client = ui.context.client
     page = PanelPage(operator, hold, shape, client.id)
@@ -223,7 +223,7 @@ def _events(page: PanelPage) -> None:
     ui.run_javascript(f"armtempo.begin({texts})")
 
 
-def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
+def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
     """The message to all pages: poses of the arm, and numbers that change during a motion."""
     live = operator.live
     angles, target = live.angles_deg, live.target_deg
@@ -249,7 +249,7 @@ def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
     }
 
 
-def position(operator: Operator) -> str:
+def position(operator: PanelBoard) -> str:
     """Where the tool and the joints are."""
     angles = operator.live.angles_deg
     where = "  ".join(f"{angle:.2f}°" for angle in angles)
@@ -261,7 +261,7 @@ def position(operator: Operator) -> str:
     return where
 
 
-def state_line(operator: Operator) -> str:
+def state_line(operator: PanelBoard) -> str:
     """The board's state in a line, with its age if that is more than OLD_S."""
     doing = f" · {operator.busy}" if operator.busy else ""
     if operator.busy and operator.progress:

@@ -18,7 +18,7 @@ from armtempo.kinematics.chain import chains_mm
 from armtempo.panel import arm_scene, words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.hold import ButtonHold
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.press import Press
 from armtempo.robot.board import Board
 
@@ -64,7 +64,7 @@ class Asked:
 class PanelPage:
     """A browser's page: common parts of its tabs."""
 
-    operator: Operator
+    operator: PanelBoard
     hold: ButtonHold
     shape: ArmShape
     client: str

@@ -16,7 +16,7 @@ from armtempo.basics.errors import ArmtempoError
 from armtempo.model.steps import position, whole_cycles
 from armtempo.panel import words
 from armtempo.panel.file_row import FileRow
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
 from armtempo.panel.sequence_editor import KINDS, kind_of
 

@@ -66,7 +66,7 @@ def _details(plan: Plan) -> list[str]:
         *(_polished(search) for search in plan.searches if search.optimum_s),
         *(_started(search) for search in plan.searches if len(search.starts_s)),
         f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes",
-        checks.rate_words(checks.step_rates(plan.arm, plan.extremes)),
+        checks.format_rate(checks.step_rates(plan.arm, plan.extremes)),
     ]
 
 
@@ -78,7 +78,7 @@ def torque_lines(motions: Iterable[tuple[Arm, Trajectory]]) -> list[str]:
     least = min(found)
     level = "warning" if least.margin < torque.ENOUGH else "torque"
     prudent = f"; {torque.ENOUGH:g} is prudent" if least.margin < torque.ENOUGH else ""
-    return [f"{level}: {least.joint} has the least to spare: {least.words}{prudent}"]
+    return [f"{level}: {least.joint} has the least to spare: {least.description}{prudent}"]
 
 
 def result_lines(results: Iterable[JointResult]) -> list[str]:
@@ -113,7 +113,7 @@ def _settings(plan: Plan, verbose: bool) -> list[str]:
     job, first = plan.job, plan.trajectory.joints[0]
     auto = " (auto)" if job.refine == AUTO else ""
     pieces = len(first.angle_points_deg) - first.degree
-    if checks.has_stretches(job):
+    if checks.planner_of(job) == "line":
         path = "tool led" if checks.leads_tool(job) else "with stops"
         more = [f"{pieces} pieces", f"refine {first.refine}{auto}"]
     elif checks.is_free(job):
@@ -159,7 +159,7 @@ def _polished(search: Search) -> str:
 def _faster(plan: Plan) -> list[str]:
     """What a free path, or stopping at every via point, would take, if the spline through them loses much to either."""
     job, total_s = plan.job, plan.total_s
-    if job.path != "through" or checks.has_stretches(job):
+    if job.path != "through" or checks.planner_of(job) == "line":
         return []
     limits = [joint.limits for joint in plan.arm.driven]
     others = {

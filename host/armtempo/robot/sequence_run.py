@@ -10,12 +10,12 @@ from armtempo_shared import wire
 
 from armtempo.basics.errors import LinkError, OtherBoardError
 from armtempo.basics.progress import Progress
+from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link import Client
 from armtempo.link.board_messages import SequenceState, StoredMotion
 from armtempo.link.refusal import refusal
 from armtempo.model.steps import position
-from armtempo.records.encoded_motion import MotionKey
-from armtempo.records.encoded_sequence import EncodedSequence
 from armtempo.robot import stored_motion
 from armtempo.robot.sequence_recording import Recorder
 from armtempo.robot.stop_request import StopRequest

@@ -14,7 +14,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
 from armtempo.panel.job_editor import JobEditor
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.press import Press
 from armtempo.robot.board_state import BoardState, JointState
 
@@ -25,18 +25,18 @@ HELD_S = 2.0
 _NUMBERS = itertools.count(1)
 
 
-def operator(board: Board, folder: Path, arm: Arm = ARM) -> Operator:
+def operator(board: Board, folder: Path, arm: Arm = ARM) -> PanelBoard:
     """Of this board, with the jobs and runs of a folder."""
-    return Operator(lambda sink, tell: board, "sim", JobEditor(arm, folder, None), folder / "runs")  # type: ignore[arg-type, return-value]
+    return PanelBoard(lambda sink, tell: board, "sim", JobEditor(arm, folder, None), folder / "runs")  # type: ignore[arg-type, return-value]
 
 
-def press(operator: Operator) -> Press:
+def press(operator: PanelBoard) -> Press:
     """One that is made now."""
     return Press(next(_NUMBERS), operator.presses.state, operator.presses.clock())
 
 
 def do(
-    operator: Operator, what: str, client: str, call: Callable[[], object], needs: Needs = Needs.MOVE
+    operator: PanelBoard, what: str, client: str, call: Callable[[], object], needs: Needs = Needs.MOVE
 ) -> None:
     """Start a command with a press that is made now."""
     operator.do(what, client, press(operator), call, needs)

@@ -11,7 +11,7 @@ from typing import Any
 from armtempo.panel import layout
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
-from armtempo.panel.operator import Operator
+from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.panel_page import PanelPage
 from nicegui import Client, background_tasks, core, ui
 from nicegui.events import GenericEventArguments, handle_event
@@ -24,7 +24,7 @@ from tests.host.panel import fakes
 class Page:
     """One page."""
 
-    operator: Operator
+    operator: PanelBoard
     client: Client
     of: PanelPage
     loop: asyncio.AbstractEventLoop
@@ -88,7 +88,7 @@ def _name(element: Any) -> str:
 
 
 @contextmanager
-def pages(operator: Operator) -> Iterator[Page]:
+def pages(operator: PanelBoard) -> Iterator[Page]:
     """A page of an operator, in control."""
     loop = asyncio.new_event_loop()
     asyncio.set_event_loop(loop)

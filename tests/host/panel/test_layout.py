@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from armtempo.panel import words
-from armtempo.panel.operator import Operator
+from armtempo.panel.panel_board import PanelBoard
 
 from tests.host.panel.fakes import board_state, unhomed
 from tests.host.panel.pages import pages
@@ -15,7 +15,7 @@ TABS = (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.
 
 
 @pytest.mark.parametrize("tab", TABS)
-def test_the_speed_follows_the_board_on_every_tab(operator: Operator, tab: str) -> None:
+def test_the_speed_follows_the_board_on_every_tab(operator: PanelBoard, tab: str) -> None:
     operator.live.state = board_state()
     with pages(operator) as page:
         page.show(tab)
@@ -28,7 +28,7 @@ def test_the_speed_follows_the_board_on_every_tab(operator: Operator, tab: str) 
 
 
 def test_a_speed_that_was_not_taken_goes_back_to_the_boards(
-    operator: Operator, monkeypatch: pytest.MonkeyPatch
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("armtempo.panel.layout.LEFT_S", -1.0)
     operator.live.state = board_state()
@@ -42,7 +42,7 @@ def test_a_speed_that_was_not_taken_goes_back_to_the_boards(
         assert "100 %" in page.texts()
 
 
-def test_a_slider_that_is_dragged_stays_with_the_finger(operator: Operator) -> None:
+def test_a_slider_that_is_dragged_stays_with_the_finger(operator: PanelBoard) -> None:
     operator.live.state = board_state()
     with pages(operator) as page:
         page.look()
@@ -52,7 +52,7 @@ def test_a_slider_that_is_dragged_stays_with_the_finger(operator: Operator) -> N
         assert slider.value == 40
 
 
-def test_a_page_that_is_loaded_again_shows_what_the_board_says(operator: Operator) -> None:
+def test_a_page_that_is_loaded_again_shows_what_the_board_says(operator: PanelBoard) -> None:
     operator.live.state = board_state(speed_percent=21.0, moving=True)
     for _ in range(2):
         with pages(operator) as page:
@@ -62,7 +62,7 @@ def test_a_page_that_is_loaded_again_shows_what_the_board_says(operator: Operato
 
 
 @pytest.mark.parametrize("tab", TABS)
-def test_pause_and_homing_follow_the_board_on_every_tab(operator: Operator, tab: str) -> None:
+def test_pause_and_homing_follow_the_board_on_every_tab(operator: PanelBoard, tab: str) -> None:
     operator.live.state = unhomed()
     with pages(operator) as page:
         page.show(tab)

@@ -13,7 +13,7 @@ from armtempo.model.arm import Arm
 from armtempo.panel import layout, problem
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.live import LiveArm
-from armtempo.panel.operator import Operator
+from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.problem import Cure
 
 from tests.host.panel.fakes import ARM, Telling, board_state, unhomed
@@ -33,7 +33,7 @@ def test_curves_that_are_read_stay_whole_when_a_run_begins() -> None:
     ]
 
 
-def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: Operator) -> None:
+def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: PanelBoard) -> None:
     operator.live.ask(Telling(unhomed()))  # type: ignore[arg-type]
     shape = ArmShape(ARM)
     told = layout.message(operator, shape)
@@ -47,14 +47,14 @@ def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: Operator
     assert told["texts"]["armtempo-angle-2"] == "-60.00°"
 
 
-def test_a_state_that_is_old_says_how_old(operator: Operator) -> None:
+def test_a_state_that_is_old_says_how_old(operator: PanelBoard) -> None:
     operator.live.ask(Telling(board_state(state="moving", moving=True, speed_percent=20.0)))  # type: ignore[arg-type]
     assert layout.state_line(operator) == "moving at 20 % · port"
     operator.live.heard_s -= 3.0
     assert re.fullmatch(r"moving at 20 % · last heard 3\.\d s ago · port", layout.state_line(operator))
 
 
-def test_a_pause_is_named_as_one(operator: Operator) -> None:
+def test_a_pause_is_named_as_one(operator: PanelBoard) -> None:
     operator.live.state = board_state(state="moving", moving=True, speed_percent=0.0)
     assert layout.state_line(operator).startswith("paused")
 
@@ -93,7 +93,7 @@ pin = "PD0"
     ],
 )
 def test_the_banner_says_what_is_wrong_and_has_the_button_that_helps(
-    operator: Operator, what: str, said: str, cures: tuple[Cure, ...], is_fault: bool
+    operator: PanelBoard, what: str, said: str, cures: tuple[Cure, ...], is_fault: bool
 ) -> None:
     live = operator.live
     live.state = board_state()

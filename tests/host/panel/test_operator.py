@@ -13,13 +13,13 @@ import pytest
 from armtempo.basics.errors import InputError, LinkError, PortInUseError
 from armtempo.panel import words
 from armtempo.panel.job_editor import JobEditor
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 
 from tests.host.panel import fakes
 from tests.host.panel.fakes import ARM, ME, OTHER, Board, board_state, do, wait
 
 
-def test_one_command_at_a_time_of_who_has_control(operator: Operator) -> None:
+def test_one_command_at_a_time_of_who_has_control(operator: PanelBoard) -> None:
     go = threading.Event()
     do(operator, "wait", ME, go.wait)
     with pytest.raises(InputError, match="wait is under way"):
@@ -33,7 +33,7 @@ def test_one_command_at_a_time_of_who_has_control(operator: Operator) -> None:
         do(operator, "more", ME, go.wait)
 
 
-def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: Operator) -> None:
+def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: PanelBoard) -> None:
     def fail() -> None:
         raise LinkError("the arm is elsewhere", "bring it there")
 
@@ -44,7 +44,7 @@ def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: Operator) ->
 
 
 def test_a_second_stop_brakes_again_and_only_an_arm_that_does_not_rest_is_frozen(
-    operator: Operator, monkeypatch: pytest.MonkeyPatch
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stops = operator.board.stops  # type: ignore[attr-defined]
     operator.freeze()  # nothing was stopped
@@ -52,7 +52,7 @@ def test_a_second_stop_brakes_again_and_only_an_arm_that_does_not_rest_is_frozen
     operator.stop()  # a double click
     operator.freeze()  # at once
     assert [now for now, _ in stops] == [False, False]
-    monkeypatch.setattr("armtempo.panel.operator.FREEZE_AFTER_S", -1.0)
+    monkeypatch.setattr("armtempo.panel.panel_board.FREEZE_AFTER_S", -1.0)
     assert operator.can_freeze
     operator.freeze()
     assert [now for now, _ in stops] == [False, False, True]
@@ -61,15 +61,15 @@ def test_a_second_stop_brakes_again_and_only_an_arm_that_does_not_rest_is_frozen
     assert operator.live.doubt == ""
 
 
-def test_a_stop_of_an_arm_at_rest_is_no_stop_to_freeze_after(operator: Operator) -> None:
+def test_a_stop_of_an_arm_at_rest_is_no_stop_to_freeze_after(operator: PanelBoard) -> None:
     operator.board.moves = False  # type: ignore[attr-defined]
     operator.stop()
     assert not operator.can_freeze
 
 
 def test_a_freeze_says_which_joints_nothing_measures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 1000.0)
-    monkeypatch.setattr("armtempo.panel.operator.FREEZE_AFTER_S", -1.0)
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    monkeypatch.setattr("armtempo.panel.panel_board.FREEZE_AFTER_S", -1.0)
     blind = replace(ARM, joints=tuple(replace(joint, encoder=None) for joint in ARM.joints))
     made = fakes.operator(Board(), tmp_path, blind)
     made.stop()
@@ -90,7 +90,7 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
             raise answer
         return answer
 
-    made = Operator(connect, "port", JobEditor(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type]
+    made = PanelBoard(connect, "port", JobEditor(ARM, tmp_path, None), tmp_path)  # type: ignore[arg-type]
     made.take_control(ME)
     assert "another program" in made.why_not(ME)
     assert "another program" in made.why_not(ME, Needs.BOARD)
@@ -112,7 +112,7 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
 def test_a_fault_of_ours_does_not_end_the_states(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("armtempo.panel.operator.LOOK_S", 0.01)
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 0.01)
     asked: list[int] = []
     board = Board()
 
@@ -128,7 +128,7 @@ def test_a_fault_of_ours_does_not_end_the_states(
     assert "the board's state" in caplog.text
 
 
-def test_a_plan_of_another_job_is_not_run(operator: Operator) -> None:
+def test_a_plan_of_another_job_is_not_run(operator: PanelBoard) -> None:
     plan: Any = object()
     operator.live.state = board_state()
     needs = Needs.MOVE | Needs.PLAN
@@ -139,7 +139,7 @@ def test_a_plan_of_another_job_is_not_run(operator: Operator) -> None:
     assert operator.why_not(ME, needs) == words.PLAN_IS_OLD
 
 
-def test_what_moves_is_compared_with_no_plan_but_its_own(operator: Operator) -> None:
+def test_what_moves_is_compared_with_no_plan_but_its_own(operator: PanelBoard) -> None:
     plan: Any = object()
     operator.live.plan = plan  # of a run that has ended
     do(operator, "sequence", ME, lambda: None)

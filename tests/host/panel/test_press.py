@@ -11,7 +11,7 @@ import pytest
 from armtempo.basics.errors import InputError
 from armtempo.panel import words
 from armtempo.panel.hold import ButtonHold
-from armtempo.panel.operator import Operator
+from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.press import Press, Presses
 
 from tests.host.panel.fakes import HELD_S, ME, OTHER, Clock, press, wait
@@ -65,7 +65,7 @@ def test_what_is_no_press_is_refused(said: object) -> None:
         Press.of(said)
 
 
-def test_a_held_button_moves_nothing_before_its_target_was_seen(operator: Operator) -> None:
+def test_a_held_button_moves_nothing_before_its_target_was_seen(operator: PanelBoard) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     begun = press(operator)
     hold.press(ME, begun, "home", lambda: jog, after_s=1000.0)
@@ -77,7 +77,7 @@ def test_a_held_button_moves_nothing_before_its_target_was_seen(operator: Operat
 
 
 @pytest.mark.parametrize("how", ["released", "silent", "late", "other in control", "lost"])
-def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
+def test_a_jog_ends_with_its_button(operator: PanelBoard, how: str) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     begun = press(operator)
     hold.press(ME, begun, "jog", lambda: jog)
@@ -99,7 +99,7 @@ def test_a_jog_ends_with_its_button(operator: Operator, how: str) -> None:
     assert any(words.BROWSER_SILENT in line for line in operator.log.last) == (how in ("silent", "late"))
 
 
-def test_a_release_that_overtakes_its_press_ends_it(operator: Operator) -> None:
+def test_a_release_that_overtakes_its_press_ends_it(operator: PanelBoard) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     late = press(operator)
     hold.release(ME, late.number)
@@ -109,7 +109,7 @@ def test_a_release_that_overtakes_its_press_ends_it(operator: Operator) -> None:
     assert not jog.held
 
 
-def test_a_refused_press_of_a_watcher_ends_nobodys_jog(operator: Operator) -> None:
+def test_a_refused_press_of_a_watcher_ends_nobodys_jog(operator: PanelBoard) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     begun = press(operator)
     hold.press(ME, begun, "jog", lambda: jog)

@@ -8,7 +8,7 @@ import pytest
 from armtempo.basics.errors import InputError
 from armtempo.link.board_messages import SequenceState
 from armtempo.panel import words
-from armtempo.panel.operator import Operator
+from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.sequence_editor import SequenceEditor
 
 from tests.host.panel.fakes import ARM
@@ -91,7 +91,7 @@ def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceEditor) -> None
     ("ending", "cycle", "said"),
     [("running", 0, "running: step 2 of cycle 1"), ("finished", 2, "finished: 2 whole cycles")],
 )
-def test_cycles_are_counted_from_one(operator: Operator, ending: str, cycle: int, said: str) -> None:
+def test_cycles_are_counted_from_one(operator: PanelBoard, ending: str, cycle: int, said: str) -> None:
     operator.live.sequence = SequenceState(ending, 0, 2, 1, cycle, "day")
     with pages(operator) as page:
         page.show(words.TAB_SEQUENCE)
