@@ -115,7 +115,7 @@ _ROWS = (
     ),
     (
         "needs_firmware",
-        "the program's core on MicroPython's own firmware can only run single motions; nothing has moved",
+        "the program's core on stock MicroPython can only run single motions; nothing has moved",
         "put the program into the firmware: 'armtempo flash'",
     ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
+from armtempo.encoding import encode
 from armtempo.link.client import Client
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.records import encode
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import wire
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.encoding import encoded_motion
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
-from armtempo.records import encoded_motion
 from armtempo.report import arm_picture, drawing, plots, run_folder
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 

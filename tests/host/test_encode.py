@@ -9,12 +9,12 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError, PlanError
+from armtempo.encoding import decode, encode
 from armtempo.link.board_messages import Hello
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
 from armtempo.planning import checks, move_law, point_to_point
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.records import decode, encode
 from armtempo.robot import engine_room
 from armtempo.robot.engine_room import CORE, IN_FIRMWARE, Room
 from armtempo.splines.trajectory import JointSpline, Trajectory
@@ -211,7 +211,7 @@ def test_an_arm_that_fits_is_told_with_its_bytes() -> None:
     line = engine_room.of_arm(PAPER, board(CORE))
     needed = engine_memory.needed_bytes(engine_room.encode.step_rates(PAPER))
     assert line == f"memory on the board: {needed} bytes for 3 joints of {CORE.size}"
-    assert "fits with MicroPython's own firmware or with the program in it" in engine_room.of_arm(PAPER)
+    assert "fits with stock MicroPython or with the program in it" in engine_room.of_arm(PAPER)
 
 
 @pytest.mark.parametrize("size", range(8_000, 24_000, 500))
@@ -259,7 +259,7 @@ def test_a_board_tells_what_the_firmware_would_give() -> None:
 def test_the_words_name_the_highest_rate_that_fits() -> None:
     room = Room(8_500)
     (rate,) = [
-        int(part.split()[2]) for part in room.words().split(": ")[1].split(", ") if part.startswith("3 x")
+        int(part.split()[2]) for part in room.describe().split(": ")[1].split(", ") if part.startswith("3 x")
     ]
     assert room.holds([rate] * 3)
     assert not room.holds([rate + 1000] * 3)
@@ -294,6 +294,7 @@ def test_a_block_holds_a_ring_of_1024_entries_or_two_of_512() -> None:
     assert 2 * engine_memory.ring_words(48_000, 3) == 1026
 
 
+@pytest.mark.slow
 def test_every_arm_fits_the_largest_memory() -> None:
     """Of the joints that a ring is as large for, the slowest each."""
     slowest = [1] + [

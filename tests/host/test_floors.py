@@ -166,9 +166,8 @@ def random_motion(seed: int, most: int = 25) -> tuple[Arm, Job]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.seeds(*range(6))
 def test_no_plan_is_below_its_floor(seed: int) -> None:
-    """1000 jobs of up to 500 via points: tests/benchmark/floors.py."""
     arm, job = random_motion(seed)
     plan = planner.plan(arm, job)
     (search,) = plan.searches

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
+from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client, traffic
 from armtempo.link.client import harmless_number
 from armtempo.link.follow import Follower
 from armtempo.link.session import Session
-from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire

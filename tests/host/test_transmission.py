@@ -12,6 +12,7 @@ import pytest
 from armtempo.basics.errors import InputError
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.diagnosis.finding import Level
+from armtempo.encoding import decode, encode
 from armtempo.model import arm_json, drive_limits, shipped, taught
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -20,7 +21,6 @@ from armtempo.model.plan import Plan
 from armtempo.model.transmission import Transmission
 from armtempo.planning import checks, planner, point_to_point, torque
 from armtempo.planning.jog import jog_motion
-from armtempo.records import decode, encode
 from armtempo.report import evaluation, run_folder, run_reader, run_report, verdict
 from armtempo.report.run import Run
 from armtempo.robot import arm_state

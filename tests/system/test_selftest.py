@@ -17,9 +17,9 @@ from armtempo import connect
 from armtempo.basics.errors import ArmtempoError, LinkError
 from armtempo.diagnosis.finding import Level
 from armtempo.diagnosis.selftest import board_part, prompt, rate_part
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Driver, JointModel, LimitSwitches, Safety
-from armtempo.records import encode
 from armtempo.robot import motor_test
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
@@ -326,7 +326,7 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
             used.selftest()
         assert (used.status().state, used.status().positions) == before
         used.client._info = replace(used.info, features=0)
-        with pytest.raises(LinkError, match=r"MicroPython's own firmware.*armtempo flash"):
+        with pytest.raises(LinkError, match=r"stock MicroPython.*armtempo flash"):
             used.selftest()
     assert before[0] == "idle"
     assert "joint 1 by +0.8°. Is the arm supported" in said[0]

@@ -29,7 +29,7 @@ def take_stored(board: "Board") -> None:
 
     An invalid record does not keep the program from starting: ``arm_problem`` says what is wrong.
     """
-    board.arm_waits = False
+    board.arm_record_pending = False
     board.arm_problem = board.arm_value = 0
     try:
         _take(board, _checked(board, _stored(board)))
@@ -43,7 +43,7 @@ def take_stored(board: "Board") -> None:
 
 def take_new(board: "Board") -> None:
     """Use the uploaded arm record; if it is invalid, raises Refused and keeps the present one."""
-    board.arm_waits = False
+    board.arm_record_pending = False
     try:
         record = _checked(board, _new(board))
     except Refused:
@@ -136,4 +136,4 @@ def drop_outputs(board: "Board") -> None:
         else:
             held.init(Pin.IN)
     board.outputs = board.inputs = None
-    board.rows.clear()
+    board.extra_commands.clear()

@@ -46,7 +46,7 @@ class Board:
         self.engine: "Any" = None
         self.outputs: "Any" = None  # of an arm that has outputs or inputs,
         self.inputs: "Any" = None  # and these then too,
-        self.rows: "dict[int, Any]" = {}  # and their commands
+        self.extra_commands: "dict[int, Any]" = {}  # and their commands
         self.program_crc = program_crc
         self.board_id = board_id()
         # A different number after each power-up
@@ -54,7 +54,7 @@ class Board:
         self.joints = 0
         self.arm_crc = 0
         self.all_but_limits = 0  # of the arm record: identity of the arm
-        self.arm_waits = False  # an arm record was uploaded and is still to be used
+        self.arm_record_pending = False  # an arm record was uploaded and is still to be used
         self.arm_problem = 0  # code: why the stored arm record is not used (0: it is used, or there is none),
         self.arm_value = 0  # and its value
         self.silence_ms = NEVER_MS  # of the host's silence, after which a run is stopped
@@ -111,7 +111,7 @@ class Board:
         """One bit per joint, set if its position is known."""
         return self.engine.known if self.engine else 0
 
-    def everyone(self) -> int:
+    def all_joints_mask(self) -> int:
         """One bit per joint, all set."""
         return (1 << self.joints) - 1
 

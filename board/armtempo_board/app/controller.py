@@ -88,7 +88,7 @@ class Controller:
             if board.engine.moving:
                 self.sequence.prepare()
             else:
-                self.sequence.go_on()
+                self.sequence.advance()
 
     def refill(self) -> None:
         """Serve the engine during longer work while a motion runs."""
@@ -181,7 +181,7 @@ class Controller:
         self._assumed = unknown
         return moving
 
-    def tidy(self) -> None:
+    def release_memory(self) -> None:
         """Free what only the last commands needed, so that new objects lie close to those that stay."""
         self.board.forget_store()
         gc.collect()
@@ -195,7 +195,7 @@ class Controller:
         if flags & START_HELD and not features.JOG:
             raise Refused(codes.NEEDS_FIRMWARE)
         homing = bool(flags & START_HOMING)
-        unknown = board.everyone() & ~board.known()
+        unknown = board.all_joints_mask() & ~board.known()
         if unknown and not homing:
             raise Refused(codes.UNHOMED, _lowest(unknown))
         self._by_host = crc is not None
@@ -215,7 +215,7 @@ class Controller:
 
         def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
             self.board.once.release()
-            self.tidy()
+            self.release_memory()
             try:
                 from armtempo_board.app import sequence_start  # here, as only sequences need its memory
 
@@ -224,7 +224,7 @@ class Controller:
                 raise Refused(codes.NO_SEQUENCE_ROOM)
 
         def _is_sequence(self, name: str) -> bool:
-            self.tidy()
+            self.release_memory()
             return bool(self.board.store().is_sequence(name))
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
@@ -233,10 +233,10 @@ class Controller:
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
         heap.collect_often(heap.OFTEN if self.board.workspace.is_short else heap.SELDOM)
-        self.tidy()
+        self.release_memory()
         try:
             motion = self.load(name, crc)
-            self.tidy()
+            self.release_memory()
             homing = self._assume(motion, unknown) if flags & START_HOMING else 0
             if homing:
                 homing = flags >> START_SWITCHES_BIT or homing
@@ -327,7 +327,7 @@ class Controller:
             return messages.FAULT
         if not board.engine:
             return messages.UNCONFIGURED
-        return messages.IDLE if board.known() == board.everyone() else messages.UNHOMED
+        return messages.IDLE if board.known() == board.all_joints_mask() else messages.UNHOMED
 
 
 def _lowest(mask: int) -> int:

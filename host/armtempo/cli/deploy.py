@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from armtempo import deploy as deployment
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
 from armtempo.model.arm import Arm
@@ -16,22 +16,19 @@ from armtempo.robot import engine_room
 
 
 @click.command("deploy")
-@click.option(
-    "--mpy", is_flag=True, help="The core, compiled with mpy-cross, in the last sectors of the chip's flash."
-)
 @options.arm
 @options.port
 @options.as_json
-def deploy(mpy: bool, arm_path: Path | None, port: str | None, as_json: bool) -> None:
+def deploy(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     """Install or update the board program on a board.
 
     mpremote copies the files below /flash/lib that differ, and writes the compiled program to the last two sectors of
     the chip's flash; all is read back. An existing boot.py or main.py is backed up. If interrupted, run it again. At
     the end it prints which arms fit into the remaining memory, and whether the given arm does.
     """
-    arm = chosen.named_arm(arm_path)
+    arm = resolve.named_arm(arm_path)
     with ProgressBar("copying") as progress:
-        info = deployment.deploy(chosen.port(port), mpy, results.progress_printer(as_json), progress)
+        info = deployment.deploy(resolve.port(port), results.progress_printer(as_json), progress)
     room = engine_room.of_board(info)
     values = {
         "board_id": info.board_id,
@@ -42,7 +39,7 @@ def deploy(mpy: bool, arm_path: Path | None, port: str | None, as_json: bool) ->
         "arm": arm.name if arm else None,
         "arm_fits": engine_room.Room.of_board(info).holds_arm(arm) if arm else None,
     }
-    of_arm = [f"{chosen.describe_arm(arm)}: {engine_room.of_arm(arm, info)}"] if arm else []
+    of_arm = [f"{resolve.describe_arm(arm)}: {engine_room.of_arm(arm, info)}"] if arm else []
     results.show(as_json, values, ["the board runs armtempo", *room, *of_arm])
 
 
@@ -54,7 +51,7 @@ def undeploy(port: str | None, as_json: bool) -> None:
 
     Stored motions are kept; the backed-up boot.py and main.py are restored.
     """
-    name = chosen.port(port)
+    name = resolve.port(port)
     deployment.undeploy(name, results.progress_printer(as_json))
     if as_json:
         results.show_json({"port": name, "program": None})
@@ -68,8 +65,8 @@ def configure(given: BoardOptions) -> None:
     The position is unknown afterwards, unless only limits differ: ranges, speeds, following errors, the link time-out.
     Stored motions of an arm with another geometry or gearing are refused; upload them again.
     """
-    arm = chosen.load_arm(given.arm_path)
-    with chosen.board(given, arm) as board:
+    arm = resolve.load_arm(given.arm_path)
+    with resolve.board(given, arm) as board:
         before = board.info.arm_crc
         board.configure(arm, replace=True)
         found = board.state()
@@ -88,11 +85,11 @@ def configure(given: BoardOptions) -> None:
 
 
 def _unchanged(arm: Arm) -> str:
-    return f"the board is already set up for {chosen.describe_arm(arm)}; nothing is changed"
+    return f"the board is already set up for {resolve.describe_arm(arm)}; nothing is changed"
 
 
 def _configured(arm: Arm, values: dict[str, Any]) -> list[str]:
-    lines = [f"the board is set up for {chosen.describe_arm(arm)}", values["memory"]]
+    lines = [f"the board is set up for {resolve.describe_arm(arm)}", values["memory"]]
     if motions := values["motions_to_upload_again"]:
         lines.append(f"{motions} stored motions are for the old arm; upload those that you need again")
     if values["position_known"]:

@@ -71,7 +71,9 @@ def _room(arm: Arm) -> list[Finding]:
             continue  # said above
         found += [
             error(
-                "room", f"posture {posture.name}: {touch.words}", "correct the posture, [room] or radius_mm"
+                "room",
+                f"posture {posture.name}: {touch.description}",
+                "correct the posture, [room] or radius_mm",
             )
             for touch in room_check.posture_touches(arm, angles)
         ]

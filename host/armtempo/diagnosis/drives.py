@@ -6,11 +6,11 @@ from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.basics.errors import ArmtempoError
 from armtempo.diagnosis.finding import Finding, error, note, warning
+from armtempo.encoding import encode
 from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
-from armtempo.planning.checks import ESTIMATED, rate_words
-from armtempo.records import encode
+from armtempo.planning.checks import ESTIMATED, format_rate
 
 _MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}
 """Microstep settings of stepper drivers: powers of 2, and decimal ones."""
@@ -41,7 +41,7 @@ def findings(arm: Arm) -> list[Finding]:
         found.append(
             warning(
                 "all joints",
-                rate_words(rates),
+                format_rate(rates),
                 "use fewer microsteps or lower speed limits; else a plan that needs more is refused",
             )
         )

@@ -35,7 +35,7 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
 def _room(arm: Arm, via_deg: Array) -> list[Finding]:
     """Via points at which the arm touches something."""
     return [
-        error("job", f"P{number}: {touch.words}", "move the via point, or correct [room] or radius_mm")
+        error("job", f"P{number}: {touch.description}", "move the via point, or correct [room] or radius_mm")
         for number, angles in enumerate(via_deg)
         for touch in room_check.posture_touches(arm, angles)
     ]

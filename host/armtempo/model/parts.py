@@ -11,7 +11,7 @@ from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.basics.part import check, key
+from armtempo.basics.toml_section import check, key
 
 LEVELS = ("low", "high")
 NOTHING = "nothing"

@@ -20,7 +20,7 @@ from armtempo_shared.basis import BASIS
 from armtempo.basics import json_codec, json_text
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import check_replaceable, replace_text, why
+from armtempo.basics.atomic_file import check_replaceable, os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_json, exchange
 from armtempo.model.arm import Arm
@@ -200,7 +200,7 @@ def _read(path: Path | str) -> Any:
             f"check the path, or make it with: armtempo plan -o {path}",
         ) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}", "check its permissions") from None
+        raise InputError(f"{path}: cannot be read: {os_reason(error)}", "check its permissions") from None
     try:
         return json_text.loads(text)
     except ValueError as error:

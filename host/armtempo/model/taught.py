@@ -10,7 +10,7 @@ from typing import Any
 
 from armtempo_shared.limits import MAX_NAME
 
-from armtempo.basics.atomic_file import replace_text, why
+from armtempo.basics.atomic_file import os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import posture as named
 from armtempo.model.arm import Arm
@@ -42,7 +42,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
         with path.open(encoding="utf-8", newline="") as file:
             text = file.read()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}", "check the path") from None
+        raise InputError(f"{path}: cannot be read: {os_reason(error)}", "check the path") from None
     known = _parsed(text, path).get("posture", {})
     if name in known and not replace:
         raise InputError(

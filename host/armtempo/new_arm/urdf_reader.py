@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.model.parts_file import MAX_ANGLE_DEG
 from armtempo.new_arm import urdf_bodies
@@ -138,7 +138,7 @@ def _check_text(path: Path) -> None:
         raise InputError(f"{path}: no such file", "check the path") from None
     except OSError as error:
         raise InputError(
-            f"{path}: cannot be read: {why(error)}", "make it readable, or give a copy"
+            f"{path}: cannot be read: {os_reason(error)}", "make it readable, or give a copy"
         ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError(f"{path}: not valid XML: {error}", "correct the file there") from None

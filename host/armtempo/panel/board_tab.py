@@ -16,7 +16,7 @@ from armtempo.deploy.firmware import image, write
 from armtempo.link.board_messages import StoredMotion
 from armtempo.panel import words
 from armtempo.panel.live import Lines
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
 
 if TYPE_CHECKING:

@@ -126,9 +126,11 @@ def leads_tool(job: Job) -> bool:
     return bool(job.ways) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
 
 
-def has_stretches(job: Job) -> bool:
-    """Whether the job is planned as stretches: it leads the tool, or its spline rests at via points."""
-    return leads_tool(job) or (bool(job.stops) and not is_free(job))
+def planner_of(job: Job) -> str:
+    """The planner of ``planner.PLANNERS`` for a job: "line" if it leads the tool, or its spline rests at via points."""
+    if leads_tool(job) or (job.stops and not is_free(job)):
+        return "line"
+    return "free" if is_free(job) else "through"
 
 
 def _check_ways(job: Job, where: str) -> None:
@@ -182,7 +184,7 @@ def _check_path(job: Job) -> None:
         )
     if leads_tool(job):
         _check_ways(job, where)
-    elif has_stretches(job) and (job.timing != "shared" or job.degree != 5):
+    elif planner_of(job) == "line" and (job.timing != "shared" or job.degree != 5):
         raise InputError(
             f'{where}: a stop needs timing = "shared" and degree 5',
             "leave timing and degree out, or plan the stretches between the stops one by one with --split",
@@ -299,7 +301,7 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
             )
     rates = step_rates(arm, reached)
     if rates > MAX_STEP_RATE_SUM:
-        raise PlanError(rate_words(rates), "lower the speed limits or use fewer microsteps")
+        raise PlanError(format_rate(rates), "lower the speed limits or use fewer microsteps")
 
 
 def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
@@ -308,7 +310,7 @@ def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
     return sum(speed * joint.motor.steps_per_deg for speed, joint in zip(speeds, arm.driven, strict=True))
 
 
-def rate_words(rates: float) -> str:
+def format_rate(rates: float) -> str:
     """Text: a sum of step rates compared with the board's."""
     return f"the joints together need up to {rates:.0f} steps/s; the board supports {MAX_STEP_RATE_SUM} {ESTIMATED}"
 

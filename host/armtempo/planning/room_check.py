@@ -53,7 +53,7 @@ class Touch:
     time_s: float
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Describe the touch."""
         depth = f"is {self.depth_mm:.1f} mm inside of" if self.depth_mm > _CLOSE_MM else "touches"
         return f"{self.link} {depth} {self.other}"
@@ -270,7 +270,7 @@ def tell_start(arm: Arm, driven_deg: Iterable[float]) -> None:
     touches = posture_touches(arm, driven_deg) if has_room(arm) else []
     if touches:
         touch = max(touches, key=lambda each: each.depth_mm)
-        LOG.warning(f"{touch.words} where it starts; it may move out only, and not back")
+        LOG.warning(f"{touch.description} where it starts; it may move out only, and not back")
 
 
 def check(arm: Arm, trajectory: Trajectory, outwards: bool = False) -> None:
@@ -295,10 +295,10 @@ def check_plan(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array, outwards: 
 def _refused(trajectory: Trajectory, touch: Touch, place: str) -> PlanError:
     if touch.time_s == 0.0:
         return PlanError(
-            f"{trajectory.name}: {touch.words} where it starts",
+            f"{trajectory.name}: {touch.description} where it starts",
             "start elsewhere: 'armtempo jog' and 'goto' move out; or, in a job that leads out, start_touches = true",
         )
     return PlanError(
-        f"{trajectory.name}: {touch.words} ({place})",
+        f"{trajectory.name}: {touch.description} ({place})",
         "add or move a via point, take another branch with posture_deg, or correct [room] in the arm file",
     )

@@ -180,8 +180,8 @@ class _Compiler:
         start, end = _angles(trajectory(0.0)), _angles(trajectory(trajectory.duration_s))
         if here.angles_deg is not None and not self._same(here.angles_deg, start):
             raise InputError(
-                f"{step.where}run: {motion.name} begins at {_words(start)}, but the arm is at "
-                f"{here.name or _words(here.angles_deg)} ({_words(here.angles_deg)})",
+                f"{step.where}run: {motion.name} begins at {_format_angles(start)}, but the arm is at "
+                f"{here.name or _format_angles(here.angles_deg)} ({_format_angles(here.angles_deg)})",
                 f"put a step before it that goes there: goto with the same file as run, {motion.name!r}",
             )
         holds = _job(motion).holds or self._holds
@@ -208,7 +208,7 @@ class _Compiler:
         elif isinstance(target, list | tuple):
             if problem := self.arm.angles_problem(target):
                 raise InputError(f"{step.where}goto: {problem}", "give one angle for each joint with a motor")
-            target = ArmPosture(_words(target), tuple(target))
+            target = ArmPosture(_format_angles(target), tuple(target))
         if isinstance(target, ArmPosture):
             return self.posture(target, f"{step.where}goto: ")
         motion = self._motion(target)
@@ -309,5 +309,5 @@ def _angles(values: np.ndarray) -> Angles:
     return tuple(float(value) for value in values)
 
 
-def _words(angles: Angles) -> str:
+def _format_angles(angles: Angles) -> str:
     return ", ".join(f"{round(angle, 3) + 0.0:g}" for angle in angles) + "°"

@@ -46,7 +46,7 @@ class LeastMargin(NamedTuple):
     held_nm: float
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Describe it, without the joint."""
         return (
             f"at {self.time_s:.2f} s its motor needs {self.needed_nm:.3g} Nm and holds {self.held_nm:.3g}, "
@@ -149,7 +149,7 @@ def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan
         found = planner.plan(_scaled(arm, factor), job, part(progress, number, _TRIES))
         least = least_margin(found.holding, found.trajectory)
         if least is not None and least.margin < ENOUGH:
-            high, short = factor, f"{least.joint}: {least.words}"
+            high, short = factor, f"{least.joint}: {least.description}"
         elif best is not None and found.total_s > best.total_s * (1.0 - _PAYS):
             break
         else:

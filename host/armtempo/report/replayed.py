@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.encoding import decode
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.records import decode
 from armtempo.report import run_folder
 from armtempo.report.run_folder import ARM, MOTION
 from armtempo.report.run_reader import RepetitionData, RunData
@@ -42,7 +42,8 @@ def trajectory_of(run: RunData) -> Trajectory:
         )
     except OSError as error:
         raise RunFolderError(
-            f"{run.path}: neither a plan nor {MOTION} can be read ({why(error)}), so the planned motion is not known",
+            f"{run.path}: neither a plan nor {MOTION} can be read ({os_reason(error)}), "
+            "so the planned motion is not known",
             "restore one of them from a copy, or run again",
         ) from error
     except InputError as error:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.basics.text import visible
-from armtempo.records import decode
+from armtempo.encoding import decode
 from armtempo.report import run_reader
 from armtempo.report.run_folder import JointScale, transmission
 from armtempo.report.run_reader import RESTORE, RepetitionData

@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
+from armtempo.encoding import encode
 from armtempo.link import Client
 from armtempo.link.board_messages import Status
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.records import encode
 from armtempo.robot import engine_room
 
 _WORDS = {
@@ -146,9 +146,9 @@ def difference(old: bytes, new: bytes) -> str:
         return "the board's record is of another version"
     if len(old_joints) != len(new_joints):
         return f"it has {len(new_joints)} driven joints, the board's arm {len(old_joints)}"
-    found = [_words(old_head, new_head)]
+    found = [_describe_change(old_head, new_head)]
     for number, rows in enumerate(zip(old_joints, new_joints, strict=True), 1):
-        words = _words(*rows)
+        words = _describe_change(*rows)
         found.append(f"joint {number}: {words}" if words else "")
     found += [
         what for what, (before, after) in zip(("outputs", "inputs"), wiring, strict=True) if before != after
@@ -166,5 +166,5 @@ def consequence(old: bytes, new: bytes) -> str:
     return _KEEPS if same else _LOSES
 
 
-def _words(old: dict[str, int], new: dict[str, int]) -> str:
+def _describe_change(old: dict[str, int], new: dict[str, int]) -> str:
     return ", ".join(dict.fromkeys(_WORDS.get(key, key) for key in old if old[key] != new[key]))

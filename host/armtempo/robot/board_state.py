@@ -181,7 +181,7 @@ def read(client: Client, port: str) -> BoardState:
         max_rate=info.max_rate,
         max_rate_sum=info.max_rate_sum,
         rates_measured=info.rates_measured,
-        room=engine_room.Room.of_board(info).words(),
+        room=engine_room.Room.of_board(info).describe(),
         arm_problem=_arm_problem(info),
         state=status.state,
         moving=status.moving,
@@ -225,6 +225,6 @@ def record_crc(arm: Arm) -> int:
     """The checksum by which a board identifies an arm."""
     from armtempo_shared import wire
 
-    from armtempo.records import encode
+    from armtempo.encoding import encode
 
     return int(wire.record_crc(encode.arm_record(arm)))

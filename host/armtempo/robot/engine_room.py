@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from armtempo_shared import engine_memory, limits
 
 from armtempo.basics.errors import InputError
+from armtempo.encoding import encode
 from armtempo.link.board_messages import Hello
 from armtempo.model.arm import Arm
-from armtempo.records import encode
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Room:
         """Whether the engine for an arm fits."""
         return self.holds(encode.step_rates(arm))
 
-    def words(self) -> str:
+    def describe(self) -> str:
         """Describe what fits: bytes, joints, steps/s."""
         return f"{self.size} bytes: {', '.join(self._fitting()) or 'no arm fits'}"
 
@@ -52,7 +52,7 @@ class Room:
 
 CORE = Room(10_900)
 IN_FIRMWARE = Room(engine_memory.LARGEST_BYTES)
-"""Memory with the program's core on MicroPython's own firmware for the STM32F4DISC, and built into the firmware.
+"""Memory with the program's core on stock MicroPython for the STM32F4DISC, and built into the firmware.
 
 Measured: ``python -m tests.benchmark.room MICROPYTHON``.
 """
@@ -80,7 +80,7 @@ def of_arm(arm: Arm, info: Hello | None = None) -> str:
         room = Room.of_board(info)
         return f"{needs} of {room.size}" if room.holds_arm(arm) else f"{needs}, too much{_or_firmware(arm)}"
     if CORE.holds_arm(arm):
-        return f"{needs}: fits with MicroPython's own firmware or with the program in it"
+        return f"{needs}: fits with stock MicroPython or with the program in it"
     if IN_FIRMWARE.holds_arm(arm):
         return f"{needs}: fits only with the program in the firmware ({_BUILD})"
     return f"{needs}: too much for an STM32F407"
@@ -89,10 +89,10 @@ def of_arm(arm: Arm, info: Hello | None = None) -> str:
 def of_board(info: Hello) -> list[str]:
     """Lines: what fits on a board, and what would fit with the program in its firmware."""
     room = Room.of_board(info)
-    lines = [f"memory for an arm: {room.words()}"]
+    lines = [f"memory for an arm: {room.describe()}"]
     if room.size < IN_FIRMWARE.size:
         lines.append(
-            f"with the program in the firmware ({_BUILD}): {IN_FIRMWARE.words()}, and room for sequences"
+            f"with the program in the firmware ({_BUILD}): {IN_FIRMWARE.describe()}, and room for sequences"
         )
     return lines
 

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
+from armtempo.encoding import encoded_motion
+from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
@@ -19,8 +21,6 @@ from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import point_to_point, room_check, via_points
 from armtempo.ports.names import is_sim
-from armtempo.records import encoded_motion
-from armtempo.records.encoded_motion import EncodedMotion, MotionKey
 from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import SampleSink, put_once, raise_fault, replay

@@ -17,11 +17,11 @@ import numpy as np
 from armtempo_shared.messages import START_HOMING, START_SWITCHES_BIT
 
 from armtempo.basics.errors import InputError, LinkError
+from armtempo.encoding import encoded_motion
 from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.planning import point_to_point
-from armtempo.records import encoded_motion
 from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import put_once, raise_fault, replay

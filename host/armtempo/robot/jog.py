@@ -13,6 +13,8 @@ from armtempo_shared.messages import START_HELD
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import BoardError, LinkError
+from armtempo.encoding import encode
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
 from armtempo.link.refusal import refusal
@@ -20,8 +22,6 @@ from armtempo.link.session import OnLoss
 from armtempo.model.arm import Arm
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMotion, JogMove
-from armtempo.records import encode
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state, goto, stored_motion
 from armtempo.robot.stop_request import StopRequest
 
@@ -107,7 +107,7 @@ class HeldJog:
             self.moving = True
             self._said_s = client.session.clock()
             for _ in range(_FIRST):
-                self._say_so()
+                self._send_hold()
             self._ends = ends.pop_all()
         return self
 
@@ -133,14 +133,14 @@ class HeldJog:
         while self.moving:
             now_s = session.clock()
             if now_s - self._said_s >= HOLD_S:
-                self._say_so()
+                self._send_hold()
             left_s = min(until_s, self._said_s + HOLD_S) - session.clock()
             self._take(session.poll(max(0.0, left_s)))
             if session.clock() >= until_s:
                 break
         return self.moving
 
-    def _say_so(self) -> None:
+    def _send_hold(self) -> None:
         now_s = self._client.session.clock()
         self._silent_s, self._said_s = max(self._silent_s, now_s - self._said_s), now_s
         try:

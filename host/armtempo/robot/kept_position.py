@@ -15,10 +15,10 @@ from armtempo_shared import wire
 from armtempo.basics import json_codec
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError, LinkError
+from armtempo.encoding import encode
 from armtempo.link.client import Client
 from armtempo.model.arm import Arm
 from armtempo.ports import names
-from armtempo.records import encode
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from armtempo_shared import armrecord
 
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.ports.names import VIRTUAL_ID
-from armtempo.records import encode
 
 DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 

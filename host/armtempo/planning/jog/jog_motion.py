@@ -53,7 +53,7 @@ class JogMove:
         """Unit of ``by``."""
         return "deg" if self.joint is not None or self.about else "mm"
 
-    def words(self, arm: Arm) -> str:
+    def describe(self, arm: Arm) -> str:
         """Describe what moves."""
         if self.joint is not None:
             return arm.driven[self.joint].name

@@ -39,7 +39,7 @@ sys.modules["time"] = Time()
 from armtempo_board.app.app import App  # noqa: E402
 
 ROOM = 12_000
-"""Bytes of memory for engines, about as on MicroPython's own firmware."""
+"""Bytes of memory for engines, about as on stock MicroPython."""
 
 
 def arm_of(rates, outputs):

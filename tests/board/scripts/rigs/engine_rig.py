@@ -30,7 +30,7 @@ class Steps:
         first, gap, _, direction = self.blocks[place[0]]
         return first + place[1] * gap, direction
 
-    def go_on(self, place, steps=1):
+    def advance(self, place, steps=1):
         """Move a place on; not beyond the end of its block."""
         place[1] += steps
         if place[1] == self.blocks[place[0]][2]:
@@ -113,7 +113,7 @@ class StepGenerator:
             step_queue.put_single(self.queue, (time >> 12) + bezier.BIAS, time & 4095)
             if steps > 1:
                 self._lengthen(time, gap, steps)
-            self._steps.go_on(self._place, steps)
+            self._steps.advance(self._place, steps)
             self.ended = self._steps.at(self._place) is None
 
     def _lengthen(self, time, gap, steps):

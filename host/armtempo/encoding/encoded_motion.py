@@ -10,10 +10,10 @@ from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
+from armtempo.encoding import decode, encode
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.planning import brake_time, point_to_point
-from armtempo.records import decode, encode
 from armtempo.splines.trajectory import Trajectory
 
 
