@@ -84,6 +84,7 @@ def test_the_compiled_program_takes_few_blocks_and_two_sectors() -> None:
     assert changes.difference(replace(there, sectors=damaged), program).image == program.image
 
 
+@pytest.mark.slow
 def test_sectors_that_hold_something_else_are_not_touched() -> None:
     other = replace(BOARD, sectors=SectorsFound("01" * 12, 0, False))
     with pytest.raises(LinkError, match=r"0x080c0000 on.*hold something else"):

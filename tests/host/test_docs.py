@@ -265,6 +265,7 @@ def test_the_tables_were_found() -> None:
     assert len(set(mentioned())) >= 25
 
 
+@pytest.mark.slow
 @sources.TOGETHER
 def test_what_the_tour_names_exists() -> None:
     for side, name in sorted(set(mentioned())):

@@ -294,6 +294,7 @@ def test_a_block_holds_a_ring_of_1024_entries_or_two_of_512() -> None:
     assert 2 * engine_memory.ring_words(48_000, 3) == 1026
 
 
+@pytest.mark.slow
 def test_every_arm_fits_the_largest_memory() -> None:
     """Of the joints that a ring is as large for, the slowest each."""
     slowest = [1] + [

@@ -199,6 +199,7 @@ def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
     assert len(seen) < 500
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [2.0, 20.0])
 def test_a_corridor_of_the_tool_that_the_stops_leave_no_room_in_is_refused(width: float) -> None:
     """The spline through the via points does not rest there, and a motion that is drawn to it would not either."""
@@ -287,6 +288,7 @@ def test_refuses_what_a_free_path_cannot_be(changes: dict[str, object], message:
         planner.plan(ARM, replace(FEED, **changes))
 
 
+@pytest.mark.slow
 def test_time_that_does_not_increase_is_refused() -> None:
     plan = planner.plan(ARM, replace(FEED, path="through", refine=1, iterations=5))
     spline = plan.trajectory.joints[0]
@@ -317,6 +319,7 @@ def test_the_tools_deviation_is_bounded_sharply(away_deg: float, linkage: bool) 
     assert reached <= bound <= reached * (1.0 + 2.0 * corridor.SHARP) + 1e-6
 
 
+@pytest.mark.slow
 def test_where_the_spline_leaves_a_range_the_free_path_is_named_and_plans_it() -> None:
     via = ((0, -60, 40), (0, -62, 42), (0, -64, 44), (90, -70, 42), (90, -72, 40), (90, -74, 38))
     job = Job("tight", via_deg=via, starts=1)

@@ -117,6 +117,7 @@ def test_the_band_around_a_mean_is_its_standard_error() -> None:
     assert corners[:, 1].max() == pytest.approx(np.max(mean + error))
 
 
+@pytest.mark.slow
 def test_figures_are_no_larger_than_they_must_be() -> None:
     """Coordinates finer than a hundredth of a point would only fill the page."""
     paths = re.findall(r' d="([^"]*)"', figure("searches"))

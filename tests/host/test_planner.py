@@ -107,6 +107,7 @@ def test_random_jobs_keep_their_limits_or_say_why_not(seed: int, monkeypatch: py
     assert planned > 140
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timing", ["shared", "per-joint"])
 def test_what_the_driver_needs_is_a_limit_of_planning(timing: str) -> None:
     """Of a step every 60 us, and of opposite steps 1.2 ms apart."""
@@ -405,6 +406,7 @@ def test_tool_strays_as_far_as_the_nearest_point_of_the_path_is(apart: Plan) -> 
     assert path_deviation.tool_stray_mm(ARM, apart.trajectory) == pytest.approx(max(strays), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan) -> None:
     text = text_summary.lines(apart)
     assert f"{apart.trajectory.duration_s:.4f} s" in text[0]

@@ -336,6 +336,7 @@ def test_exact_samples_show_the_theory() -> None:
             assert deviation.rms <= deviation.largest <= worst
 
 
+@pytest.mark.slow
 def test_the_standard_error_is_that_of_the_scatter() -> None:
     found = analysis.curves([samples(seed=seed) for seed in range(40)], PLAN)
     assert np.nanmean(found.sem[0]) == pytest.approx(0.05 / np.sqrt(40), rel=0.1)

@@ -137,6 +137,7 @@ def test_a_recording_at_the_end_of_a_range_stays_in_it() -> None:
     assert moved.max() <= 60.0 + 1e-9
 
 
+@pytest.mark.slow
 def test_a_recording_that_begins_in_motion_is_slowed_far_down_or_refused() -> None:
     """Within the tolerance nothing that the limits allow starts so suddenly."""
     line = np.linspace((0, -60, 40), (60, -90, 10), 40)

@@ -172,6 +172,7 @@ def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it(caplog: pytest.LogCapt
     assert "where it starts; it may move out only" in told
 
 
+@pytest.mark.slow
 def test_a_plan_that_starts_where_it_touches_is_refused_unless_it_says_so_and_never_comes_back() -> None:
     arm = thick(PAPER, 20.0, ArmRoom((FEEDER,)))
     inside, outside = (90.0, -60.0, 40.0), (20.0, -60.0, 40.0)

@@ -78,6 +78,7 @@ LINES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", LINES, ids=" ".join)
 def test_every_line_fits(arguments: tuple[str, ...]) -> None:
     wide, narrow = (

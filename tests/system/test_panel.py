@@ -167,9 +167,9 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     press(page, page.get_by_role("button", name="Run", exact=True))
     wait_for(page, "moving", "at ", "Run")
     press(page, page.get_by_role("button", name="Pause"))
-    wait_for(page, "in a pause", "Run")
+    wait_for(page, "paused", "Run")
     press(page, page.get_by_role("button", name="Resume"))  # on along the path
-    page.wait_for_function("!document.getElementById('armtempo-state').textContent.includes('in a pause')")
+    page.wait_for_function("!document.getElementById('armtempo-state').textContent.includes('paused')")
     # joint 1
     page.wait_for_function(
         "parseFloat(document.getElementById('armtempo-where').textContent.split('·').at(-1)) > 0"
@@ -183,6 +183,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     page.wait_for_function(
         "document.querySelector('.armtempo-dock .armtempo-percent').textContent == '100 %'"
     )
+    page.wait_for_selector('[role=slider][aria-label="Speed"][aria-valuenow="100"]')
     press(page, page.get_by_role("button", name="Go to the start"))  # after a stop a motion only begins anew
     commandline.wait_for(lambda: abs(panels.rest(panel.state).joints[0].angle_deg or 0.0) < 0.05, "the start")
     press(page, page.get_by_role("button", name="Run", exact=True))
@@ -235,7 +236,7 @@ def test_a_via_point_is_clicked_and_dragged_in_the_picture(page: Any) -> None:
     cell = page.get_by_label("P3 joint 1")
     before = cell.input_value()
     page.mouse.click(*page.evaluate(_PLACE, "via 3"))
-    page.wait_for_selector("text=P3: postures of the arm with the tool there")
+    page.wait_for_selector("text=P3: postures that reach it")
     assert cell.input_value() == before
     x, y = page.evaluate(_PLACE, "via 3")
     page.mouse.down()
@@ -378,7 +379,7 @@ def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel) -> None:
     press(page, page.get_by_role("button", name="Run", exact=True))
     page.wait_for_selector(".armtempo-lit:has-text('2')")
     page.keyboard.press("Escape")
-    page.wait_for_selector("text=cycle 1: stopped")
+    page.wait_for_selector("text=stopped: step 2 of cycle 1")
     assert page.locator(".armtempo-lit").count() == 0
 
 

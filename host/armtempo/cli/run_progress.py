@@ -50,7 +50,7 @@ class RunProgress(Watcher):
         if sample.ticks <= before:
             return ""
         percent = round(100 * (sample.path_ticks - path_before) / (sample.ticks - before))
-        return "" if percent in (99, 100, 101) else f", at {percent} %" if percent > 0 else ", in a pause"
+        return "" if percent in (99, 100, 101) else f", at {percent} %" if percent > 0 else ", paused"
 
     def end(self, repetition: Repetition) -> None:
         """Print how the repetition ended."""
