@@ -221,7 +221,8 @@ COMMANDS: "dict[str, str]" = {
     "home": "Sets the positions of the joints of the mask `joints` to these steps; the tail has an i32 for every "
     "joint.",
     "start": "Starts a stored trajectory whose checksum is `crc`; the name `/once`: the record of `put_once`. "
-    "`flags` 1: a limit switch ends it without a fault; 2: it is held, and brakes without a fault when no `hold` "
+    "`flags` 1: a limit switch ends it without a fault; with bits from 4 on, one per joint, only a switch of these "
+    "joints does, else one of any that moves; 2: it is held, and brakes without a fault when no `hold` "
     "arrives for 300 ms. Answer: number of the run and its length in ticks. Or starts a sequence, each of whose "
     "motions is a run of its own; then the answer has the number of the last run and 0.",
     "stop": "`now` 0: brake along the path (freeze if the motion has no brake times); 1: freeze.",

@@ -185,11 +185,11 @@ def test_backwards_mirrors_time() -> None:
 def test_records_read_back() -> None:
     motion = point_to_point.straight("x", START, END, ARM)
     data = encode.motion_record(motion, ARM)
-    found = decode.trajectory(data, ARM.driven, "x")
+    found = decode.trajectory(data, ARM.transmission, "x")
     times = np.linspace(0.0, motion.duration_s, 101)
     np.testing.assert_allclose(found(times), motion(times), atol=1e-7)
     with pytest.raises(InputError, match="not a motion record"):
-        decode.trajectory(data[:-1], ARM.driven, "x")
+        decode.trajectory(data[:-1], ARM.transmission, "x")
 
 
 def six_joints() -> Arm:

@@ -13,7 +13,14 @@ import time
 
 from armtempo_shared import codes, messages
 from armtempo_shared.limits import HOLD_TIMEOUT_MS
-from armtempo_shared.messages import ONCE_NAME, RESUME, SAMPLE_BRAKING, START_HELD, START_HOMING
+from armtempo_shared.messages import (
+    ONCE_NAME,
+    RESUME,
+    SAMPLE_BRAKING,
+    START_HELD,
+    START_HOMING,
+    START_SWITCHES_BIT,
+)
 from micropython import const
 
 from armtempo_board import features, heap
@@ -231,6 +238,8 @@ class Controller:
             motion = self.load(name, crc)
             self.release_memory()
             homing = self._assume(motion, unknown) if flags & START_HOMING else 0
+            if homing:
+                homing = flags >> START_SWITCHES_BIT or homing
             self.board.engine.load(motion, rate, None, homing)
         except Refused:
             self._withdraw_assumed()

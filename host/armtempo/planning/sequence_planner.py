@@ -293,10 +293,8 @@ class _Compiler:
         return len(self.legs) - 1
 
     def _same(self, one: Angles, other: Angles) -> bool:
-        return all(
-            abs(a - b) * joint.steps_per_deg <= _SAME_STEPS
-            for a, b, joint in zip(one, other, self.arm.driven, strict=True)
-        )
+        off_steps = self.arm.transmission.steps(np.array(one) - np.array(other))
+        return bool(np.all(np.abs(off_steps) <= _SAME_STEPS))
 
 
 def _job(motion: SourceMotion) -> Job:

@@ -26,13 +26,13 @@ class JointState:
     known: bool
     """Whether the position is known."""
     steps: int
-    """Steps commanded."""
+    """Steps commanded, of its own motor."""
     angle_deg: float | None
-    """The commanded steps in degrees; None if the arm is not known."""
+    """The commanded angle; None if the arm is not known."""
     counts: int
-    """Encoder counts; 0 without an encoder."""
+    """Encoder counts; 0 without an encoder. Of a coupled joint: of its own motor."""
     encoder_deg: float | None
-    """The encoder counts in degrees; None without an encoder, or if the arm is not known."""
+    """The angle by the encoders; None without one, or if the arm is not known."""
 
 
 @dataclass(frozen=True)
@@ -130,14 +130,19 @@ class BoardState:
         """The state in degrees and with the joints' names, if the board is set up for ``arm``; else unchanged."""
         if arm is None or self.arm or record_crc(arm) != self.arm_crc:
             return self
+        gears = arm.transmission
+        known = gears.known(joint.known for joint in self.joints)
+        angles = gears.angles_of_steps([joint.steps for joint in self.joints]).tolist()
+        measured = gears.angles_of_counts([joint.counts for joint in self.joints]).tolist()
         joints = tuple(
             replace(
                 joint,
                 name=driven.name,
-                angle_deg=joint.steps / driven.steps_per_deg,
-                encoder_deg=joint.counts / driven.counts_per_deg if driven.encoder else None,
+                known=known[number],
+                angle_deg=angles[number],
+                encoder_deg=measured[number] if gears.measured[number] else None,
             )
-            for joint, driven in zip(self.joints, arm.driven, strict=True)
+            for number, (joint, driven) in enumerate(zip(self.joints, arm.driven, strict=True))
         )
         tool = _tool(arm, joints) if all(joint.known for joint in joints) else None
         return replace(self, arm=arm.name, arm_source=arm.source, joints=joints, tool=tool)

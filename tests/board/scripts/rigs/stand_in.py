@@ -205,6 +205,7 @@ class Engine:
             assert ready.is_ready and ready.motion is motion and ready.rate == rate
         self.calls.append("load ready" if ready else "load unchecked" if self.skip_check else "load")
         self.rates.wanted = rate
+        self.homing = homing
         if self.refusal:
             from armtempo_board.errors import Refused
 
