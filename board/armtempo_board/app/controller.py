@@ -221,7 +221,7 @@ class Controller:
 
                 self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
             except MemoryError:
-                raise Refused(codes.NO_SEQUENCE_ROOM)
+                raise Refused(codes.NO_SEQUENCE_MEMORY)
 
         def _is_sequence(self, name: str) -> bool:
             self.release_memory()
@@ -232,7 +232,7 @@ class Controller:
 
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
-        heap.collect_often(heap.OFTEN if self.board.workspace.is_short else heap.SELDOM)
+        heap.collect_often(heap.OFTEN if self.board.engine_memory.is_short else heap.SELDOM)
         self.release_memory()
         try:
             motion = self.load(name, crc)

@@ -22,18 +22,18 @@ from armtempo.model import (
     outputs_file,
     parts_file,
     pin_use,
-    room,
     shipped,
     tool_pose,
     transmission,
+    workspace,
 )
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
-from armtempo.model.room import ArmRoom
 from armtempo.model.tool_pose import Pose
 from armtempo.model.transmission import Transmission
+from armtempo.model.workspace import Workspace
 
 _REACHES_MM = 1e-6
 STILL_DEG = 0.01
@@ -58,7 +58,7 @@ class Arm:
     inputs: tuple[Input, ...] = field(default=(), metadata=json_codec.ADDED)
     postures: tuple[ArmPosture, ...] = field(default=(), metadata=json_codec.ADDED)
     """In the order of the file; not sent to the board."""
-    room: ArmRoom | None = field(default=None, metadata=json_codec.ADDED)
+    workspace: Workspace | None = field(default=None, metadata={**json_codec.ADDED, json_codec.KEY: "room"})
     """The space in which it may move; not sent to the board."""
     loads: tuple[Load, ...] = field(default=(), metadata=json_codec.ADDED)
     """What its tool may hold; the board knows nothing of them."""
@@ -156,7 +156,7 @@ class Arm:
         board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
         outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
         postures = top.table("posture")
-        around = room.read(top.table("room"))
+        around = workspace.read(top)
         loads = parts_file.loads(top)
         homing = parts_file.homing(top, [joint.name for joint in joints])
         driven = [joint.name for joint in joints if joint.motor is not None]
@@ -171,7 +171,7 @@ class Arm:
             board,
             outputs,
             inputs,
-            room=around,
+            workspace=around,
             loads=loads,
             homing=homing,
             coupling=coupling,

@@ -281,8 +281,8 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int, hint: str = MOV
     low, high = extremes.range_of(np.moveaxis(bspline.polynomials(angle_points_deg, degree), 2, 0))
     for joint, lowest, highest in zip(arm.driven, low, high, strict=True):
         least, most = joint.range_deg
-        room = TOLERANCE * max(1.0, abs(least), abs(most))
-        if lowest < least - room or highest > most + room:
+        margin = TOLERANCE * max(1.0, abs(least), abs(most))
+        if lowest < least - margin or highest > most + margin:
             raise PlanError(
                 f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} degrees, its range is "
                 f"{least:g} to {most:g}",

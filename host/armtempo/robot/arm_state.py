@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
-from armtempo.encoding import encode
+from armtempo.encoding import encode, engine_heap
+from armtempo.encoding.engine_heap import EngineHeap
 from armtempo.link import Client
 from armtempo.link.board_messages import Status
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.robot import engine_room
 
 _WORDS = {
     "channel": "motor channel",
@@ -56,7 +56,7 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
         raise _other_arm(arm, client.fetch(wire.ARM_RECORD_NAME), data)
     if arm.outputs or arm.inputs:
         client.need("outputs", f"the outputs and inputs of arm {arm.name!r}")
-    engine_room.check(arm, client.info)
+    engine_heap.check(arm, EngineHeap(client.info.engine_bytes))
     client.upload(wire.ARM_RECORD_NAME, data)
     client.hello()
 

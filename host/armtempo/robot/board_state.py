@@ -84,7 +84,7 @@ class BoardState:
     """Highest step rate of all joints together, steps/s."""
     rates_measured: bool
     """Whether the step rates were measured by its self-test; otherwise they are estimates."""
-    room: str
+    engine_memory: str
     """Text: which arms fit into its memory."""
     arm_problem: str
     """Why a stored arm record is not used; "" if it is used, or there is none."""
@@ -160,8 +160,8 @@ def _tool(arm: Arm, joints: tuple[JointState, ...]) -> ToolPlace:
 
 def read(client: Client, port: str) -> BoardState:
     """The board's present state, in steps and counts."""
+    from armtempo.encoding.engine_heap import EngineHeap
     from armtempo.link.program_version import own_crc
-    from armtempo.robot import engine_room
     from armtempo.robot.stored_motion import fault_name
 
     info, status = client.info, client.status()
@@ -181,7 +181,7 @@ def read(client: Client, port: str) -> BoardState:
         max_rate=info.max_rate,
         max_rate_sum=info.max_rate_sum,
         rates_measured=info.rates_measured,
-        room=engine_room.Room.of_board(info).describe(),
+        engine_memory=EngineHeap(info.engine_bytes).describe(),
         arm_problem=_arm_problem(info),
         state=status.state,
         moving=status.moving,
