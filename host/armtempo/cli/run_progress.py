@@ -58,15 +58,9 @@ class RunProgress(Watcher):
 
     def _angles_deg(self, sample: Sample) -> Array:
         """Measured angles, degrees (J,); commanded angles of joints without an encoder."""
-        joints, positions = self._motion.arm.driven, sample.positions
-        return np.array(
-            [
-                counts / joint.counts_per_deg if joint.encoder else steps / joint.steps_per_deg
-                for joint, steps, counts in zip(
-                    joints, positions.commanded_steps, positions.counts, strict=True
-                )
-            ]
-        )
+        gears, positions = self._motion.arm.transmission, sample.positions
+        measured = gears.angles_of_counts(positions.counts)
+        return np.where(gears.measured, measured, gears.angles_of_steps(positions.commanded_steps))
 
     def __enter__(self) -> Self:
         self._progress.__enter__()

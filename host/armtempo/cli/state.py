@@ -59,7 +59,7 @@ def lines(state: BoardState) -> list[str]:
         f"arm       {_arm(state)}",
         f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
         f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together, {_measured(state)}",
-        f"engine    {state.room}",
+        f"engine    {state.engine_memory}",
         *_wear(state),
         *motion_lines(state),
     ]

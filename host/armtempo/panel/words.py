@@ -79,7 +79,7 @@ SPEED_OF_MOTION = "Speed"
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
 HOMING = "Home…"
 HOME_BY_SWITCHES = "Home by the switches"
-BY_SWITCHES = "Or let the arm find its switches, in this order: {order}. It moves; clear its room."
+BY_SWITCHES = "Or let the arm find its switches, in this order: {order}. It moves; clear its workspace."
 SURE = "Does the arm stand as the grey one in the picture? If so, its joints are at:"
 
 DRAG_HINT = "Drag a via point in the picture, or click it to see the other postures that reach it."

@@ -13,6 +13,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import replace_text
 from armtempo.model.steps import position, whole_cycles
 from armtempo.report import html_page
+from armtempo.report.run_folder import transmission
 from armtempo.report.run_report import PAGE
 from armtempo.report.sequence_reader import SequenceRun
 from armtempo.report.verdict import BAD, GOOD, OPEN, STEPS_OFF, Verdict, VerdictItem
@@ -72,8 +73,7 @@ def _results(found: SequenceRun) -> Iterator[LegResult]:
 def _leg(found: SequenceRun, number: int, chosen: NDArray[np.int64]) -> LegResult:
     samples, leg = found.samples, found.legs[number - 1]
     planned = leg(np.minimum(samples.path_s[chosen], leg.duration_s))
-    steps_per_deg = np.array([joint.steps_per_deg for joint in found.joints])
-    command = np.abs(samples.commanded_deg[chosen] - planned) * steps_per_deg
+    command = np.abs(transmission(found.joints).steps(samples.commanded_deg[chosen] - planned))
     measured = np.abs(samples.angle_deg[chosen] - planned)
     runs = found.run[chosen]
     at_end = samples.path_s[chosen] >= leg.duration_s - END_S

@@ -11,24 +11,24 @@ from armtempo.kinematics import Geometry, all_frames
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.model import mesh_files, shipped
 from armtempo.model.arm import Arm
-from armtempo.model.room import FAR_MM, ArmRoom, KeepOut
+from armtempo.model.workspace import FAR_MM, KeepOut, Workspace
 from armtempo.panel.arm_scene import ArmShape
 
 from tests.host.panel.fakes import ARM
 
 
 def test_the_picture_has_the_radii_and_the_room_of_the_arm_file() -> None:
-    room = ArmRoom(
+    workspace = Workspace(
         (KeepOut("tray", (100.0, -50.0, 0.0), (200.0, 50.0, 30.0)),), low_mm=(-FAR_MM, -FAR_MM, -20.0)
     )
     thick = tuple(
         replace(joint, radius_mm=40.0 if number == 2 else 0.0) for number, joint in enumerate(ARM.joints)
     )
-    shape = ArmShape(replace(ARM, joints=thick, room=room))
+    shape = ArmShape(replace(ARM, joints=thick, workspace=workspace))
     radii = {index // 2: radius * shape.reach_mm for index, _, radius in shape.pieces}
     assert radii[2] == pytest.approx(40.0)
     assert all(radius > 5.0 for radius in radii.values())  # what the file does not say is drawn all the same
-    tray, (floor_low, floor_high) = shape.room
+    tray, (floor_low, floor_high) = shape.workspace
     assert np.array(tray) * shape.reach_mm == pytest.approx(np.array([[100, -50, 0], [200, 50, 30]]))
     assert floor_low[2] == floor_high[2] == pytest.approx(-20.0 / shape.reach_mm)
     assert all(floor_high[:2] - floor_low[:2] > 1.0)
