@@ -215,6 +215,20 @@ def case_the_heap_is_collected_often_but_while_something_moves():
         assert 0 < gc.threshold() < (gc.mem_alloc() + gc.mem_free()) // 60
 
 
+def case_a_homing_start_names_whose_switches_end_it():
+    app, host = connected()
+    crc = wire.record_crc(host.record)
+    engine = app.controller.board.engine
+    for mask in (0, 0b10):
+        flags = messages.START_HOMING | mask << messages.START_SWITCHES_BIT
+        assert host.ask("start", (flags, crc), "feed")[0] == "ok"
+        assert engine.homing == mask  # without one: of the joints that move, which are none
+        engine.finish()
+        host.turn(10)
+    start(host)
+    assert engine.homing == 0
+
+
 def hold_one(flags=0):
     app, host = connected(flags=flags)
     crc = wire.record_crc(host.record)
