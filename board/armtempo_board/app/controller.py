@@ -13,7 +13,14 @@ import time
 
 from armtempo_shared import codes, messages
 from armtempo_shared.limits import HOLD_TIMEOUT_MS
-from armtempo_shared.messages import ONCE_NAME, RESUME, SAMPLE_BRAKING, START_HELD, START_HOMING
+from armtempo_shared.messages import (
+    ONCE_NAME,
+    RESUME,
+    SAMPLE_BRAKING,
+    START_HELD,
+    START_HOMING,
+    START_SWITCHES_BIT,
+)
 from micropython import const
 
 from armtempo_board import features, heap
@@ -214,7 +221,7 @@ class Controller:
 
                 self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
             except MemoryError:
-                raise Refused(codes.NO_SEQUENCE_ROOM)
+                raise Refused(codes.NO_SEQUENCE_MEMORY)
 
         def _is_sequence(self, name: str) -> bool:
             self.release_memory()
@@ -225,12 +232,14 @@ class Controller:
 
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
-        heap.collect_often(heap.OFTEN if self.board.workspace.is_short else heap.SELDOM)
+        heap.collect_often(heap.OFTEN if self.board.engine_memory.is_short else heap.SELDOM)
         self.release_memory()
         try:
             motion = self.load(name, crc)
             self.release_memory()
             homing = self._assume(motion, unknown) if flags & START_HOMING else 0
+            if homing:
+                homing = flags >> START_SWITCHES_BIT or homing
             self.board.engine.load(motion, rate, None, homing)
         except Refused:
             self._withdraw_assumed()

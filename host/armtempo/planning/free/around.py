@@ -17,10 +17,10 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import room_check
+from armtempo.planning import workspace_check
 from armtempo.planning.free import free_plan
-from armtempo.planning.room_check import Bodies, Touch
 from armtempo.planning.through_plan import Planned
+from armtempo.planning.workspace_check import Bodies, Touch
 
 _ROUNDS = 5
 """Largest number of planned motions, each closer to the collision-free way."""
@@ -44,7 +44,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
     """The motion of ``free_plan.motion``, around obstacles if a way is found.
 
     Otherwise the motion that touches something. ``nearest``: as near to what is in the way as is fastest; else
-    with room for the changes of a path that becomes part of another.
+    with a distance for the changes of a path that becomes part of another.
     """
     first = planned = free_plan.motion(arm, job, via_deg, progress)
     holding = arm.holding(job.holds)
@@ -86,7 +86,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
 
 def _touch(arm: Arm, job: Job, planned: Planned) -> Touch | None:
     """What a motion touches."""
-    return room_check.touch_of(arm.holding(job.holds), planned.trajectory, None, job.start_touches)
+    return workspace_check.touch_of(arm.holding(job.holds), planned.trajectory, None, job.start_touches)
 
 
 def _loosened(

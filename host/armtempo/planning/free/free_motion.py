@@ -90,14 +90,14 @@ class Demand:
         return np.asarray(np.ptp(self.via_deg, axis=0))
 
     @property
-    def room_deg(self) -> Array:
+    def margin_deg(self) -> Array:
         """Distance of each via point from the nearer end of its joint's range: (n + 1, J)."""
         return np.minimum(self.via_deg - self.low_deg, self.high_deg - self.via_deg)
 
     @property
     def turning(self) -> NDArray[np.bool_]:
         """Via points at the end of a joint's range, where the joint must turn: (n + 1, J)."""
-        return np.asarray(self.room_deg <= _AT_END * self.size_deg)
+        return np.asarray(self.margin_deg <= _AT_END * self.size_deg)
 
 
 @dataclass(frozen=True, eq=False)

@@ -142,7 +142,7 @@ def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
     via = via_deg[:, joints]
     driven = [arm.driven[joint] for joint in joints]
     low, high = np.array([joint.range_deg for joint in driven]).T
-    room = _WIDER * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
+    margin = _WIDER * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
     span = np.ptp(via, axis=0)
     tool = Tool(arm, joints, via_deg[0])
     tolerances = _tolerances(job, via, tool)
@@ -150,8 +150,8 @@ def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
         names=tuple(joint.name for joint in driven),
         via_deg=via,
         limits=np.array([joint.limits.values for joint in driven]),
-        low_deg=np.maximum(low - room, via.min(axis=0) - _BEYOND * span),
-        high_deg=np.minimum(high + room, via.max(axis=0) + _BEYOND * span),
+        low_deg=np.maximum(low - margin, via.min(axis=0) - _BEYOND * span),
+        high_deg=np.minimum(high + margin, via.max(axis=0) + _BEYOND * span),
         stops={stop.via: stop.dwell_s for stop in job.stops},
         corridor_deg=np.inf if job.corridor_deg is None else job.corridor_deg,
         corridor_mm=np.inf if job.corridor_mm is None else job.corridor_mm,
