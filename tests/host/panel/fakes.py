@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo.basics.errors import LinkError
-from armtempo.link.board_messages import Levels
+from armtempo.link.board_messages import Levels, StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.panel_board import Needs, PanelBoard
@@ -91,14 +91,37 @@ class Jog:
 
 
 class Board:
-    """A board that only jogs."""
+    """A board that jogs, and notes what else is asked of it."""
 
     def __init__(self) -> None:
-        self.client = type("Client", (), {"session": Session()})()
+        self.calls: list[tuple[object, ...]] = []
+        """What was called, with its arguments."""
+        self.stored = [StoredMotion("feed", 100, 1, 0, 3, False)]
+        self.info = type("Info", (), {"virtual": True})()
+        self.client = type(
+            "Client", (), {"session": Session(), "drivers": staticmethod(self._noted("drivers"))}
+        )()
         self.jog = Jog()
         self.stops: list[tuple[bool, str]] = []
         self.moves = True
         self.homes = 0
+
+    def _noted(self, *name: object) -> Any:
+        return lambda *given, **more: self.calls.append((*name, *given))
+
+    def __getattr__(self, name: str) -> Any:
+        return self._noted(name)
+
+    def list(self) -> list[StoredMotion]:
+        return self.stored
+
+    def output(self, name: str) -> Any:
+        return type("Output", (), {"set": staticmethod(self._noted("output", name))})
+
+    def selftest(self, progress: object) -> Any:
+        self.calls.append(("selftest",))
+        line = {"verdict": "ok", "part": "pulses", "what": "w", "measured": "1", "expected": "1", "cure": ""}
+        return type("SelfTest", (), {"to_json": lambda _: {"lines": [line]}})()
 
     def configure(self, arm: Arm) -> None:
         """It has this arm."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -36,8 +36,18 @@ class Page:
 
     def look(self) -> None:
         """What the page does every quarter of a second."""
-        with self.client:
-            self.of.refresh()
+        self._call(self.of.refresh)
+
+    def _call(self, call: Callable[[], object]) -> None:
+        """Call something, and wait for what it begins."""
+
+        async def ended() -> None:
+            before = set(background_tasks.running_tasks)
+            with self.client:
+                call()
+            await asyncio.wait_for(asyncio.gather(*(background_tasks.running_tasks - before)), 60)
+
+        self.loop.run_until_complete(ended())
 
     def elements(self, kind: type[Any] = ui.element) -> list[Any]:
         """The elements of a kind, in the order in which they were made."""
@@ -45,7 +55,9 @@ class Page:
 
     def named(self, name: str) -> Any:
         """The control of a name."""
-        found = [one for one in self.elements() if _name(one) == name and not isinstance(one, ui.label)]
+        found = [
+            one for one in self.elements() if _name(one) == name and not isinstance(one, ui.label | ui.tab)
+        ]
         assert found, (name, sorted({_name(one) for one in self.elements()}))
         return found[0]
 
@@ -59,40 +71,51 @@ class Page:
 
     def fire(self, element: Any, event: str, *arguments: Any) -> None:
         """An event of the browser; what it begins is waited for."""
-        given = list(arguments) if len(arguments) != 1 else arguments[0]
-        before = set(background_tasks.running_tasks)  # of the page itself
-        with self.client:
+        given: Any = list(arguments) if len(arguments) != 1 else arguments[0]
+
+        def send() -> None:
             for listener in list(element._event_listeners.values()):
                 if listener.type == event:
-                    handle_event(
-                        listener.handler,
-                        GenericEventArguments(sender=element, client=self.client, args=given),
-                    )
-        self.loop.run_until_complete(
-            asyncio.wait_for(asyncio.gather(*background_tasks.running_tasks - before), 60)
-        )
+                    sent = GenericEventArguments(sender=element, client=self.client, args=given)
+                    handle_event(listener.handler, sent)
+
+        self._call(send)
+
+    def answer(self, name: str) -> None:
+        """Press the button of that name in the dialog that is open."""
+        buttons = [one for one in self.elements(ui.dialog)[-1].descendants() if _name(one) == name]
+        self.press_one(buttons[-1])
 
     def press(self, name: str, value: Any = None, event: str = "click", late_s: float = 0.0) -> None:
         """Press a control that gives a command, as the page's script says it."""
-        element = self.named(name)
-        assert element.enabled, (
-            name,
-            [control.reason for control in self.of.controls if control.element is element],
-        )
+        self.press_one(self.named(name), value, event, late_s)
+
+    def press_one(self, element: Any, value: Any = None, event: str = "click", late_s: float = 0.0) -> None:
+        """Press a control."""
+        reasons = [control.reason for control in self.of.controls if control.element is element]
+        assert element.enabled, (_name(element), reasons)
         said = asdict(fakes.press(self.operator))
         self.fire(element, event, {**said, "made_s": said["made_s"] - late_s}, value)
 
+    def done(self) -> None:
+        """Wait for the running command."""
+        fakes.wait(lambda: not self.operator.busy)
+        self.look()
+
 
 def _name(element: Any) -> str:
-    return str(element.props.get("aria-label") or getattr(element, "text", "") or "")
+    names = (element.props.get("aria-label"), getattr(element, "text", ""), element.props.get("label"))
+    return str(next((name for name in names if name), ""))
 
 
 @contextmanager
 def pages(operator: PanelBoard) -> Iterator[Page]:
     """A page of an operator, in control."""
+    errors: list[BaseException] = []
     loop = asyncio.new_event_loop()
     asyncio.set_event_loop(loop)
     before, core.loop = core.loop, loop
+    handle, core.app.handle_exception = core.app.handle_exception, errors.append  # type: ignore[method-assign]
     client = Client(PageOf("/"))
     try:
         with client:
@@ -103,6 +126,11 @@ def pages(operator: PanelBoard) -> Iterator[Page]:
         yield made
     finally:
         client.delete()
+        for task in asyncio.all_tasks(loop):
+            task.cancel()
+        loop.run_until_complete(asyncio.sleep(0))
         core.loop = before
+        core.app.handle_exception = handle  # type: ignore[method-assign]
         loop.close()
         asyncio.set_event_loop(None)
+    assert errors == []
