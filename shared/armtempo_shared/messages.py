@@ -28,6 +28,8 @@ RESUME = 0xFFFF
 """Instead of a rate: that before the pause."""
 START_HOMING = 1  # flag of start: a limit switch ends the motion without a fault
 START_HELD = 2  # flag of start: the motion brakes unless the host keeps sending hold
+START_SWITCHES_BIT = 2
+"""First bit of start's flags for a homing motion: a bit per joint whose switches end it; none: all that move."""
 
 FEATURES = ("sequences", "outputs", "jog", "speed")
 """Optional features of a program; bits of ``features`` in the answer to ``hello``."""

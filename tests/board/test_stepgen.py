@@ -310,6 +310,7 @@ def test_points_of_quintics_are_rounded_to_the_nearest_unit(bezier: ModuleType) 
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "halves.py"
 
 
+@pytest.mark.slow
 def test_parts_are_the_segments_halves_whatever_way_leads_to_them(interpreter: str, tmp_path: Path) -> None:
     records = [motions.feeding(), motions.feeding(degree=3, refine=3)]
     paths = [tmp_path / f"{number}.atm" for number in range(len(records))]

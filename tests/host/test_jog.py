@@ -14,6 +14,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.cli.jog_screen import JogChoice, JogScreen, _StopKeys
 from armtempo.cli.keys import INTERRUPT, WindowsKeys
+from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.planning import brake_time, move_law
@@ -21,7 +22,6 @@ from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_line import FollowedLine
 from armtempo.planning.jog.jog_motion import JogMotion, JogMove
 from armtempo.planning.move_law import WayLimits
-from armtempo.records import encode
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared.engine_memory import ONCE_BYTES
@@ -441,7 +441,7 @@ def test_keys_choose_what_moves(keys: str, said: str) -> None:
     choice = JogChoice()
     for key in keys:
         assert choice.press(key, len(NAMES)) is (key != "3")
-    assert choice.words(NAMES) == said
+    assert choice.describe(NAMES) == said
     assert not choice.press("+", len(NAMES))
 
 

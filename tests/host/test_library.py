@@ -15,11 +15,11 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.basics import errors
+from armtempo.encoding import encoded_sequence
 from armtempo.kinematics import PoseSolver
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample
 from armtempo.model import shipped
-from armtempo.records import encoded_sequence
 from armtempo.robot import sequence_run
 from armtempo.simulator import LaunchOptions, launch
 from numpy.typing import ArrayLike

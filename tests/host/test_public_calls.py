@@ -13,7 +13,7 @@ from typing import Any, cast
 import armtempo
 import numpy as np
 import pytest
-from armtempo.records import encoded_motion
+from armtempo.encoding import encoded_motion
 
 ARM = armtempo.Arm.paper()
 JOB = armtempo.Job(

@@ -19,6 +19,8 @@ from armtempo.report import run_folder
 from armtempo_shared import armrecord, motion, sequence, way_back, wire
 
 RAMPS = tuple(range(1000, 65000, 1000)), tuple(range(1, 33)), 14
+NAMED = {"engine_bytes": "engine_room"}
+"""Fields by the names that their numbers follow from: those they had when their bytes were kept."""
 KEPT = Path(__file__).with_name("stored_bytes.json")
 
 
@@ -28,7 +30,9 @@ def layouts() -> dict[str, str]:
 
 
 def _number(name: str, kind: str) -> int:
-    return crc32(name.encode()) % (1 << {"B": 8, "H": 16, "I": 32, "i": 31, "q": 63, "Q": 64}[kind])
+    return crc32(NAMED.get(name, name).encode()) % (
+        1 << {"B": 8, "H": 16, "I": 32, "i": 31, "q": 63, "Q": 64}[kind]
+    )
 
 
 def _fields(table: tuple[tuple[str, str], ...], prefix: str = "") -> dict[str, int]:

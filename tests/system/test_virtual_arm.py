@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
+from armtempo.encoding import encode
 from armtempo.link import Client, open_board
 from armtempo.link.board_messages import Sample, Status
 from armtempo.link.follow import RunEnd
@@ -19,7 +20,6 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, JointModel
 from armtempo.planning import planner, point_to_point
-from armtempo.records import encode
 from armtempo.robot import arm_state, goto, homing, stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch

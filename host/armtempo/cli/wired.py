@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import LinkError
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
@@ -56,7 +56,7 @@ def _print(
         return
     if not lines:
         results.remark(
-            f"arm {chosen.describe_arm(arm)} has no {kind}s: write [{kind}.NAME] tables in its file"
+            f"arm {resolve.describe_arm(arm)} has no {kind}s: write [{kind}.NAME] tables in its file"
         )
     for line in lines:
         results.echo(line)
@@ -78,7 +78,7 @@ def _output_values(output: Output, raw: int) -> dict[str, Any]:
 
 def _output_lines(found: list[tuple[Output, int]]) -> list[str]:
     return [
-        f"{output.name:<12} {output.kind:<6} {output.pin:<4} {output.words(raw):<16} {_choices(output)}"
+        f"{output.name:<12} {output.kind:<6} {output.pin:<4} {output.describe(raw):<16} {_choices(output)}"
         for output, raw in found
     ]
 
@@ -132,13 +132,13 @@ class Wired:
 @contextmanager
 def _board(given: BoardOptions) -> Iterator[Wired]:
     """Access to the board; raises LinkError if it is set up for another arm than the one that is set."""
-    given = chosen.any_port(given)
-    named = chosen.named_arm(given.arm_path)
-    with chosen.shared_or_own(given, named) as found:
+    given = resolve.any_port(given)
+    named = resolve.named_arm(given.arm_path)
+    with resolve.shared_or_own(given, named) as found:
         if isinstance(found, SharedBoard):
             yield Wired(found, _same_arm(found.state().arm_crc, named))
             return
-        arm = chosen.arm_of_board(found, named)
+        arm = resolve.arm_of_board(found, named)
         found.configure(arm)
         yield Wired(found.client, arm)
 
@@ -147,7 +147,7 @@ def _same_arm(arm_crc: int, named: Arm | None) -> Arm:
     arm = named or Arm.paper()
     if record_crc(arm) != arm_crc:
         raise LinkError(
-            f"the board is set up for a different arm than {chosen.describe_arm(arm)}",
+            f"the board is set up for a different arm than {resolve.describe_arm(arm)}",
             "give that arm's file with --arm",
         )
     return arm

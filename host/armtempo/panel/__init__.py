@@ -2,7 +2,7 @@
 
 ::
 
-    operator.py    the panel's board: one command at a time, one client in control, states for all
+    panel_board.py the panel's board: one command at a time, one client in control, states for all
     live.py        data from the board: state, samples, inputs, outputs, sequence
     press.py       which presses are still meant: number, age, state
     hold.py        a motion that lasts while a browser reports that its button is held

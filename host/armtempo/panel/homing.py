@@ -9,7 +9,7 @@ from nicegui import ui
 
 from armtempo.model.arm import Arm
 from armtempo.panel import words
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage

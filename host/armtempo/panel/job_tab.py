@@ -21,7 +21,7 @@ from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.job_editor import ANGLES, OPTIONS, POSE, WAY_KEYS, Via
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
 
 if TYPE_CHECKING:
@@ -347,7 +347,7 @@ class JobTab:
             self._options.refresh()
             self._draw_vias()
         self._file.look()
-        self._result.set_text(self._plan_words())
+        self._result.set_text(self._describe_plan())
         plan = jobs.plan
         if plan is None or plan is self._played:
             return
@@ -356,14 +356,14 @@ class JobTab:
         for order, chart in enumerate(self._charts):
             chart.show(times, plan.trajectory(times, order))
 
-    def _plan_words(self) -> str:
+    def _describe_plan(self) -> str:
         plan = self._jobs.plan
         if plan is None:
             return words.NO_PLAN
         if self._jobs.plan_is_old:
             return words.PLAN_IS_OLD
-        floor = max(search.floor_s for search in plan.searches)
-        return words.MOTION_TIME.format(total=plan.total_s, floor=floor)
+        bound = max(search.floor_s for search in plan.searches)
+        return words.MOTION_TIME.format(total=plan.total_s, bound=bound)
 
 
 def _cell(via: Via, index: int) -> str:

@@ -19,6 +19,8 @@ from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
 from armtempo.diagnosis.selftest import selftest
 from armtempo.diagnosis.selftest.result import SelfTest
+from armtempo.encoding import encoded_motion, encoded_sequence
+from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, SequenceState, Status, StoredMotion
 from armtempo.model.arm import Arm
@@ -26,8 +28,6 @@ from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning.jog.jog_motion import SPEED, move_of
-from armtempo.records import encoded_motion, encoded_sequence
-from armtempo.records.encoded_motion import EncodedMotion, MotionKey
 from armtempo.report.run import Run
 from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot import (

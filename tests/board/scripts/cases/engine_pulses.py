@@ -133,7 +133,7 @@ def check_samples(rig, motion):
             place = [0, 0]
             while steps.at(place) and steps.at(place)[0] <= planned + late:
                 position += steps.at(place)[1]
-                steps.go_on(place)
+                steps.advance(place)
             assert sample[COMMANDED + joint] == position, (number, joint, sample, position)
 
 

@@ -58,7 +58,7 @@ class Needs(Flag):
     MOVE = IDLE | BOARD | REST
 
 
-class Operator:
+class PanelBoard:
     """The panel's board. All methods are thread-safe.
 
     Commands run one at a time in separate threads; ``stop`` does not wait for them.

@@ -1,35 +1,21 @@
-"""Random lines, arcs, cut corners, waits and speeds of the tool, planned and looked at by code of its own.
-
-    python -m tests.benchmark.lines [--first 0] [--count 100] [--minutes M] [--arcs]
+"""Random jobs with lines, arcs, cut corners, waits and speeds of the tool, and plans of them checked by other code.
 
 For arms that ship: forward kinematics by plain matrix products, scipy's B-splines and rotations, 40 samples a segment.
-Looks for places beyond the tolerance of a line, tools that are too fast, limits exceeded, rests missing. A job that is
-refused is followed in small steps: where that reaches the end within the ranges, it counts as refused wrongly. Prints
-each fault with its seed, and a summary; exits with 1 if a plan is at fault.
 """
 
 from __future__ import annotations
 
-import argparse
-import os
-import sys
-import time
 from dataclasses import dataclass, replace
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
+import numpy as np
+from armtempo.model.arm import Arm
+from armtempo.model.job import Job, Stop
+from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import APPROACH, WHOLE, Pose
+from armtempo.model.tool_way import ToolWay
+from scipy.spatial.transform import Rotation
 
-import numpy as np  # noqa: E402
-from armtempo.basics.errors import PlanError  # noqa: E402
-from armtempo.model.arm import Arm  # noqa: E402
-from armtempo.model.job import Job, Stop  # noqa: E402
-from armtempo.model.plan import Plan  # noqa: E402
-from armtempo.model.tool_pose import APPROACH, WHOLE, Pose  # noqa: E402
-from armtempo.model.tool_way import ToolWay  # noqa: E402
-from armtempo.planning import planner  # noqa: E402
-from scipy.spatial.transform import Rotation  # noqa: E402
-
-from tests.host.problems import faults, sampled  # noqa: E402
+from tests.host.problems import sampled
 
 ARMS = ("parol6", "ar4", "thor", "community", "moveo", "scara", "paper")
 _FOLLOWED = 400
@@ -311,47 +297,3 @@ def _step(arm: Arm, here: np.ndarray, way: Way, part: float) -> np.ndarray | Non
         if not np.all(np.isfinite(angles)) or np.abs(angles - here).max() > 60.0:
             return None
     return None
-
-
-def main() -> int:
-    """Plan and look."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--minutes", type=float, default=np.inf, help="begin no further job after these")
-    parser.add_argument("--arcs", action="store_true", help="only jobs with arcs")
-    options = parser.parse_args()
-    end = time.monotonic() + 60.0 * options.minutes
-    counts = {"planned": 0, "refused": 0, "refused wrongly": 0, "faulty": 0, "arcs in those planned": 0}
-    seconds, over = [], []
-    for seed in range(options.first, options.first + options.count):
-        if time.monotonic() > end:
-            break
-        arm, job = random_lines(seed)
-        arcs = sum(way.arc_through_mm is not None for way in job.ways)
-        if not job.ways or (options.arcs and not arcs):
-            continue
-        start = time.process_time()
-        try:
-            plan = planner.plan(arm, job)
-        except PlanError as error:
-            wrongly = allowed(arm, job)
-            counts["refused wrongly" if wrongly else "refused"] += 1
-            print(f"seed {seed}: {arm.name}: {'WRONGLY ' * wrongly}refused: {error.problem}", flush=True)
-            continue
-        seconds.append(time.process_time() - start)
-        over.append(100.0 * (plan.total_s / plan.searches[0].floor_s - 1.0))
-        counts["planned"] += 1
-        counts["arcs in those planned"] += arcs
-        found = faults(plan, 1e9) + line_faults(plan)
-        counts["faulty"] += bool(found)
-        for fault in found:
-            print(f"seed {seed}: {arm.name}: {fault}", flush=True)
-    print(", ".join(f"{count} {what}" for what, count in counts.items()))
-    print(f"CPU seconds a plan: median {np.median(seconds):.2f}, longest {max(seconds):.2f}")
-    print(f"over the floor: median {np.median(over):.2f} %")
-    return int(counts["faulty"] > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from armtempo_shared import sequence, sequence_check
 from armtempo_shared.wire import record_crc
 
+from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import SequencePlan, rows_of
-from armtempo.records import encode, encoded_motion
-from armtempo.records.encoded_motion import EncodedMotion, MotionKey
 
 
 @dataclass(frozen=True, eq=False)

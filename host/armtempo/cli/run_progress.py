@@ -1,4 +1,4 @@
-"""Display of a run: a progress bar with angles and errors, and optionally a window."""
+"""Display of a run: a progress bar with angles and errors."""
 
 from __future__ import annotations
 
@@ -10,25 +10,21 @@ import numpy as np
 from armtempo_shared.limits import TICK_HZ
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import ArmtempoError
 from armtempo.cli import results
 from armtempo.cli.results import ProgressBar
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link.board_messages import Sample
-from armtempo.records.encoded_motion import EncodedMotion
-from armtempo.report.live_plot import LivePlot
 from armtempo.report.run_folder import Repetition, RunFolder
 from armtempo.robot.recording import Watcher
 
 
-class Live(Watcher):
-    """Shows a run on the terminal; a context. Without a display it prints that and opens no window."""
+class RunProgress(Watcher):
+    """Shows a run on the terminal; a context."""
 
-    def __init__(self, window: bool, where: str = "", aside: bool = False) -> None:
+    def __init__(self, where: str = "", aside: bool = False) -> None:
         """``where``: text about a virtual board; ``aside``: print to stderr."""
         self._say = results.remark if aside else results.echo
-        self._window = window
         self._where = f", on {where}" if where else ""
-        self._plot: LivePlot | None = None
         self._progress = ProgressBar("moving")
         self._before = (0, 0)
         """Ticks of the last sample, and of the motion's own time."""
@@ -37,7 +33,6 @@ class Live(Watcher):
         """Print the motion and its run folder."""
         self._motion = motion
         self._started_s = time.monotonic()
-        self._plot = self._open() if self._window else None
         self._say(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}")
 
     def on_sample(self, sample: Sample, duration_s: float) -> None:
@@ -48,8 +43,6 @@ class Live(Watcher):
         pairs = (f"{angle:.1f}° ({error:+.2f})" for angle, error in zip(angles, errors, strict=True))
         elapsed = time.monotonic() - self._started_s
         self._progress(time_s, duration_s, f"{elapsed:.0f} s{self._speed(sample)}  {'  '.join(pairs)}")
-        if self._plot is not None:
-            self._plot.add(time_s, angles)
 
     def _speed(self, sample: Sample) -> str:
         """The speed since the previous sample, if it is not the planned one."""
@@ -57,30 +50,17 @@ class Live(Watcher):
         if sample.ticks <= before:
             return ""
         percent = round(100 * (sample.path_ticks - path_before) / (sample.ticks - before))
-        return "" if percent in (99, 100, 101) else f", at {percent} %" if percent > 0 else ", in a pause"
+        return "" if percent in (99, 100, 101) else f", at {percent} %" if percent > 0 else ", paused"
 
     def end(self, repetition: Repetition) -> None:
         """Print how the repetition ended."""
         self._say(repetition_line(repetition))
 
-    def _open(self) -> LivePlot | None:
-        try:
-            return LivePlot(self._motion.trajectory, [joint.name for joint in self._motion.arm.driven])
-        except ArmtempoError as error:
-            results.show_error(error, "no live plot")
-            return None
-
     def _angles_deg(self, sample: Sample) -> Array:
         """Measured angles, degrees (J,); commanded angles of joints without an encoder."""
-        joints, positions = self._motion.arm.driven, sample.positions
-        return np.array(
-            [
-                counts / joint.counts_per_deg if joint.encoder else steps / joint.steps_per_deg
-                for joint, steps, counts in zip(
-                    joints, positions.commanded_steps, positions.counts, strict=True
-                )
-            ]
-        )
+        gears, positions = self._motion.arm.transmission, sample.positions
+        measured = gears.angles_of_counts(positions.counts)
+        return np.where(gears.measured, measured, gears.angles_of_steps(positions.commanded_steps))
 
     def __enter__(self) -> Self:
         self._progress.__enter__()
@@ -90,8 +70,6 @@ class Live(Watcher):
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._progress.__exit__(kind, value, trace)
-        if self._plot is not None:
-            self._plot.close()
 
 
 def repetition_line(done: Repetition) -> str:

@@ -1,28 +1,19 @@
-"""Random motions in random rooms, checked against dense samples by code of its own.
+"""Random motions in random workspaces, and their distances at dense samples by code of its own.
 
-    python -m tests.benchmark.rooms [--first 0] [--count 1000] [--free]
-
-Straight motions of arms that ship, links and loads of random radii, boxes. Distances are taken at 1500 times of each
-motion between points on the links and the boxes; what moves less than that between samples is allowed for. Exits with 1
-where a motion is accepted that touches, or more than 2 % are refused that do not. With --free those that touch are
-planned with path = "free" instead, from where nothing touches to where nothing does.
+Straight motions of arms that ship, links and loads of random radii, boxes; distances of points on the links from the
+boxes.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
-import time
 from dataclasses import replace
 
 import numpy as np
-from armtempo.basics.errors import PlanError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
 from armtempo.model.parts import Load
-from armtempo.model.room import ArmRoom, KeepOut
-from armtempo.planning import planner, point_to_point, room_check
+from armtempo.model.workspace import KeepOut, Workspace
+from armtempo.planning import point_to_point, workspace_check
 from armtempo.splines.trajectory import Trajectory
 
 ARMS = ("parol6", "ar4", "thor", "community", "moveo", "scara", "paper")
@@ -30,8 +21,8 @@ _POINTS = 41
 """Points on a link."""
 
 
-def random_room(seed: int) -> tuple[Arm, Trajectory]:
-    """An arm in a room, and a motion from a posture that touches nothing."""
+def random_workspace(seed: int) -> tuple[Arm, Trajectory]:
+    """An arm in a workspace, and a motion from a posture that touches nothing."""
     rng = np.random.default_rng([seed, 32])
     for _ in range(1000):
         name = ARMS[int(rng.integers(len(ARMS)))]
@@ -53,8 +44,8 @@ def random_room(seed: int) -> tuple[Arm, Trajectory]:
             figures = reach * rng.uniform(0.0, (0.05, 0.2))
             centre = tuple(map(float, 0.1 * reach * rng.uniform(-1.0, 1.0, 3)))
             load = Load("random", 0.0, *map(float, figures), "xyz"[rng.integers(3)], centre)
-        arm = replace(arm, joints=joints, room=ArmRoom(tuple(boxes)), held=load)
-        if not room_check.posture_touches(arm, start):
+        arm = replace(arm, joints=joints, workspace=Workspace(tuple(boxes)), held=load)
+        if not workspace_check.posture_touches(arm, start):
             return arm, point_to_point.straight("random", start, end, arm)
     raise AssertionError("no posture is free")
 
@@ -94,64 +85,8 @@ def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
 def _least(arm: Arm, points: np.ndarray) -> float:
     """Of points (N, 3, P) from all boxes; they count as 0 inside."""
     found = np.inf
-    for box in (arm.room or ArmRoom()).keep_out:
+    for box in (arm.workspace or Workspace()).keep_out:
         low, high = np.array(box.low_mm)[:, None], np.array(box.high_mm)[:, None]
         away = np.maximum(np.maximum(low - points, points - high), 0.0)
         found = min(found, float(np.linalg.norm(away, axis=1).min()))
     return found
-
-
-def main() -> int:
-    """Check and count."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--count", type=int, default=1000)
-    parser.add_argument("--free", action="store_true")
-    options = parser.parse_args()
-    if options.free:
-        return _free(range(options.first, options.first + options.count))
-    counts = {"free": 0, "touching": 0, "touching, but accepted": 0, "refused wrongly": 0}
-    for seed in range(options.first, options.first + options.count):
-        arm, trajectory = random_room(seed)
-        touch, least = room_check.touch_of(arm, trajectory), dense_least(arm, trajectory, 1500)
-        if touch is None:
-            kind = "free" if least > 0.0 else "touching, but accepted"
-        else:
-            kind = "touching" if least < 0.1 else "refused wrongly"
-        counts[kind] += 1
-        if kind not in ("free", "touching"):
-            print(
-                f"seed {seed}: {arm.name}: {kind}, least {least:.3f} mm, {touch and touch.words}", flush=True
-            )
-    print(", ".join(f"{count} {what}" for what, count in counts.items()))
-    return int(counts["touching, but accepted"] > 0 or counts["refused wrongly"] > 0.02 * options.count)
-
-
-def _free(seeds: range) -> int:
-    """Plan around what is in the way."""
-    counts, seconds = {"around": 0, "refused": 0, "touching, but accepted": 0}, []
-    for seed in seeds:
-        arm, trajectory = random_room(seed)
-        via = trajectory(np.array([0.0, trajectory.duration_s]))
-        if not room_check.touch_of(arm, trajectory) or room_check.posture_touches(arm, via[1]):
-            continue
-        begun = time.process_time()
-        try:
-            plan = planner.plan(replace(arm, loads=(arm.held,) * bool(arm.held)), _job(arm, via))
-            kind = "around" if dense_least(arm, plan.trajectory, 1500) > 0.0 else "touching, but accepted"
-        except PlanError as error:
-            kind = "refused"
-            print(f"seed {seed}: {arm.name}: {error.problem}", flush=True)
-        seconds.append(time.process_time() - begun)
-        counts[kind] += 1
-    print(", ".join(f"{count} {what}" for what, count in counts.items()))
-    print(f"CPU seconds a plan: median {np.median(seconds):.2f}, longest {max(seconds):.2f}")
-    return int(counts["touching, but accepted"] > 0)
-
-
-def _job(arm: Arm, via: np.ndarray) -> Job:
-    return Job("free", via_deg=via.tolist(), path="free", holds=arm.held.name if arm.held else "")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -124,10 +124,10 @@ def arm_of_board(board: Board, named: Arm | None) -> Arm:
 
 def describe_arm(arm: Arm) -> str:
     """An arm as commands name it."""
-    return source_words(arm.name, arm.source)
+    return describe_source(arm.name, arm.source)
 
 
-def source_words(name: str, source: str) -> str:
+def describe_source(name: str, source: str) -> str:
     """An arm's name and file; without the file for a shipped arm."""
     ships = Path(source).is_relative_to(Path(__file__).parents[1]) if source else False
     where = "ships with armtempo" if ships else source
@@ -180,8 +180,8 @@ def as_recorded(
 
 def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = None) -> SequencePlan:
     """A planned sequence; raises InputError if an arm is set and it does not fit, or if ``name`` is given."""
+    from armtempo.encoding.encode import arm_record
     from armtempo.model.sequence_plan import SequencePlan
-    from armtempo.records.encode import arm_record
 
     if name is not None:
         raise InputError("--name: the name of a sequence is in its file", "change it there and plan it again")
@@ -244,7 +244,7 @@ def board(
         else connect.connect_now(port, arm, how)
     )
     if found.info.virtual:
-        remark(f"port {found.port}: {_virtual_words(found.port)}")
+        remark(f"port {found.port}: {_describe_virtual(found.port)}")
     return found
 
 
@@ -278,7 +278,7 @@ def board_state(given: BoardOptions) -> BoardState:
                 continue
 
 
-def _virtual_words(port: str) -> str:
+def _describe_virtual(port: str) -> str:
     """Describe the virtual board on a port."""
     if port == SIM:
         return "a virtual board, which ends with this command"

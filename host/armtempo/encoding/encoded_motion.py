@@ -10,10 +10,10 @@ from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
+from armtempo.encoding import decode, encode
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.planning import brake_time, point_to_point
-from armtempo.records import decode, encode
 from armtempo.splines.trajectory import Trajectory
 
 
@@ -82,5 +82,5 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
 
 def of_record(name: str, data: bytes, arm: Arm) -> EncodedMotion:
     """The motion of a record from the board; raises InputError if it is damaged or does not fit the arm."""
-    trajectory = decode.trajectory(data, arm.driven, name, f"arm {arm.name!r}")
+    trajectory = decode.trajectory(data, arm.transmission, name, f"arm {arm.name!r}")
     return EncodedMotion(name, arm, trajectory, data)
