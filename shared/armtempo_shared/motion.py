@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import BinaryIO
 
-    Ramps = tuple[Sequence[int], Sequence[int], int]
+    Ramps = tuple[Sequence[int], Sequence[int], int, int]
 
 MAGIC = b"ATM4"
 SHARED_AXIS = 1
@@ -87,9 +87,9 @@ def size(degree: int, joints: int, shared: bool, segments: int, refine: int) -> 
     return HEAD_SIZE + 8 * points + 4
 
 
-def no_ramps() -> "tuple[tuple[int, ...], tuple[int, ...], int]":
+def no_ramps() -> "tuple[tuple[int, ...], tuple[int, ...], int, int]":
     """Ramps of a motion that can neither brake nor change its speed."""
-    return (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS
+    return (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS, 0
 
 
 def pack(
@@ -99,17 +99,16 @@ def pack(
     refine: int,
     ramps: "Ramps",
     arm_crc: int,
-    edge_bits: int = 0,
 ) -> bytes:
     """A motion record of n path segments with ``refine`` R time segments each.
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
     all, its n * R + k control points (int, ticks * 2**16). ``ramps``: REST_ENTRIES entries of ramps to rest,
-    OTHER_ENTRIES of others, and the bits of their unit; ``edge_bits``: e.
+    OTHER_ENTRIES of others, the bits of their unit, and e.
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
-    flags = (SHARED_AXIS if shared else 0) | edge_bits << _EDGE_BIT
+    flags = (SHARED_AXIS if shared else 0) | ramps[3] << _EDGE_BIT
     head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, ramps[2], segments, refine, arm_crc)
     head += struct.pack(_RAMPS, *ramps[0], *ramps[1])
     body: "list[int]" = []

@@ -32,7 +32,7 @@ from tests.shared import stored_bytes
 
 BITS = {"B": 8, "H": 16, "I": 32, "i": 31}
 ARM_CRC = 0x12345678
-RAMPS = tuple(range(1, 65)), tuple(range(1000, 65000, 2000)), 14
+RAMPS = tuple(range(1, 65)), tuple(range(1000, 65000, 2000)), 14, 0
 Row = tuple[int, int, int, int, int]
 LARGEST = {
     sequence.MOVE: (0, 0),

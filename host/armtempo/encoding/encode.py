@@ -63,8 +63,7 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
     checks.check_held(trajectory, arm)
     first = trajectory.joints[0]
     crc = record_crc(arm_record(arm))
-    edge_bits = brakes.edge_bits if brakes else 0
-    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc, edge_bits)
+    return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc)
 
 
 def way_back(data: bytes, name: str, brakes: BrakeTimes) -> bytes:
@@ -72,16 +71,16 @@ def way_back(data: bytes, name: str, brakes: BrakeTimes) -> bytes:
 
     ``name``: of the stored motion; ``brakes``: those of the way back.
     """
-    return motion_way_back.pack(data, name, _ramps(brakes), brakes.edge_bits)
+    return motion_way_back.pack(data, name, _ramps(brakes))
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
-    """Ramp entries, to rest and others, as integers, and the bits of their unit."""
+    """Ramp entries, to rest and others, as integers, the bits of their unit, and e (``armtempo_shared.motion``)."""
     if brakes is None:
         return motion.no_ramps()
     shapes = (motion.RAMP_LENGTH + 1) * np.append(brakes.shapes, motion.EVEN_RAMP)
     to_rest = [int(entry) for entry in brakes.to_rest + shapes]
-    return to_rest, [int(entry) for entry in brakes.others], brakes.unit_bits
+    return to_rest, [int(entry) for entry in brakes.others], brakes.unit_bits, brakes.edge_bits
 
 
 def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:

@@ -63,7 +63,7 @@ def some_ramps():
         [random.randrange(300, longest) + 2048 * random.randrange(len(RAMP_SHAPES)) for longest in lengths]
         for lengths in RAMPS[:2]
     ]
-    return ramps[0], ramps[1], RAMP_BITS
+    return ramps[0], ramps[1], RAMP_BITS, random.choice([0, 0, 2, 3, 5])
 
 
 def place_of(parts, edge_bits, share):
@@ -102,7 +102,7 @@ def some_motion():
         inner = [(random.random() - 0.5) * size for _ in range(segments - 5)] if segments > 5 else []
         last = (random.random() - 0.5) * size
         angles.append([0.0] * 5 + inner + [last] * (segments - len(inner)))
-    return record(some_ramps(), angles, times, random.choice([0, 0, 2, 3, 5]))
+    return record(some_ramps(), angles, times)
 
 
 def begin(motion, rate=1000):

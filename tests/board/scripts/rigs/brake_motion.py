@@ -8,7 +8,7 @@ SEGMENTS = 9
 BRAKE_TICKS = TICK_HZ // 5
 RAMP_BITS = 14
 _LENGTH = (BRAKE_TICKS >> RAMP_BITS,)
-RAMPS = _LENGTH * motion.REST_ENTRIES, _LENGTH * motion.OTHER_ENTRIES, RAMP_BITS
+RAMPS = _LENGTH * motion.REST_ENTRIES, _LENGTH * motion.OTHER_ENTRIES, RAMP_BITS, 0
 # steps at the control points, seconds at those of the time axis
 ANGLES = (
     (0, 0, 0, 0, 0, 400, 1800, 2500, 3000, 3000, 3000, 3000, 3000, 3000),
@@ -22,10 +22,10 @@ def whole(values, scale):
     return [round(value * scale) for value in values]
 
 
-def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES, edge_bits=0):
+def record(ramps=RAMPS, control_points=ANGLES, time_points=TIMES):
     angles = [whole(points, 1 << 28) for points in control_points]
     times = [whole(time_points, TICK_HZ << 16)]
-    return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0, edge_bits))
+    return motion.Motion(motion.pack(5, angles, times, 1, ramps, 0))
 
 
 def ramp_way(shape, r):
