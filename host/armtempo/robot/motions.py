@@ -29,7 +29,7 @@ from armtempo.robot.recording import Watcher
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.store import BoardStore
+from armtempo.robot.store import BoardStore, stored_name
 
 MOST_REPETITIONS = 99
 """Their files are numbered with two digits."""
@@ -200,7 +200,7 @@ class Motions:
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
         """Store the sequence if it is a plan, and move a virtual arm to its start; returns its key."""
         if isinstance(sequence, str):
-            found = self._board.client.find(self._store.stored_name(sequence))
+            found = self._board.client.find(stored_name(sequence))
             if found is None or not found.sequence:
                 raise InputError(f"the board has no sequence {sequence!r}", "see 'armtempo list'")
             if self._board.arm is not None:
