@@ -144,7 +144,7 @@ class _Work:
         self._now_ms = 0
         self._rests_ms = 0
         self._steps = self._in_steps(arm.home_deg)
-        self._limits = [(row["min_steps"], row["max_steps"]) for row in encode.joint_rows(arm)]
+        self._limits = [(row["min_steps"], row["max_steps"]) for row in encode.motor_rows(arm)]
         self.run.posture_deg = tuple(float(angle) for angle in arm.home_deg)
 
     def _in_steps(self, angles_deg: Sequence[float]) -> list[int]:

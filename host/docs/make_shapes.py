@@ -14,6 +14,7 @@ from armtempo.model.parts import Limits
 from armtempo.planning import brake_time, move_law
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
+from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPE_BIT
 
 MODULE = Path(__file__).parents[2] / "shared" / "armtempo_shared" / "shapes.py"
@@ -33,9 +34,9 @@ RAMP_BITS = 10
 SHAPES = (
 '''
 DESCRIPTION = '''\
-"""Little endian, each: 3 I, speed, acceleration and jerk of a move over 1 in time 1, at most, the latter two over
-the fractions of the limits that moves by hand use; i, control points of the way, then of the time; H, entries of ramps
-to rest and of others as in a motion record."""
+"""Little endian, each: 4 I, speed, acceleration and jerk of a move over 1 in time 1, at most, the latter two over
+the fractions of the limits that moves by hand use, and e of a motion record; i, control points of the way, then of the
+time; H, entries of ramps to rest and of others as in a motion record."""
 '''
 
 
@@ -56,7 +57,7 @@ def text(motion: Trajectory) -> str:
     fractions = (1.0, move_law.ACCELERATION, move_law.JERK)
     limits = [value / part for value, part in zip(most.values, fractions, strict=True)]
     brakes = brake_time.of_motion(motion, [Limits(*limits)])
-    starts_s = [np.linspace(0.0, 1.0, len(table)) for table in (brakes.to_rest, brakes.others)]
+    unit = 1024 * 2**brakes.unit_bits / TICK_HZ
     shapes = np.append(brakes.shapes, EVEN_RAMP) << RAMP_SHAPE_BIT
     factors = [math.ceil(value * 1024) for value in limits]
     points = [
@@ -66,11 +67,11 @@ def text(motion: Trajectory) -> str:
     ]
     ramps = np.concatenate(
         [
-            np.ceil(brakes.rest_s(starts_s[0]) * 1024).astype(int) + shapes,
-            np.ceil(brakes.change_s(starts_s[1]) * 1024).astype(int),
+            np.ceil(brakes.to_rest * unit).astype(int) + shapes,
+            np.ceil(brakes.others * unit).astype(int),
         ]
     ).tolist()
-    data = struct.pack(f"<3I{len(points)}i{len(ramps)}H", *factors, *points, *ramps)
+    data = struct.pack(f"<4I{len(points)}i{len(ramps)}H", *factors, brakes.edge_bits, *points, *ramps)
     lines = [
         '    b"' + "".join(f"\\x{byte:02x}" for byte in data[at : at + 25]) + '"'
         for at in range(0, len(data), 25)

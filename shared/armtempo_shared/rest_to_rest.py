@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 DEGREE = 5
 SHORTEST_TICKS = TICK_HZ // 20
 PERCENT = 100
-_FACTORS = "<3I"
+_FACTORS = "<4I"
+_EDGE_BITS = 3
 _ENTRIES = REST_ENTRIES + OTHER_ENTRIES
 _POINTS_AT = struct.calcsize(_FACTORS)
 
@@ -106,7 +107,8 @@ class Move:
             shape = entry >> RAMP_SHAPE_BIT
             length = (entry & RAMP_LENGTH) * self.duration_ticks >> RAMP_BITS + bits
             scaled.append((shape << RAMP_SHAPE_BIT) + length + 1)
-        return scaled[:REST_ENTRIES], scaled[REST_ENTRIES:], bits
+        edge_bits = struct.unpack_from(_FACTORS, self._shape, 0)[_EDGE_BITS]
+        return scaled[:REST_ENTRIES], scaled[REST_ENTRIES:], bits, edge_bits
 
 
 def _points(shape: bytes) -> int:

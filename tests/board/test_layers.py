@@ -86,7 +86,7 @@ make_constants = sources.script(BOARD.parent / "make_constants.py")
 
 
 def literals(index: ast.AST, allowed: tuple[int, ...] = ()) -> Iterator[int]:
-    """Numbers in an index. The first needs no name, nor does a neighbour, one further or one before, nor a word's 4 bytes."""
+    """Numbers in an index. The first needs no name, nor a neighbour, one further or before, nor a word's 4 bytes."""
     if isinstance(index, ast.Constant) and isinstance(index.value, int) and index.value not in allowed:
         yield index.value
     if isinstance(index, ast.BinOp) and isinstance(index.op, ast.Add | ast.Sub):

@@ -394,7 +394,7 @@ def test_the_program_on_a_board(project: Path, monkeypatch: pytest.MonkeyPatch) 
     def deploy(port: str, tell: Any, progress: Any) -> Hello:
         tell("copied")
         numbers = dict.fromkeys(Hello.__dataclass_fields__, 0)
-        return Hello(**{**numbers, "board_id": "x", "engine_room": 60_000})
+        return Hello(**{**numbers, "board_id": "x", "engine_bytes": 60_000})
 
     monkeypatch.setattr("armtempo.deploy.deploy", deploy)
     monkeypatch.setattr("armtempo.deploy.undeploy", lambda port, tell: tell("removed"))

@@ -28,6 +28,7 @@ from armtempo.report.run_reader import RunData
 from armtempo_shared import wire
 from click.testing import CliRunner
 
+from tests import interpreters, sources
 from tests.host import made_runs
 
 FORMULAS = ("$$", r"$\theta$", r"_a^{b}\frac")
@@ -207,3 +208,35 @@ def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:
     assert all(f"{joint.name} " in line for joint, line in zip(made.arm.driven, lines[2:], strict=True))
     times = stored.motion_lines(motion, [1.0] * len(scales))[3:]
     assert len({line.index(" s, up to") for line in times}) == 1
+
+
+SENTENCES = (
+    "is taken as this",
+    "moving in a pause",
+    "lets nobody watch",
+    "points apart by",
+    "turn to turn",
+    "the best nearby",
+    "with the tool there",
+    "is not the server's",
+    "as far as it was measured",
+    "can look at them",
+    "Is there while",
+    "version of machine",
+)
+"""Parts of sentences that had to be read twice."""
+
+
+@sources.TOGETHER
+def test_sentences_that_had_to_be_read_twice_are_gone() -> None:
+    texts = [
+        path
+        for folder in ("host", "shared", "board")
+        for path in (interpreters.ROOT / folder).rglob("*")
+        if path.suffix in (".py", ".md", ".js", ".html", ".txt") and "_build" not in path.parts
+    ]
+    assert len(texts) > 300
+    found = [
+        f"{path}: {one}" for path in texts for one in SENTENCES if one in path.read_text(encoding="utf-8")
+    ]
+    assert found == []

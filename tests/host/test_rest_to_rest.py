@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 import random
-import struct
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 from armtempo_shared import limits, motion, rest_to_rest
 from armtempo_shared.engine_memory import ONCE_BYTES
-from armtempo_shared.motion import EVEN_RAMP, RAMP_LENGTH
+from armtempo_shared.motion import EVEN_RAMP, RAMP_LENGTH, RAMP_SHAPE_BIT
 from armtempo_shared.rest_to_rest import Move, TooLongError
 
 from tests.host.test_floors import changed_excess, every_start
@@ -48,14 +48,17 @@ def random_ends(rng: random.Random, arm: Arm) -> tuple[list[int], list[int]]:
 def brakes_of(data: bytes, found: Trajectory, starts_s: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Length in seconds and shape of the ramps to rest, and of others, from these times."""
     stored = motion.Motion(data)
-    entries = struct.unpack("<96H", stored.ramps)
     unit_s = (1 << stored.ramp_bits) / limits.TICK_HZ
+    duration = math.ceil(found.duration_s * limits.TICK_HZ / 1024)
     rows = []
-    for table in (np.array(entries[:64]), np.array(entries[64:])):
-        places = np.linspace(0.0, found.duration_s, len(table))
-        lengths = unit_s * np.interp(starts_s, places, table & RAMP_LENGTH)
-        number = (starts_s * (len(table) - 1) / found.duration_s).astype(int)
-        rows.append((lengths, table[number] >> 11))
+    for to_rest in (True, False):
+        entries = np.array(
+            [
+                stored.ramp(int(start * limits.TICK_HZ / 1024), duration, to_rest)
+                for start in starts_s.tolist()
+            ]
+        )
+        rows.append((unit_s * (entries & RAMP_LENGTH), entries >> RAMP_SHAPE_BIT))
     return rows
 
 
@@ -67,7 +70,7 @@ def test_random_moves_keep_their_limits_and_end_where_they_should(seed: int) -> 
         arm = rng.choice(ARMS)
         start, target = random_ends(rng, arm)
         data = record(arm, start, target)
-        found = decode.trajectory(data, arm.driven, "move")
+        found = decode.trajectory(data, arm.transmission, "move")
         for joint, spline, most, begin, end in zip(
             arm.driven, found.joints, extremes.of_joints(found.joints), start, target, strict=True
         ):
@@ -86,7 +89,7 @@ def test_braking_and_changes_of_speed_keep_what_they_may(seed: int) -> None:
     for _ in range(3):
         arm = rng.choice(ARMS)
         data = record(arm, *random_ends(rng, arm))
-        found = decode.trajectory(data, arm.driven, "move")
+        found = decode.trajectory(data, arm.transmission, "move")
         starts = every_start(found, 31)
         allowed = [joint.limits for joint in arm.driven]
         to_rest, others = brakes_of(data, found, starts)
@@ -104,7 +107,7 @@ def test_they_take_little_more_time_than_the_hosts_moves(share: float) -> None:
         start = [low + 0.05 * (high - low) for low, high in (joint.range_deg for joint in arm.driven)]
         end = [low + (0.05 + share) * (high - low) for low, high in (joint.range_deg for joint in arm.driven)]
         data = record(arm, steps(arm, start), steps(arm, end))
-        taken_s = decode.trajectory(data, arm.driven, "move").duration_s
+        taken_s = decode.trajectory(data, arm.transmission, "move").duration_s
         assert taken_s <= 1.25 * point_to_point.straight("m", start, end, arm).duration_s
 
 

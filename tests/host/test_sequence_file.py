@@ -412,8 +412,8 @@ def test_a_whole_run() -> None:
         (recorded(), leg(runs=5), OPEN, "2 runs of motions lack samples, or did not reach their end"),
         (recorded(), leg(end_steps=7.0), BAD, "a motion ended 7.0 steps from its planned end"),
         (recorded(), leg(measured_deg=np.nan), OPEN, f"{JOINT} has no encoder"),
-        (recorded("stopped"), leg(), OPEN, "stopped in step 1 after 3 whole cycles"),
-        (recorded("refused", code="busy"), leg(), BAD, "refused (busy) in step 1 after 3 whole cycles"),
+        (recorded("stopped"), leg(), OPEN, "stopped in step 1 of cycle 4"),
+        (recorded("refused", code="busy"), leg(), BAD, "refused (busy) in step 1 of cycle 4"),
     ],
 )
 def test_what_is_not_as_it_should_be_comes_first(

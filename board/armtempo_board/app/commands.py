@@ -182,7 +182,7 @@ class Commands:
             board.arm_crc,
             board.program_crc,
             board.boot,
-            board.engine_room(),
+            board.engine_bytes(),
             features.BITS | (RATES_MEASURED if 0 < board.joints <= step_rates.joints else 0),
             board.arm_problem,
             board.arm_value,

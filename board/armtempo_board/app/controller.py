@@ -13,7 +13,14 @@ import time
 
 from armtempo_shared import codes, messages
 from armtempo_shared.limits import HOLD_TIMEOUT_MS
-from armtempo_shared.messages import ONCE_NAME, RESUME, SAMPLE_BRAKING, START_HELD, START_HOMING
+from armtempo_shared.messages import (
+    ONCE_NAME,
+    RESUME,
+    SAMPLE_BRAKING,
+    START_HELD,
+    START_HOMING,
+    START_SWITCHES_BIT,
+)
 from micropython import const
 
 from armtempo_board import features, heap
@@ -228,7 +235,7 @@ class Controller:
 
                     self.sequence = program_start.user_program(self, name, crc, rate)
             except MemoryError:
-                raise Refused(codes.NO_SEQUENCE_ROOM)
+                raise Refused(codes.NO_SEQUENCE_MEMORY)
 
         def _kind(self, name: str) -> int:
             self.release_memory()
@@ -239,12 +246,15 @@ class Controller:
 
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
-        heap.collect_often(heap.OFTEN if self.board.workspace.is_short else heap.SELDOM)
+        heap.collect_often(heap.OFTEN if self.board.engine_memory.is_short else heap.SELDOM)
         self.release_memory()
         try:
             motion = self.load(name, crc)
             self.release_memory()
-            homing = self._assume(motion, unknown) if flags & START_HOMING else 0
+            homing = 0
+            if flags & START_HOMING:
+                moving = self._assume(motion, unknown)
+                homing = flags >> START_SWITCHES_BIT or moving
             self.board.engine.load(motion, rate, None, homing)
         except Refused:
             self._withdraw_assumed()

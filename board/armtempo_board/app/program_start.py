@@ -29,7 +29,7 @@ def user_program(controller: "Any", name: str, crc: "int | None", rate: int) -> 
         gc.collect()
         missing = program.needed_bytes(record.source_bytes) - gc.mem_free()
         if missing > 0:
-            raise Refused(codes.NO_SEQUENCE_ROOM, value=missing)
+            raise Refused(codes.NO_SEQUENCE_MEMORY, value=missing)
     try:
         return UserProgram(controller, record, name.encode(), rate)
     except ValueError:

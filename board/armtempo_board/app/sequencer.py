@@ -118,8 +118,8 @@ class Sequencer:
         free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES
         if free < _START_BYTES:
             controller.sequence = None
-            raise Refused(codes.NO_SEQUENCE_ROOM, value=_START_BYTES - free)
-        heap.collect_often(heap.OFTEN if controller.board.workspace.is_short else heap.SELDOM)
+            raise Refused(codes.NO_SEQUENCE_MEMORY, value=_START_BYTES - free)
+        heap.collect_often(heap.OFTEN if controller.board.engine_memory.is_short else heap.SELDOM)
         self._command.attach(controller.board.extra_commands)
 
     def change_rate(self, rate: int) -> None:

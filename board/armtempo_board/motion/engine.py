@@ -411,7 +411,7 @@ class Engine:
         self.moving = False
 
     def close(self) -> None:
-        """Release the hardware, the workspace and the motion's file; the engine is not used after it."""
+        """Release the hardware, the engine_memory and the motion's file; the engine is not used after it."""
         self.freeze()
         for joint in self.drives:
             joint.close()

@@ -11,8 +11,9 @@ from armtempo import deploy as deployment
 from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
+from armtempo.encoding import engine_heap
+from armtempo.encoding.engine_heap import EngineHeap
 from armtempo.model.arm import Arm
-from armtempo.robot import engine_room
 
 
 @click.command("deploy")
@@ -29,18 +30,18 @@ def deploy(arm_path: Path | None, port: str | None, as_json: bool) -> None:
     arm = resolve.named_arm(arm_path)
     with ProgressBar("copying") as progress:
         info = deployment.deploy(resolve.port(port), results.progress_printer(as_json), progress)
-    room = engine_room.of_board(info)
+    heap = EngineHeap(info.engine_bytes)
     values = {
         "board_id": info.board_id,
         "virtual": info.virtual,
         "program_crc": info.program_crc,
         "protocol": info.protocol,
-        "engine_room_bytes": info.engine_room,
+        "engine_bytes": info.engine_bytes,
         "arm": arm.name if arm else None,
-        "arm_fits": engine_room.Room.of_board(info).holds_arm(arm) if arm else None,
+        "arm_fits": heap.holds_arm(arm) if arm else None,
     }
-    of_arm = [f"{resolve.describe_arm(arm)}: {engine_room.of_arm(arm, info)}"] if arm else []
-    results.show(as_json, values, ["the board runs armtempo", *room, *of_arm])
+    of_arm = [f"{resolve.describe_arm(arm)}: {engine_heap.of_arm(arm, heap)}"] if arm else []
+    results.show(as_json, values, ["the board runs armtempo", *engine_heap.of_board(heap), *of_arm])
 
 
 @click.command("undeploy")
@@ -71,7 +72,7 @@ def configure(given: BoardOptions) -> None:
         board.configure(arm, replace=True)
         found = board.state()
         motions = len(board.list())
-        room = engine_room.of_arm(arm, board.info)
+        memory = engine_heap.of_arm(arm, EngineHeap(board.info.engine_bytes))
     changed, known = found.arm_crc != before, all(joint.known for joint in found.joints)
     values = {
         "arm": arm.name,
@@ -79,7 +80,7 @@ def configure(given: BoardOptions) -> None:
         "changed": changed,
         "position_known": known,
         "motions_to_upload_again": motions if before and changed else 0,
-        "memory": room,
+        "memory": memory,
     }
     results.show(given.as_json, values, _configured(arm, values) if changed else [_unchanged(arm)])
 

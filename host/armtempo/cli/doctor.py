@@ -124,7 +124,7 @@ def examine_board(state: BoardState | ArmtempoError) -> list[Finding]:
     found = [
         good("board", f"{state.board_id}{' (virtual)' if state.virtual else ''}, port {state.port}"),
         _program(state),
-        _room(state),
+        _memory(state),
         good(
             "arm on the board", state.arm or (f"record {state.arm_crc:08x}" if state.arm_crc else "none yet")
         ),
@@ -147,7 +147,7 @@ def _program(state: BoardState) -> Finding:
     return error("program", f"{text}, which differs from the one installed here, {own_crc():08x}", UPDATE)
 
 
-def _room(state: BoardState) -> Finding:
+def _memory(state: BoardState) -> Finding:
     text = f"{state.free_heap} bytes of heap, {state.free_flash} of flash"
     if state.free_heap >= _LEAST_HEAP:
         return good("free", text)

@@ -11,13 +11,13 @@ from armtempo.basics.atomic_file import check_not_input
 from armtempo.basics.errors import InputError
 from armtempo.cli import resolve, results, sequences
 from armtempo.cli.results import ProgressBar
+from armtempo.encoding import engine_heap
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import is_sequence
 from armtempo.planning import checks, torque
 from armtempo.report import text_summary
-from armtempo.robot import engine_room
 
 
 class Order(NamedTuple):
@@ -96,7 +96,7 @@ def _save(made: dict[Path, Plan], force: bool) -> None:
 
 def _lines(file: Path, plan: Plan, verbose: bool) -> list[str]:
     summary = [f"arm: {resolve.describe_arm(plan.arm)}", *pipeline.summary(plan, verbose)]
-    return [*summary, *([engine_room.of_arm(plan.arm)] if verbose else ()), f"written: {file}"]
+    return [*summary, *([engine_heap.of_arm(plan.arm)] if verbose else ()), f"written: {file}"]
 
 
 def _json(file: Path, plan: Plan) -> dict[str, Any]:

@@ -164,10 +164,12 @@ def print_position(board: Board, as_json: bool = False) -> None:
 
 
 def format_angles(angles_deg: Array, arm: Arm) -> str:
-    """A posture in one line: each driven joint's name, its angle and its steps."""
+    """A posture in one line: each driven joint's name, its angle and its motor's steps."""
     return ", ".join(
-        f"{joint.name} {round(angle, 2) + 0.0:.2f}° ({round(angle * joint.steps_per_deg)} steps)"
-        for joint, angle in zip(arm.driven, angles_deg, strict=True)
+        f"{joint.name} {round(angle, 2) + 0.0:.2f}° ({steps} steps)"
+        for joint, angle, steps in zip(
+            arm.driven, angles_deg, arm.transmission.whole_steps(angles_deg), strict=True
+        )
     )
 
 

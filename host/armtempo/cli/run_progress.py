@@ -50,7 +50,7 @@ class RunProgress(Watcher):
         if sample.ticks <= before:
             return ""
         percent = round(100 * (sample.path_ticks - path_before) / (sample.ticks - before))
-        return "" if percent in (99, 100, 101) else f", at {percent} %" if percent > 0 else ", in a pause"
+        return "" if percent in (99, 100, 101) else f", at {percent} %" if percent > 0 else ", paused"
 
     def end(self, repetition: Repetition) -> None:
         """Print how the repetition ended."""
@@ -58,15 +58,9 @@ class RunProgress(Watcher):
 
     def _angles_deg(self, sample: Sample) -> Array:
         """Measured angles, degrees (J,); commanded angles of joints without an encoder."""
-        joints, positions = self._motion.arm.driven, sample.positions
-        return np.array(
-            [
-                counts / joint.counts_per_deg if joint.encoder else steps / joint.steps_per_deg
-                for joint, steps, counts in zip(
-                    joints, positions.commanded_steps, positions.counts, strict=True
-                )
-            ]
-        )
+        gears, positions = self._motion.arm.transmission, sample.positions
+        measured = gears.angles_of_counts(positions.counts)
+        return np.where(gears.measured, measured, gears.angles_of_steps(positions.commanded_steps))
 
     def __enter__(self) -> Self:
         self._progress.__enter__()

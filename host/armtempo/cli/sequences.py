@@ -21,9 +21,10 @@ from armtempo.cli.state import counted
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share
+from armtempo.model.steps import position, whole_cycles
 from armtempo.report import text_summary
 from armtempo.robot.board import Board
-from armtempo.robot.sequence_run import cycles, where
+from armtempo.robot.sequence_run import where
 from armtempo.robot.stop_request import Stopped
 
 
@@ -122,9 +123,9 @@ class Shown:
         self.last = state
         doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
-            click.echo(f"\r\x1b[Kcycle {state.cycle}, step {state.step}{doing}", nl=False, err=True)
+            click.echo(f"\r\x1b[K{position(state.step, state.cycle)}{doing}", nl=False, err=True)
         elif state.cycle != self._cycle:
-            self._say(f"cycle {state.cycle}, step {state.step}{doing}")
+            self._say(f"{position(state.step, state.cycle)}{doing}")
         self._cycle = state.cycle
 
     def close(self) -> None:
@@ -164,7 +165,7 @@ def run_and_report(
             "find the cause, 'armtempo goto' its start, run it again",
         )
     result = _as_json(end, board, recorded.path if recorded else None)
-    results.show(as_json, result, [f"{end.ending} after {cycles(end)}{counted(board.counters)}"])
+    results.show(as_json, result, [f"{end.ending} after {whole_cycles(end.cycle)}{counted(board.counters)}"])
     return end
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 from armtempo_shared.program import SUFFIX
+from armtempo_shared.sequence import ENDINGS, FINISHED
 
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
@@ -14,6 +15,7 @@ from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.model.arm import Arm
+from armtempo.model.steps import position, whole_cycles
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 
 
@@ -58,7 +60,7 @@ def lines(state: BoardState) -> list[str]:
         f"arm       {_arm(state)}",
         f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
         f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together, {_measured(state)}",
-        f"engine    {state.room}",
+        f"engine    {state.engine_memory}",
         *_wear(state),
         *motion_lines(state),
     ]
@@ -92,8 +94,9 @@ def _sequence(stand: SequenceStand) -> str:
     """Name, place and counters of a sequence or program."""
     if stand.name.endswith(SUFFIX):
         return f"program   {stand.name}: {stand.ending}, line {stand.step}{counted(stand.counters)}"
-    cycles = f"{stand.cycle} whole cycle{'s' * (stand.cycle != 1)}"
-    return f"sequence  {stand.name}: {stand.ending}, step {stand.step}, {cycles}{counted(stand.counters)}"
+    is_whole = stand.ending == ENDINGS[FINISHED]
+    where = whole_cycles(stand.cycle) if is_whole else position(stand.step, stand.cycle)
+    return f"sequence  {stand.name}: {stand.ending}, {where}{counted(stand.counters)}"
 
 
 def counted(counters: Mapping[str, int]) -> str:

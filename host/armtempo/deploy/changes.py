@@ -116,7 +116,7 @@ def choose(found: Survey, tell: Tell) -> Wanted:
     if not _fits(found, program.files):
         raise LinkError(
             f"the program needs {_needed(found, program.files)} blocks of flash, the board has room for "
-            f"{_room(found)}; {_taken(found)}",
+            f"{_free_blocks(found)}; {_taken(found)}",
             _way_out(found),
         )
     return program
@@ -179,7 +179,7 @@ def digest(data: bytes) -> str:
 
 
 def _fits(found: Survey, library: Mapping[str, bytes]) -> bool:
-    return _needed(found, library) <= _room(found)
+    return _needed(found, library) <= _free_blocks(found)
 
 
 def _needed(found: Survey, library: Mapping[str, bytes]) -> int:
@@ -204,7 +204,7 @@ def _way_out(found: Survey) -> str:
     return ", or ".join([*ways, "put the program into the firmware ('armtempo flash')"])
 
 
-def _room(found: Survey) -> int:
+def _free_blocks(found: Survey) -> int:
     """Free blocks after our old files are removed."""
     start_files = {path: digest(data) for path, data in program_files.start_files().items()}
     old = [found.files[path][0] for path in ours(found)]

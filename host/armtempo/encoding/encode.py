@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from binascii import crc32
-from dataclasses import asdict
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -31,17 +31,17 @@ _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 def arm_record(arm: Arm) -> bytes:
     """The arm record (layout: ``armtempo_shared.armrecord``); raises InputError if a value does not fit the board."""
-    return armrecord.pack(_head(arm), joint_rows(arm), outputs(arm), inputs(arm))
+    return armrecord.pack(_head(arm), motor_rows(arm), outputs(arm), inputs(arm))
 
 
-def joint_rows(arm: Arm) -> list[dict[str, Any]]:
+def motor_rows(arm: Arm) -> list[dict[str, Any]]:
     """Rows of ``armrecord.JOINT``; raises as ``arm_record``."""
-    return [_joint(joint) for joint in arm.driven]
+    return [_motor(arm, number) for number in range(len(arm.motors))]
 
 
 def step_rates(arm: Arm) -> list[int]:
-    """The highest step rates of the joints in the arm record, steps/s."""
-    return [_max_rate(joint) for joint in arm.driven]
+    """The highest step rates of the motors in the arm record, steps/s."""
+    return [_max_rate(motor) for motor in arm.motors]
 
 
 def move_limits(arm: Arm) -> list[list[int]]:
@@ -67,8 +67,7 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
             "plan it for this arm",
         )
     angles = [
-        _fixed(spline.angle_points_deg * joint.steps_per_deg, limits.STEP_FRACTION_BITS)
-        for spline, joint in zip(trajectory.joints, arm.driven, strict=True)
+        _fixed(points, limits.STEP_FRACTION_BITS) for points in checks.motor_points_steps(trajectory, arm)
     ]
     axes = trajectory.joints[:1] if trajectory.shared else trajectory.joints
     times = [_fixed(spline.time_points_s * limits.TICK_HZ, limits.TICK_FRACTION_BITS) for spline in axes]
@@ -87,12 +86,12 @@ def way_back(data: bytes, name: str, brakes: BrakeTimes) -> bytes:
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
-    """Ramp entries, to rest and others, as integers, and the bits of their unit."""
+    """Ramp entries, to rest and others, as integers, the bits of their unit, and e (``armtempo_shared.motion``)."""
     if brakes is None:
         return motion.no_ramps()
     shapes = (motion.RAMP_LENGTH + 1) * np.append(brakes.shapes, motion.EVEN_RAMP)
     to_rest = [int(entry) for entry in brakes.to_rest + shapes]
-    return to_rest, [int(entry) for entry in brakes.others], brakes.unit_bits
+    return to_rest, [int(entry) for entry in brakes.others], brakes.unit_bits, brakes.edge_bits
 
 
 def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:
@@ -131,24 +130,28 @@ def _head(arm: Arm) -> dict[str, Any]:
 
 def _identity(arm: Arm) -> int:
     """A hash of everything that maps joint angles to the arm's position: all except names, limits and models."""
-    joints = [{k: v for k, v in asdict(joint).items() if k not in _NOT_IDENTITY} for joint in arm.joints]
+    joints = [_as_floats(joint) for joint in arm.joints]
     for joint in joints:
+        for name in _NOT_IDENTITY:
+            joint.pop(name, None)
         if joint["encoder"]:
             del joint["encoder"]["following_error_deg"]
-    text = json.dumps(_as_floats(joints), sort_keys=True)
+    facts = [joints, _as_floats(arm.coupling)] if arm.coupling else joints
+    text = json.dumps(facts, sort_keys=True)
     return crc32(text.encode())
 
 
 def _as_floats(value: Any) -> Any:
-    """The value with all numbers as floats, as 20 and 20.0 are the same gear ratio."""
-    if isinstance(value, dict):
-        return {key: _as_floats(entry) for key, entry in value.items()}
+    """The value as JSON has it, with all numbers as floats, as 20 and 20.0 are the same gear ratio."""
+    if is_dataclass(value):
+        return {entry.name: _as_floats(getattr(value, entry.name)) for entry in fields(value)}
     if isinstance(value, list | tuple):
         return [_as_floats(entry) for entry in value]
     return float(value) if isinstance(value, int | float) else value
 
 
-def _joint(joint: DrivenJoint) -> dict[str, Any]:
+def _motor(arm: Arm, number: int) -> dict[str, Any]:
+    joint = arm.motors[number]
     motor, encoder, switches = joint.motor, joint.encoder, joint.switches
     per_step = joint.counts_per_step
     if max(abs(per_step.numerator), per_step.denominator) >= 2**31:
@@ -163,6 +166,9 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
             f"{joint.name}: its range is {high - low} steps, more than the board can count",
             "make range_deg narrower, or use fewer microsteps",
         )
+    forward = (
+        arm.transmission.matrix[number, number] > 0.0
+    )  # else it turns backwards when its joint alone goes up
     return {
         "channel": motor.channel - 1,
         "dir_inverted": int(motor.direction < 0),
@@ -174,8 +180,8 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
         "max_steps": high,
         "max_rate": _max_rate(joint),
         "following_counts": round(following),
-        "limit_low": _switch(switches.low),
-        "limit_high": _switch(switches.high),
+        "limit_low": _switch(switches.low if forward else switches.high),
+        "limit_high": _switch(switches.high if forward else switches.low),
         "limit_active_high": int(switches.active == "high"),
         "spare": 0,
     }
@@ -187,16 +193,16 @@ def _switch(where: int | str | None) -> int:
     return where - 1 if isinstance(where, int) else armrecord.POLLED + pin_number(where)
 
 
-def _max_rate(joint: DrivenJoint) -> int:
-    """The joint's speed limit in steps/s, with a margin for rounding.
+def _max_rate(motor: DrivenJoint) -> int:
+    """The motor's speed limit in steps/s, with a margin for rounding.
 
     Raises InputError if the board cannot step that fast.
     """
-    rate = joint.limits.speed_deg_s * joint.steps_per_deg
+    rate = motor.limits.speed_deg_s * motor.steps_per_deg
     if rate > limits.MAX_STEP_RATE:
         raise InputError(
             (
-                f"{joint.name}: speed_deg_s = {joint.limits.speed_deg_s:g} means {rate:.0f} steps/s; the board "
+                f"{motor.name}: speed_deg_s = {motor.limits.speed_deg_s:g} means {rate:.0f} steps/s; the board "
                 f"makes at most {limits.MAX_STEP_RATE}"
             ),
             "check the unit, microsteps and gear_ratio",

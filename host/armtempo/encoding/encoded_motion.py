@@ -82,5 +82,5 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
 
 def of_record(name: str, data: bytes, arm: Arm) -> EncodedMotion:
     """The motion of a record from the board; raises InputError if it is damaged or does not fit the arm."""
-    trajectory = decode.trajectory(data, arm.driven, name, f"arm {arm.name!r}")
+    trajectory = decode.trajectory(data, arm.transmission, name, f"arm {arm.name!r}")
     return EncodedMotion(name, arm, trajectory, data)

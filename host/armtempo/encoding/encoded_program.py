@@ -16,7 +16,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.outputs import SWITCH, Output
 from armtempo.model.posture import HOME
 from armtempo.model.user_program import UserProgram
-from armtempo.planning import point_to_point, room_check, via_points
+from armtempo.planning import point_to_point, via_points, workspace_check
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,15 @@ def of_program(
 
 
 def table(arm: Arm) -> dict[str, Any]:
-    """What ``cell`` must know of an arm, see ``armtempo_shared.program``; postures that it cannot take are left out."""
+    """What ``cell`` must know of an arm, see ``armtempo_shared.program``; postures that it cannot take are left out.
+
+    Raises InputError for an arm with coupled joints: the board knows its motors, but no limits of its joints.
+    """
+    if arm.coupling:
+        raise InputError(
+            f"arm {arm.name!r} has coupled joints: the board cannot make moves for it",
+            "let the host move it (board.goto, armtempo run), or plan a sequence",
+        )
     return {
         "limits": encode.move_limits(arm),
         "per_deg": [joint.steps_per_deg for joint in arm.driven],
@@ -78,11 +86,7 @@ def _postures(arm: Arm) -> dict[str, list[int]]:
     found = {}
     for name in (HOME, *(posture.name for posture in arm.postures)):
         try:
-            angles = via_points.posture_deg(arm, arm.posture(name))
-            found[name] = [
-                round(float(angle) * joint.steps_per_deg)
-                for angle, joint in zip(angles, arm.driven, strict=True)
-            ]
+            found[name] = arm.transmission.whole_steps(via_points.posture_deg(arm, arm.posture(name)))
         except ArmtempoError:
             continue
     return found
@@ -99,7 +103,7 @@ def moves_that_touch(found: EncodedProgram) -> list[str]:
     The board knows nothing of the workspace; which of these moves the program makes is not known either.
     """
     arm = found.arm
-    if not room_check.has_room(arm):
+    if not workspace_check.has_room(arm):
         return []
     places = {
         f"posture {name!r}": via_points.posture_deg(arm, arm.posture(name)) for name in found.program.postures
@@ -112,7 +116,7 @@ def moves_that_touch(found: EncodedProgram) -> list[str]:
     for number, here in enumerate(names):
         for there in names[number + 1 :]:
             try:
-                room_check.check(arm, point_to_point.straight("goto", places[here], places[there], arm))
+                workspace_check.check(arm, point_to_point.straight("goto", places[here], places[there], arm))
             except PlanError as error:
                 problems.append(f"between {here} and {there}: {error.problem}")
     return problems

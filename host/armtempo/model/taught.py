@@ -53,13 +53,17 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
 
 
 def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
-    """The angles with the fewest digits that give the same steps, within their ranges."""
-    found = []
-    for joint, angle in zip(arm.driven, angles_deg, strict=True):
+    """The angles with the fewest digits that give the same steps of all motors, within their ranges."""
+    gears, found = arm.transmission, list(angles_deg)
+    steps = gears.whole_steps(angles_deg)
+    for index, (joint, angle) in enumerate(zip(arm.driven, angles_deg, strict=True)):
         low, high = joint.range_deg
-        steps = round(angle * joint.steps_per_deg)
-        rounded = (min(max(round(angle, places), low), high) + 0.0 for places in range(2, 12))
-        found.append(next((value for value in rounded if round(value * joint.steps_per_deg) == steps), angle))
+        for places in range(2, 12):
+            found[index] = min(max(round(angle, places), low), high) + 0.0
+            if gears.whole_steps(found) == steps:
+                break
+        else:
+            found[index] = angle
     return found
 
 

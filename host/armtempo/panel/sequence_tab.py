@@ -8,11 +8,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from armtempo_shared.sequence import MOVE, WAIT
+from armtempo_shared.sequence import ENDINGS, FINISHED, MOVE, WAIT
 from nicegui import run, ui
 
 from armtempo import pipeline
 from armtempo.basics.errors import ArmtempoError
+from armtempo.model.steps import position, whole_cycles
 from armtempo.panel import words
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.panel_board import Needs
@@ -20,6 +21,7 @@ from armtempo.panel.panel_page import named
 from armtempo.panel.sequence_editor import KINDS, kind_of
 
 if TYPE_CHECKING:
+    from armtempo.link.board_messages import SequenceState
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.panel.panel_page import PanelPage
     from armtempo.panel.press import Press
@@ -138,10 +140,7 @@ class SequenceTab:
                     row.classes(add=_LIT) if number == step else row.classes(remove=_LIT)
             self._lit = step
         if state is not None:
-            # The board counts the cycles that are finished
-            cycle = state.cycle + (state.ending != "finished")
-            text = words.STEP_NOW.format(step=state.step, cycle=cycle)
-            self._where.set_text(text if running else f"{text}: {state.ending}")
+            self._where.set_text(_where(state))
 
     def _look_at_times(self) -> None:
         """The planned time of each step, and of all."""
@@ -205,6 +204,13 @@ class SequenceTab:
                 pipeline.report(recorded)
 
         self._page.do(press, words.RUN, run_it)
+
+
+def _where(state: SequenceState) -> str:
+    """Where a sequence is, or how it ended."""
+    if state.ending == ENDINGS[FINISHED]:
+        return f"{state.ending}: {whole_cycles(state.cycle)}"
+    return f"{state.ending}: {position(state.step, state.cycle)}"
 
 
 def _time_of(plan: SequencePlan, step: int) -> str:

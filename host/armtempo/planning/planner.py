@@ -18,7 +18,7 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_way import ToolWay
-from armtempo.planning import checks, path_deviation, room_check, through_plan
+from armtempo.planning import checks, path_deviation, through_plan, workspace_check
 from armtempo.planning.free import around
 from armtempo.planning.through_plan import Planned
 from armtempo.splines import extremes
@@ -60,7 +60,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
     speeds_deg_s = np.array([each.speed_deg_s for each in reached])
-    room_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
+    workspace_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
     notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, trajectory))
     return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
 

@@ -18,7 +18,7 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, planner, room_check, via_points
+from armtempo.planning import checks, planner, via_points, workspace_check
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
@@ -223,11 +223,11 @@ class _Compiler:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
-        # A plan with another load is accepted if it keeps to the room
+        # A plan with another load is accepted if it keeps to the workspace
         for (known, _), found in self._plans.items():
             arm = self.arm.holding(_job(motion).holds or self._holds)
             outwards = _job(motion).start_touches
-            if known == id(motion) and room_check.touch_of(arm, found, None, outwards) is None:
+            if known == id(motion) and workspace_check.touch_of(arm, found, None, outwards) is None:
                 return found
         found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
         return found
@@ -239,7 +239,7 @@ class _Compiler:
                     f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
                 )
             arm = self.arm.holding(source.job.holds or self._holds)
-            room_check.check(arm, source.trajectory, source.job.start_touches)
+            workspace_check.check(arm, source.trajectory, source.job.start_touches)
             return source.trajectory
         job = replace(source, holds=source.holds or self._holds)
         found = planner.plan(self.arm, job, self.progress).trajectory
@@ -293,10 +293,8 @@ class _Compiler:
         return len(self.legs) - 1
 
     def _same(self, one: Angles, other: Angles) -> bool:
-        return all(
-            abs(a - b) * joint.steps_per_deg <= _SAME_STEPS
-            for a, b, joint in zip(one, other, self.arm.driven, strict=True)
-        )
+        off_steps = self.arm.transmission.steps(np.array(one) - np.array(other))
+        return bool(np.all(np.abs(off_steps) <= _SAME_STEPS))
 
 
 def _job(motion: SourceMotion) -> Job:

@@ -28,7 +28,7 @@ _HEAD = (
 _WIDTHS = (12, 8, 10, 16, 16, 17)
 _RESULT_WIDTHS = (11, 11, 12, 12)
 _BOUNDS = {
-    "rests": "from turn to turn of a joint under its speed, acceleration and jerk limits",
+    "rests": "of one joint between its reversals, under its speed, acceleration and jerk limits",
     "path": "along the path under the speed, acceleration and jerk limits of all its joints",
     "together": "through the via points under the speed, acceleration and jerk limits of all joints, whatever the path",
     "vias": "through the via angles of a joint under its speed, acceleration and jerk limits, whatever the path",
@@ -152,7 +152,7 @@ def _polished(search: Search) -> str:
     joints = ", ".join(str(joint + 1) for joint in search.joints)
     return (
         f"polished, driven joint {joints}: {search.searched_s:.4f} s to {search.total_s:.4f} s, "
-        f"within {gap:.1e} of the best nearby with {len(search.intervals_s)} variables"
+        f"{100 * gap:.2g} % above the local optimum of its {len(search.intervals_s)} variables"
     )
 
 
@@ -189,7 +189,7 @@ def _free_s(plan: Plan) -> float:
 def _separation(plan: Plan) -> list[str]:
     """For per-joint timing: differences of the joints' times at the via points, and the tool's deviation."""
     spread = ", ".join(f"{value:.2f}" for value in path_deviation.via_spread_s(plan.trajectory))
-    apart = f"joints pass the via points apart by {spread} s"
+    apart = f"time from the first to the last joint at each via point: {spread} s"
     if checks.is_free(plan.job):
         return [apart]
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)

@@ -88,7 +88,6 @@ class HeldJog:
         self.ends = ""
         """Why it ended by itself, known after the context; "" if it did not."""
         self._client = client
-        self._steps_per_deg = np.array([joint.steps_per_deg for joint in arm.driven])
         self._run = 0
         self._said_s = 0.0
         self._silent_s = 0.0  # the longest time between two holds
@@ -122,7 +121,7 @@ class HeldJog:
         """Commanded joint angles by the last message of the board, degrees (J,)."""
         if self._positions is None:
             return self.motion.trajectory(0.0)
-        return np.asarray(np.array(self._positions.commanded_steps, dtype=float) / self._steps_per_deg)
+        return self.arm.transmission.angles_of_steps(self._positions.commanded_steps)
 
     def hold(self, seconds: float = 0.05) -> bool:
         """Hold the jog for ``seconds`` and read the board's messages; returns False once it has ended.
@@ -163,7 +162,8 @@ class HeldJog:
         """Why it has ended by itself."""
         if self.fault is not None:
             return "a fault"
-        if np.all(np.abs(self.angles_deg - self.motion.end_deg) * self._steps_per_deg < _AT_END_STEPS):
+        off_steps = self.arm.transmission.steps(self.angles_deg - self.motion.end_deg)
+        if np.all(np.abs(off_steps) < _AT_END_STEPS):
             return self.motion.ends
         if self._silent_s > HOLD_TIMEOUT_MS / 1000.0:
             return f"this program was busy for {self._silent_s:.1f} s and did not hold it"
@@ -191,7 +191,7 @@ class HeldJog:
     def _make_a_step(self) -> None:
         """Go on until a joint has moved by a step: the shortest press moves something."""
         session = self._client.session
-        start = np.rint(self.motion.trajectory(0.0) * self._steps_per_deg)
+        start = np.rint(self.arm.transmission.steps(self.motion.trajectory(0.0)))
         limit_s = session.clock() + _FIRST_STEP_S
         while self.moving and session.clock() < limit_s:
             status = self._client.status()

@@ -33,7 +33,7 @@ class KeptPosition:
         """Where the motors of ``arm`` stand; None if it is another arm: at home."""
         if arm is None or wire.record_crc(encode.arm_record(arm)) != self.arm_crc:
             return None
-        return [count / joint.steps_per_deg for count, joint in zip(self.steps, arm.driven, strict=True)]
+        return [float(angle) for angle in arm.transmission.angles_of_steps(self.steps)]
 
 
 def _file(port: str) -> Path | None:

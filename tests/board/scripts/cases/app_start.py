@@ -92,24 +92,24 @@ def case_what_the_board_has_not_is_named():  # not emulated
 class Cramped:
     """A board with less memory for engines."""
 
-    room = engine_memory.needed_bytes([1])
+    size = engine_memory.needed_bytes([1])
     is_short = True
 
 
 def case_a_record_that_no_longer_fits_is_named():  # not emulated
     arm = stand_in.arm()
     root = folder_with(arm)
-    room = sys.modules["armtempo_board.app.room"]
-    room.workspace, before = Cramped, room.workspace
+    memory_shares = sys.modules["armtempo_board.app.memory_shares"]
+    memory_shares.for_engine, before = Cramped, memory_shares.for_engine
     try:
         _, host, hello = started(root)
     finally:
-        room.workspace = before
+        memory_shares.for_engine = before
     needed = engine_memory.needed_bytes([1, 1])
-    assert (wire.ERRORS[hello[PROBLEM]][0], hello[VALUE]) == ("no_room", needed)
+    assert (wire.ERRORS[hello[PROBLEM]][0], hello[VALUE]) == ("no_engine_memory", needed)
     small = stand_in.arm(joints=1)
     assert host.upload("/arm", small)[-1] == ("ok", (), b"")
-    assert host.upload("/arm", arm)[-1] == ("error", "no_room", 255, needed)
+    assert host.upload("/arm", arm)[-1] == ("error", "no_engine_memory", 255, needed)
     assert host.hello()[1][ARM_CRC] == wire.record_crc(small)
     with open(root + "/arm.ata", "rb") as file:
         assert file.read() == small, "what does not fit does not take the old one's place"

@@ -262,7 +262,7 @@ class Rig:
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]])
             for joint in joints
         ]
-        self.workspace = self._workspace()
+        self.engine_memory = self._engine_memory()
         self.make_engine(joints)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
 
@@ -271,14 +271,14 @@ class Rig:
         from armtempo_board.motion.engine import Engine
         from armtempo_board.motion.engine_parts import EngineParts
 
-        self.engine = Engine(EngineParts(self.head, joints, self.workspace))
+        self.engine = Engine(EngineParts(self.head, joints, self.engine_memory))
 
     @staticmethod
-    def _workspace():
-        from armtempo_board.motion.workspace import Workspace
+    def _engine_memory():
+        from armtempo_board.motion.engine_memory import EngineMemory
         from armtempo_shared.engine_memory import LARGEST_BYTES
 
-        made = Workspace(LARGEST_BYTES)
+        made = EngineMemory(LARGEST_BYTES)
         made.make_memory(12 * 1026)
         return made
 

@@ -22,7 +22,7 @@ from armtempo.kinematics.chain import all_angles_deg, outline_mm
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
-from armtempo.model.room import ArmRoom, KeepOut
+from armtempo.model.workspace import KeepOut, Workspace
 from armtempo.planning.capsules import box_distance, segment_distance
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
@@ -68,7 +68,7 @@ class Bodies:
     @cached_property
     def obstacles(self) -> tuple[KeepOut, ...]:
         """Boxes and walls."""
-        return (self.arm.room or ArmRoom()).obstacles
+        return (self.arm.workspace or Workspace()).obstacles
 
     @cached_property
     def names(self) -> list[str]:
@@ -183,7 +183,7 @@ class Bodies:
 def has_room(arm: Arm) -> bool:
     """Whether there is anything that the arm could touch."""
     thick = sum(joint.radius_mm > 0.0 for joint in arm.joints) + bool(arm.held and arm.held.radius_mm)
-    return bool(arm.room and arm.room.obstacles) or thick > 1
+    return bool(arm.workspace and arm.workspace.obstacles) or thick > 1
 
 
 def posture_touches(arm: Arm, driven_deg: Iterable[float]) -> list[Touch]:
@@ -257,7 +257,7 @@ def _apart_s(bodies: Bodies, trajectory: Trajectory, start: Array) -> Array:
 def touch_of(
     arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, outwards: bool = False
 ) -> Touch | None:
-    """As ``first_touch``; skips arms without a room, and computes unknown speeds."""
+    """As ``first_touch``; skips arms without a workspace, and computes unknown speeds."""
     if not has_room(arm):
         return None
     if speeds_deg_s is None:
@@ -274,7 +274,7 @@ def tell_start(arm: Arm, driven_deg: Iterable[float]) -> None:
 
 
 def check(arm: Arm, trajectory: Trajectory, outwards: bool = False) -> None:
-    """Raise PlanError if a motion leaves the room, with both objects and time; ``outwards``: see ``first_touch``."""
+    """Raise PlanError if a motion leaves the workspace, with objects and time; ``outwards``: see ``first_touch``."""
     if touch := touch_of(arm, trajectory, None, outwards):
         raise _refused(trajectory, touch, f"at {touch.time_s:.2f} s")
 
@@ -300,5 +300,5 @@ def _refused(trajectory: Trajectory, touch: Touch, place: str) -> PlanError:
         )
     return PlanError(
         f"{trajectory.name}: {touch.description} ({place})",
-        "add or move a via point, take another branch with posture_deg, or correct [room] in the arm file",
+        "add or move a via point, take another branch with posture_deg, or correct [workspace] in the arm file",
     )

@@ -8,7 +8,7 @@ import gc
 from armtempo_shared import engine_memory
 
 from armtempo_board.hardware import backup_sram
-from armtempo_board.motion.workspace import Workspace
+from armtempo_board.motion.engine_memory import EngineMemory
 
 _RESERVE = 16_300  # bytes of heap for the rest, the motion run once among them; to spare: docs/memory.md
 _USUAL_JOINTS = 3
@@ -18,29 +18,29 @@ _SAMPLES_SHARE = 48  # between them, this part of the free heap
 _STEP_WORDS = 64
 
 
-def workspace() -> "Workspace":
+def for_engine() -> "EngineMemory":
     """Memory for the largest arm that fits."""
     address = backup_sram.find()
     gc.collect()
     free = _free()
-    room = engine_memory.LARGEST_BYTES
+    size = engine_memory.LARGEST_BYTES
     if free:
         beside = _RESERVE + (0 if address else 4 * engine_memory.PROCESSOR_WORDS)
-        room = min(max(free - beside, 0), room)
-    made = Workspace(room, address)
-    share(made, _USUAL_JOINTS)
+        size = min(max(free - beside, 0), size)
+    made = EngineMemory(size, address)
+    resize(made, _USUAL_JOINTS)
     return made
 
 
-def share(workspace: "Workspace", joints: int) -> None:
-    """Make the memory for an engine of ``joints`` joints, whose objects need part of the room; it must be unused.
+def resize(made: "EngineMemory", joints: int) -> None:
+    """Make the memory for an engine of ``joints`` joints, whose objects need part of it; it must be unused.
 
     If the heap no longer has blocks large enough, the engine gets less memory until the next start.
     """
-    words = engine_memory.room_words(joints, workspace.room)
-    while workspace.memory.size != words:
+    words = engine_memory.memory_words(joints, made.size)
+    while made.memory.size != words:
         try:
-            workspace.make_memory(words)
+            made.make_memory(words)
         except MemoryError:
             if not words:
                 raise

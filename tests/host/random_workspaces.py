@@ -1,4 +1,4 @@
-"""Random motions in random rooms, and their distances at dense samples by code of its own.
+"""Random motions in random workspaces, and their distances at dense samples by code of its own.
 
 Straight motions of arms that ship, links and loads of random radii, boxes; distances of points on the links from the
 boxes.
@@ -12,8 +12,8 @@ import numpy as np
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Load
-from armtempo.model.room import ArmRoom, KeepOut
-from armtempo.planning import point_to_point, room_check
+from armtempo.model.workspace import KeepOut, Workspace
+from armtempo.planning import point_to_point, workspace_check
 from armtempo.splines.trajectory import Trajectory
 
 ARMS = ("parol6", "ar4", "thor", "community", "moveo", "scara", "paper")
@@ -21,8 +21,8 @@ _POINTS = 41
 """Points on a link."""
 
 
-def random_room(seed: int) -> tuple[Arm, Trajectory]:
-    """An arm in a room, and a motion from a posture that touches nothing."""
+def random_workspace(seed: int) -> tuple[Arm, Trajectory]:
+    """An arm in a workspace, and a motion from a posture that touches nothing."""
     rng = np.random.default_rng([seed, 32])
     for _ in range(1000):
         name = ARMS[int(rng.integers(len(ARMS)))]
@@ -44,8 +44,8 @@ def random_room(seed: int) -> tuple[Arm, Trajectory]:
             figures = reach * rng.uniform(0.0, (0.05, 0.2))
             centre = tuple(map(float, 0.1 * reach * rng.uniform(-1.0, 1.0, 3)))
             load = Load("random", 0.0, *map(float, figures), "xyz"[rng.integers(3)], centre)
-        arm = replace(arm, joints=joints, room=ArmRoom(tuple(boxes)), held=load)
-        if not room_check.posture_touches(arm, start):
+        arm = replace(arm, joints=joints, workspace=Workspace(tuple(boxes)), held=load)
+        if not workspace_check.posture_touches(arm, start):
             return arm, point_to_point.straight("random", start, end, arm)
     raise AssertionError("no posture is free")
 
@@ -85,7 +85,7 @@ def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
 def _least(arm: Arm, points: np.ndarray) -> float:
     """Of points (N, 3, P) from all boxes; they count as 0 inside."""
     found = np.inf
-    for box in (arm.room or ArmRoom()).keep_out:
+    for box in (arm.workspace or Workspace()).keep_out:
         low, high = np.array(box.low_mm)[:, None], np.array(box.high_mm)[:, None]
         away = np.maximum(np.maximum(low - points, points - high), 0.0)
         found = min(found, float(np.linalg.norm(away, axis=1).min()))

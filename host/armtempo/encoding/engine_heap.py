@@ -8,23 +8,17 @@ from armtempo_shared import engine_memory, limits
 
 from armtempo.basics.errors import InputError
 from armtempo.encoding import encode
-from armtempo.link.board_messages import Hello
 from armtempo.model.arm import Arm
 
 
 @dataclass(frozen=True)
-class Room:
+class EngineHeap:
     """Heap for an engine and its objects: ``size`` bytes.
 
     Step generators have more memory outside the heap, the same on every chip (``engine_memory.PROCESSOR_WORDS``).
     """
 
     size: int
-
-    @classmethod
-    def of_board(cls, info: Hello) -> Room:
-        """The memory that a board reports."""
-        return cls(info.engine_room)
 
     def holds(self, rates: list[int]) -> bool:
         """Whether an engine for joints of these highest step rates (steps/s) fits."""
@@ -50,8 +44,8 @@ class Room:
         return 0
 
 
-CORE = Room(10_900)
-IN_FIRMWARE = Room(engine_memory.LARGEST_BYTES)
+CORE = EngineHeap(10_900)
+IN_FIRMWARE = EngineHeap(engine_memory.LARGEST_BYTES)
 """Memory with the program's core on stock MicroPython for the STM32F4DISC, and built into the firmware.
 
 Measured: ``python -m tests.benchmark.room MICROPYTHON``.
@@ -59,26 +53,25 @@ Measured: ``python -m tests.benchmark.room MICROPYTHON``.
 _BUILD = "'armtempo flash'"
 
 
-def check(arm: Arm, info: Hello) -> None:
+def check(arm: Arm, heap: EngineHeap) -> None:
     """Raise InputError if the engine for the arm does not fit, with the bytes needed and available."""
-    rates, room = encode.step_rates(arm), Room.of_board(info)
-    if room.holds_arm(arm):
+    if heap.holds_arm(arm):
         return
+    rates = encode.step_rates(arm)
     raise InputError(
-        f"arm {arm.name!r} needs {engine_memory.needed_bytes(rates)} bytes for its engine; the board has {room.size}",
+        f"arm {arm.name!r} needs {engine_memory.needed_bytes(rates)} bytes for its engine; the board has {heap.size}",
         f"lower its top speeds (its joints step up to {', '.join(map(str, rates))} steps/s; slower ones have "
         f"smaller rings), drive fewer joints{_or_firmware(arm)}",
     )
 
 
-def of_arm(arm: Arm, info: Hello | None = None) -> str:
-    """One line: the memory that an arm needs, and whether the board has it (without ``info``: which boards
+def of_arm(arm: Arm, heap: EngineHeap | None = None) -> str:
+    """One line: the memory that an arm needs, and whether the board has it (without ``heap``: which boards
     have it)."""
     rates = encode.step_rates(arm)
     needs = f"memory on the board: {engine_memory.needed_bytes(rates)} bytes for {len(rates)} joints"
-    if info is not None:
-        room = Room.of_board(info)
-        return f"{needs} of {room.size}" if room.holds_arm(arm) else f"{needs}, too much{_or_firmware(arm)}"
+    if heap is not None:
+        return f"{needs} of {heap.size}" if heap.holds_arm(arm) else f"{needs}, too much{_or_firmware(arm)}"
     if CORE.holds_arm(arm):
         return f"{needs}: fits with stock MicroPython or with the program in it"
     if IN_FIRMWARE.holds_arm(arm):
@@ -86,13 +79,12 @@ def of_arm(arm: Arm, info: Hello | None = None) -> str:
     return f"{needs}: too much for an STM32F407"
 
 
-def of_board(info: Hello) -> list[str]:
+def of_board(heap: EngineHeap) -> list[str]:
     """Lines: what fits on a board, and what would fit with the program in its firmware."""
-    room = Room.of_board(info)
-    lines = [f"memory for an arm: {room.describe()}"]
-    if room.size < IN_FIRMWARE.size:
+    lines = [f"memory for an arm: {heap.describe()}"]
+    if heap.size < IN_FIRMWARE.size:
         lines.append(
-            f"with the program in the firmware ({_BUILD}): {IN_FIRMWARE.describe()}, and room for sequences"
+            f"with the program in the firmware ({_BUILD}): {IN_FIRMWARE.describe()}, and memory for sequences"
         )
     return lines
 

@@ -1,4 +1,4 @@
-"""The room in which an arm may move, and the table [room] of its file."""
+"""The workspace in which an arm may move, and the table [workspace] of its file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class KeepOut:
 
 @checked_fields
 @dataclass(frozen=True)
-class ArmRoom:
+class Workspace:
     """Boxes to keep out of, and walls: the least and largest x, y and z (FAR_MM for a missing wall)."""
 
     keep_out: tuple[KeepOut, ...] = ()
@@ -55,8 +55,12 @@ class ArmRoom:
         return (*self.keep_out, *walls)
 
 
-def read(table: Table | None) -> ArmRoom | None:
-    """The room of an arm file's table; None if there is none. Raises InputError for invalid values."""
+def read(top: Table) -> Workspace | None:
+    """The workspace of an arm file; None if it has none. Raises InputError for invalid values.
+
+    The table of files written before it had this name is [room].
+    """
+    table = top.table("workspace" if top.has("workspace") else "room")
     if table is None:
         return None
     low, high = [-FAR_MM] * 3, [FAR_MM] * 3
@@ -77,4 +81,4 @@ def read(table: Table | None) -> ArmRoom | None:
         box.done()
         boxes.append(found)
     table.done()
-    return ArmRoom(tuple(boxes), tuple(low), tuple(high))
+    return Workspace(tuple(boxes), tuple(low), tuple(high))

@@ -1,4 +1,4 @@
-"""The room of an arm: distances, whole motions against dense samples of their own, and what is refused in words."""
+"""The workspace of an arm: distances, motions against dense samples of their own, and what is refused in words."""
 
 from __future__ import annotations
 
@@ -7,34 +7,36 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.basics import toml_table
+from armtempo.basics import json_codec, toml_table
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.parts import NOTHING, Load
-from armtempo.model.room import FAR_MM, ArmRoom, KeepOut, read
 from armtempo.model.sequence import Sequence
 from armtempo.model.steps import Goto, Hold
 from armtempo.model.tool_way import ToolWay
-from armtempo.planning import planner, point_to_point, room_check, sequence_planner
+from armtempo.model.workspace import FAR_MM, KeepOut, Workspace, read
+from armtempo.planning import planner, point_to_point, sequence_planner, workspace_check
 from armtempo.planning.capsules import box_distance, segment_distance
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.robot import goto
 
 from tests.host import arms
-from tests.host.random_rooms import dense_least, random_room
+from tests.host.random_workspaces import dense_least, random_workspace
 
 PAPER = Arm.paper()
 FEEDER = KeepOut("feeder", (-50.0, 150.0, -FAR_MM), (50.0, 400.0, FAR_MM))
 OVER = r"over: the link of joint . is .* mm inside of feeder \(at .* s, between P0 and P1\)"
 
 
-def thick(arm: Arm, radius_mm: float, room: ArmRoom | None) -> Arm:
-    """The arm with links of this radius in a room."""
-    return replace(arm, room=room, joints=tuple(replace(joint, radius_mm=radius_mm) for joint in arm.joints))
+def thick(arm: Arm, radius_mm: float, workspace: Workspace | None) -> Arm:
+    """The arm with links of this radius in a workspace."""
+    return replace(
+        arm, workspace=workspace, joints=tuple(replace(joint, radius_mm=radius_mm) for joint in arm.joints)
+    )
 
 
 def test_distances_are_exact() -> None:
@@ -66,8 +68,8 @@ def test_inside_a_box_says_how_deep() -> None:
 @pytest.mark.slow
 @pytest.mark.seeds(*range(10))
 def test_motions_in_random_rooms_agree_with_dense_samples(seed: int) -> None:
-    arm, trajectory = random_room(seed)
-    touch = room_check.touch_of(arm, trajectory)
+    arm, trajectory = random_workspace(seed)
+    touch = workspace_check.touch_of(arm, trajectory)
     least = dense_least(arm, trajectory, 200)
     if touch is None:
         assert least > 0.0, f"seed {seed}: accepted, {least:.3f} mm"
@@ -78,9 +80,9 @@ def test_motions_in_random_rooms_agree_with_dense_samples(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.seeds
 def test_free_paths_in_random_rooms_touch_nothing(seed: int) -> None:
-    arm, trajectory = random_room(seed)
+    arm, trajectory = random_workspace(seed)
     via = trajectory(np.array([0.0, trajectory.duration_s]))
-    if not room_check.touch_of(arm, trajectory) or room_check.posture_touches(arm, via[1]):
+    if not workspace_check.touch_of(arm, trajectory) or workspace_check.posture_touches(arm, via[1]):
         return
     job = Job("free", via_deg=via.tolist(), path="free", holds=arm.held.name if arm.held else "")
     try:
@@ -100,7 +102,7 @@ def test_links_do_not_touch_each_other() -> None:
         arms.joint(0.0, 100.0, 0.0),
     )
     arm = thick(arms.arm("fold", *links), 10.0, None)
-    assert (1, 5) in room_check.Bodies(arm).pairs
+    assert (1, 5) in workspace_check.Bodies(arm).pairs
     for _ in range(8):
         end = np.array([20.0, *rng.uniform(95.0, 130.0, 2)])
         trajectory = point_to_point.straight("fold", np.zeros(3), end, arm)
@@ -112,7 +114,7 @@ def test_links_do_not_touch_each_other() -> None:
             points[:, 1, None] + np.linspace(0.0, 1.0, 41)[:, None] * (points[:, 2] - points[:, 1])[:, None]
         )
         apart = np.linalg.norm(first[:, :, None] - third[:, None], axis=3).min()
-        touch = room_check.touch_of(arm, trajectory)
+        touch = workspace_check.touch_of(arm, trajectory)
         refused += touch is not None
         assert (apart > 20.0) if touch is None else (apart < 21.0), f"seed {seed}: {apart}, {touch}"
     assert 0 < refused < 8
@@ -125,7 +127,7 @@ def test_a_plan_names_link_obstacle_depth_time_and_via_points() -> None:
     )
     assert planner.plan(PAPER, job)
     with pytest.raises(PlanError, match=OVER):
-        planner.plan(thick(PAPER, 20.0, ArmRoom((FEEDER,))), job)
+        planner.plan(thick(PAPER, 20.0, Workspace((FEEDER,))), job)
 
 
 @pytest.mark.slow
@@ -133,7 +135,7 @@ def test_a_free_path_goes_around_what_is_between_its_via_points() -> None:
     """Over a box, as seen by dense samples; if walls leave no way, it is refused as before."""
     via = [[20, -60, 40], [160, -60, 40], [100, -90, 20]]
     job = Job("over", via_deg=via, stops=(Stop(1, 0.5),), path="free", refine=5, starts=1)
-    arm = thick(PAPER, 20.0, ArmRoom((replace(FEEDER, high_mm=(50.0, 400.0, 250.0)),)))
+    arm = thick(PAPER, 20.0, Workspace((replace(FEEDER, high_mm=(50.0, 400.0, 250.0)),)))
     plan = planner.plan(arm, job)
     assert "the path goes around feeder" in plan.notes
     assert dense_least(arm, plan.trajectory, 2000) > 0.0
@@ -149,24 +151,24 @@ def test_a_free_path_goes_around_what_is_between_its_via_points() -> None:
     assert dense_least(arm, led.trajectory, 2000) > 0.0
     wall = replace(FEEDER, low_mm=(-20.0, 40.0, -FAR_MM), high_mm=(20.0, FAR_MM, FAR_MM))
     with pytest.raises(PlanError, match=OVER):
-        planner.plan(replace(arm, room=ArmRoom((wall,))), job)
+        planner.plan(replace(arm, workspace=Workspace((wall,))), job)
 
 
 @pytest.mark.slow
 def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it(caplog: pytest.LogCaptureFixture) -> None:
     start = np.array([20.0, -60.0, 40.0])
-    arm = thick(PAPER, 20.0, ArmRoom((FEEDER,)))
+    arm = thick(PAPER, 20.0, Workspace((FEEDER,)))
     with pytest.raises(PlanError, match="inside of feeder"):
         goto.motion(arm, start, np.array([160.0, -60.0, 40.0]), goto.MovePace())
     jog = jog_motion.plan("jog", arm, start, JogMove(np.inf, joint=0))
     assert "would touch feeder" in jog.ends
-    assert room_check.touch_of(arm, jog.trajectory) is None
+    assert workspace_check.touch_of(arm, jog.trajectory) is None
     assert start[0] + 5.0 < jog.end_deg[0] < 90.0
     inside = np.array([90.0, -60.0, 40.0])
-    assert room_check.posture_touches(arm, inside)
+    assert workspace_check.posture_touches(arm, inside)
     out = point_to_point.straight("out", inside, start, arm)
-    assert room_check.touch_of(arm, out) is not None
-    assert room_check.touch_of(arm, out, outwards=True) is None
+    assert workspace_check.touch_of(arm, out) is not None
+    assert workspace_check.touch_of(arm, out, outwards=True) is None
     goto.motion(arm, inside, start, goto.MovePace())
     (told,) = {record.message for record in caplog.records}
     assert "where it starts; it may move out only" in told
@@ -174,10 +176,10 @@ def test_goto_and_jog_keep_to_the_room_and_lead_out_of_it(caplog: pytest.LogCapt
 
 @pytest.mark.slow
 def test_a_plan_that_starts_where_it_touches_is_refused_unless_it_says_so_and_never_comes_back() -> None:
-    arm = thick(PAPER, 20.0, ArmRoom((FEEDER,)))
+    arm = thick(PAPER, 20.0, Workspace((FEEDER,)))
     inside, outside = (90.0, -60.0, 40.0), (20.0, -60.0, 40.0)
     out = Job("out", via=(inside, outside), path="through", optimiser="gradient", starts=1)
-    touch = max(room_check.posture_touches(arm, inside), key=lambda each: each.depth_mm)
+    touch = max(workspace_check.posture_touches(arm, inside), key=lambda each: each.depth_mm)
     with pytest.raises(PlanError, match=f"out: {touch.description} where it starts"):
         planner.plan(arm, out)
     plan = planner.plan(arm, replace(out, start_touches=True))
@@ -192,13 +194,15 @@ def test_what_the_tool_holds_keeps_to_the_room_from_the_step_on_that_says_so() -
     cup = Load("cup", radius_mm=10.0, length_mm=100.0, along="x", centre_mm=(0.0, 0.0, 30.0))
     arm = replace(thick(PAPER, 20.0, None), loads=(cup,))
     start, end = (20.0, -60.0, 40.0), (160.0, -60.0, 40.0)
-    low = room_check.Bodies(arm.holding("cup")).ends(np.array([[90.0, -60.0, 40.0]]))
+    low = workspace_check.Bodies(arm.holding("cup")).ends(np.array([[90.0, -60.0, 40.0]]))
     box = KeepOut("box", (-150.0, 60.0, -FAR_MM), (150.0, 400.0, float(low[0][-1, 0, 2]) - 15.0))
-    assert room_check.Bodies(arm).ends(np.array([start]))[0].shape == (12, 1, 3)
+    assert workspace_check.Bodies(arm).ends(np.array([start]))[0].shape == (12, 1, 3)
     for top, refused in ((0.0, False), (10.0, True)):
         raised = replace(box, high_mm=(150.0, 400.0, box.high_mm[2] + top))
-        there = replace(arm, room=ArmRoom((raised,)))
-        touch = room_check.touch_of(there.holding("cup"), point_to_point.straight("over", start, end, arm))
+        there = replace(arm, workspace=Workspace((raised,)))
+        touch = workspace_check.touch_of(
+            there.holding("cup"), point_to_point.straight("over", start, end, arm)
+        )
         assert (touch is not None) == refused
     for line in (False, True):
         with pytest.raises(PlanError, match="the load cup is"):
@@ -211,15 +215,16 @@ def test_what_the_tool_holds_keeps_to_the_room_from_the_step_on_that_says_so() -
 
 
 def test_check_names_postures_that_touch() -> None:
-    arm = thick(PAPER, 20.0, ArmRoom(high_mm=(FAR_MM, FAR_MM, 200.0)))
+    arm = thick(PAPER, 20.0, Workspace(high_mm=(FAR_MM, FAR_MM, 200.0)))
     assert any("the ceiling" in finding.what and "home" in finding.what for finding in check_arm(arm))
-    assert not any(finding.where == "room" for finding in check_arm(PAPER))
+    assert not any(finding.where == "workspace" for finding in check_arm(PAPER))
 
 
 FILE = """
+[workspace]
 floor_mm = 0
 x_mm = [-100, 300]
-[[keep_out]]
+[[workspace.keep_out]]
 name = "feeder"
 low_mm = [1, 2, 3]
 high_mm = [4, 5, 6]
@@ -229,6 +234,12 @@ high_mm = [4, 5, 6]
 def test_a_file_says_walls_and_boxes() -> None:
     found = read(toml_table.parse(FILE, "arm.toml"))
     assert found is not None
+    assert read(toml_table.parse(FILE.replace("workspace", "room"), "arm.toml")) == found, (
+        "as older files call it"
+    )
+    there = replace(PAPER, workspace=found)
+    assert json_codec.encode(there)["room"], "as in older trajectory files"
+    assert json_codec.decode(Arm, json_codec.encode(there), "arm") == there
     names = [obstacle.name for obstacle in found.obstacles]
     assert names == ["feeder", "the wall at x = -100", "the wall at x = 300", "the floor"]
 
@@ -242,23 +253,27 @@ def test_a_file_says_walls_and_boxes() -> None:
         ("floor_mm", "flor_mm", "unknown key"),
     ],
 )
-def test_what_a_room_may_not_say(old: str, new: str, message: str) -> None:
+def test_what_a_workspace_may_not_say(old: str, new: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         read(toml_table.parse(FILE.replace(old, new), "arm.toml"))
 
 
-def test_an_arm_file_has_radii_room_and_loads(tmp_path: Path) -> None:
+def test_an_arm_file_has_radii_workspace_and_loads(tmp_path: Path) -> None:
     text = Path(PAPER.source).read_text(encoding="utf-8")
     file = tmp_path / "arm.toml"
     file.write_text(
         text.replace("d_mm", "radius_mm = 12\nd_mm", 1)
-        + "\n[room]\nfloor_mm = -5\n[load.cup]\nradius_mm = 30\ncentre_mm = [0, 0, 40]\n",
+        + "\n[workspace]\nfloor_mm = -5\n[load.cup]\nradius_mm = 30\ncentre_mm = [0, 0, 40]\n",
         encoding="utf-8",
     )
     arm = Arm.load(file)
-    assert arm.room == ArmRoom(low_mm=(-FAR_MM, -FAR_MM, -5.0))
+    assert arm.workspace == Workspace(low_mm=(-FAR_MM, -FAR_MM, -5.0))
     assert arm.joints[0].radius_mm == 12.0
     assert arm.holding("cup").held == Load("cup", radius_mm=30.0, centre_mm=(0.0, 0.0, 40.0))
+    file.write_text(file.read_text(encoding="utf-8") + "[room]\n", encoding="utf-8")
+    with pytest.raises(InputError, match="room: unknown key"):
+        Arm.load(file)
+    file.write_text(file.read_text(encoding="utf-8").removesuffix("[room]\n"), encoding="utf-8")
     job = 'name = "j"\nvia_deg = [[0, 0, 0], [1, 1, 1]]\nholds = '
     assert Job.of_table(toml_table.parse(job + '"cup"', "job.toml"), arm).holds == "cup"
     with pytest.raises(InputError, match=r"job\.toml: holds: .* no load 'cub'; did you mean 'cup'"):

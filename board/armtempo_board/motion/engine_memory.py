@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-class Workspace:
-    """``room``: bytes for an engine, see ``armtempo_shared.engine_memory``; ``memory`` is made by ``make_memory``.
+class EngineMemory:
+    """``size``: bytes for an engine, see ``armtempo_shared.engine_memory``; ``memory`` is made by ``make_memory``.
 
     ``address``: of its PROCESSOR_WORDS; 0: in the heap. It owns the interrupts' callbacks, so they never
     refer to objects of an earlier engine.
     """
 
-    def __init__(self, room: int, address: int = 0) -> None:
-        self.room = room
-        self.is_short = room < LARGEST_BYTES  # the heap does not have enough for every arm
+    def __init__(self, size: int, address: int = 0) -> None:
+        self.size = size
+        self.is_short = size < LARGEST_BYTES  # the heap does not have enough for every arm
         self._own = None if address else Memory([PROCESSOR_WORDS]).take(PROCESSOR_WORDS)
         self._address = address or uctypes.addressof(self._own)
         self.memory = Memory([])
