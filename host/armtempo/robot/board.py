@@ -27,7 +27,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.planning.jog.jog_motion import SPEED, move_of
+from armtempo.planning.jog.jog_motion import SPEED, move_of, number_of_joint
 from armtempo.report.run import Run
 from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot import (
@@ -45,6 +45,7 @@ from armtempo.robot import (
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.goto import Where, posture_deg
+from armtempo.robot.homing import HomingProgress
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardInput, BoardOutput
@@ -220,25 +221,42 @@ class Board:
 
     # where the arm is
 
-    def home(self, arm: Arm | Path | str, where: Where | None = None) -> None:
+    def home(self, arm: Arm | Path | str, where: Where | None = None, joint: int | str | None = None) -> None:
         """Declare that ``arm`` is at ``where`` (default: its home posture); nothing moves.
 
-        Raises InputError for a posture that does not fit the arm, LinkError if the board is set up for another.
+        ``joint``: number (from 1) or name of the only joint, with those that are coupled with it, that is declared to
+        be at its home angle. Raises InputError for a posture that does not fit the arm, a joint that it does not have,
+        or a posture and a joint, LinkError if the board is set up for another arm.
         """
         arm = Arm.of(arm)
+        if joint is not None and where is not None:
+            raise InputError("a posture and a joint exclude each other", "give one of them")
+        number = None if joint is None else number_of_joint(arm, joint)
         self.configure(arm)
-        arm_state.home(self.client, arm, None if where is None else posture_deg(where, arm))
+        if number is None:
+            arm_state.home(self.client, arm, None if where is None else posture_deg(where, arm))
+        else:
+            arm_state.home_joint(self.client, arm, number)
 
-    def home_to_switches(self, arm: Arm | Path | str, stop: StopRequest | None = None) -> None:
+    def home_to_switches(
+        self,
+        arm: Arm | Path | str,
+        stop: StopRequest | None = None,
+        joint: int | str | None = None,
+        progress: HomingProgress | None = None,
+    ) -> None:
         """Home the joints that have a switch of known angle: to it, off it, slowly to it again, to their home angle.
 
-        Raises InputError if no joint has such a switch, LinkError if a switch does not trip.
+        ``joint``: number (from 1) or name of the only one, with those that are coupled with it. ``progress``: called
+        with what happens and how many of the joints are at home. Raises InputError if no joint has such a switch,
+        LinkError if a switch does not trip.
         """
         arm = Arm.of(arm)
+        number = None if joint is None else number_of_joint(arm, joint)
         self.configure(arm)
         with self._stoppable(stop) as wanted:
             self._start.moved = True
-            homing.home_to_switches(self.client, arm, wanted)
+            homing.home_to_switches(self.client, arm, wanted, number, progress or homing.silent)
 
     def posture_deg(self) -> Array:
         """Joint angles from the commanded steps, degrees (J,); raises LinkError if a position is unknown."""
