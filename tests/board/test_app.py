@@ -51,7 +51,7 @@ def test_the_loop_allocates_nothing_while_moving(name: str, tmp_path: Path) -> N
 
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "fuzz.py"
-FRAMES = {"cpython": 100_000, "micropython": 50_000, "micropython-arm": 4_000}
+FRAMES = {"cpython": 20_000, "micropython": 10_000, "micropython-arm": 1_000}
 SEED = 20261121
 
 

@@ -235,7 +235,7 @@ def test_free_floor_holds_for_any_multipliers(seed: int) -> None:
     low = scan._between()
     for s in rng.uniform(0, 1, 20):
         times, x = (each[:-1] + s * np.diff(each, axis=0) for each in (scan.times, scan.x))
-        cost = via_bound._Cost.of(ways[scan.stretch[:-1]], limits, times)
+        cost = via_bound._Cost.of(ways[scan.leg[:-1]], limits, times)
         together = np.isfinite(low)
         assert np.all((cost.exact(x, cost.arguments(x)) + 1e-7 * (1 + np.abs(low)) >= low)[together])
     assert scan.floor().sum() <= 6.8222

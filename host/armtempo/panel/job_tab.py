@@ -379,8 +379,8 @@ class JobTab:
             return words.NO_PLAN
         if self._jobs.plan_is_old:
             return words.PLAN_IS_OLD
-        floor = max(search.floor_s for search in plan.searches)
-        return words.MOTION_TIME.format(total=plan.total_s, floor=floor)
+        bound = max(search.floor_s for search in plan.searches)
+        return words.MOTION_TIME.format(total=plan.total_s, bound=bound)
 
 
 def _shown_keys(via: Via) -> list[str]:

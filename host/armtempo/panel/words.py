@@ -138,7 +138,7 @@ CHOICES = {
     "shared": "shared by all joints",
     "per-joint": "one for each joint",
 }
-MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {floor:.3f} s."
+MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {bound:.3f} s."
 PLAY, PLAY_TIME = "Play on the model", "Time on the model"
 TIME_S, ANGLE, SPEED, ACCELERATION, JERK = (
     "s",

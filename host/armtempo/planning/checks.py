@@ -187,7 +187,7 @@ def _check_path(job: Job) -> None:
     elif planner_of(job) == "line" and (job.timing != "shared" or job.degree != 5):
         raise InputError(
             f'{where}: a stop needs timing = "shared" and degree 5',
-            "leave timing and degree out, or plan the stretches between the stops one by one with --split",
+            "leave timing and degree out, or plan the legs between the stops one by one with --split",
         )
     _check_stops(job, where)
     if is_free(job):

@@ -175,4 +175,5 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
         "low_deg": joint.switches.low_deg,
         "high_deg": joint.switches.high_deg,
         "model": asdict(model),
+        "encoder_on_motor": joint.encoder is not None and joint.encoder.on == "motor",
     }

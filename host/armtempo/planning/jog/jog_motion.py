@@ -265,7 +265,7 @@ def _within(trajectory: Trajectory, arm: Arm) -> bool:
 
 
 def _slowed(trajectory: Trajectory, arm: Arm, speed: float) -> Trajectory:
-    """The motion stretched so that every joint keeps its fraction of the limits."""
+    """The motion scaled so that every joint keeps its fraction of the limits."""
     factor = 0.0
     for reached, joint in zip(extremes.of_joints(trajectory.joints), arm.driven, strict=True):
         most = joint.limits
