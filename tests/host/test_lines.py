@@ -112,7 +112,7 @@ def test_the_bound_holds_and_is_sharp() -> None:
     """Random splines next to a line: no sample of them is beyond the bound, and it is near to the largest."""
     seed = 31
     rng = np.random.default_rng(seed)
-    led = line_path.led_stretches(ARM, replace(JOB, via=JOB.via[:2], ways=JOB.ways[:1]), _via(JOB)[:2])[0]
+    led = line_path.led_legs(ARM, replace(JOB, via=JOB.via[:2], ways=JOB.ways[:1]), _via(JOB)[:2])[0]
     course, tool = led.followed.course, led.followed.tool
     for size in (0.03, 1.0, 5.0):
         angles = bspline.fit(led.followed.at(led.ways(8)), 5)

@@ -17,7 +17,7 @@ from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.model.tool_way import ToolWay
 from armtempo.planning import checks, lower_bounds, path_deviation, planner
-from armtempo.planning.fitness import Fitness, stretch_of
+from armtempo.planning.fitness import Fitness, scale_of
 from armtempo.planning.lower_bounds import Floor
 from armtempo.report import text_summary
 from armtempo.splines import bspline, extremes, time_axis
@@ -288,11 +288,11 @@ def test_sees_the_extremes(degree: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_stretch_is_that_of_the_highest_peaks(seed: int) -> None:
+def test_the_scale_is_that_of_the_highest_peaks(seed: int) -> None:
     rng = np.random.default_rng(seed)
     fitness = Fitness(bspline.fit(rng.normal(0, 30, (9, 3)), 5), 5, LIMITS)
     population = rng.uniform(0.1, 3.0, (30, 8))
-    assert np.array_equal(fitness.stretch(population), stretch_of(fitness.peaks(population).max(axis=(1, 2))))
+    assert np.array_equal(fitness.scale(population), scale_of(fitness.peaks(population).max(axis=(1, 2))))
 
 
 def test_stretched_is_the_time_that_just_keeps_the_limits() -> None:
@@ -300,9 +300,9 @@ def test_stretched_is_the_time_that_just_keeps_the_limits() -> None:
     population = np.random.default_rng(3).uniform(0.5, 2.5, (20, 6))
     found = Fitness(points, 5, LIMITS).stretched(population)
     for value, intervals in zip(found, population, strict=True):
-        factor = stretch_of(exact_ratios(points, intervals, 5).T).max()
+        factor = scale_of(exact_ratios(points, intervals, 5).T).max()
         assert value == pytest.approx(factor * intervals.sum(), rel=0.005)
-        assert stretch_of(exact_ratios(points, intervals * factor, 5).T).max() == pytest.approx(1, rel=1e-9)
+        assert scale_of(exact_ratios(points, intervals * factor, 5).T).max() == pytest.approx(1, rel=1e-9)
 
 
 def test_stretched_does_not_depend_on_the_unit_of_time() -> None:

@@ -237,9 +237,10 @@ class Controller:
         try:
             motion = self.load(name, crc)
             self.release_memory()
-            homing = self._assume(motion, unknown) if flags & START_HOMING else 0
-            if homing:
-                homing = flags >> START_SWITCHES_BIT or homing
+            homing = 0
+            if flags & START_HOMING:
+                moving = self._assume(motion, unknown)
+                homing = flags >> START_SWITCHES_BIT or moving
             self.board.engine.load(motion, rate, None, homing)
         except Refused:
             self._withdraw_assumed()

@@ -36,11 +36,20 @@ def checked(target: T) -> T:
     """
     if not isinstance(target, type):
         return _wrapped(target)  # type: ignore[arg-type, return-value]
+    return checked_as(target.__name__)(target)
+
+
+def checked_as(owner: str) -> Callable[[T], T]:
+    """The same for a class whose methods users call by the class ``owner``, which errors name."""
+    return lambda target: _checked_methods(target, owner)
+
+
+def _checked_methods(target: T, owner: str) -> T:
     for name, entry in [*vars(target).items()]:
         if isinstance(entry, classmethod) and not name.startswith("_"):
-            setattr(target, name, classmethod(_wrapped(entry.__func__, target.__name__)))
+            setattr(target, name, classmethod(_wrapped(entry.__func__, owner)))
         elif inspect.isfunction(entry) and (name == "__call__" or not name.startswith("_")):
-            setattr(target, name, _wrapped(entry, target.__name__))
+            setattr(target, name, _wrapped(entry, owner))
     return target
 
 

@@ -16,7 +16,7 @@ from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
 from armtempo.model.outputs import Input, Output
 from armtempo.robot.board_state import record_crc
-from armtempo.robot.outputs import BoardOutput, Way
+from armtempo.robot.outputs import BoardAccess, BoardOutput
 from armtempo.robot.shared_board import SharedBoard
 
 
@@ -33,7 +33,7 @@ def output(name: str | None, value: str | None, given: BoardOptions) -> None:
     """
     with _board(given) as board:
         if name is not None:
-            output = BoardOutput(board.way, board.arm, name)
+            output = BoardOutput(board.access, board.arm, name)
             if value is not None:
                 output.set(value)
         levels = board.levels().outputs
@@ -119,19 +119,19 @@ def _input_lines(found: list[tuple[Input, bool]]) -> list[str]:
 
 @dataclass(frozen=True)
 class Wired:
-    """Access to a board that is set up for ``arm``."""
+    """BoardAccess to a board that is set up for ``arm``."""
 
-    way: Way
+    access: BoardAccess
     arm: Arm
 
     def levels(self) -> Levels:
         """The levels of its inputs and outputs."""
-        return self.way.levels()
+        return self.access.levels()
 
 
 @contextmanager
 def _board(given: BoardOptions) -> Iterator[Wired]:
-    """Access to the board; raises LinkError if it is set up for another arm than the one that is set."""
+    """BoardAccess to the board; raises LinkError if it is set up for another arm than the one that is set."""
     given = resolve.any_port(given)
     named = resolve.named_arm(given.arm_path)
     with resolve.shared_or_own(given, named) as found:

@@ -238,12 +238,12 @@ def _check(plan: Plan, path: Path | str) -> None:
         raise InputError(f"{path}: searches name a joint that does not exist", "plan it again")
 
 
-def _check_spline(spline: JointSpline, stretches: int, where: str) -> None:
-    segments = stretches
+def _check_spline(spline: JointSpline, legs: int, where: str) -> None:
+    segments = legs
     if spline.via_segments is not None:
-        if len(spline.via_segments) != stretches + 1 or spline.via_segments[0] != 0:
+        if len(spline.via_segments) != legs + 1 or spline.via_segments[0] != 0:
             raise InputError(
-                f"{where}: via_segments must name {stretches + 1} via points, the first at 0", "plan it again"
+                f"{where}: via_segments must name {legs + 1} via points, the first at 0", "plan it again"
             )
         if np.any(np.diff(spline.via_segments) < 1):
             raise InputError(f"{where}: its via_segments do not increase", "plan it again")

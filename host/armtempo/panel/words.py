@@ -78,9 +78,11 @@ VIEW = "View"
 SPEED_OF_MOTION = "Speed"
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
 HOMING = "Home…"
+WHICH_JOINTS, ALL_JOINTS = "Home", "All joints"
+NO_SWITCH = "{joint} has no switch whose angle is known: say where it is instead."
 HOME_BY_SWITCHES = "Home by the switches"
 BY_SWITCHES = "Or let the arm find its switches, in this order: {order}. It moves; clear its workspace."
-SURE = "Does the arm stand as the grey one in the picture? If so, its joints are at:"
+SURE = "Compare the arm with the grey one in the picture. If it stands so, its joints are at:"
 
 DRAG_HINT = "Drag a via point in the picture, or click it to see the other postures that reach it."
 POSTURES_OF = "P{number}: postures that reach it: {count}. The nearest is used; choose another:"
@@ -136,7 +138,7 @@ CHOICES = {
     "shared": "shared by all joints",
     "per-joint": "one for each joint",
 }
-MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {floor:.3f} s."
+MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {bound:.3f} s."
 PLAY, PLAY_TIME = "Play on the model", "Time on the model"
 TIME_S, ANGLE, SPEED, ACCELERATION, JERK = (
     "s",

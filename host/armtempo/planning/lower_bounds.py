@@ -108,7 +108,7 @@ def of_vias(
 ) -> Floor:
     """A lower bound for all motions through via angles (n + 1, J), on any path.
 
-    The sum over stretches between stops (dwells in seconds by via point) of the largest, over joints, of the
+    The sum over legs between stops (dwells in seconds by via point) of the largest, over joints, of the
     least time through its turning via angles under its three limits: at a turning via angle the joint stands
     still there or beyond. With several joints and ``times_s`` (n + 1,), when a plan arrives at the via points, or
     what ``via_bound`` proves for the joints together, if that is more. ``loose`` via points, which may be passed at

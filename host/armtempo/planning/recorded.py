@@ -38,7 +38,7 @@ def plan(
 ) -> Plan:  # fmt: skip
     """The motion through recorded angles (n, J) at their times (n,), within ``tolerance_deg`` at each of them.
 
-    It begins and ends at rest. If it would exceed a limit, all times are stretched by the same factor, which a note
+    It begins and ends at rest. If it would exceed a limit, all times are scaled by the same factor, which a note
     states. Raises PlanError if the spline cannot be near enough, as for a recording that begins in motion, or if the
     arm would leave its ranges or its workspace.
     """

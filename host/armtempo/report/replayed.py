@@ -87,14 +87,14 @@ def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
     )
 
 
-def is_stretched(repetition: RepetitionData) -> bool:
+def is_scaled(repetition: RepetitionData) -> bool:
     """Whether the speed was ever below 100 %."""
     return bool(np.any(np.abs(repetition.time_s - repetition.path_s) > _EQUAL_S))
 
 
 def path_times(repetition: RepetitionData, times_s: Array) -> Array:
     """The motion's own time (K,) at real times (K,), interpolated and extrapolated linearly."""
-    if len(repetition.time_s) < 2 or not is_stretched(repetition):
+    if len(repetition.time_s) < 2 or not is_scaled(repetition):
         return times_s
     inside = np.interp(times_s, repetition.time_s, repetition.path_s)
     return np.where(times_s > repetition.time_s[-1], repetition.path_s[-1], inside)
@@ -116,7 +116,7 @@ def theory(trajectory: Trajectory, times_s: Array, path_s: Array) -> Array:
 
 def speed_note(repetition: RepetitionData) -> str:
     """Text on the speed of a repetition; "" for the planned speed."""
-    if not is_stretched(repetition):
+    if not is_scaled(repetition):
         return ""
     passed_s = np.diff(repetition.time_s)
     whole = passed_s > _SHORT_S  # the last sample may come shortly after another

@@ -51,7 +51,7 @@ _COLOURS = {
 _EXTREMES = {
     "joint": "",
     "motion time (s)": "when the joint arrives",
-    "floor (s)": "no motion of this joint along its path keeps the limits in less time",
+    "at least (s)": "no motion of this joint along its path keeps the limits in less time",
     "speed (°/s)": "the largest magnitude in the plan, exact, of what the arm file allows",
     "acceleration (°/s²)": "the same",
     "jerk (°/s³)": "the same",

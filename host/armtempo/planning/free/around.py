@@ -61,15 +61,15 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
     for _ in range(_ROUNDS):
         names.add(touch.other)
         stage(f"looking for a way around {touch.other}")
-        stretch, part = _place(planned, touch, ways)
-        if len(ways[stretch]) == 2:
-            found = space.way(ways[stretch][0], ways[stretch][1], rng)
+        leg, part = _place(planned, touch, ways)
+        if len(ways[leg]) == 2:
+            found = space.way(ways[leg][0], ways[leg][1], rng)
             if found is None:
                 break
-            ways[stretch] = found
+            ways[leg] = found
         else:  # the path cuts a corner too much: keep it closer to the way
-            middle = 0.5 * (ways[stretch][part] + ways[stretch][part + 1])
-            ways[stretch] = np.insert(ways[stretch], part + 1, middle, axis=0)
+            middle = 0.5 * (ways[leg][part] + ways[leg][part + 1])
+            ways[leg] = np.insert(ways[leg], part + 1, middle, axis=0)
         helped = _helped(job, ways)
         angles = np.concatenate([ways[0], *(way[1:] for way in ways[1:])])
         try:
@@ -118,12 +118,12 @@ def _places(ways: Sequence[Array]) -> Array:
 
 
 def _place(planned: Planned, touch: Touch, ways: Sequence[Array]) -> tuple[int, int]:
-    """The stretch in which a motion touches something, and the part of its way."""
+    """The leg in which a motion touches something, and the part of its way."""
     times = planned.trajectory.joints[0].via_times_s
     part = int(np.clip(np.searchsorted(times, touch.time_s) - 1, 0, len(times) - 2))
     places = _places(ways)
-    stretch = int(np.searchsorted(places, part, side="right")) - 1
-    return stretch, part - int(places[stretch])
+    leg = int(np.searchsorted(places, part, side="right")) - 1
+    return leg, part - int(places[leg])
 
 
 def _helped(job: Job, ways: Sequence[Array]) -> Job:

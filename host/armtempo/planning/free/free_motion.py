@@ -34,8 +34,8 @@ _PEAK_GRID_FACTOR = 4
 _PEAK_THRESHOLDS = 0.95, 0.999
 """Peaks that become points after the first solve, and after a later one."""
 _AWAY, _LEAST_AWAY = 0.01, 1e-5
-"""Fraction by which time is stretched before each solve, for a start within the limits: twice what the last one was
-stretched by, within these."""
+"""Fraction by which time is scaled before each solve, for a start within the limits: twice what the last one was
+scaled by, within these."""
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
 """Weight of steps between time differences in the first solve, per segment and via point; fraction of it later."""
 _LEAST_STEP = 1e-3
@@ -131,14 +131,14 @@ class FreeMotion:
         return np.append(times[self.layout.arrivals[:-1], 0], times[-1].sum())
 
     @property
-    def stretch_times_s(self) -> Array:
+    def leg_times_s(self) -> Array:
         """Time from each via point to the next, without dwells: (n,)."""
         dwells = [self.layout.stops.get(via, 0.0) for via in range(len(self.layout.pieces))]
         return np.asarray(np.diff(self.via_times_s) - np.array(dwells))
 
-    def stretched(self, limits: Array) -> FreeMotion:
+    def scaled(self, limits: Array) -> FreeMotion:
         """The motion with time scaled so that it just keeps every limit, proven."""
-        return self.slower(self.curve(limits).stretch())
+        return self.slower(self.curve(limits).scale())
 
     def slower(self, factor: float) -> FreeMotion:
         """The motion with time scaled, except in dwells: the difference that acts only on a dwell compensates.
@@ -245,17 +245,17 @@ class Improver:
         """The motion after ``rounds`` solves, each with the peaks of the previous one; never slower than
         ``motion``."""
         points = collocation.grid(self.layout.segments, _PARTS, ends=False)
-        best = here = motion.stretched(self.demand.limits)
-        stretch = np.inf
+        best = here = motion.scaled(self.demand.limits)
+        scale = np.inf
         for number in range(rounds):
-            here = self._inside(self._solve(here, points, stretch), best)
+            here = self._inside(self._solve(here, points, scale), best)
             curve = here.curve(self.demand.limits)
-            stretch = curve.stretch()
+            scale = curve.scale()
             least = _PEAK_THRESHOLDS[min(number, 1)]
             points += collocation.peaks(curve, _PEAK_GRID_FACTOR * _PARTS, least)
-            here = here.slower(stretch)
+            here = here.slower(scale)
             best = min(best, here, key=lambda candidate: candidate.total_s)
-            if stretch < 1.0 + _NEAR:
+            if scale < 1.0 + _NEAR:
                 break
         return best
 
@@ -302,11 +302,11 @@ class Improver:
             self.variables
         )
 
-    def _solve(self, motion: FreeMotion, points: Points, stretch: float) -> FreeMotion:
-        """``stretch``: how much the solve before exceeded the limits, as a factor on time; inf for the first."""
+    def _solve(self, motion: FreeMotion, points: Points, scale: float) -> FreeMotion:
+        """``scale``: how much the solve before exceeded the limits, as a factor on time; inf for the first."""
         unit_s = motion.total_s / self.layout.segments
         limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
-        first, excess = stretch == np.inf, stretch - 1.0
+        first, excess = scale == np.inf, scale - 1.0
         smoothing = self._smoothing() * (1.0 if first else _SMOOTHED)
         steps = motion.differences_s / unit_s * (1.0 + min(2.0 * excess + _LEAST_AWAY, _AWAY))
         least = min(_LEAST_STEP, 0.5 * float(steps.min()))

@@ -112,7 +112,7 @@ def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planne
 
 
 def _axis_s(demand: Demand, spline: Planned, pieces: int) -> Array:
-    """Differences of the optimal time axis with ``pieces`` segments per stretch of the spline."""
+    """Differences of the optimal time axis with ``pieces`` segments per leg of the spline."""
     joint = spline.trajectory.joints[0]
     start = time_axis.cut(np.diff(joint.time_points_s), joint.refine, pieces, DEGREE)
     limits = [Limits(*values) for values in demand.limits]
@@ -192,9 +192,9 @@ def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[S
 
 
 def _kept(arm: Arm, trajectory: Trajectory) -> Trajectory:
-    """The trajectory, stretched slightly if rounding of control points exceeds a limit.
+    """The trajectory, scaled slightly if rounding of control points exceeds a limit.
 
-    For a very small move, the stretched times may be rounded differently: then it is stretched again, each time more.
+    For a very small move, the scaled times may be rounded differently: then it is scaled again, each time more.
     """
     for margin in _MARGINS:
         factors = [
@@ -220,8 +220,8 @@ def _joint(motion: FreeMotion, column: int) -> JointSpline:
 
 
 def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
-    stretch = max(1.0, MIN_DURATION_S / motion.total_s)
-    times = time_points(motion.differences_s * stretch, DEGREE)
+    scale = max(1.0, MIN_DURATION_S / motion.total_s)
+    times = time_points(motion.differences_s * scale, DEGREE)
     return JointSpline(DEGREE, 1, angle_points_deg, times, tuple(map(int, motion.layout.arrivals)))
 
 

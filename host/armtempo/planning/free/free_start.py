@@ -45,10 +45,10 @@ def along_spline(demand: Demand, pieces: int, times_s: Array) -> FreeMotion:
 
 
 def on_time_axis(demand: Demand, differences_s: Array) -> FreeMotion:
-    """The spline through the via points on a time axis (S + 4,) with the same number of segments per stretch."""
-    stretches = len(demand.via_deg) - 1
-    pieces = (len(differences_s) - DEGREE + 1) // stretches
-    return replace(along_spline(demand, pieces, np.ones(stretches)), differences_s=differences_s)
+    """The spline through the via points on a time axis (S + 4,) with the same number of segments per leg."""
+    legs = len(demand.via_deg) - 1
+    pieces = (len(differences_s) - DEGREE + 1) // legs
+    return replace(along_spline(demand, pieces, np.ones(legs)), differences_s=differences_s)
 
 
 def smooth(demand: Demand, layout: Layout, times_s: Array) -> FreeMotion:
@@ -66,7 +66,7 @@ def resampled(demand: Demand, layout: Layout, motion: FreeMotion) -> FreeMotion:
     curve = motion.curve(demand.limits)
     times = motion.via_times_s
     leaves = times + np.array([motion.layout.stops.get(via, 0.0) for via in range(len(times))])
-    steps_s = motion.stretch_times_s / layout.pieces
+    steps_s = motion.leg_times_s / layout.pieces
     knots = [np.array([0.0])]
     for via, (step, count) in enumerate(zip(steps_s, layout.pieces, strict=True)):
         if layout.arrivals[via] < layout.departures()[via]:

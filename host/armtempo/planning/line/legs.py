@@ -1,4 +1,4 @@
-"""A job's via points divided into stretches from rest to rest: on a spline, or along lines and arcs of the tool."""
+"""A job's via points divided into legs from rest to rest: on a spline, or along lines and arcs of the tool."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _CUT = 0.5
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Leg:
     """Via points ``first`` to ``last``, with rests at both; ``ways``: the lines and arcs of the tool, if any."""
 
     first: int
@@ -44,11 +44,11 @@ class Stretch:
         )
 
 
-def of_job(job: Job) -> list[Stretch]:
-    """The stretches of a job in order."""
+def of_job(job: Job) -> list[Leg]:
+    """The legs of a job in order."""
     led = {way.via: way for way in job.ways if way.line}
     stops = {stop.via for stop in job.stops}
-    stretches: list[Stretch] = []
+    legs: list[Leg] = []
     first, ways = 0, []
     for via in range(1, len(job.via)):
         if via in led:
@@ -57,9 +57,9 @@ def of_job(job: Job) -> list[Stretch]:
         else:
             goes_on = via + 1 not in led and via not in stops
         if via == len(job.via) - 1 or not goes_on:
-            stretches.append(Stretch(first, via, tuple(ways)))
+            legs.append(Leg(first, via, tuple(ways)))
             first, ways = via, []
-    return stretches
+    return legs
 
 
 def kept(arm: Arm, end: tuple[float, ...] | Pose) -> tuple[str, ...]:
@@ -73,23 +73,23 @@ def kept(arm: Arm, end: tuple[float, ...] | Pose) -> tuple[str, ...]:
     return WHOLE if count >= 6 else (APPROACH,) if count == 5 else ()
 
 
-def course(arm: Arm, job: Job, stretch: Stretch, first_deg: Array) -> Course:
-    """The way of the tool in a stretch that begins at angles ``first_deg``, (J,).
+def course(arm: Arm, job: Job, leg: Leg, first_deg: Array) -> Course:
+    """The way of the tool in a leg that begins at angles ``first_deg``, (J,).
 
     Raises PlanError for an invalid way.
     """
     tool = Tool(arm, list(range(len(arm.driven))), first_deg)
-    fixed = kept(arm, job.via[stretch.last])
-    for via in range(stretch.first + 1, stretch.last):
+    fixed = kept(arm, job.via[leg.last])
+    for via in range(leg.first + 1, leg.last):
         if kept(arm, job.via[via]) != fixed:
             raise PlanError(
-                f"P{stretch.first} to P{stretch.last}: the corner at P{via} cannot be cut, as the lines at it keep "
+                f"P{leg.first} to P{leg.last}: the corner at P{via} cannot be cut, as the lines at it keep "
                 "different parts of the tool's orientation",
                 "leave blend_mm out, or give both via points the same kind of pose",
             )
     here = pose_at(tool, first_deg)
     pieces: list[ToolPiece] = []
-    for way in stretch.ways:
+    for way in leg.ways:
         target = job.via[way.via]
         end = np.array(target.matrix) if isinstance(target, Pose) else pose_at(tool, np.array(target))
         pieces.append(_piece(way, here, end, fixed))
@@ -97,10 +97,10 @@ def course(arm: Arm, job: Job, stretch: Stretch, first_deg: Array) -> Course:
         length = np.array([last.length])
         here = end.copy()
         here[:3, :3] = last.turned(length)[0] @ last.start[:3, :3]
-    cuts = tuple(way.blend_mm for way in stretch.ways[:-1])
+    cuts = tuple(way.blend_mm for way in leg.ways[:-1])
     path = ToolPath(tuple(pieces), cuts)
-    _check_cuts(stretch, path)
-    return Course(arm, path, fixed, stretch.name)
+    _check_cuts(leg, path)
+    return Course(arm, path, fixed, leg.name)
 
 
 def pose_at(tool: Tool, angles_deg: Array) -> Array:
@@ -125,11 +125,11 @@ def _piece(way: ToolWay, start: Array, end: Array, fixed: tuple[str, ...]) -> To
     return tool_path.line(start, end, turn, where)
 
 
-def _check_cuts(stretch: Stretch, path: ToolPath) -> None:
+def _check_cuts(leg: Leg, path: ToolPath) -> None:
     """Raise PlanError if corners are cut over more than half of a line."""
     ways = [0.0, *path.cuts, 0.0]
     for number, piece in enumerate(path.pieces):
-        name = f"P{stretch.first + number} to P{stretch.first + number + 1}"
+        name = f"P{leg.first + number} to P{leg.first + number + 1}"
         if path.cuts and not np.any(piece.direction):
             raise PlanError(
                 f"{name}: the tool only turns, so no corner is cut there",
@@ -147,4 +147,4 @@ def end_deg(arm: Arm, job: Job, via: int, before_deg: Array) -> Array:
     """Angles (J,) at the end of the line to a via point, starting at the posture ``before_deg`` (J,)."""
     way = tool_way.at(job.ways, via)
     assert way is not None
-    return follow(course(arm, job, Stretch(via - 1, via, (way,)), before_deg), before_deg).end_deg
+    return follow(course(arm, job, Leg(via - 1, via, (way,)), before_deg), before_deg).end_deg
