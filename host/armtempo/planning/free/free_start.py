@@ -149,6 +149,8 @@ def _nearest(forms: Forms, room: float, fixed: Equalities, wanted: Array) -> Arr
     """
     x, room = wanted, min(_ROOM * room, _MOST_ROOM)
     excess = _excess(forms, x) + room
+    if excess < min(room - _TOO_NEAR, 0.0):
+        return x
     for _ in range(_STEPS):
         if excess <= 0.5 * room:
             break
