@@ -21,6 +21,8 @@ PLACE = ROOT / ".cache" / "ci"
 OLDEST = (3, 11)
 WHAT = ["-e", ".[plot,cluster,mpy,urdf,ros,panel,docs]", "-r", "tests/requirements.txt"]
 RELEASE = "import sys, venv; sys.version_info.releaselevel == 'final' and print(*sys.version_info[:2])"
+QUICK = ("WORKERS=2", "PYTEST_ARGS=-k 'not micropython'")
+"""What runs on MicroPython is the same with every Python, and quick tests do not wait for anything."""
 DESCRIBE = """
 from importlib.metadata import version
 import platform
@@ -79,9 +81,9 @@ def run(*command: str | Path) -> str:
     return done.stdout
 
 
-def make(environment: Environment, target: str) -> str:
+def make(environment: Environment, target: str, *variables: str) -> str:
     """What ``make`` prints for a target in an environment."""
-    return run("make", f"VENV={environment.folder.relative_to(ROOT)}", target)
+    return run("make", f"VENV={environment.folder.relative_to(ROOT)}", *variables, target)
 
 
 def prepare(environment: Environment) -> None:
@@ -104,7 +106,7 @@ def main() -> int:
         for environment, ready in [(one, pool.submit(prepare, one)) for one in environments(found)]:
             try:
                 ready.result()
-                passed = make(environment, "quick").strip().splitlines()[-1]
+                passed = make(environment, "quick", *QUICK).strip().splitlines()[-1]
             except subprocess.CalledProcessError as error:
                 failed = True
                 print(error.output, f"failed: {' '.join(map(str, error.cmd))}", sep="\n")

@@ -22,14 +22,27 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 NEEDS = {
     "board/test_cortex_m4.py": "unicorn",
     "host/test_docs.py": "docutils",
-    "host/test_job_editor.py": "tomlkit",
-    "host/test_panel.py": "nicegui",
+    "host/panel": "nicegui",
     "host/test_urdf.py": "trimesh",
     "system/test_panel.py": "nicegui",
 }
-"""What test modules import that armtempo itself does without: an extra, or a tool of the tests."""
+"""What test modules, or all of a folder, import that armtempo itself does without: an extra, or a tool of the tests."""
+_NONE = (pytest.param(0, marks=pytest.mark.skip("takes long: only with --cases")),)
 DEPRECATIONS = ("DeprecationWarning", "PendingDeprecationWarning", "FutureWarning")
 """Errors in the commands that tests start, too; in the tests' own process every warning is one."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Random tests with other cases than every day's."""
+    parser.addoption("--cases", type=int, metavar="N", help="N random cases for each test that has seeds")
+    parser.addoption("--first", type=int, default=0, metavar="SEED", help="the first of them, default 0")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Give a test marked ``seeds`` a ``seed``: those of the mark, or those of --cases."""
+    if mark := metafunc.definition.get_closest_marker("seeds"):
+        first, count = metafunc.config.getoption("first"), metafunc.config.getoption("cases")
+        metafunc.parametrize("seed", range(first, first + count) if count else mark.args or _NONE)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -70,7 +83,8 @@ class LeftOut(pytest.Module):
 
 def _missing(path: Path) -> str:
     """The package that a test module lacks; "" if it has all, or if nothing may be left out."""
-    needed = NEEDS.get(path.relative_to(Path(__file__).parent).as_posix(), "")
+    module = path.relative_to(Path(__file__).parent)
+    needed = NEEDS.get(module.as_posix(), "") or NEEDS.get(module.parent.as_posix(), "")
     return needed if needed and not os.environ.get("CI") and find_spec(needed) is None else ""
 
 

@@ -36,7 +36,7 @@ _IMPORTED_LATER = (
     "armtempo_board.motion.endpoints",
     "armtempo_board.storage.motion_file",
     "armtempo_board.storage.store",
-    "armtempo_board.app.room",
+    "armtempo_board.app.memory_shares",
     "armtempo_board.app.arm_setup",
     "armtempo_board.app.store_commands",
 )

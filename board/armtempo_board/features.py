@@ -1,6 +1,6 @@
 """Features of the program beyond one motion at a time.
 
-The program in the firmware has all of them. On MicroPython's own firmware they are left out, to save heap
+The program in the firmware has all of them. On stock MicroPython they are left out, to save heap
 (``deploy/program_files.py`` on the host), and their commands are refused.
 """
 

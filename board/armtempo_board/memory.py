@@ -60,7 +60,7 @@ class Memory:
         raise MemoryError
 
 
-def bytes_behind(part: "Any", first: int, words: int) -> bytearray:
+def bytes_of(part: "Any", first: int, words: int) -> bytearray:
     """The bytes of a part of ``words`` words, from the word ``first`` on."""
     return uctypes.bytearray_at(uctypes.addressof(part) + 4 * first, 4 * (words - first))
 

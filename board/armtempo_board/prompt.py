@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 _QUIET_MS = const(50)
 _CTRL_C = const(3)
 _CONTROLS = b"\r\x03"
-_FIRST = const(0)
 
 
 class PromptRequest:
@@ -65,7 +64,7 @@ def wait() -> None:
     byte = bytearray(1)
     while True:
         came = port.readinto(byte, 1)
-        if request.comes(byte[_FIRST] if came else -1, time.ticks_ms()):
+        if request.comes(byte[0] if came else -1, time.ticks_ms()):
             break
         if not came:
             time.sleep_ms(1)

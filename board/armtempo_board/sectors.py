@@ -1,6 +1,6 @@
 """Becomes ``/flash/lib/armtempo_sectors.mpy``: runs the program from the chip's last two sectors of flash.
 
-For MicroPython's own firmware, whose heap the program would fill. ``boot.py`` imports it; from then on ``import`` finds
+For stock MicroPython, whose heap the program would fill. ``boot.py`` imports it; from then on ``import`` finds
 the compiled modules there. ``load`` imports them all and has their code, byte code or machine code, run where it is in
 the flash, so that the copies in the heap are freed.
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.basics.progress import Progress, part
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -27,7 +28,6 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
-from armtempo.records import encode
 from armtempo.report import comparison, sequence_report, text_summary
 from armtempo.report.run import Run
 from armtempo.report.sequence_reader import SequenceRun

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo import optimise
-from armtempo.basics import part
+from armtempo.basics import toml_section
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
 from armtempo.optimise.task import Number, Parameter
 
@@ -49,7 +49,7 @@ def _keys(of: type, name: str) -> Callable[[], str]:
 
     def body() -> str:
         lines = [f"| key of `{name}` | meaning | default |", "|---|---|---|"]
-        for one, key in part.keys(of):
+        for one, key in toml_section.keys(of):
             default = "required" if one.default is MISSING else _value(one.default)
             lines.append(f"| `{one.name}` | {key.meaning}{_allowed(key)} | {default} |")
         return "\n".join(lines) + "\n"
@@ -57,7 +57,7 @@ def _keys(of: type, name: str) -> Callable[[], str]:
     return body
 
 
-def _allowed(key: part.Key) -> str:
+def _allowed(key: toml_section.Key) -> str:
     if key.choices:
         return f": {' or '.join(map(_value, key.choices))}"
     return "" if math.isinf(key.most) else f"; {_value(key.least)} to {_value(key.most)}"

@@ -1,6 +1,6 @@
 """The memory of the engine for an arm on the board: one formula for host and board.
 
-The board's answer to ``hello`` has the bytes of heap for an engine, its objects and its memory (``engine_room``). The
+The board's answer to ``hello`` has the bytes of heap for an engine, its objects and its memory (``engine_bytes``). The
 memory consists of blocks, as a heap has few large ones. Each joint has a ring of edge times in them. The step
 generators' buffers are in ``PROCESSOR_WORDS``, as far as they fit, otherwise in the blocks too.
 """
@@ -66,9 +66,9 @@ def needed_bytes(rates: "list[int]") -> int:
     return 4 * words(rates) + object_bytes(len(rates))
 
 
-def room_words(joints: int, room_bytes: int) -> int:
-    """Words for an engine's memory in ``room_bytes``, without the objects for ``joints``."""
-    return min(max((room_bytes - object_bytes(joints)) // 4, 0), LARGEST_WORDS)
+def memory_words(joints: int, free_bytes: int) -> int:
+    """Words for an engine's memory in ``free_bytes``, without the objects for ``joints``."""
+    return min(max((free_bytes - object_bytes(joints)) // 4, 0), LARGEST_WORDS)
 
 
 def ahead_bytes(joints: int) -> int:
@@ -92,9 +92,9 @@ def lasting_ms(rates: "list[int]", memory_words: int) -> int:
     return 0
 
 
-def fits(rates: "list[int]", room_bytes: int) -> bool:
-    """Whether the engine fits into ``room_bytes``."""
-    return lasting_ms(rates, room_words(len(rates), room_bytes)) > 0
+def fits(rates: "list[int]", free_bytes: int) -> bool:
+    """Whether the engine fits into ``free_bytes``."""
+    return lasting_ms(rates, memory_words(len(rates), free_bytes)) > 0
 
 
 def _find_place(rates: "list[int]", memory_words: int, lasts_ms: int) -> bool:

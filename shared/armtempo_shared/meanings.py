@@ -58,7 +58,7 @@ _ROWS = (
         "run the command again",
     ),
     (
-        "no_room",
+        "no_engine_memory",
         "the engine for this arm does not fit into the board's memory; nothing was changed",
         "lower its top speeds, drive fewer joints, or put the program into the firmware ('armtempo flash')",
     ),
@@ -104,8 +104,8 @@ _ROWS = (
         "plan the sequence again with the arm file that the board is set up for",
     ),
     (
-        "no_sequence_room",
-        "the board has no room to run a sequence of motions for this arm; nothing has moved",
+        "no_sequence_memory",
+        "the board has no memory to run a sequence of motions for this arm; nothing has moved",
         "put the program into the firmware ('armtempo flash'), or let the host run the steps (board.run)",
     ),
     (
@@ -115,7 +115,7 @@ _ROWS = (
     ),
     (
         "needs_firmware",
-        "the program's core on MicroPython's own firmware can only run single motions; nothing has moved",
+        "the program's core on stock MicroPython can only run single motions; nothing has moved",
         "put the program into the firmware: 'armtempo flash'",
     ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
@@ -169,12 +169,12 @@ VALUES: "dict[str, str]" = {
     "wrong_start": "steps from there to the start",
     "too_long": "bytes of the record (at `put_begin`: that it takes); of a joint: its largest number",
     "too_abrupt": "steps/s²",
-    "no_room": "bytes needed",
+    "no_engine_memory": "bytes needed",
     "pin_taken": "16 times the port (A is 0) and the number in it",
     "leg_missing": "number of the motion in the sequence, from 1",
     "leg_elsewhere": "number of the step in the sequence",
     "no_such_pin": "number of the step in the sequence",
-    "no_sequence_room": "bytes that are missing",
+    "no_sequence_memory": "bytes that are missing",
 }
 """What ``value`` of a refusal means, by name; the others have none."""
 
@@ -182,7 +182,7 @@ COMMANDS: "dict[str, str]" = {
     "hello": "Begins a session; `session` is a number that differs between hosts, so that the board recognises a "
     "new one. Refused with `protocol` if the versions differ. Answer: the board's identity; `joints` and `arm_crc` "
     "are 0 without an arm record; `boot` changes at every start of the program; "
-    "`engine_room`: bytes of heap (without the chip's backup SRAM) available to an engine and its objects; "
+    "`engine_bytes`: bytes of heap (without the chip's backup SRAM) available to an engine and its objects; "
     "`features`: what the program can do beyond one motion at a time, 1 sequences, 2 outputs and inputs, "
     "4 held motions, 8 other speeds; 128: both rates were measured on this board; "
     "`arm_problem`: code of the error in the stored arm record, 0 if it is valid or missing; `arm_value`: its "
@@ -200,7 +200,7 @@ COMMANDS: "dict[str, str]" = {
     "next offset.",
     "put_commit": "Ends the upload: the record is read back from the flash, checked against `crc` and for "
     "completeness, and replaces the old one. An arm record whose engine would not fit is refused before that "
-    "(`no_room`), and the old one remains valid; otherwise it takes effect at once.",
+    "(`no_engine_memory`), and the old one remains valid; otherwise it takes effect at once.",
     "put_once": "A piece of the record, `size` bytes in all, of a motion that is run once: it stays in the board's "
     "memory until the next one or a reset, and nothing is written to the flash. A motion record, or one for the way "
     "back along a stored motion (`shared/armtempo_shared/backwards.py`). Offset 0 begins a new one. Answer: the next "
@@ -221,7 +221,8 @@ COMMANDS: "dict[str, str]" = {
     "home": "Sets the positions of the joints of the mask `joints` to these steps; the tail has an i32 for every "
     "joint.",
     "start": "Starts a stored trajectory whose checksum is `crc`; the name `/once`: the record of `put_once`. "
-    "`flags` 1: a limit switch ends it without a fault; 2: it is held, and brakes without a fault when no `hold` "
+    "`flags` 1: a limit switch ends it without a fault; with bits from 4 on, one per joint, only a switch of these "
+    "joints does, else one of any that moves; 2: it is held, and brakes without a fault when no `hold` "
     "arrives for 300 ms. Answer: number of the run and its length in ticks. Or starts a sequence, each of whose "
     "motions is a run of its own; then the answer has the number of the last run and 0.",
     "stop": "`now` 0: brake along the path (freeze if the motion has no brake times); 1: freeze.",

@@ -1,6 +1,6 @@
 """Constants of the wire protocol; its messages are in ``table.py``, its frames in ``wire.py``."""
 
-PROTOCOL_VERSION = 6
+PROTOCOL_VERSION = 7
 """Never 3: each ``hello`` contains it, and MicroPython takes this byte for Ctrl-C."""
 SYNC = 0xA5
 MAX_PAYLOAD = 256
@@ -28,6 +28,8 @@ RESUME = 0xFFFF
 """Instead of a rate: that before the pause."""
 START_HOMING = 1  # flag of start: a limit switch ends the motion without a fault
 START_HELD = 2  # flag of start: the motion brakes unless the host keeps sending hold
+START_SWITCHES_BIT = 2
+"""First bit of start's flags for a homing motion: a bit per joint whose switches end it; none: all that move."""
 
 FEATURES = ("sequences", "outputs", "jog", "speed")
 """Optional features of a program; bits of ``features`` in the answer to ``hello``."""

@@ -46,7 +46,7 @@ C hold 28
 C drivers 29 on:B
 C samples 30 acknowledged:I wanted:H
 A hello 01 protocol:B joints:B encoders:B state:B tick_hz:I max_rate:I max_rate_sum:I free_flash:I
- free_heap:I arm_crc:I program_crc:I boot:I engine_room:I features:B
+ free_heap:I arm_crc:I program_crc:I boot:I engine_bytes:I features:B
  arm_problem:B arm_value:I once_bytes:H text
 A status 02 state:B fault:B fault_joint:B known:B run:I ticks:Q path:Q rate:H
  samples_kept:H samples_lost:I frames_bad:I rest_ms:H bytes

@@ -14,9 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from armtempo.encoding import encoded_motion
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.records import encoded_motion
 from armtempo.robot import stored_motion
 from armtempo.robot.connect import connect
 from armtempo.simulator import LaunchOptions, launch

@@ -2,7 +2,7 @@
 
     python -m tests.benchmark.freeze MICROPYTHON [store]
 
-MICROPYTHON as for tests/benchmark/firmware.py. MicroPython's own firmware for the chip, with the program's files, is
+MICROPYTHON as for tests/benchmark/firmware.py. Stock MicroPython for the chip, with the program's files, is
 run by QEMU, which counts instructions: from the moment at which the interrupt is pending, all that the firmware does
 before and after the program's callback included. ``store`` puts the figures into freeze.json; a test holds them, and
 the callback's own instructions on an emulated core, against the program.
@@ -56,7 +56,7 @@ def alone() -> int:
     registers = at["BLOCK_WORDS"]
     words = array("I", bytes(4 * (registers + 2100)))
     words[at["TIM2_AT"]] = DATA_AT + 4 * registers
-    words[at["PORT_A_BEHIND"]] = 4096
+    words[at["PORT_A_OFFSET"]] = 4096
     line = at["FIRST_LINE"] + at["LINE_WORDS"] * (15 - at["SOFTWARE_LINE"])
     words[line + at["LINE_LEVELS"]] = words[line + at["LINE_MASK"]] = 1
     machine = Machine(ISR)

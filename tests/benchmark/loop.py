@@ -3,7 +3,7 @@
     python -m tests.benchmark.loop MICROPYTHON [files]
     python -m tests.benchmark.loop MICROPYTHON stops [COUNT [SEED [RATE]]]
 
-MICROPYTHON as for tests/benchmark/firmware.py. The program is built into MicroPython's own firmware for the chip, and
+MICROPYTHON as for tests/benchmark/firmware.py. The program is built into stock MicroPython for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
 back to too late runs dry as on the chip. What stands in for timers, DMA, USB, encoders, backup SRAM: loop_board.c and
 tests/board/scripts/benchmarks/firmware_loop.py. With ``files`` after it only the costs of a turn, with the program in
@@ -31,8 +31,8 @@ from zlib import crc32
 
 from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
-from armtempo.records import encode
 from armtempo_shared import armrecord, wire
 from armtempo_shared.limits import MAX_JOINTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
 from armtempo_shared.motion import MOST_RAMP_BITS, OTHER_ENTRIES, REST_ENTRIES

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from armtempo.deploy.firmware import frozen
 from armtempo.diagnosis.selftest import motion, prompt, rate_part
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
-from armtempo.records import encode
 from armtempo_shared import armrecord
 
 from tests.benchmark import firmware

@@ -27,8 +27,8 @@ def main(times: int) -> None:
                 stated.append(used.client.hello())
         print(f"{times - wrong} of {times} passed, drivers {'on' if is_enabled(Path(name)) else 'never on'}")
     for title, part in (("first", stated[: times // 2]), ("second", stated[times // 2 :])):
-        heaps, rooms = [one.free_heap for one in part], {one.engine_room for one in part}
-        print(f"{title} half: heap free {min(heaps)} to {max(heaps)}, engine {rooms}")
+        heaps, engines = [one.free_heap for one in part], {one.engine_bytes for one in part}
+        print(f"{title} half: heap free {min(heaps)} to {max(heaps)}, engine {engines}")
 
 
 if __name__ == "__main__":

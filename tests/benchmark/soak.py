@@ -19,8 +19,8 @@ from pathlib import Path
 
 import armtempo
 from armtempo.basics.errors import BoardError
+from armtempo.encoding import encoded_sequence
 from armtempo.model.sequence import Sequence
-from armtempo.records import encoded_sequence
 from armtempo.simulator import LaunchOptions, edgelog, launch
 
 from tests import interpreters

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 from armtempo.deploy import program_files
 from armtempo.deploy.program_files import STM32F4
+from armtempo.encoding import encode
 from armtempo.model import arm
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.records import encode
 from armtempo_shared import wire
 
 from tests import interpreters

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
+from armtempo.encoding import encode
 from armtempo.link.client import Client
 from armtempo.link.session import Session
 from armtempo.link.transport import SerialTransport
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.records import encode
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import wire
 
@@ -51,7 +51,7 @@ def test_the_loop_allocates_nothing_while_moving(name: str, tmp_path: Path) -> N
 
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "fuzz.py"
-FRAMES = {"cpython": 100_000, "micropython": 50_000, "micropython-arm": 4_000}
+FRAMES = {"cpython": 20_000, "micropython": 10_000, "micropython-arm": 1_000}
 SEED = 20261121
 
 

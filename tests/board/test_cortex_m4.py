@@ -329,7 +329,7 @@ def frozen(machine: Machine, chip: Chip, edge: float, cycles: float) -> array[in
 
     block = array("I", bytes(4 * (FREEZE_AT["BLOCK_WORDS"] + WORDS)))
     block[FREEZE_AT["TIM2_AT"]] = REGISTERS
-    block[FREEZE_AT["PORT_A_BEHIND"]] = 4 * PORT_A
+    block[FREEZE_AT["PORT_A_OFFSET"]] = 4 * PORT_A
     line = FREEZE_AT["FIRST_LINE"] + FREEZE_AT["LINE_WORDS"] * (15 - FREEZE_AT["SOFTWARE_LINE"])
     block[line + FREEZE_AT["LINE_LEVELS"]] = block[line + FREEZE_AT["LINE_MASK"]] = 1
     chip.run(edge)

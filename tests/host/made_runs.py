@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.encoding import encoded_motion
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner
-from armtempo.records import encoded_motion
 from armtempo.report import arm_picture, drawing, plots, run_folder
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 
@@ -91,8 +91,9 @@ def _samples(made: Plan, scatter_deg: float, rng: np.random.Generator) -> list[S
     ticks = np.append(np.arange(0, end, SAMPLE_TICKS), end)
     angles = made.trajectory(ticks / TICK_HZ)
     seen = angles + rng.normal(scale=scatter_deg, size=angles.shape)
-    steps = np.rint(angles * [scale.steps_per_deg for scale in scales]).astype(int).tolist()
-    counts = np.rint(seen * [scale.counts_per_deg for scale in scales]).astype(int).tolist()
+    motors = np.array(made.arm.coupling) if made.arm.coupling else np.eye(len(scales))
+    steps = np.rint(angles @ motors.T * [scale.steps_per_deg for scale in scales]).astype(int).tolist()
+    counts = np.rint(seen @ motors.T * [scale.counts_per_deg for scale in scales]).astype(int).tolist()
     rows = enumerate(zip(ticks.tolist(), steps, counts, strict=True))
     return [
         Sample(run=1, index=n, ticks=t, path_ticks=t, flags=0, positions=Positions(tuple(step), tuple(count)))

@@ -129,6 +129,31 @@ def random_free_problem(seed: int) -> tuple[Arm, Job]:
     return arm, job
 
 
+def tight_free_problem(seed: int) -> tuple[Arm, Job]:
+    """A job for an arm with ranges that its via points fill, or with moves far smaller than its limits."""
+    rng = np.random.default_rng(seed)
+    joints, count = int(rng.integers(1, 7)), int(rng.integers(3, 9))
+    limits = np.stack(
+        [rng.uniform(20, 80, joints), rng.uniform(20, 80, joints), rng.uniform(80, 300, joints)], 1
+    )
+    if seed % 2:
+        via = np.cumsum(rng.uniform(-1.0, 1.0, (count, joints)) * 10.0 ** rng.uniform(-1.7, -0.3), axis=0)
+        if rng.random() < 0.5:
+            via[count // 2 :] += rng.uniform(-90.0, 90.0, joints)
+        span = (-180.0, 180.0)
+    else:
+        half = float(rng.uniform(5.0, 90.0))
+        span = (-half, half)
+        via = rng.uniform(*span, (count, joints))
+        at = rng.random((count, joints)) < 0.33
+        via = np.where(at, np.where(rng.random((count, joints)) < 0.5, *span), via)
+        near = rng.random((count, joints)) < 0.2
+        via = np.where(near, np.clip(via, *span) * (1.0 - 10.0 ** rng.uniform(-5, -1)), via)
+    timing = str(rng.choice(["shared", "per-joint"]))
+    job = Job(f"random-{seed}", tuple(map(tuple, via.tolist())), path="free", timing=timing, starts=1)
+    return make_arm(limits.tolist(), span), job
+
+
 FEEDING = np.array(
     [
         [0, -60, 40],

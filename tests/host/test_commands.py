@@ -258,7 +258,6 @@ def test_status_says_where_the_tool_is(run: Run) -> None:
 NO_REPORT = {
     "demo": "shows a newcomer around",
     "teach": "a screen with keys, and a line on the file",
-    "completion": "prints a script",
     "help": "prints a page",
     "virtual-board": "prints its port, and stays",
     "panel": "prints its address, and stays",
@@ -392,10 +391,10 @@ def test_speeds_name_the_program_that_was_asked(project: Path, monkeypatch: pyte
 
 @pytest.mark.slow
 def test_the_program_on_a_board(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def deploy(port: str, mpy: bool, tell: Any, progress: Any) -> Hello:
+    def deploy(port: str, tell: Any, progress: Any) -> Hello:
         tell("copied")
         numbers = dict.fromkeys(Hello.__dataclass_fields__, 0)
-        return Hello(**{**numbers, "board_id": "x", "engine_room": 60_000})
+        return Hello(**{**numbers, "board_id": "x", "engine_bytes": 60_000})
 
     monkeypatch.setattr("armtempo.deploy.deploy", deploy)
     monkeypatch.setattr("armtempo.deploy.undeploy", lambda port, tell: tell("removed"))

@@ -69,8 +69,8 @@ def held(image: bytes) -> SectorsFound:
 @pytest.mark.slow
 def test_the_compiled_program_takes_few_blocks_and_two_sectors() -> None:
     told: list[str] = []
-    program = changes.choose(BOARD, False, told.append)
-    assert "too small for the sources" in told[0]
+    program = changes.choose(BOARD, told.append)
+    assert not told
     files = {**program.files, **program_files.start_files()}
     assert program.files[program_files.LOADER][:2] == b"M\x06"
     assert sum(-(-len(data) // BOARD.block_size) for data in files.values()) <= 10, "board/docs/memory.md"
@@ -84,20 +84,21 @@ def test_the_compiled_program_takes_few_blocks_and_two_sectors() -> None:
     assert changes.difference(replace(there, sectors=damaged), program).image == program.image
 
 
+@pytest.mark.slow
 def test_sectors_that_hold_something_else_are_not_touched() -> None:
     other = replace(BOARD, sectors=SectorsFound("01" * 12, 0, False))
     with pytest.raises(LinkError, match=r"0x080c0000 on.*hold something else"):
-        changes.choose(other, True, quiet)
+        changes.choose(other, quiet)
     assert changes.difference(other, Wanted({})).image is None
     interrupted = replace(other, files={program_files.ERASING: (0, "")})
-    assert changes.choose(interrupted, True, quiet).image
+    assert changes.choose(interrupted, quiet).image
     change = changes.difference(interrupted, Wanted({}))
     assert (change.image, change.remove) == (b"", []), "to be erased; the file goes after that"
     assert changes.difference(replace(BOARD, sectors=held(b"ARMT" + bytes(20))), Wanted({})).image == b""
     damaged = replace(other, files={program_files.LOADER: (4, "")})  # but the file that reads them is there
-    assert changes.choose(damaged, True, quiet).image
+    assert changes.choose(damaged, quiet).image
     with pytest.raises(LinkError, match="less than 1 MB of flash"):
-        changes.choose(replace(BOARD, sectors=None), True, quiet)
+        changes.choose(replace(BOARD, sectors=None), quiet)
 
 
 def test_only_what_a_deployment_writes_is_surveyed(tmp_path: Path) -> None:
@@ -158,15 +159,15 @@ def test_all_code_of_an_image_is_aligned() -> None:
     assert found > 500
 
 
-@pytest.mark.slow
-def test_sources_go_where_there_is_room() -> None:
-    program = changes.choose(replace(BOARD, free_blocks=2000, free_heap=200_000), False, quiet)
+def test_an_interpreter_without_compiled_files_gets_sources() -> None:
+    cpython = replace(BOARD, mpy=0, free_blocks=2000)
+    program = changes.choose(cpython, quiet)
     assert "/flash/lib/armtempo_board/app/app.py" in program.files
     assert not program.image
-    told: list[str] = []
-    program = changes.choose(replace(BOARD, free_blocks=2000), False, told.append)
-    assert list(program.files) == [program_files.LOADER]
-    assert "memory is too small for the sources" in told[0]
+    with pytest.raises(
+        LinkError, match="too small for the sources, and its interpreter takes no compiled files"
+    ):
+        changes.choose(replace(cpython, free_blocks=200), quiet)
 
 
 def test_only_what_differs_is_written() -> None:
@@ -211,7 +212,7 @@ def test_program_in_the_firmware_leaves_no_library() -> None:
     told: list[str] = []
     frozen = replace(BOARD, firmware_crc=own_crc(), free_blocks=20)
     changes.check_suitable(frozen)
-    assert changes.choose(frozen, False, told.append) == Wanted({})
+    assert changes.choose(frozen, told.append) == Wanted({})
     assert "part of the board's firmware" in told[0]
 
 
@@ -219,22 +220,15 @@ def test_program_in_the_firmware_leaves_no_library() -> None:
 def test_full_flash_is_refused() -> None:
     full = replace(BOARD, free_blocks=2)
     with pytest.raises(LinkError, match="has room for 2; nothing of it is in use") as refused:
-        changes.choose(full, True, quiet)
+        changes.choose(full, quiet)
     assert "remove" not in refused.value.hint
     mine = replace(full, others={"/flash/notes.txt": 700, "/flash/armtempo/a.atm": 60_000})
     with pytest.raises(
         LinkError, match=r"what takes it: /flash/armtempo/a.atm \(118 blocks\), /flash/notes"
     ) as refused:
-        changes.choose(mine, True, quiet)
+        changes.choose(mine, quiet)
     assert "armtempo remove" in refused.value.hint
     assert "mpremote rm" in refused.value.hint
-
-
-def test_a_board_under_cpython_takes_no_compiled_files() -> None:
-    with pytest.raises(LinkError, match="interpreter is CPython") as caught:
-        program_files.library(0)
-    assert caught.value.hint.startswith("deploy without --mpy, ")
-    assert "version 0.0" not in str(caught.value)
 
 
 @pytest.mark.parametrize("mpy", [9 | 7 << 10, 6 | 3 << 8])

@@ -86,15 +86,8 @@ def test_an_example_is_a_command_that_can_be_given(tmp_path: Path, monkeypatch: 
         assert f"  armtempo {line}\n" in page, line
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_a_completion_script_for(shell: str) -> None:
-    done = CliRunner().invoke(main, ["completion", shell])
-    assert done.exit_code == 0
-    assert "_ARMTEMPO_COMPLETE" in done.output
-
-
 def completed(line: str) -> set[str]:
-    """What the script is answered: kind and word."""
+    """What click's script for the shell is answered: kind and word."""
     words = {
         "COMP_WORDS": line,
         "COMP_CWORD": str(len(line.split(" ")) - 1),
@@ -106,7 +99,7 @@ def completed(line: str) -> set[str]:
 
 
 @pytest.mark.slow
-def test_what_the_script_asks_is_answered() -> None:
+def test_what_the_tab_key_asks_is_answered() -> None:
     assert completed("armtempo st") == {"plain,stop", "plain,status"}
     assert completed("armtempo plan --timing p") == {"plain,per-joint"}
     assert completed("armtempo check --arm mo") == {"plain,moveo"}
@@ -272,6 +265,7 @@ def test_the_tables_were_found() -> None:
     assert len(set(mentioned())) >= 25
 
 
+@pytest.mark.slow
 @sources.TOGETHER
 def test_what_the_tour_names_exists() -> None:
     for side, name in sorted(set(mentioned())):

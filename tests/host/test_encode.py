@@ -9,17 +9,15 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.link.board_messages import Hello
+from armtempo.encoding import decode, encode, engine_heap
+from armtempo.encoding.engine_heap import CORE, IN_FIRMWARE, EngineHeap
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
 from armtempo.planning import checks, move_law, point_to_point
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.records import decode, encode
-from armtempo.robot import engine_room
-from armtempo.robot.engine_room import CORE, IN_FIRMWARE, Room
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, engine_memory, limits, motion
-from armtempo_shared.engine_memory import SHORT_MS, room_words
+from armtempo_shared.engine_memory import SHORT_MS, memory_words
 
 ARM = Arm.paper()
 BRAKES = BrakeTimes(1.0, np.arange(5.0, 69.0), np.arange(100.0, 420.0, 10.0), np.arange(63) % 32, 14)
@@ -187,20 +185,11 @@ def test_backwards_mirrors_time() -> None:
 def test_records_read_back() -> None:
     motion = point_to_point.straight("x", START, END, ARM)
     data = encode.motion_record(motion, ARM)
-    found = decode.trajectory(data, ARM.driven, "x")
+    found = decode.trajectory(data, ARM.transmission, "x")
     times = np.linspace(0.0, motion.duration_s, 101)
     np.testing.assert_allclose(found(times), motion(times), atol=1e-7)
     with pytest.raises(InputError, match="not a motion record"):
-        decode.trajectory(data[:-1], ARM.driven, "x")
-
-
-def board(room: Room) -> Hello:
-    """A board with so much memory for engines."""
-    return Hello(
-        protocol=1, joints=0, encoders=0, state="unconfigured", tick_hz=84_000_000, max_rate=240_000,
-        max_rate_sum=240_000, free_flash=0, free_heap=0, arm_crc=0, program_crc=0, boot=1,
-        engine_room=room.size, features=0, arm_problem=0, arm_value=0, once_bytes=3072, board_id="1",
-    )  # fmt: skip
+        decode.trajectory(data[:-1], ARM.transmission, "x")
 
 
 def six_joints() -> Arm:
@@ -208,61 +197,61 @@ def six_joints() -> Arm:
 
 
 def test_an_arm_that_fits_is_told_with_its_bytes() -> None:
-    line = engine_room.of_arm(PAPER, board(CORE))
-    needed = engine_memory.needed_bytes(engine_room.encode.step_rates(PAPER))
+    line = engine_heap.of_arm(PAPER, CORE)
+    needed = engine_memory.needed_bytes(encode.step_rates(PAPER))
     assert line == f"memory on the board: {needed} bytes for 3 joints of {CORE.size}"
-    assert "fits with MicroPython's own firmware or with the program in it" in engine_room.of_arm(PAPER)
+    assert "fits with stock MicroPython or with the program in it" in engine_heap.of_arm(PAPER)
 
 
 @pytest.mark.parametrize("size", range(8_000, 24_000, 500))
 def test_what_is_said_to_fit_fits_with_the_margin_of_the_record(size: int) -> None:
     for joints in range(1, limits.MAX_JOINTS + 1):
-        if rate := Room(size)._highest_rate(joints):
-            assert Room(size).holds([engine_room.encode.with_margin(rate)] * joints), (joints, rate)
+        if rate := EngineHeap(size)._highest_rate(joints):
+            assert EngineHeap(size).holds([encode.with_margin(rate)] * joints), (joints, rate)
 
 
 def test_an_arm_with_more_joints_is_sent_to_the_firmware() -> None:
     arm = six_joints()
     with pytest.raises(InputError) as refused:
-        engine_room.check(arm, board(CORE))
+        engine_heap.check(arm, CORE)
     assert f"the board has {CORE.size}" in refused.value.problem
     assert "armtempo flash" in refused.value.hint
-    assert "too much, or put the program into the board's firmware" in engine_room.of_arm(arm, board(CORE))
-    assert "fits only with the program in the firmware" in engine_room.of_arm(arm)
-    engine_room.check(arm, board(IN_FIRMWARE))
+    assert "too much, or put the program into the board's firmware" in engine_heap.of_arm(arm, CORE)
+    assert "fits only with the program in the firmware" in engine_heap.of_arm(arm)
+    engine_heap.check(arm, IN_FIRMWARE)
 
 
-def test_a_room_that_is_too_small_is_told_in_bytes() -> None:
-    small = Room(6_000)
+def test_memory_that_is_too_small_is_told_in_bytes() -> None:
+    small = EngineHeap(6_000)
     with pytest.raises(InputError) as refused:
-        engine_room.check(PAPER, board(small))
+        engine_heap.check(PAPER, small)
     assert "the board has 6000" in refused.value.problem
     assert "lower its top speeds" in refused.value.hint
 
 
 def test_no_way_out_is_promised_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine_room, "IN_FIRMWARE", CORE)
+    monkeypatch.setattr(engine_heap, "IN_FIRMWARE", CORE)
     with pytest.raises(InputError) as refused:
-        engine_room.check(six_joints(), board(CORE))
+        engine_heap.check(six_joints(), CORE)
     assert "armtempo flash" not in refused.value.hint
 
 
 def test_a_board_tells_what_the_firmware_would_give() -> None:
-    lines = engine_room.of_board(board(CORE))
+    lines = engine_heap.of_board(CORE)
     assert len(lines) == 2
     assert "1 x 240000 steps/s, 2 x 120000 steps/s, 3 x 61000 steps/s" in lines[0]
     assert "6 x 40000 steps/s" in lines[1]
     assert "sequences" in lines[1]
-    assert len(engine_room.of_board(board(IN_FIRMWARE))) == 1
+    assert len(engine_heap.of_board(IN_FIRMWARE)) == 1
 
 
 def test_the_words_name_the_highest_rate_that_fits() -> None:
-    room = Room(8_500)
+    heap = EngineHeap(8_500)
     (rate,) = [
-        int(part.split()[2]) for part in room.words().split(": ")[1].split(", ") if part.startswith("3 x")
+        int(part.split()[2]) for part in heap.describe().split(": ")[1].split(", ") if part.startswith("3 x")
     ]
-    assert room.holds([rate] * 3)
-    assert not room.holds([rate + 1000] * 3)
+    assert heap.holds([rate] * 3)
+    assert not heap.holds([rate + 1000] * 3)
 
 
 def test_rings_last_as_long_as_there_is_memory_for() -> None:
@@ -275,8 +264,8 @@ def test_rings_last_as_long_as_there_is_memory_for() -> None:
         ([20_000] * 6, 6, 0),
         ([40_000] * 6, 3, 0),
     ):
-        assert engine_memory.lasting_ms(rates, room_words(len(rates), IN_FIRMWARE.size)) == in_firmware
-        assert engine_memory.lasting_ms(rates, room_words(len(rates), CORE.size)) == core
+        assert engine_memory.lasting_ms(rates, memory_words(len(rates), IN_FIRMWARE.size)) == in_firmware
+        assert engine_memory.lasting_ms(rates, memory_words(len(rates), CORE.size)) == core
     for lasts_ms in engine_memory.LASTING_MS:
         for rate in (5_000, 60_000, 240_000):
             entries = engine_memory.ring_words(rate, lasts_ms) - 1
@@ -294,6 +283,7 @@ def test_a_block_holds_a_ring_of_1024_entries_or_two_of_512() -> None:
     assert 2 * engine_memory.ring_words(48_000, 3) == 1026
 
 
+@pytest.mark.slow
 def test_every_arm_fits_the_largest_memory() -> None:
     """Of the joints that a ring is as large for, the slowest each."""
     slowest = [1] + [

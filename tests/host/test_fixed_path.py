@@ -64,17 +64,16 @@ def test_gradients_never_make_it_worse(seed: int) -> None:
     rng = np.random.default_rng(seed)
     points = bspline.fit(rng.normal(0, 40, (int(rng.integers(2, 9)), 2)), 5)
     path = FixedPath(points, 5, LIMITS[:2], mirrored=True)
-    start = path.stretched(path.of_intervals(rng.uniform(0.3, 2, len(points) - 5)))
+    start = path.scaled(path.of_intervals(rng.uniform(0.3, 2, len(points) - 5)))
     found = path.optimum(start, 1e-8)
     assert found.total_s <= path.duration_s(start) * (1 + 1e-12)
-    assert path.duration_s(path.stretched(found.differences_s)) == pytest.approx(found.total_s, rel=1e-9)
+    assert path.duration_s(path.scaled(found.differences_s)) == pytest.approx(found.total_s, rel=1e-9)
     assert found.bound_s <= found.total_s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.seeds(*range(8))
 def test_every_polished_axis_has_a_bound_near_it(seed: int) -> None:
-    """More of them: tests/benchmark/floors.py."""
     arm, job = problems.random_problem(seed)
     if np.all(np.ptp(job.via, axis=0) == 0):
         return

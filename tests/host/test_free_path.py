@@ -21,7 +21,6 @@ from armtempo.planning.free import corridor
 from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
-from tests.benchmark import corridors, refusals
 from tests.host import problems
 from tests.host.problems import faults, sampled
 
@@ -46,9 +45,9 @@ def test_the_shipped_motion_is_5_percent_faster_and_keeps_everything() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 5, 79, 83, 92, 109])
+@pytest.mark.seeds(1, 5, 79, 83, 92, 109)
 def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> None:
-    """More of them: tests/benchmark/random_plans.py. The last four have repeated via points, a dwell at angles
+    """The last four have repeated via points, a dwell at angles
     that hardly differ, and one far shorter than the rest: there rounding exceeded limits, the dwell came out too short,
     and time ran backwards.
     """
@@ -62,10 +61,10 @@ def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [37, 54])
+@pytest.mark.seeds(37, 54)
 def test_what_stops_would_keep_is_not_refused(seed: int) -> None:
-    """A move of 0.05 degrees, and via points at both ends of a range; more of them: tests/benchmark/refusals.py."""
-    assert faults(planner.plan(*refusals.random_job(seed))) == []
+    """A move of 0.05 degrees, and via points at both ends of a range."""
+    assert faults(planner.plan(*problems.tight_free_problem(seed))) == [], f"seed {seed}"
 
 
 @pytest.mark.slow
@@ -150,10 +149,38 @@ def test_wider_corridors_are_never_slower_and_none_is_the_spline() -> None:
     assert totals[0] == pytest.approx(on_spline.total_s, rel=1e-9)
 
 
+def random_corridors(seed: int) -> tuple[Arm, Job, list[float]]:
+    """An arm, a job on the spline, and corridors from narrow to wide, in the unit of the job's parameter ``unit``."""
+    rng = np.random.default_rng(seed)
+    arm = Arm.paper() if rng.random() < 0.7 else Arm.load("parol6")
+    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    still = rng.random(len(middle)) < 0.3
+    still[rng.integers(len(still))] = False
+    via = middle + half * np.where(still, 0.0, rng.uniform(-0.5, 0.5, (int(rng.integers(3, 9)), len(middle))))
+    widths = sorted(10.0 ** rng.uniform(-1.5, 2, 3))
+    return (
+        arm,
+        Job(f"random-{seed}", via_deg=via.tolist(), seed=seed, path="through"),
+        [float(width) for width in widths],
+    )
+
+
 @pytest.mark.slow
-def test_a_corridor_is_never_slower_than_the_spline_nor_than_a_narrower_one() -> None:
-    """More of them: tests/benchmark/corridors.py."""
-    assert corridors.faults(list(corridors.times(1))) == []
+@pytest.mark.seeds(1)
+def test_a_corridor_is_never_slower_than_the_spline_nor_than_a_narrower_one(seed: int) -> None:
+    arm, job, widths = random_corridors(seed)
+    try:
+        on_spline = planner.plan(arm, job).total_s
+    except PlanError:
+        return  # the spline itself leaves a range
+    least = np.inf
+    for width in widths:
+        own = {"corridor_mm": width} if seed % 2 else {"corridor_deg": 0.1 * width}
+        total = planner.plan(arm, replace(job, path="free", **own)).total_s
+        assert total <= on_spline * (1 + 1e-9), f"seed {seed}, corridor {width}"
+        assert total <= least * 1.001, f"seed {seed}, corridor {width}"
+        least = min(least, total)
 
 
 @pytest.mark.slow
@@ -174,6 +201,7 @@ def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
     assert len(seen) < 500
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [2.0, 20.0])
 def test_a_corridor_of_the_tool_that_the_stops_leave_no_room_in_is_refused(width: float) -> None:
     """The spline through the via points does not rest there, and a motion that is drawn to it would not either."""
@@ -262,6 +290,7 @@ def test_refuses_what_a_free_path_cannot_be(changes: dict[str, object], message:
         planner.plan(ARM, replace(FEED, **changes))
 
 
+@pytest.mark.slow
 def test_time_that_does_not_increase_is_refused() -> None:
     plan = planner.plan(ARM, replace(FEED, path="through", refine=1, iterations=5))
     spline = plan.trajectory.joints[0]
@@ -292,6 +321,7 @@ def test_the_tools_deviation_is_bounded_sharply(away_deg: float, linkage: bool) 
     assert reached <= bound <= reached * (1.0 + 2.0 * corridor.SHARP) + 1e-6
 
 
+@pytest.mark.slow
 def test_where_the_spline_leaves_a_range_the_free_path_is_named_and_plans_it() -> None:
     via = ((0, -60, 40), (0, -62, 42), (0, -64, 44), (90, -70, 42), (90, -72, 40), (90, -74, 38))
     job = Job("tight", via_deg=via, starts=1)

@@ -96,6 +96,7 @@ def test_previous_posture_chooses_the_branch() -> None:
     assert answer["chosen"] == 6
 
 
+@pytest.mark.slow
 def test_out_of_reach_ends_with_1_and_the_inequality() -> None:
     result = run("--position", "900", "0", "300", "--rpy", "0", "0", "0")
     assert result.exit_code == 1
@@ -123,6 +124,7 @@ def test_singular_poses_say_so() -> None:
     assert "     33.0000" in result.stdout
 
 
+@pytest.mark.slow
 def test_an_arm_outside_the_class_is_searched_numerically(tmp_path: Path) -> None:
     arm = tmp_path / "arm.toml"
     arm.write_text(

@@ -270,5 +270,5 @@ def test_targets_that_make_no_sense_are_refused() -> None:
 
 
 def test_targets_say_what_they_ask_for() -> None:
-    words = [asked(TARGET, fixed).words for fixed in ((), ("pitch",), ("roll", "pitch", "yaw"))]
+    words = [asked(TARGET, fixed).description for fixed in ((), ("pitch",), ("roll", "pitch", "yaw"))]
     assert words == ["position only", "position and pitch", "whole pose"]

@@ -15,12 +15,13 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.basics import errors
+from armtempo.encoding import encoded_sequence
 from armtempo.kinematics import PoseSolver
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample
 from armtempo.model import shipped
-from armtempo.records import encoded_sequence
 from armtempo.robot import sequence_run
+from armtempo.robot.connection import Connection
 from armtempo.simulator import LaunchOptions, launch
 from numpy.typing import ArrayLike
 
@@ -40,7 +41,7 @@ def test_the_button_starts_an_uploaded_sequence_only_where_asked(
 ) -> None:
     defaults: list[str] = []
     client: Any = SimpleNamespace(set_default=defaults.append)
-    monkeypatch.setattr(armtempo.Board, "configure", lambda board, arm: None)
+    monkeypatch.setattr(Connection, "configure", lambda board, arm: None)
     sequence = armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.Wait(1.0),)))
     monkeypatch.setattr(encoded_sequence, "of_plan", lambda plan: SimpleNamespace(arm=arm))
     monkeypatch.setattr(sequence_run, "store", lambda *_: SimpleNamespace(name="pick"))

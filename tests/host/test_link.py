@@ -7,14 +7,15 @@ from pathlib import Path
 
 import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
+from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client, traffic
 from armtempo.link.client import harmless_number
 from armtempo.link.follow import Follower
 from armtempo.link.session import Session
-from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
+from armtempo_shared.messages import START_SWITCHES_BIT
 
 from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, started
 from tests.system.relay import ReplayTransport
@@ -152,6 +153,9 @@ def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) 
     samples = list(Follower(board, run).samples())
     assert samples[0].positions.commanded_steps == (7, 7, 7)
     assert board.status().known == 1
+    assert pipe.app.controller.board.engine.homing == 0b111
+    board.start("feed", wire.record_crc(data), wire.START_HOMING | 0b010 << START_SWITCHES_BIT)
+    assert pipe.app.controller.board.engine.homing == 0b010
 
 
 @pytest.mark.slow

@@ -11,11 +11,11 @@ from threading import Event, Thread
 
 import pytest
 from armtempo.basics.errors import LinkError, NoAnswerError, OtherBoardError
+from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.link.transport import SerialTransport
-from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot import stored_motion
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import StopRequest

@@ -14,13 +14,13 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
 from armtempo.cli import main, stored
 from armtempo.diagnosis.finding import Finding, Level
+from armtempo.encoding import encoded_motion
 from armtempo.link import board_messages
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.planning import planner, rest_to_rest
-from armtempo.records import encoded_motion
 from armtempo.report import drawing, plots, run_folder, run_report, text_summary
 from armtempo.report.replayed import results
 from armtempo.report.run_folder import Repetition
@@ -28,6 +28,7 @@ from armtempo.report.run_reader import RunData
 from armtempo_shared import wire
 from click.testing import CliRunner
 
+from tests import interpreters, sources
 from tests.host import made_runs
 
 FORMULAS = ("$$", r"$\theta$", r"_a^{b}\frac")
@@ -96,6 +97,7 @@ def test_other_alphabets_are_names(tmp_path: Path) -> None:
     assert Arm.load(path).driven[1].name == "Schulter – плечо 肩"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CONTROL if "\n" not in name])
 def test_a_trajectory_file_with_them_is_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / "x.json"
@@ -147,6 +149,7 @@ def test_a_plan_of_joints_with_long_names(made: Plan) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_plan_tells_of_coarse_steps(made: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = Finding(Level.WARNING, "waist", "a step is 1.8°", "use more microsteps")
     monkeypatch.setattr(text_summary, "coarse_steps", lambda arm: [coarse])
@@ -155,6 +158,7 @@ def test_a_plan_tells_of_coarse_steps(made: Plan, monkeypatch: pytest.MonkeyPatc
     )
 
 
+@pytest.mark.slow
 def test_a_plan_on_the_spline_tells_what_is_faster_if_it_loses_much_to_it() -> None:
     """Short approaches, as of a pick, between which the spline swings."""
     via = [[0, -60, 40], [0, -60, 42], [90, -70, 42], [90, -70, 40]]
@@ -175,6 +179,7 @@ def test_a_plan_on_the_spline_tells_what_is_faster_if_it_loses_much_to_it() -> N
     assert not any("takes" in line for line in text_summary.lines(free))
 
 
+@pytest.mark.slow
 def test_a_path_that_swings_beyond_its_via_points_is_told_with_joint_place_and_degrees() -> None:
     """Uneven distances: the spline goes the wrong way first."""
     via = [[20, -60, 40], [21, -60, 40], [120, -60, 40]]
@@ -203,3 +208,35 @@ def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:
     assert all(f"{joint.name} " in line for joint, line in zip(made.arm.driven, lines[2:], strict=True))
     times = stored.motion_lines(motion, [1.0] * len(scales))[3:]
     assert len({line.index(" s, up to") for line in times}) == 1
+
+
+SENTENCES = (
+    "is taken as this",
+    "moving in a pause",
+    "lets nobody watch",
+    "points apart by",
+    "turn to turn",
+    "the best nearby",
+    "with the tool there",
+    "is not the server's",
+    "as far as it was measured",
+    "can look at them",
+    "Is there while",
+    "version of machine",
+)
+"""Parts of sentences that had to be read twice."""
+
+
+@sources.TOGETHER
+def test_sentences_that_had_to_be_read_twice_are_gone() -> None:
+    texts = [
+        path
+        for folder in ("host", "shared", "board")
+        for path in (interpreters.ROOT / folder).rglob("*")
+        if path.suffix in (".py", ".md", ".js", ".html", ".txt") and "_build" not in path.parts
+    ]
+    assert len(texts) > 300
+    found = [
+        f"{path}: {one}" for path in texts for one in SENTENCES if one in path.read_text(encoding="utf-8")
+    ]
+    assert found == []

@@ -11,11 +11,11 @@ import pytest
 from armtempo import simulator
 from armtempo.basics.errors import InputError
 from armtempo.diagnosis import arm_check
+from armtempo.encoding import encode
 from armtempo.model import arm_json, engine_pins, pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.boards import BOARDS, TIMER_OUTPUTS
 from armtempo.model.outputs import Input
-from armtempo.records import encode
 from armtempo.robot import arm_state
 from armtempo_shared import armrecord
 
@@ -74,8 +74,8 @@ def test_values_are_the_whole_range(arm: Arm) -> None:
     for raw in (0, 1, 32768, 65535):
         assert gripper.raw(gripper.value(raw)) == raw
     assert (gripper.state(7282), gripper.state(7283)) == ("open", "")
-    assert gripper.words(7282) == "open (20 deg)"
-    assert pump.words(65535) == "on"
+    assert gripper.describe(7282) == "open (20 deg)"
+    assert pump.describe(65535) == "on"
 
 
 @pytest.mark.parametrize(

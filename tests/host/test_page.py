@@ -1,4 +1,4 @@
-"""Pages and figures: numbers aligned, labels in the page's colour; the bar and the window of a run under way."""
+"""Pages and figures: numbers aligned, labels in the page's colour; the bar of a run under way."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.cli.live import Live
 from armtempo.cli.results import ProgressBar
+from armtempo.cli.run_progress import RunProgress
+from armtempo.encoding import encoded_motion
 from armtempo.kinematics import chain
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.paper import searches
-from armtempo.records import encoded_motion
 from armtempo.report import analysis, arm_picture, drawing, html_page, plots, run_folder, sections
-from armtempo.report.live_plot import LivePlot
 from armtempo.report.run_folder import RunFolder
 
 from tests.host.made_runs import shipped_plan
@@ -118,6 +117,7 @@ def test_the_band_around_a_mean_is_its_standard_error() -> None:
     assert corners[:, 1].max() == pytest.approx(np.max(mean + error))
 
 
+@pytest.mark.slow
 def test_figures_are_no_larger_than_they_must_be() -> None:
     """Coordinates finer than a hundredth of a point would only fill the page."""
     paths = re.findall(r' d="([^"]*)"', figure("searches"))
@@ -131,7 +131,7 @@ def test_per_joint_timing_has_a_section() -> None:
     assert "<h2>Per-joint timing</h2>" in sheet.render()
 
 
-# what a run under way shows: the bar's text, and the window if there is a display
+# what a run under way shows: the bar's text
 
 
 FOLDER = RunFolder(Path("runs/feed-001"), "feed", ())
@@ -151,7 +151,7 @@ def sample(time_s: float, off_deg: float) -> Sample:
 
 def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     notes: list[Any] = []
-    with Live(window=False) as live:
+    with RunProgress() as live:
         live.begin(encoded_motion.of_plan(shipped_plan()), FOLDER)
         monkeypatch.setattr(live, "_progress", lambda *shown: notes.append(shown))
         live.on_sample(sample(3.0, 0.9), 6.8)
@@ -160,35 +160,6 @@ def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch)
     assert (time_s, whole_s) == (3.0, 6.8)
     assert note.count("(+0.") == 3
     assert all(abs(float(part.split(")")[0]) - 0.9) < 0.1 for part in note.split("(")[1:])
-
-
-@pytest.mark.slow
-def test_without_a_display_the_run_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
-    import matplotlib as mpl
-
-    mpl.use("agg")
-    with Live(window=True) as live:
-        live.begin(encoded_motion.of_plan(shipped_plan()), FOLDER)
-        live.on_sample(sample(1.0, 0.0), 6.8)
-    assert "no live plot: there is no display" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_the_window_follows_the_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    import matplotlib.pyplot as plt
-
-    monkeypatch.setattr(plt, "get_backend", lambda: "tkagg")
-    monkeypatch.setattr("matplotlib.figure.Figure.show", lambda self: None)
-    plan = shipped_plan()
-    plot = LivePlot(plan.trajectory, ["a", "b", "c"])
-    for time in (0.0, 0.1, 0.2):
-        plot.add(time, plan.trajectory(time))
-    assert [len(line.get_xdata()) for line in plot._lines] == [3, 3, 3]
-    np.testing.assert_allclose(plot._lines[1].get_ydata()[-1], plan.trajectory(0.2)[1])
-    plot.add(0.0, plan.trajectory(0.0))
-    assert len(plot._lines[0].get_xdata()) == 1
-    plot.close()
-    assert not plt.get_fignums()
 
 
 def test_the_command_line_loads_no_plotting_by_itself() -> None:

@@ -45,6 +45,7 @@ def test_plans_the_shipped_job_without_options() -> None:
     assert Plan.load("feed.json").job.iterations == 20
 
 
+@pytest.mark.slow
 def test_what_the_board_has_to_do_and_how_it_was_searched_is_printed_with_v() -> None:
     said = run("--job", "move.toml", "-v").output
     for words in (
@@ -66,6 +67,7 @@ def test_help_loads_no_numbers() -> None:
     assert found.stdout.splitlines()[-1] == "False"
 
 
+@pytest.mark.slow
 def test_json_is_one_document_and_quiet_leaves_it_alone() -> None:
     result = CliRunner().invoke(main, ["--quiet", "plan", "--iterations", "5", "--json"])
     assert result.exit_code == 0, result.output
@@ -193,6 +195,7 @@ def test_plans_a_free_path_with_a_stop_and_says_its_starts_and_record() -> None:
     assert plan.job.stops[0].dwell_s == 0.5
 
 
+@pytest.mark.slow
 def test_a_spline_stops_and_split_makes_two_motions_of_it() -> None:
     Path("rests.toml").write_text(RESTING)
     whole = run("--job", "rests.toml", "-o", "whole.json")

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from armtempo.basics import progress
 from armtempo.basics.errors import InputError, PlanError
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
+from armtempo.model.job import Job, Stop
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
-from armtempo.planning import lower_bounds, path_deviation, planner
-from armtempo.planning.fitness import Fitness, stretch_of
+from armtempo.model.tool_way import ToolWay
+from armtempo.planning import checks, lower_bounds, path_deviation, planner
+from armtempo.planning.fitness import Fitness, scale_of
 from armtempo.planning.lower_bounds import Floor
-from armtempo.records import encode
 from armtempo.report import text_summary
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline
@@ -89,23 +90,24 @@ def test_problem(problem: problems.Problem) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(4))
-def test_random_jobs_keep_their_limits_or_say_why_not(part: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """800 jobs (``tests.benchmark.random_plans`` takes more); floors have their own test."""
+@pytest.mark.seeds(*range(4))
+def test_random_jobs_keep_their_limits_or_say_why_not(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """200 jobs each; floors have their own test."""
     monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))
     planned = 0
-    for seed in range(200 * part, 200 * part + 200):
-        arm, job = problems.random_problem(seed)
+    for number in range(200 * seed, 200 * seed + 200):
+        arm, job = problems.random_problem(number)
         if np.all(np.ptp(job.via, axis=0) == 0):
             with pytest.raises(PlanError, match="nothing moves"):
                 planner.plan(arm, job)
             continue
         plan = planner.plan(arm, job)
-        (check_thoroughly if seed % 20 == 0 else check)(plan, f"seed {seed}")
+        (check_thoroughly if number % 20 == 0 else check)(plan, f"job {number}")
         planned += 1
     assert planned > 140
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timing", ["shared", "per-joint"])
 def test_what_the_driver_needs_is_a_limit_of_planning(timing: str) -> None:
     """Of a step every 60 us, and of opposite steps 1.2 ms apart."""
@@ -286,11 +288,11 @@ def test_sees_the_extremes(degree: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_stretch_is_that_of_the_highest_peaks(seed: int) -> None:
+def test_the_scale_is_that_of_the_highest_peaks(seed: int) -> None:
     rng = np.random.default_rng(seed)
     fitness = Fitness(bspline.fit(rng.normal(0, 30, (9, 3)), 5), 5, LIMITS)
     population = rng.uniform(0.1, 3.0, (30, 8))
-    assert np.array_equal(fitness.stretch(population), stretch_of(fitness.peaks(population).max(axis=(1, 2))))
+    assert np.array_equal(fitness.scale(population), scale_of(fitness.peaks(population).max(axis=(1, 2))))
 
 
 def test_stretched_is_the_time_that_just_keeps_the_limits() -> None:
@@ -298,9 +300,9 @@ def test_stretched_is_the_time_that_just_keeps_the_limits() -> None:
     population = np.random.default_rng(3).uniform(0.5, 2.5, (20, 6))
     found = Fitness(points, 5, LIMITS).stretched(population)
     for value, intervals in zip(found, population, strict=True):
-        factor = stretch_of(exact_ratios(points, intervals, 5).T).max()
+        factor = scale_of(exact_ratios(points, intervals, 5).T).max()
         assert value == pytest.approx(factor * intervals.sum(), rel=0.005)
-        assert stretch_of(exact_ratios(points, intervals * factor, 5).T).max() == pytest.approx(1, rel=1e-9)
+        assert scale_of(exact_ratios(points, intervals * factor, 5).T).max() == pytest.approx(1, rel=1e-9)
 
 
 def test_stretched_does_not_depend_on_the_unit_of_time() -> None:
@@ -404,6 +406,7 @@ def test_tool_strays_as_far_as_the_nearest_point_of_the_path_is(apart: Plan) -> 
     assert path_deviation.tool_stray_mm(ARM, apart.trajectory) == pytest.approx(max(strays), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan) -> None:
     text = text_summary.lines(apart)
     assert f"{apart.trajectory.duration_s:.4f} s" in text[0]
@@ -416,3 +419,16 @@ def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan
     assert any("strays up to" in line for line in text)
     assert not any("strays" in line for line in text_summary.lines(together))
     assert all(len(line) <= 110 for line in text)
+
+
+def test_each_job_has_a_planner_of_the_table() -> None:
+    led = replace(JOB, ways=(ToolWay(1, line=True),))
+    asked = {
+        "through": replace(JOB, path="through"),
+        "free": replace(JOB, path="free", stops=(Stop(1),)),
+        "line": replace(JOB, path="through", stops=(Stop(1),)),
+    }
+    assert {name: checks.planner_of(job) for name, job in asked.items()} == {
+        name: name for name in planner.PLANNERS
+    }
+    assert checks.planner_of(led) == checks.planner_of(replace(led, path="free")) == "line"

@@ -14,7 +14,6 @@ import pytest
 from armtempo import deploy
 from armtempo.basics.errors import InputError, LinkError, PortError, PortInUseError
 from armtempo.cli import main
-from armtempo.deploy import program_files
 from armtempo.link import connect, transport
 from armtempo.link.transport import SerialTransport
 from armtempo.ports import board_port, names
@@ -89,11 +88,6 @@ def test_an_interrupted_deployment_is_completed_by_deploying() -> None:
     assert error.hint == "'armtempo deploy' completes it"
 
 
-def test_compiled_files_for_a_virtual_board_under_cpython() -> None:
-    with pytest.raises(LinkError, match="CPython, or a MicroPython built without them; deploy without --mpy"):
-        program_files._compiler(0)
-
-
 def test_port_that_does_not_exist() -> None:
     with pytest.raises(InputError, match="there is no port /dev/nowhere"):
         SerialTransport("/dev/nowhere")
@@ -109,7 +103,7 @@ def test_port_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(LinkError, match=r"in use by another program.*close it"):
             SerialTransport(os.ttyname(slave))
         with pytest.raises(LinkError, match="in use by another program"):  # mpremote is not asked
-            deploy.deploy(os.ttyname(slave), False, print, lambda *_: None)
+            deploy.deploy(os.ttyname(slave), print, lambda *_: None)
         first.close()
         SerialTransport(os.ttyname(slave)).close()
     finally:

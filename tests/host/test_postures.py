@@ -12,12 +12,12 @@ import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
 from armtempo.cli.posture import NamedPosture
+from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import arm_json, shipped, taught
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner, via_points
-from armtempo.records import encode
 from click.testing import CliRunner
 
 PARK = "\n[posture.park]\nangles_deg = [0, -60, 40]\n"

@@ -13,7 +13,11 @@ from typing import Any, cast
 import armtempo
 import numpy as np
 import pytest
-from armtempo.records import encoded_motion
+from armtempo.encoding import encoded_motion
+from armtempo.robot.board_io import BoardIO
+from armtempo.robot.motions import Motions
+from armtempo.robot.position import ArmPosition
+from armtempo.robot.store import BoardStore
 
 ARM = armtempo.Arm.paper()
 JOB = armtempo.Job(
@@ -81,9 +85,9 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
     """A value that fits, by the name of a parameter."""
     alike = (
         ("x", "name old output input counter"),
-        (1.0, "wait_s to mass_kg speed_deg_s acceleration_deg_s2 jerk_deg_s3 at_s"),
+        (1.0, "angle_deg wait_s to mass_kg speed_deg_s acceleration_deg_s2 jerk_deg_s3 at_s"),
         (0, "raw d_mm a_mm alpha_deg theta_offset_deg value number row"),
-        (1, "channel via"),
+        (1, "channel joint via"),
         (None, "posture options start_deg"),
         ([0, -60, 40], "angles_deg where"),
         ([0, 1, 2], "points"),
@@ -191,3 +195,14 @@ def test_wrong_types_and_values_are_refused_in_words(
                 shown = f"{name}({parameter.name}={wrong!r})"
                 assert said is None or (said.problem and said.hint), f"{shown}: {said}"
                 assert number or said or parameter.annotation in ("Any", "object"), f"{shown} is taken"
+
+
+def test_the_board_has_every_method_of_its_roles() -> None:
+    for role in (BoardStore, ArmPosition, BoardIO, Motions):
+        for name, method in vars(role).items():
+            if inspect.isfunction(method) and not name.startswith("_"):
+                own = getattr(armtempo.Board, name)
+                assert inspect.signature(own) == inspect.signature(method), name
+                assert own.__doc__ == method.__doc__, name
+    roles = {type(value) for value in vars(armtempo.Board(cast(Any, Gone()), NOWHERE)).values()}
+    assert {BoardStore, ArmPosition, BoardIO, Motions} <= roles

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import ArmtempoError, InputError, RunFolderError
+from armtempo.encoding import encoded_motion
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
-from armtempo.records import encoded_motion
 from armtempo.report import analysis, differentiation, peaks, run_folder, run_reader, run_report
 from armtempo.report.run_reader import RepetitionData
 from armtempo.robot import recording
@@ -336,6 +336,7 @@ def test_exact_samples_show_the_theory() -> None:
             assert deviation.rms <= deviation.largest <= worst
 
 
+@pytest.mark.slow
 def test_the_standard_error_is_that_of_the_scatter() -> None:
     found = analysis.curves([samples(seed=seed) for seed in range(40)], PLAN)
     assert np.nanmean(found.sem[0]) == pytest.approx(0.05 / np.sqrt(40), rel=0.1)

@@ -280,7 +280,7 @@ def test_every_column_is_explained(folder: Path) -> None:
         "steps made",
         "planned",
         "verdict",
-        "floor (s)",
+        "at least (s)",
     ):
         assert name in explained
 

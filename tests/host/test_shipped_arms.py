@@ -169,8 +169,11 @@ def test_scara_stands_where_its_sketch_says() -> None:
         ("parol6", [6400 / 360 * ratio for ratio in (6.4, 20, 20 * 38 / 42, 4, 4, 10)]),
         # stepsPerRevolution
         ("moveo", [steps / 360 for steps in (32800, 18000, 72000, 3280, 14400)]),
-        # teeth of the CAD files, the planetary gear's 57/11, and the assumed 120 / 20 of joint 3
-        ("thor", [3200 / 360 * ratio for ratio in (50 / 10, 57 / 11 * 60 / 10, 57 / 11 * 120 / 20, 20 / 10)]),
+        # teeth of the CAD files, the planetary gear's 57/11, and the assumed 120 / 20 of joint 3 and belts of the wrist
+        (
+            "thor",
+            [3200 / 360 * ratio for ratio in (50 / 10, 57 / 11 * 60 / 10, 57 / 11 * 120 / 20, 20 / 10, 1, 1)],
+        ),
         # STEPS_PER_REV, MICROSTEPS, MAIN_GEAR_TEETH, MOTOR_GEAR_TEETH
         ("community", [200 * 16 * 90 / 20 / 360] * 3),
         # theta1AngleToSteps, theta2AngleToSteps, phiAngleToSteps
@@ -179,7 +182,7 @@ def test_scara_stands_where_its_sketch_says() -> None:
 )
 def test_steps_per_degree_are_the_published_ones(name: str, steps_per_deg: list[float]) -> None:
     driven = Arm.load(name).driven
-    np.testing.assert_allclose([joint.steps_per_deg for joint in driven], steps_per_deg, rtol=3e-8)
+    np.testing.assert_allclose([joint.motor.steps_per_deg for joint in driven], steps_per_deg, rtol=3e-8)
 
 
 def test_ar4_encoders_count_as_its_driver_says() -> None:

@@ -24,7 +24,7 @@ ORDER = (
     "model",  # arm, job, pose, plan, and their files
     "kinematics",  # forward, inverse, choice
     "planning",  # from a job to a plan
-    "records",  # arm and motion as the board takes them
+    "encoding",  # arm and motion in the binary encoding for the board
     "new_arm",  # a folder for a new arm, also from a robot description
     "simulator",  # the virtual board
     "link",  # port, session, commands, samples of a run

@@ -174,6 +174,7 @@ def test_a_motor_needs_what_gravity_its_rotor_and_the_gear_ask() -> None:
     np.testing.assert_allclose(found.held_nm[:, second], np.where(rpm <= 60.0, 0.5 - rpm / 600.0, 0.0))
 
 
+@pytest.mark.slow
 def test_plan_report_and_check_say_how_much_is_to_spare() -> None:
     plan = weighty(((0.0, 0.02), (6000.0, 0.01)))
     least = torque.least_margin(plan.arm, plan.trajectory)
@@ -193,6 +194,7 @@ def test_plan_report_and_check_say_how_much_is_to_spare() -> None:
     assert not any("the least to spare" in line for line in text_summary.lines(light))
 
 
+@pytest.mark.slow
 def test_plans_by_torque_leave_each_motor_what_is_prudent(monkeypatch: pytest.MonkeyPatch) -> None:
     """With a planner whose motions are as much faster as the limits allow, up to a speed limit."""
     plan, fastest = weighty(((0.0, 0.31), (6000.0, 0.3))), 8.0

@@ -232,13 +232,50 @@ def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
 
 
 J2_LIMIT = '    <limit lower="-2.0" upper="2.0" effort="10" velocity="1.5"/>\n'
-MIMIC = '<mimic joint="{}" multiplier="-1"/>'
+J3_LIMIT = '    <limit lower="-3.0" upper="3.0" effort="10" velocity="2.0"/>\n'
+MIMIC = '<mimic joint="{}" multiplier="{}" offset="{}"/>'
+
+
+@pytest.mark.parametrize(("limit", "master", "offset"), [(J2_LIMIT, "j1", 0.0), (J3_LIMIT, "j2", 0.3)])
+def test_a_joint_that_a_parallelogram_turns(tmp_path: Path, limit: str, master: str, offset: float) -> None:
+    """It turns by minus the angle of the joint before, has no motor, and its link keeps its direction."""
+    urdf, out = tmp_path / "linkage.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    urdf.write_text(text.replace(limit, MIMIC.format(master, -1, offset)))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    content = out.read_text()
+    assert [content.count(f"# motor = {{ channel = {channel}") for channel in (1, 2, 3)] == [1, 1, 0]
+    arm = Arm.shape(out)
+    slave = "j2" if master == "j1" else "j3"
+    assert [joint.name for joint in arm.joints if joint.parallel_linkage] == [slave]
+    assert slave not in [joint.name for joint in arm.driven]
+    rng = np.random.default_rng(SEED)
+    for driven in rng.uniform(-2.0, 2.0, (20, 2)):
+        angles = dict(zip((joint.name for joint in arm.driven), driven, strict=True))
+        angles[slave] = offset - angles[master]
+        pose = of_arm.forward(arm, np.degrees(driven))
+        np.testing.assert_allclose(pose, tool_pose(urdf, angles), atol=0.02)
+
+
+@pytest.mark.parametrize(("master", "factor"), [("j1", -1), ("j2", 1), ("j2", -0.5)])
+def test_other_linkages_are_refused(tmp_path: Path, master: str, factor: float) -> None:
+    urdf = tmp_path / "linkage.urdf"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    urdf.write_text(text.replace(J3_LIMIT, MIMIC.format(master, factor, 0)))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
+    assert result.exit_code == 2
+    assert (
+        f"joint 'j3': it mimics '{master}' by a factor of {factor:g}; an arm file has only linkages"
+        in result.output
+    )
+    assert not (tmp_path / "arm.toml").exists()
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (J2_LIMIT, J2_LIMIT + MIMIC.format("j1"), "joint 'j2': it mimics 'j1'"),
+        (J2_LIMIT, J2_LIMIT + MIMIC.format("j1", 1, 0), "joint 'j2': it mimics 'j1'"),
         ('name="j2" type="revolute"', 'name="j2" type="prismatic"', "joint 'j2': it slides"),
         ('name="j3" type="revolute"', 'name="j3" type="prismatic"', "joint 'j3': it slides"),
     ],

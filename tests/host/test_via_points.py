@@ -137,6 +137,7 @@ def test_a_branch_change_between_angles_the_user_gave_is_his_own() -> None:
     assert via_points.resolve(ARM, job((40.0, -110.0, 70.0), (150.0, -93.0, -140.0))).notes == ()
 
 
+@pytest.mark.slow
 def test_a_pose_out_of_reach_is_refused_with_every_reason() -> None:
     far = Pose.of_angles((3000.0, 0.0, 0.0), {"roll": 0.0, "pitch": 0.0, "yaw": 0.0})
     with pytest.raises(PlanError, match="P1: no posture reaches this pose within") as caught:
@@ -229,6 +230,7 @@ def test_a_tolerance_decides_whether_undriven_joints_are_missed() -> None:
     assert note.kind == "undriven"
 
 
+@pytest.mark.slow
 def test_an_arm_outside_the_class_is_served_numerically() -> None:
     bent = tuple(
         replace(joint, a_mm=10.0) if number == 3 else joint for number, joint in enumerate(ARM.joints)
@@ -572,6 +574,7 @@ def apart_deg(one: np.ndarray, other: np.ndarray) -> float:
     return max(away(one, other), away(other, one))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "rows",
     [
@@ -602,6 +605,7 @@ def test_a_recording_beyond_a_range_is_refused_with_its_line(tmp_path: Path) -> 
         via_table.read(table, ARM)
 
 
+@pytest.mark.slow
 def test_rests_of_a_recording_are_kept_as_stops(tmp_path: Path) -> None:
     """A motion, a second of rest, and a motion back another way, with rests around and noise of an encoder."""
     there = point_to_point.straight("there", (0, -60, 40), (40, -90, 20), ARM)
@@ -632,6 +636,7 @@ def test_rests_of_a_recording_are_kept_as_stops(tmp_path: Path) -> None:
     assert apart_deg(moved, noisy) <= 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_the_bound_of_thinning_holds(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -665,6 +670,7 @@ def test_what_cannot_be_thinned_to_a_motion_is_refused() -> None:
         thinning.thinned(noise, 0.001, np.arange(700.0))
 
 
+@pytest.mark.slow
 def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     shipped_plan().save("feed.json")

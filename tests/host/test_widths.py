@@ -17,7 +17,7 @@ from tests.interpreters import ROOT
 SEED = 5
 READ_BY_PROGRAMS = {
     "exchange.py": 1,  # CSV
-    "help.py": 2,  # a page, and a script for a shell
+    "help.py": 1,  # a page
     "jog_screen.py": 4,  # fits its line to the terminal itself
     "panel.py": 1,  # an address
     "results.py": 3,
@@ -78,6 +78,7 @@ LINES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", LINES, ids=" ".join)
 def test_every_line_fits(arguments: tuple[str, ...]) -> None:
     wide, narrow = (

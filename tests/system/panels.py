@@ -185,7 +185,7 @@ def asked(address: str, request: bytes) -> bytes:
 
 
 def _library() -> dict[str, bytes]:
-    files = program_files.library(None)
+    files = program_files.library(0)
     return {name.removeprefix(f"{program_files.ROOT}/"): data for name, data in files.items()}
 
 

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import armtempo
 import numpy as np
+from armtempo.encoding import encode, encoded_motion, encoded_sequence
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.model import shipped
 from armtempo.model.arm import Arm, Joint
 from armtempo.model.job import Job
@@ -17,8 +19,6 @@ from armtempo.model.parts import Limits
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import planner
-from armtempo.records import encode, encoded_motion, encoded_sequence
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.simulator import InjectedFault, edgelog
 from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.motion import Motion

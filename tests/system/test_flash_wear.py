@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.records import encode, encoded_motion
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import stored_motion
 from armtempo.robot.connect import connect
 from armtempo.simulator import LaunchOptions, launch, wear

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from armtempo import simulator
 from armtempo.basics.errors import BoardError
+from armtempo.encoding import encode, encoded_motion
 from armtempo.link import Opening, open_board, traffic
 from armtempo.link.board_messages import Done, Event, Sample
 from armtempo.link.follow import Follower
@@ -23,7 +24,6 @@ from armtempo.link.traffic import FROM_BOARD, TO_BOARD, Chunk
 from armtempo.link.transport import SerialTransport
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.records import encode, encoded_motion
 from armtempo.report import run_folder, run_reader
 from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
+from armtempo.encoding import encode, encoded_motion
 from armtempo.link import Client, open_board
 from armtempo.link.client import Started
 from armtempo.planning import point_to_point
-from armtempo.records import encode, encoded_motion
 from armtempo.robot import arm_state
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from mpremote.transport import TransportError

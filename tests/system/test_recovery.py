@@ -62,6 +62,8 @@ def _steps(text: str) -> list[str]:
 
 
 SECTIONS = sections()
+HELD_S = {"**Safe boot**": 0.9, "**Factory reset**": 1.5}
+"""How long the user button is held from power-up on."""
 MPREMOTE_S = 60.0
 TRIES = 4
 """If mpremote's Ctrl-C meets boot.py, that ends by it, main.py begins, and nobody answers. On a serial port mpremote
@@ -99,10 +101,8 @@ class Bench:
 
     def by_hand(self, what: str) -> None:
         """What the page says in bold."""
-        if what in ("**Safe boot**", "**Factory reset**"):
-            seconds = re.search(re.escape(what) + r":.*?--hold-button ([\d.]+)", PAGE, re.DOTALL)
-            assert seconds
-            self.power(button_s=float(seconds[1]))
+        if what in HELD_S:
+            self.power(button_s=HELD_S[what])
         elif what == "**Take the card out**":
             self.hardware.pop("sd_card")
         elif what == "**Install MicroPython**":

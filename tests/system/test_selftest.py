@@ -17,9 +17,9 @@ from armtempo import connect
 from armtempo.basics.errors import ArmtempoError, LinkError
 from armtempo.diagnosis.finding import Level
 from armtempo.diagnosis.selftest import board_part, prompt, rate_part
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Driver, JointModel, LimitSwitches, Safety
-from armtempo.records import encode
 from armtempo.robot import motor_test
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from armtempo.simulator.launch_options import InjectedFault
@@ -300,7 +300,7 @@ def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.M
 
 PRESSED = [
     InjectedFault("input", at_s, run, name=pin, level=level)
-    for run, pin in ((4, "D8"), (7, "E15"))  # after the joint's two motions and one away from the switch
+    for run, pin in ((6, "D8"), (9, "E15"))  # after the joint's four motions and one away from the switch
     for at_s, level in ((0.1, 0), (0.2, 1))
 ]
 
@@ -326,7 +326,7 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
             used.selftest()
         assert (used.status().state, used.status().positions) == before
         used.client._info = replace(used.info, features=0)
-        with pytest.raises(LinkError, match=r"MicroPython's own firmware.*armtempo flash"):
+        with pytest.raises(LinkError, match=r"stock MicroPython.*armtempo flash"):
             used.selftest()
     assert before[0] == "idle"
     assert "joint 1 by +0.8°. Is the arm supported" in said[0]
@@ -335,10 +335,66 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert lines == {
         "joint 1: direction": (Level.GOOD, "as in the arm file"),
         "joint 1: encoder": (Level.ERROR, "-9 counts for 28 steps"),
+        "joint 1: backlash": (Level.NOTE, "none that its encoder shows"),
         "the switch at the low end of joint 1": (Level.GOOD, "stopped the joint"),
         "the switch at the high end of joint 1": (Level.ERROR, "not seen"),
         "the E-stop": (Level.GOOD, "stopped the joint"),
     }
+
+
+def test_backlash_by_the_encoder_of_the_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motor_test, "_SPEED", 1.0)
+    (joint,) = commandline.ARM.joints[:1]
+    model = replace(joint.model, backlash_deg=0.3, scatter_deg=0.0)
+    joint = _encoder(replace(joint, model=model), counts_per_rev=36_000, following_error_deg=0.0)
+    arm = replace(commandline.ARM, joints=(joint,))
+    with board(tmp_path, arm, arm=arm) as port, connect(port) as used:
+        used.home(arm)
+        found = used.motor_test(arm, lambda _: True, lambda _: None)
+    lines = {line.what: line for line in found.lines}
+    assert lines["joint 1: encoder"].verdict is Level.GOOD
+    said = lines["joint 1: backlash"].measured.split("°")[0]
+    assert float(said) == pytest.approx(0.3, abs=0.03)
+    assert found.data["arm_file"] == [f"joint 1: model: backlash_deg = {said} or so, for the virtual arm"]
+
+
+@pytest.mark.parametrize(
+    ("reversed_", "further", "said", "verdict"),
+    [
+        (5, 6, "none that its encoder shows", Level.NOTE),
+        (3, 6, "0.27° within 0.18°", Level.NOTE),
+        (1, 6, "it did not move in the first 0.51°", Level.ERROR),
+        (1, 2, "", None),
+    ],
+)
+def test_what_a_reversal_shows(reversed_: int, further: int, said: str, verdict: Level | None) -> None:
+    """Halves of a degree with an encoder of 4000 counts: what is lost of one, and nothing of the other."""
+    joint = _encoder(commandline.ARM.driven[0], counts_per_rev=4000)
+    moves = [motor_test.Moved(-18, sign * counts) for sign, counts in ((1, reversed_), (-1, further))]
+    line, lines = motor_test.judge_backlash(joint, *moves)
+    assert (line.verdict if line else None) is verdict
+    assert (line.measured if line else "").startswith(said)
+    assert bool(lines) == ("within" in said)
+
+
+def test_a_coupled_joint_that_turns_the_other_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The direction of its own motor may be right, and the other's wrong: no line for the arm file."""
+    monkeypatch.setattr(motor_test, "_SPEED", 1.0)
+    joints = [replace(joint, model=JointModel()) for joint in commandline.ARM.joints[:2]]
+    coupled = tuple(
+        replace(joint, encoder=joint.encoder and replace(joint.encoder, on="motor")) for joint in joints
+    )
+    arm = replace(commandline.ARM, joints=coupled, coupling=((1.0, 1.0), (1.0, -1.0)))
+    with board(tmp_path, arm, arm=arm) as port, connect(port) as used:
+        used.home(arm)
+        found = used.motor_test(arm, lambda question: "joint 1 just" not in question, lambda _: None)
+    lines = {line.what: line for line in found.lines}
+    assert lines["joint 1: direction"].verdict is Level.ERROR
+    assert "[coupling]" in lines["joint 1: direction"].cure
+    assert [lines[f"joint {n}: encoder"].verdict for n in (1, 2)] == [Level.GOOD] * 2
+    assert lines["joint 2: direction"].verdict is Level.GOOD
+    assert "joint 1: backlash" not in lines
+    assert not found.data["arm_file"]
 
 
 @pytest.mark.parametrize(

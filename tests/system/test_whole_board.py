@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.deploy import program_files
+from armtempo.encoding import encode, encoded_motion
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner
-from armtempo.records import encode, encoded_motion
 from armtempo_shared.limits import TICK_HZ
 
 from tests import interpreters, scripted

@@ -49,7 +49,7 @@ class App:
         self.commands.greeted = False
         self.link.forget()
 
-    def left(self) -> int:
+    def leave_requested(self) -> int:
         """Whether a host has asked for the REPL, and the reply was sent."""
         return self.commands.leaving and self.link.idle()
 

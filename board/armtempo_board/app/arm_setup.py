@@ -11,7 +11,7 @@ from armtempo_shared.messages import ARM_RECORD_NAME
 from pyb import Pin, Timer
 
 from armtempo_board import features
-from armtempo_board.app import room
+from armtempo_board.app import memory_shares
 from armtempo_board.app.board import NEVER_MS
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
@@ -29,7 +29,7 @@ def take_stored(board: "Board") -> None:
 
     An invalid record does not keep the program from starting: ``arm_problem`` says what is wrong.
     """
-    board.arm_waits = False
+    board.arm_record_pending = False
     board.arm_problem = board.arm_value = 0
     try:
         _take(board, _checked(board, _stored(board)))
@@ -43,7 +43,7 @@ def take_stored(board: "Board") -> None:
 
 def take_new(board: "Board") -> None:
     """Use the uploaded arm record; if it is invalid, raises Refused and keeps the present one."""
-    board.arm_waits = False
+    board.arm_record_pending = False
     try:
         record = _checked(board, _new(board))
     except Refused:
@@ -78,7 +78,7 @@ def _decide(board: "Board", is_fit: bool) -> None:
 
 def _checked(board: "Board", data: bytes) -> "Record":
     """The unpacked arm record; raises Refused if it is invalid."""
-    return arm_check.checked(data, board.workspace.room)
+    return arm_check.checked(data, board.engine_memory.size)
 
 
 def _take(board: "Board", record: "Record") -> None:
@@ -91,7 +91,7 @@ def _take(board: "Board", record: "Record") -> None:
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
     _drop_engine(board)
-    room.share(board.workspace, len(joints))
+    memory_shares.resize(board.engine_memory, len(joints))
     board.make_engine(head, joints)
     board.all_but_limits = all_but_limits
     if known:
@@ -136,4 +136,4 @@ def drop_outputs(board: "Board") -> None:
         else:
             held.init(Pin.IN)
     board.outputs = board.inputs = None
-    board.rows.clear()
+    board.extra_commands.clear()

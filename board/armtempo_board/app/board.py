@@ -12,7 +12,7 @@ from armtempo_shared.messages import NO_JOINT
 from armtempo_shared.table import offset
 from micropython import const
 
-from armtempo_board.app import room
+from armtempo_board.app import memory_shares
 from armtempo_board.app.sample_buffer import SampleBuffer
 from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
 from armtempo_board.errors import Refused
@@ -38,15 +38,15 @@ class Board:
 
     def __init__(self, root: str, program_crc: int, fault: int) -> None:
         flags_at = offset("E", "sample", "flags") - offset("E", "sample", "ticks")
-        self.workspace = room.workspace()  # before anything fragments the heap
-        self.once = Once(SHORT_ONCE_BYTES if self.workspace.is_short else ONCE_BYTES)
-        self.samples = SampleBuffer(room.sample_bytes(), flags_at)
+        self.engine_memory = memory_shares.for_engine()  # before anything fragments the heap
+        self.once = Once(SHORT_ONCE_BYTES if self.engine_memory.is_short else ONCE_BYTES)
+        self.samples = SampleBuffer(memory_shares.sample_bytes(), flags_at)
         self.root = root
         self._store: "Any" = None
         self.engine: "Any" = None
         self.outputs: "Any" = None  # of an arm that has outputs or inputs,
         self.inputs: "Any" = None  # and these then too,
-        self.rows: "dict[int, Any]" = {}  # and their commands
+        self.extra_commands: "dict[int, Any]" = {}  # and their commands
         self.program_crc = program_crc
         self.board_id = board_id()
         # A different number after each power-up
@@ -54,7 +54,7 @@ class Board:
         self.joints = 0
         self.arm_crc = 0
         self.all_but_limits = 0  # of the arm record: identity of the arm
-        self.arm_waits = False  # an arm record was uploaded and is still to be used
+        self.arm_record_pending = False  # an arm record was uploaded and is still to be used
         self.arm_problem = 0  # code: why the stored arm record is not used (0: it is used, or there is none),
         self.arm_value = 0  # and its value
         self.silence_ms = NEVER_MS  # of the host's silence, after which a run is stopped
@@ -82,7 +82,7 @@ class Board:
     def make_engine(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
         """For an arm, as ``armrecord.unpack`` gives it."""
         gc.collect()
-        self.engine = Engine(EngineParts(head, joints, self.workspace))
+        self.engine = Engine(EngineParts(head, joints, self.engine_memory))
 
     def checked(self, motion: "MotionHead", crc: "int | None") -> "MotionHead":
         """The motion; raises Refused if it is another than expected (``crc``), or not for this arm."""
@@ -96,9 +96,9 @@ class Board:
 
     # state
 
-    def engine_room(self) -> int:
+    def engine_bytes(self) -> int:
         """Bytes available for an engine (``armtempo_shared.engine_memory``)."""
-        return int(self.workspace.room)
+        return int(self.engine_memory.size)
 
     def check_ready(self) -> None:
         """Raise Refused while a fault is pending or no arm is configured."""
@@ -111,7 +111,7 @@ class Board:
         """One bit per joint, set if its position is known."""
         return self.engine.known if self.engine else 0
 
-    def everyone(self) -> int:
+    def all_joints_mask(self) -> int:
         """One bit per joint, all set."""
         return (1 << self.joints) - 1
 

@@ -1,6 +1,6 @@
 """Executes the commands of the message table; refusals are raised as ``Refused``.
 
-During a motion only the commands of ``_WHILE_MOVING`` and ``Board.rows`` are accepted; of these, all but
+During a motion only the commands of ``_WHILE_MOVING`` and ``Board.extra_commands`` are accepted; of these, all but
 ``hello``, ``stop`` and ``speed`` allocate nothing. Commands of the store and the drivers are in
 ``store_commands.py``; of outputs and inputs in ``output_commands.py``, loaded for arms
 that have them; of sequences in ``sequence_command.py``, loaded when a sequence is started.
@@ -86,7 +86,7 @@ class Commands:
             raise
 
     def _dispatch(self, number: int) -> None:
-        row = self._while_moving.get(number) or self.board.rows.get(number)
+        row = self._while_moving.get(number) or self.board.extra_commands.get(number)
         if row is None:
             if number not in self._numbers:
                 return self._refuse(number, _UNKNOWN)
@@ -107,7 +107,7 @@ class Commands:
         size = self._store(handler, row, length) if isinstance(handler, str) else handler(self, row, length)
         if size is not None and size < 0:
             return self._refuse(number, -size)
-        if self.board.arm_waits:
+        if self.board.arm_record_pending:
             self.controller.take_new_arm()
         self.controller.refill()
         self.link.answer(self._ok, _ANSWER_AT - PAYLOAD_AT + (size or 0))
@@ -182,7 +182,7 @@ class Commands:
             board.arm_crc,
             board.program_crc,
             board.boot,
-            board.engine_room(),
+            board.engine_bytes(),
             features.BITS | (RATES_MEASURED if 0 < board.joints <= step_rates.joints else 0),
             board.arm_problem,
             board.arm_value,
@@ -243,7 +243,7 @@ class Commands:
 
     def start(self, row: tuple, length: int) -> int:
         """Start a stored motion."""
-        self.controller.tidy()  # before objects of the command occupy the place of the motion's code
+        self.controller.release_memory()  # before objects of the command occupy the place of the motion's code
         flags, crc = self.fields(row)
         name = self.text(row, length)
         self.controller.begin(name, flags, crc)

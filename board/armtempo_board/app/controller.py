@@ -13,7 +13,14 @@ import time
 
 from armtempo_shared import codes, messages
 from armtempo_shared.limits import HOLD_TIMEOUT_MS
-from armtempo_shared.messages import ONCE_NAME, RESUME, SAMPLE_BRAKING, START_HELD, START_HOMING
+from armtempo_shared.messages import (
+    ONCE_NAME,
+    RESUME,
+    SAMPLE_BRAKING,
+    START_HELD,
+    START_HOMING,
+    START_SWITCHES_BIT,
+)
 from micropython import const
 
 from armtempo_board import features, heap
@@ -81,7 +88,7 @@ class Controller:
             if board.engine.moving:
                 self.sequence.prepare()
             else:
-                self.sequence.go_on()
+                self.sequence.advance()
 
     def refill(self) -> None:
         """Serve the engine during longer work while a motion runs."""
@@ -174,7 +181,7 @@ class Controller:
         self._assumed = unknown
         return moving
 
-    def tidy(self) -> None:
+    def release_memory(self) -> None:
         """Free what only the last commands needed, so that new objects lie close to those that stay."""
         self.board.forget_store()
         gc.collect()
@@ -188,7 +195,7 @@ class Controller:
         if flags & START_HELD and not features.JOG:
             raise Refused(codes.NEEDS_FIRMWARE)
         homing = bool(flags & START_HOMING)
-        unknown = board.everyone() & ~board.known()
+        unknown = board.all_joints_mask() & ~board.known()
         if unknown and not homing:
             raise Refused(codes.UNHOMED, _lowest(unknown))
         self._by_host = crc is not None
@@ -208,16 +215,16 @@ class Controller:
 
         def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
             self.board.once.release()
-            self.tidy()
+            self.release_memory()
             try:
                 from armtempo_board.app import sequence_start  # here, as only sequences need its memory
 
                 self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
             except MemoryError:
-                raise Refused(codes.NO_SEQUENCE_ROOM)
+                raise Refused(codes.NO_SEQUENCE_MEMORY)
 
         def _is_sequence(self, name: str) -> bool:
-            self.tidy()
+            self.release_memory()
             return bool(self.board.store().is_sequence(name))
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
@@ -225,12 +232,15 @@ class Controller:
 
         ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
         """
-        heap.collect_often(heap.OFTEN if self.board.workspace.is_short else heap.SELDOM)
-        self.tidy()
+        heap.collect_often(heap.OFTEN if self.board.engine_memory.is_short else heap.SELDOM)
+        self.release_memory()
         try:
             motion = self.load(name, crc)
-            self.tidy()
-            homing = self._assume(motion, unknown) if flags & START_HOMING else 0
+            self.release_memory()
+            homing = 0
+            if flags & START_HOMING:
+                moving = self._assume(motion, unknown)
+                homing = flags >> START_SWITCHES_BIT or moving
             self.board.engine.load(motion, rate, None, homing)
         except Refused:
             self._withdraw_assumed()
@@ -318,7 +328,7 @@ class Controller:
             return messages.FAULT
         if not board.engine:
             return messages.UNCONFIGURED
-        return messages.IDLE if board.known() == board.everyone() else messages.UNHOMED
+        return messages.IDLE if board.known() == board.all_joints_mask() else messages.UNHOMED
 
 
 def _lowest(mask: int) -> int:

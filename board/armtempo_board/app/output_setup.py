@@ -31,7 +31,7 @@ def attach(board: "Board", outputs: "Rows", inputs: "Rows") -> None:
     board.inputs = inputs_of(inputs)
     handlers = output_commands.output, output_commands.inputs_and_outputs
     for (_, number, fields, _, tail), (_, _, values, _, _), handler in zip(rows("O"), rows("P"), handlers):
-        board.rows[number] = (handler, fields, values, tail)
+        board.extra_commands[number] = (handler, fields, values, tail)
 
 
 def outputs_of(table: "Rows") -> "Outputs":

@@ -73,7 +73,7 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
         while True:
             app.turn()
             try:
-                if app.left():
+                if app.leave_requested():
                     break
                 _serve_panel(leds, button, watchdog)
             except Exception as error:

@@ -63,9 +63,9 @@ class AheadSequencer(Sequencer):
             self._do_slice()
             self._controller.board.engine.refill()
 
-    def go_on(self) -> None:
+    def advance(self) -> None:
         """See ``Sequencer``; also prepares during a wait."""
-        super().go_on()
+        super().advance()
         self._replan_if_rate_changed()
         if self._work and not self._controller.board.engine.moving:
             self._do_slice()
@@ -122,7 +122,7 @@ class AheadSequencer(Sequencer):
             row = record.row(place.next)
             if row[_OP] == sequence.MOVE:
                 return row[_NUMBER]
-            place.go_on(row)
+            place.advance(row)
         return _NONE
 
     def _open(self, number: int) -> "MotionHead":

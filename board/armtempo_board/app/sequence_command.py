@@ -26,14 +26,14 @@ ENDING, CODE, STEP, ROW, CYCLE, PASSED, RUN, VALUE = (
     const(6),
     const(7),
 )
-"""Indices in ``told``: the fields of the messages ``sequence`` and ``row``."""
+"""Indices in ``status``: the fields of the messages ``sequence`` and ``row``."""
 
 
 class SequenceCommand:
-    """``told``: state of the sequence, or how it ended; ``name``: its name; ``counters``: names of its counters."""
+    """``status``: state of the sequence, or how it ended; ``name``: its name; ``counters``: names of its counters."""
 
-    def __init__(self, told: "array[int]", name: bytes, counters: "list[bytes]") -> None:
-        self._told = told
+    def __init__(self, status: "array[int]", name: bytes, counters: "list[bytes]") -> None:
+        self._status = status
         self._name = name
         self._counters = counters
         self._counts = array("i", [0] * len(counters))
@@ -56,10 +56,17 @@ class SequenceCommand:
 
     def sequence(self, commands: "Any", row: tuple, length: int) -> int:
         """Answer with its state; returns the size of the answer."""
-        told = self._told
+        status = self._status
         reply = commands.link.reply
         pack_into(
-            row[_ANSWER], reply, _ANSWER_AT, told[ENDING], told[CODE], told[STEP], told[ROW], told[CYCLE]
+            row[_ANSWER],
+            reply,
+            _ANSWER_AT,
+            status[ENDING],
+            status[CODE],
+            status[STEP],
+            status[ROW],
+            status[CYCLE],
         )
         return self._named(reply, row, self._name)
 
@@ -79,8 +86,8 @@ class SequenceCommand:
 
     def tell(self, link: "Any") -> None:
         """Send the event of the row that has begun, once, when there is room."""
-        told = self._told
-        passed = told[PASSED]
+        status = self._status
+        passed = status[PASSED]
         if passed == self._sent or not link.room(self._size):
             return
         self._sent = passed
@@ -89,10 +96,10 @@ class SequenceCommand:
             link.out,
             link.payload(),
             passed,
-            told[RUN],
-            told[ROW],
-            told[STEP],
-            told[CYCLE],
-            told[VALUE],
+            status[RUN],
+            status[ROW],
+            status[STEP],
+            status[CYCLE],
+            status[VALUE],
         )
         link.event(self._number, self._size)

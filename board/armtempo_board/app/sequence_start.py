@@ -38,7 +38,7 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, fla
     except (MotionError, SequenceError):
         raise Refused(codes.BAD_RECORD)
     _check_rows(controller, record, ends)
-    kind = Sequencer if controller.board.workspace.is_short else AheadSequencer
+    kind = Sequencer if controller.board.engine_memory.is_short else AheadSequencer
     return kind(controller, record, name.encode(), rate)
 
 

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
         def load(self, name: str, crc: "int | None" = None) -> MotionHead: ...
 
-        def tidy(self) -> None: ...
+        def release_memory(self) -> None: ...
 
         def begin_motion(self, name: str, crc: "int | None", rate: int) -> None: ...
 
@@ -71,7 +71,7 @@ class Place:
             self._first[depth] = other._first[depth]
             self._left[depth] = other._left[depth]
 
-    def go_on(self, row: "tuple[int, ...]") -> None:
+    def advance(self, row: "tuple[int, ...]") -> None:
         """Move to the place after ``row``."""
         self.next += 1
         op = row[_OP]
@@ -90,7 +90,7 @@ class Place:
 
 
 class Sequencer:
-    """``told`` is its state, also after its end; indices are in ``sequence_command``."""
+    """``status`` is its state, also after its end; indices are in ``sequence_command``."""
 
     def __init__(self, controller: "Runner", record: "SequenceFile", name: bytes, rate: int) -> None:
         self._controller = controller
@@ -99,23 +99,23 @@ class Sequencer:
         self._row: "tuple[int, ...]" = (0, 0, 0, 0, 0)  # the present row
         self._place = Place()  # after it
         self._checked = 0  # motions whose splines were checked in this run
-        self.told = array("i", [sequence.RUNNING] + [0] * VALUE)
+        self.status = array("i", [sequence.RUNNING] + [0] * VALUE)
         self.stopping = False
         self._command = SequenceCommand(
-            self.told, name, [record.counter(number) for number in range(record.counters)]
+            self.status, name, [record.counter(number) for number in range(record.counters)]
         )
         self.tell = self._command.tell
 
     def begin(self) -> None:
         """Begin with the next turn; raises Refused if the heap has no room for a motion."""
         controller = self._controller
-        controller.tidy()
+        controller.release_memory()
         free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES
         if free < _START_BYTES:
             controller.sequence = None
-            raise Refused(codes.NO_SEQUENCE_ROOM, value=_START_BYTES - free)
-        heap.collect_often(heap.OFTEN if controller.board.workspace.is_short else heap.SELDOM)
-        self._command.attach(controller.board.rows)
+            raise Refused(codes.NO_SEQUENCE_MEMORY, value=_START_BYTES - free)
+        heap.collect_often(heap.OFTEN if controller.board.engine_memory.is_short else heap.SELDOM)
+        self._command.attach(controller.board.extra_commands)
 
     def change_rate(self, rate: int) -> None:
         """As ``Engine.change_rate``, also for the following motions."""
@@ -131,7 +131,7 @@ class Sequencer:
     def prepare(self) -> None:
         """Called during a motion; does nothing here, see ``sequence_ahead``."""
 
-    def go_on(self) -> None:
+    def advance(self) -> None:
         """Called while nothing moves: end, continue to wait, or execute the next row."""
         controller = self._controller
         if controller.board.fault():
@@ -159,10 +159,10 @@ class Sequencer:
             engine = self._controller.board.engine
             engine.check_splines(self._controller.load(name, crc))
         except Refused:
-            for self.told[ROW] in range(record.rows):
-                row = record.row(self.told[ROW])
+            for self.status[ROW] in range(record.rows):
+                row = record.row(self.status[ROW])
                 if row[_OP] == sequence.MOVE and row[_NUMBER] == self._checked:
-                    self.told[STEP] = row[_STEP_OF_ROW]
+                    self.status[STEP] = row[_STEP_OF_ROW]
                     break
             raise
         self._checked += 1
@@ -170,10 +170,10 @@ class Sequencer:
     def _do(self) -> None:
         """Execute the next row."""
         self._row = self._record.row(self._place.next)
-        self.told[STEP] = self._row[_STEP_OF_ROW]
-        self.told[ROW] = self._place.next
-        self.told[VALUE] = 0
-        self._place.go_on(self._row)
+        self.status[STEP] = self._row[_STEP_OF_ROW]
+        self.status[ROW] = self._place.next
+        self.status[VALUE] = 0
+        self._place.advance(self._row)
         self._since_ms = time.ticks_ms()  # start time of the row
         op, number, value, _, _ = self._row
         if op == sequence.MOVE:
@@ -181,11 +181,11 @@ class Sequencer:
         elif op == sequence.OUTPUT:
             self._controller.board.outputs.set(number, value)
         elif op in (sequence.REPEAT, sequence.END):
-            self.told[CYCLE] = (self.told[CYCLE] + value) & _MOST
+            self.status[CYCLE] = (self.status[CYCLE] + value) & _MOST
         elif op == sequence.COUNT:
-            self.told[VALUE] = self._command.count(number)
-        self.told[RUN] = self._controller.run_number
-        self.told[PASSED] = (self.told[PASSED] + 1) & _MOST
+            self.status[VALUE] = self._command.count(number)
+        self.status[RUN] = self._controller.run_number
+        self.status[PASSED] = (self.status[PASSED] + 1) & _MOST
 
     def _move(self, number: int) -> None:
         """Begin a motion."""
@@ -219,7 +219,7 @@ class Sequencer:
         return then == sequence.NEXT_THEN
 
     def _end(self, ending: int, code: int = 0) -> None:
-        self.told[ENDING] = ending
-        self.told[CODE] = code
+        self.status[ENDING] = ending
+        self.status[CODE] = code
         self._controller.sequence = None
         heap.collect_often()

@@ -62,7 +62,7 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
 def _begin(controller: "Controller", name: str) -> None:
     board = controller.board
     if not board.fault():
-        unknown = board.everyone() & ~board.known()
+        unknown = board.all_joints_mask() & ~board.known()
         if unknown:
             motion = controller.load(name)
             print("taking the posture of the arm as the start of", name)

@@ -53,7 +53,7 @@ def put_commit(commands: "Caller", row: tuple, length: int) -> None:
     """Check the upload and store it; an arm record is used after this has returned."""
     (crc,) = commands.fields(row)
     board = commands.board
-    board.arm_waits = board.store().commit(crc) == ARM_RECORD_NAME
+    board.arm_record_pending = board.store().commit(crc) == ARM_RECORD_NAME
 
 
 def put_once(commands: "Caller", row: tuple, length: int) -> int:

@@ -50,7 +50,7 @@ class Inputs:
         block = self._block
         block[isr.TIM2_AT] = stm.TIM2 & 0x3FFFFFFF
         block[isr.TIM2_AT + 1] = stm.TIM2 >> 30
-        block[isr.PORT_A_BEHIND] = stm.GPIOA - stm.TIM2
+        block[isr.PORT_A_OFFSET] = stm.GPIOA - stm.TIM2
         self._set_line(isr.SOFTWARE_LINE, isr.ALWAYS, isr.ALWAYS)
         return isr.freezer(block)
 

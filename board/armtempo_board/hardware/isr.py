@@ -63,7 +63,7 @@ TURN_SLACK_TICKS = const(16)  # how late it may come
 DIR_SETUP_TICKS = const(17)  # DIR stable before a rising edge
 HIGH_B = const(18)  # and port B
 TIM2_AT = const(19)  # its address: the low 30 bits, and in the next word the rest
-PORT_A_BEHIND = const(21)  # bytes from TIM2 to port A
+PORT_A_OFFSET = const(21)  # bytes from TIM2 to port A
 BLOCK_HEAD = const(22)
 ALWAYS = const(1 << 16)  # in LINE_LEVELS and LINE_MASK, where no pin is: whatever DIR says
 # words of a joint in the block, after the head
@@ -113,7 +113,6 @@ RAW_ROOM = const(4)  # raw samples: 0.4 s; the main loop comes every few millise
 _SAMPLE_TICKS = const(8400000)
 
 _FIRST_ENTRY = const(0)
-_HERE = const(0)  # the word that a pointer points to
 _LEAST_AHEAD_TICKS = const(84)  # 1 us: a compare value nearer than that may be missed
 _CALL_TICKS = const(336)  # 4 us
 _LOW_BITS = const(0x3FFFFFFF)
@@ -269,7 +268,7 @@ def release_channel(block: ptr32, timer: ptr32, at: int) -> object:
 
 
 @micropython.viper
-def push_away(timer: ptr32, compare: int, state: ptr32) -> object:
+def park_compare(timer: ptr32, compare: int, state: ptr32) -> object:
     """Move the compare value of an empty ring half a round of the counter away."""
     half = 1
     far = timer[CNT] + (half << 31)
@@ -366,9 +365,9 @@ def take_sample(raw: ptr32, block: ptr32, dma: ptr32, encoders: object, timer: p
         while n:
             n -= 1
             block = ptr32(int(block) - 4 * JOINT_WORDS)
-            raw[_HERE] = (
-                (block[NDTR_AT_START] - dma[block[NDTR_AT]] - block[MATCHED]) & block[MASK]
-            ) + block[MATCHED]
+            raw[0] = ((block[NDTR_AT_START] - dma[block[NDTR_AT]] - block[MATCHED]) & block[MASK]) + block[
+                MATCHED
+            ]
             raw = ptr32(int(raw) - 4)
         block = head
         n = block[ENCODERS]
@@ -393,7 +392,7 @@ def freezer(shared: "array[int]") -> "Callable[[int], object]":
     Looking up a name takes 110 to 150 instructions of an interrupt, so nothing is looked up: all that it needs is
     in the block. It takes the same time whatever the joints do (docs/hardware.md).
 
-    The counters stand meanwhile: no edge comes, and what it reads belongs together. DMA has long brought each compare
+    The counters are stopped: no edge comes, and what it reads belongs together. DMA has long brought each compare
     register its next edge when its requests are switched off. Pins that are low are held low. One that is high has its
     falling edge in its compare register, which comes when the counters continue.
     """
@@ -403,7 +402,7 @@ def freezer(shared: "array[int]") -> "Callable[[int], object]":
     def freeze(line: int) -> object:
         block = ptr32(int(address))
         tim2 = ptr32((block[TIM2_AT + 1] << 30) + block[TIM2_AT])
-        port_a = ptr32(int(tim2) + block[PORT_A_BEHIND])
+        port_a = ptr32(int(tim2) + block[PORT_A_OFFSET])
         words = ptr32(int(block) + _LINE_BYTES * line)
         why = (port_a[_PORT_E + ODR] ^ words[_LINE_0 + LINE_LEVELS]) & words[_LINE_0 + LINE_MASK]
         if why:

@@ -108,11 +108,11 @@ class Ring:
         isr.release_channel(self._block, self.timer, self._at)
         enable_irq(before)
 
-    def push_away(self) -> None:
+    def park_compare(self) -> None:
         """Keep the compare value of an empty ring far from the counter."""
         if isr.kiticks_until(self.timer, self.state, isr.FAR_TIME) < _FAR_KITICKS:
             self.set_last_to_now()
-            isr.push_away(self.timer, self._block[self._at + isr.CCR_AT], self.state)
+            isr.park_compare(self.timer, self._block[self._at + isr.CCR_AT], self.state)
 
     def set_last_to_now(self) -> None:
         """Take the time of the last entry for now: the ring is empty, only turns of DIR are measured from it."""

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 _QUIET_MS = const(50)  # time after which an incomplete frame is dropped
 _ATTEMPTS = const(8)  # reads and rejected frames in one poll: bounds its time
 _PIECE = const(64)  # bytes read at once
-_FIRST = const(0)
 
 
 class FrameReader:
@@ -90,7 +89,7 @@ class FrameReader:
                 return True
             return False
         self._heard_ms = now_ms
-        first = self._piece[_FIRST]
+        first = self._piece[0]
         if self._filled == 0 and first != SYNC:
             self.outside = first
             self._skip()

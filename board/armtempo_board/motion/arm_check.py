@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     Record = tuple[dict[str, int], Rows, int, Rows, Rows]
 
 
-def checked(data: bytes, room_bytes: int) -> "Record":
+def checked(data: bytes, free_bytes: int) -> "Record":
     """(head, joints, crc32, outputs, inputs) of an arm record, as ``armrecord`` unpacks them.
 
-    ``room_bytes``: available for an engine. Raises Refused: BAD_RECORD if it is damaged, of another version,
+    ``free_bytes``: available for an engine. Raises Refused: BAD_RECORD if it is damaged, of another version,
     or names something that the board does not have; PIN_TAKEN if the pin or timer of an output, input or
-    polled switch is in use; NO_ROOM with the bytes needed.
+    polled switch is in use; NO_ENGINE_MEMORY with the bytes needed.
     """
     try:
         head, joints, crc = armrecord.unpack(data)
@@ -38,8 +38,8 @@ def checked(data: bytes, room_bytes: int) -> "Record":
         raise Refused(codes.NEEDS_FIRMWARE)
     _check_pins(head, joints, outputs, inputs)
     rates = [row["max_rate"] for row in joints]
-    if not engine_memory.fits(rates, room_bytes):
-        raise Refused(codes.NO_ROOM, NO_JOINT, engine_memory.needed_bytes(rates))
+    if not engine_memory.fits(rates, free_bytes):
+        raise Refused(codes.NO_ENGINE_MEMORY, NO_JOINT, engine_memory.needed_bytes(rates))
     return head, joints, crc, outputs, inputs
 
 

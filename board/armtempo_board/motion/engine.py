@@ -49,7 +49,6 @@ _PERMILLE = const(1000)
 _KITICKS_PER_32_MS = const(2625)
 _MOST_KITICKS = const(5_000_000)  # a minute
 _ALL_JOINTS = const(0xFF)
-_ANY_JOINT = const(0)
 # work besides the filling of queues: one of these in each call of ``service``
 _POLL_SWITCHES = const(0)
 _CHECK_FOLLOWING = const(1)
@@ -176,7 +175,7 @@ class Engine:
 
     def check_splines(self, motion: "MotionHead") -> None:
         """Check the splines of a motion; raises Refused."""
-        joint = self.drives[_ANY_JOINT]  # as the gap is the same for all; it walks through the motion
+        joint = self.drives[0]  # any one, as the gap is the same for all; it walks through the motion
         motion_check.check(motion, self.limits, joint.gap_ticks, joint.generator.subintervals)
 
     def _check_start(self, motion: "MotionHead") -> None:
@@ -412,7 +411,7 @@ class Engine:
         self.moving = False
 
     def close(self) -> None:
-        """Release the hardware, the workspace and the motion's file; the engine is not used after it."""
+        """Release the hardware, the engine_memory and the motion's file; the engine is not used after it."""
         self.freeze()
         for joint in self.drives:
             joint.close()

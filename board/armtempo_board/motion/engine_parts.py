@@ -7,11 +7,11 @@ from armtempo_board.hardware import isr, registers
 from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.inputs import Inputs
 from armtempo_board.motion.clock import MotionClock
+from armtempo_board.motion.engine_memory import EngineMemory
 from armtempo_board.motion.following_error import FollowingError
 from armtempo_board.motion.joint_drive import JointDrive
 from armtempo_board.motion.rate_control import RateControl
 from armtempo_board.motion.readings import Readings
-from armtempo_board.motion.workspace import Workspace
 
 _PULSE_SPARE_US = const(5)
 _TICKS_PER_US = const(84)
@@ -26,23 +26,25 @@ _LIMITS = (
 class EngineParts:
     """``head`` and ``joints``: from ``armrecord.unpack``. Nothing moves, drivers are off.
 
-    ``workspace``: memory taken over from the engine before; raises MemoryError if it is too small.
+    ``engine_memory``: memory taken over from the engine before; raises MemoryError if it is too small.
     """
 
-    def __init__(self, head: "dict[str, int]", joints: "list[dict[str, int]]", workspace: Workspace) -> None:
-        self.feeder = workspace.feeder
+    def __init__(
+        self, head: "dict[str, int]", joints: "list[dict[str, int]]", engine_memory: EngineMemory
+    ) -> None:
+        self.feeder = engine_memory.feeder
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
         fitted = [EncoderInput(row["encoder"], row["encoder_inverted"]) for row in rows]
-        self.sampler = workspace.sampler
+        self.sampler = engine_memory.sampler
         self.sampler.configure(len(joints), tuple([encoder.address for encoder in fitted]))
         self.block = self.sampler.block
         self.sampler.connect()
         registers.apply(registers.CLOCKS)
         registers.apply(registers.TIMERS)
-        rings = workspace.rings([row["max_rate"] for row in joints])
+        rings = engine_memory.rings([row["max_rate"] for row in joints])
         arm = head, joints
         self.drives = [
-            JointDrive(n, arm, self.sampler, ring, workspace.memory) for n, ring in enumerate(rings)
+            JointDrive(n, arm, self.sampler, ring, engine_memory.memory) for n, ring in enumerate(rings)
         ]
         self.encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]

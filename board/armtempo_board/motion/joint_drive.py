@@ -86,9 +86,9 @@ class JointDrive:
     def load(self, motion: "MotionHead", number: int) -> None:
         """Prepare for a motion; the clock is before 0."""
         self.generator.load(motion, number, self._base, self._sampler.block[isr.PULSE_TICKS], self.gap_ticks)
-        self.stand()
+        self.prepare_start()
 
-    def stand(self) -> None:
+    def prepare_start(self) -> None:
         """Prepare for the motion that the generator has loaded."""
         self._direction = self.generator.direction
         self._dir.value((self._direction > 0) ^ self._inverted)
@@ -166,11 +166,11 @@ class JointDrive:
                 ring.set_last_to_now()
                 self._turn()
             elif generator.halted:
-                ring.push_away()
+                ring.park_compare()
                 self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS
             return 0
         if generator.next_kiticks() - now_kiticks > self.lookahead_kiticks:
-            ring.push_away()
+            ring.park_compare()
             self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS
             return 0
         if ring.written():

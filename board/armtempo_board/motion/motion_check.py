@@ -72,11 +72,11 @@ def _check_joint(interval: "Subintervals", judge: "Judge", joint: int) -> None:
     while measured := interval.measure():
         code = judge.verdict(measured)
         if code == _SPLIT:
-            interval.go_on(subdivision.SPLIT)
+            interval.advance(subdivision.SPLIT)
         elif code:
             raise Refused(code, joint, judge.value)
         else:
-            interval.go_on(subdivision.SKIP)
+            interval.advance(subdivision.SKIP)
 
 
 def _check_numbers(motion: "MotionHead", joint: int) -> None:

@@ -141,7 +141,7 @@ class NextMotion:
         generator = self._generators[number]
         self._generators[number] = joint.generator
         self._put(number, joint, generator)
-        joint.stand()
+        joint.prepare_start()
 
     def give_back(self) -> None:
         """Give all joints their former generators again; this object is not used any more; nothing moves."""

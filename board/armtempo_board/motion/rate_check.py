@@ -136,13 +136,13 @@ def _add(interval: "Subintervals", motion: "MotionHead", joint: int, width: int,
         is_measured = interval.angle_measures[SCALE] and interval.time_measures[SCALE]
         begin, end = interval.time[HIGH], interval.time[LAST_HIGH]
         if not is_measured or end - begin > width:
-            interval.go_on(SPLIT)
+            interval.advance(SPLIT)
             continue
         rate = highest(interval)
         first = max(begin - BIAS, 0) // width
         last = min((end - BIAS) // width, _SPANS)
         for i in range(first, last + 1):
             peaks[i] = max(peaks[i], rate)
-        interval.go_on(SKIP)
+        interval.advance(SKIP)
     for i in range(_SPANS + 1):
         sums[i] += peaks[i]

@@ -6,7 +6,7 @@ So a motion takes the same memory whatever its size. Reading allocates nothing; 
 import micropython
 from micropython import const
 
-from armtempo_board.memory import bytes_behind
+from armtempo_board.memory import bytes_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class ControlPoints:
 
     def __init__(self, words: "memoryview") -> None:
         self.words = words
-        self._fresh = bytes_behind(words, _FRESH_AT, WINDOW_WORDS)
+        self._fresh = bytes_of(words, _FRESH_AT, WINDOW_WORDS)
         self._stream: "Any" = None
         self._end = 0
         self._degree = 0

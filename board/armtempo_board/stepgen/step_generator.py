@@ -362,7 +362,7 @@ class StepGenerator:
             self._first_due = comes
 
     def _queue_first(self) -> None:
-        """FIRST, if LAST is pending too against that."""
+        """Queue FIRST; with LAST pending too, decide both."""
         is_opposite = self._first_direction != self.direction
         if self._pending == _BOTH:
             if is_opposite and self._since_last(self._high(), self._first_ticks) <= self._gap_ticks:

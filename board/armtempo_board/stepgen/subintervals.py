@@ -108,6 +108,6 @@ class Subintervals:
                 break
         return found
 
-    def go_on(self, move: int) -> None:
+    def advance(self, move: int) -> None:
         """With its first half (subdivision.SPLIT), or after it (SKIP)."""
         self.time_measures[subdivision.MOVE] = move

@@ -36,11 +36,20 @@ def checked(target: T) -> T:
     """
     if not isinstance(target, type):
         return _wrapped(target)  # type: ignore[arg-type, return-value]
+    return checked_as(target.__name__)(target)
+
+
+def checked_as(owner: str) -> Callable[[T], T]:
+    """The same for a class whose methods users call by the class ``owner``, which errors name."""
+    return lambda target: _checked_methods(target, owner)
+
+
+def _checked_methods(target: T, owner: str) -> T:
     for name, entry in [*vars(target).items()]:
         if isinstance(entry, classmethod) and not name.startswith("_"):
-            setattr(target, name, classmethod(_wrapped(entry.__func__, target.__name__)))
+            setattr(target, name, classmethod(_wrapped(entry.__func__, owner)))
         elif inspect.isfunction(entry) and (name == "__call__" or not name.startswith("_")):
-            setattr(target, name, _wrapped(entry, target.__name__))
+            setattr(target, name, _wrapped(entry, owner))
     return target
 
 
@@ -68,7 +77,7 @@ def _wrapped(function: Callable[..., Any], owner: str = "") -> Callable[..., Any
 
 
 def _wrong(name: str, argument: str, value: object, kind: Any) -> InputError:
-    return InputError(f"{name}: {argument} is {reprlib.repr(value)}", f"give {words(kind)}")
+    return InputError(f"{name}: {argument} is {reprlib.repr(value)}", f"give {describe_kind(kind)}")
 
 
 @cache
@@ -165,7 +174,7 @@ def _entries_fit(value: object, origin: Any, kinds: Sequence[Any]) -> bool:
     return all(map(_check(kinds[0]), entries))
 
 
-def words(kind: Any) -> str:
+def describe_kind(kind: Any) -> str:
     """Describe a type."""
     origin, inner = get_origin(kind) or kind, get_args(kind)
     if kind in _SIMPLE:
@@ -173,15 +182,15 @@ def words(kind: Any) -> str:
     if kind is Numbers:
         return "finite numbers"
     if origin in (Union, UnionType):
-        return " or ".join(dict.fromkeys(words(one) for one in inner))
+        return " or ".join(dict.fromkeys(describe_kind(one) for one in inner))
     if isinstance(kind, dataclasses.InitVar):
-        return words(kind.type)
+        return describe_kind(kind.type)
     if origin is Callable:
         return "a function"
     if origin is tuple and inner[-1] is not Ellipsis:
-        return f"({', '.join(words(one) for one in inner)})"
+        return f"({', '.join(describe_kind(one) for one in inner)})"
     if origin in (tuple, Sequence):
-        return f"a list, each entry {words(inner[0])}"
+        return f"a list, each entry {describe_kind(inner[0])}"
     if origin is Mapping:
-        return f"a dictionary, each value {words(inner[1])}"
+        return f"a dictionary, each value {describe_kind(inner[1])}"
     return "a path" if origin.__name__ == "Path" else f"an object of type {origin.__name__}"

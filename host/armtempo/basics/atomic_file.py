@@ -25,7 +25,7 @@ def replace_text(path: Path, text: str, newline: str | None = None) -> None:
         else:
             _replace(path.resolve(), text, newline)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {why(error)}", "choose another place") from None
+        raise InputError(f"{path}: cannot be written: {os_reason(error)}", "choose another place") from None
 
 
 def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
@@ -59,7 +59,7 @@ def _holds(path: Path, text: str) -> bool:
         return False
 
 
-def why(error: Exception) -> str:
+def os_reason(error: Exception) -> str:
     """The reason as the operating system or a decoder gives it, without the path."""
     return getattr(error, "strerror", None) or str(error)
 

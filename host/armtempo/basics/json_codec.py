@@ -19,6 +19,8 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean, visible
 
 _AGAIN = "restore the file from a copy, or make it again with the command that wrote it"
+KEY = "json_key"
+"""Metadata of a field: its key in JSON, if that is not its name."""
 ADDED = {"added": True}
 """Metadata of a dataclass field that older files do not have; they get its default."""
 
@@ -31,7 +33,7 @@ def added_as(value: Any) -> dict[str, Any]:
 def encode(value: Any) -> Any:
     """JSON value of dataclasses, mappings, tuples, arrays and plain values."""
     if dataclasses.is_dataclass(value):
-        return {field.name: encode(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        return {_key(field): encode(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, Mapping):
@@ -116,14 +118,18 @@ def _dataclass(kind: Any, value: Any, where: str) -> Any:
     if not isinstance(value, dict):
         raise InputError(f"{where}: {_short(value)} should be a table", _AGAIN)
     value = {**_before(kind), **value}
-    fields = {field.name: field.metadata.get("added", False) for field in dataclasses.fields(kind)}
-    missing = {name for name, added in fields.items() if name not in value and not added}
+    fields = {_key(field): field for field in dataclasses.fields(kind)}
+    missing = {key for key, field in fields.items() if key not in value and not field.metadata.get("added")}
     for what, keys in (("unknown", value.keys() - fields.keys()), ("missing", missing)):
         if keys:
             meant = did_you_mean(min(keys), fields) if what == "unknown" else ""
             raise InputError(f"{where}: {what} key {', '.join(sorted(keys))}{meant}", _AGAIN)
     hints = _hints(kind)
-    found = {name: decode(hints[name], value[name], f"{where}.{name}") for name in fields if name in value}
+    found = {
+        field.name: decode(hints[field.name], value[key], f"{where}.{key}")
+        for key, field in fields.items()
+        if key in value
+    }
     try:
         return kind(**found)
     except InputError as error:
@@ -133,10 +139,14 @@ def _dataclass(kind: Any, value: Any, where: str) -> Any:
 def _before(kind: Any) -> dict[str, Any]:
     """What older files meant without a key, where that is not its default now."""
     return {
-        field.name: field.metadata["before"]
+        _key(field): field.metadata["before"]
         for field in dataclasses.fields(kind)
         if "before" in field.metadata
     }
+
+
+def _key(field: dataclasses.Field[Any]) -> str:
+    return str(field.metadata.get(KEY, field.name))
 
 
 _hints: Callable[[Any], dict[str, Any]] = get_type_hints

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import is_number
 
@@ -48,7 +48,8 @@ def text_of(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"{path}: cannot be read: {why(error)}", "check the path, and that it is a text file in UTF-8"
+            f"{path}: cannot be read: {os_reason(error)}",
+            "check the path, and that it is a text file in UTF-8",
         ) from None
 
 

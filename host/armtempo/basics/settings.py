@@ -69,7 +69,7 @@ class ProjectSettings:
     def _default_runs(self) -> Setting:
         if self.file is None:
             return Setting(RUNS, _DEFAULT_RUNS, "default")
-        return Setting(RUNS, _beside(self.file, _DEFAULT_RUNS), f"default next to {_near(self.file)}")
+        return Setting(RUNS, _relative_to(self.file, _DEFAULT_RUNS), f"default next to {_near(self.file)}")
 
     @cached_property
     def _in_file(self) -> dict[str, str]:
@@ -108,12 +108,12 @@ def _from_file(file: Path, name: str, value: str) -> str:
     ):
         return value  # the name of a shipped arm
     if name != PORT:
-        return _beside(file, value)
+        return _relative_to(file, value)
     kind, colon, folder = value.partition(":")
-    return f"{kind}:{_beside(file, folder)}" if (kind, colon) == ("sim", ":") and folder else value
+    return f"{kind}:{_relative_to(file, folder)}" if (kind, colon) == ("sim", ":") and folder else value
 
 
-def _beside(file: Path, value: str) -> str:
+def _relative_to(file: Path, value: str) -> str:
     """A path relative to the file, made relative to the current folder."""
     return str(_near(file.parent) / Path(value).expanduser())
 

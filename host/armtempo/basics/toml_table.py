@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean, is_plain, misspelt
 
@@ -28,7 +28,7 @@ def read(path: Path | str) -> Table:
         raise InputError(f"{path}: no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"{path}: cannot be read: {why(error)}",
+            f"{path}: cannot be read: {os_reason(error)}",
             "check that it is a text file in UTF-8 that you may read",
         ) from None
     return parse(text, str(path))

@@ -10,12 +10,12 @@ import click
 
 from armtempo.basics.errors import InputError
 from armtempo.basics.settings import JOB, ProjectSettings
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.diagnosis import arm_check, figures
 from armtempo.diagnosis.figures import JointFigures, table
 from armtempo.diagnosis.finding import Finding, Level
 from armtempo.model.arm import Arm
-from armtempo.planning.checks import rate_words
+from armtempo.planning.checks import format_rate
 from armtempo.report import arm_picture, drawing
 
 
@@ -37,7 +37,7 @@ def check(
     with warnings and notes only.
     """
     _check_picture(picture, force)
-    path = chosen.arm_file(arm_path)
+    path = resolve.arm_file(arm_path)
     job = ProjectSettings().get(JOB, job_path)
     arm, found = arm_check.check(path, job.path if job else None)
     joints = figures.of(arm) if arm else ()
@@ -65,7 +65,7 @@ def _print_text(path: Path, arm: Arm | None, joints: tuple[JointFigures, ...], f
     for line in table(joints):
         results.echo(line)
     if joints:
-        results.echo(rate_words(sum(joint.top_steps_s for joint in joints)))
+        results.echo(format_rate(sum(joint.top_steps_s for joint in joints)))
     for finding in found:
         results.echo(f"{finding.level.value + ':':<9}{finding.where}: {finding.what}")
         results.echo(f"{'':9}-> {finding.next_step}")

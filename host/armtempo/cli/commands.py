@@ -169,7 +169,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "deploy:deploy",
             "Install or update the board program on a board.",
             "deploy --port /dev/ttyACM0",
-            "deploy --mpy",
+            "deploy --arm ar4",
         ),
         "undeploy": Entry("deploy:undeploy", "Remove the board program from a board.", "undeploy"),
         "firmware": Entry(
@@ -236,11 +236,6 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "paper:paper",
             "Repeat the paper: every number next to the printed one, on one page.",
             "paper --quick",
-        ),
-        "completion": Entry(
-            "help:completion",
-            "Print a completion script for SHELL.",
-            "completion bash >> ~/.bashrc",
         ),
     },
 }

@@ -9,7 +9,7 @@ import click
 import armtempo
 from armtempo import pipeline
 from armtempo.basics.errors import ArmtempoError, InputError, MissingPackageError
-from armtempo.cli import chosen, options, results, sequences
+from armtempo.cli import options, resolve, results, sequences
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.run import run_and_report
@@ -55,11 +55,11 @@ def demo(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | 
         return
     with ProgressBar("planning") as progress:
         plan = pipeline.plan(Arm.paper(), Job.paper(), progress)
-    results.echo(f"arm: {chosen.describe_arm(plan.arm)}")
+    results.echo(f"arm: {resolve.describe_arm(plan.arm)}")
     for line in pipeline.summary(plan):
         results.echo(line)
-    with chosen.board(BoardOptions(port, log_traffic), plan.arm) as board:
-        run = run_and_report(board, plan, 1, chosen.runs(out))
+    with resolve.board(BoardOptions(port, log_traffic), plan.arm) as board:
+        run = run_and_report(board, plan, 1, resolve.runs(out))
     try:
         page = pipeline.report(run)
         results.echo(_NEXT.format(page=page, uri=page.resolve().as_uri()))
@@ -75,7 +75,7 @@ def _pick_and_place() -> None:
     arm = Arm.load(folder / "arm.toml")
     with ProgressBar("planning") as progress:
         plan = armtempo.plan_sequence(arm, Sequence.load(folder / "sequence.toml", arm), progress)
-    results.echo(f"arm: {chosen.describe_arm(arm)}")
+    results.echo(f"arm: {resolve.describe_arm(arm)}")
     for line in sequences.lines(plan):
         results.echo(line)
     part = arm.inputs[arm.input("part")]

@@ -15,7 +15,7 @@ import click
 from armtempo.basics import installation, settings
 from armtempo.basics.errors import ArmtempoError
 from armtempo.basics.settings import ProjectSettings
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.diagnosis import arm_check
 from armtempo.diagnosis.finding import Finding, Level, error, good, note
@@ -83,7 +83,7 @@ def _board(port: str | None, arm_path: Path | None) -> list[Finding]:
     except ArmtempoError:  # no port is set and no board is plugged in: not an error
         return [note("board", "not checked", "give --port PORT, or --port sim")]
     try:
-        return examine_board(_named(chosen.board_state(BoardOptions(name)), arm_path))
+        return examine_board(_named(resolve.board_state(BoardOptions(name)), arm_path))
     except ArmtempoError as refused:
         return examine_board(refused)
 
@@ -91,7 +91,7 @@ def _board(port: str | None, arm_path: Path | None) -> list[Finding]:
 def _named(state: BoardState, arm_path: Path | None) -> BoardState:
     """``state`` with the arm's name, if the board is set up for the arm that is set here."""
     try:
-        arm = chosen.named_arm(arm_path)
+        arm = resolve.named_arm(arm_path)
     except ArmtempoError:  # already reported with the arm
         return state
     return state if arm is None else state.named(arm)
@@ -124,7 +124,7 @@ def examine_board(state: BoardState | ArmtempoError) -> list[Finding]:
     found = [
         good("board", f"{state.board_id}{' (virtual)' if state.virtual else ''}, port {state.port}"),
         _program(state),
-        _room(state),
+        _memory(state),
         good(
             "arm on the board", state.arm or (f"record {state.arm_crc:08x}" if state.arm_crc else "none yet")
         ),
@@ -147,7 +147,7 @@ def _program(state: BoardState) -> Finding:
     return error("program", f"{text}, which differs from the one installed here, {own_crc():08x}", UPDATE)
 
 
-def _room(state: BoardState) -> Finding:
+def _memory(state: BoardState) -> Finding:
     text = f"{state.free_heap} bytes of heap, {state.free_flash} of flash"
     if state.free_heap >= _LEAST_HEAP:
         return good("free", text)

@@ -10,7 +10,7 @@ from armtempo_shared.limits import MAX_JOINTS
 from armtempo.basics import toml_table
 from armtempo.basics.atomic_file import check_not_input, check_replaceable, replace_text
 from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.model import mesh_files, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -68,12 +68,12 @@ def import_table(
     (rad); or x, y, z and roll, pitch, yaw for poses. Columns are separated by commas, semicolons, tabs or blanks. A
     file that 'armtempo export' wrote becomes a job of few via points along the same path.
     """
-    arm = chosen.load_arm(arm_path)
+    arm = resolve.load_arm(arm_path)
     title = name or table.stem
     target = output or Path(f"{title}.json" if own_timing else f"{title}.toml")
     check_not_input(target, (table, arm.source))
     if own_timing:
-        plan = chosen.as_recorded(table, arm, title, radians, tolerance_deg)
+        plan = resolve.as_recorded(table, arm, title, radians, tolerance_deg)
         plan.save(target, force)
         _show_timed(plan, target, as_json)
         return

@@ -1,4 +1,4 @@
-"""``armtempo help`` and ``completion``: pages of the documentation, and shell completion."""
+"""``armtempo help``: pages of the documentation."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from importlib.resources import files
 from pathlib import Path
 
 import click
-from click.shell_completion import get_completion_class
 
-from armtempo.cli import main, results
+from armtempo.cli import results
 
 TOPICS = {
     "first-hour": "host",
@@ -50,21 +49,3 @@ def page(topic: str) -> str:
     shipped = package / "data" / "pages" / f"{topic}.md"
     found = shipped if shipped.exists() else package.parents[1] / TOPICS[topic] / "docs" / f"{topic}.md"
     return found.read_text(encoding="utf-8")
-
-
-SHELLS = ("bash", "zsh", "fish")
-
-
-@click.command("completion")
-@click.argument("shell", type=click.Choice(SHELLS))
-def completion(shell: str) -> None:
-    """Print a completion script for SHELL.
-
-    \b
-    bash: armtempo completion bash >> ~/.bashrc
-    zsh:  armtempo completion zsh >> ~/.zshrc
-    fish: armtempo completion fish > ~/.config/fish/completions/armtempo.fish
-    """
-    maker = get_completion_class(shell)
-    assert maker is not None  # click defines these three
-    click.echo(maker(main, {}, "armtempo", "_ARMTEMPO_COMPLETE").source())

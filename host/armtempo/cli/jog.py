@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import click
 
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError
-from armtempo.cli import chosen, gamepad, keys, options, posture, results
+from armtempo.cli import gamepad, keys, options, posture, resolve, results
 from armtempo.cli.jog_screen import KEYS, SPEEDS, JogScreen
 from armtempo.cli.keys import Keys
 from armtempo.cli.options import BoardOptions
@@ -57,9 +57,9 @@ def jog(
     if to is not None and (joint is None or by is not None):
         raise InputError("--to needs --joint, without --by", "for example --joint 2 --to 30")
     moves = _one_move(joint, axis, about, by if to is None else to, gamepad, given.as_json)
-    arm = chosen.named_arm(given.arm_path)
-    with chosen.board(given, arm) as board:
-        prepare(board, chosen.arm_of_board(board, arm).holding(holds), given.replace_arm)
+    arm = resolve.named_arm(given.arm_path)
+    with resolve.board(given, arm) as board:
+        prepare(board, resolve.arm_of_board(board, arm).holding(holds), given.replace_arm)
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 screen(board, pressed, speed).loop()

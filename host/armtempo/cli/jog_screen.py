@@ -79,7 +79,7 @@ class JogChoice:
             return False
         return True
 
-    def words(self, names: list[str]) -> str:
+    def describe(self, names: list[str]) -> str:
         """Describe the choice in a few words."""
         if self.joint is not None:
             what, unit = names[self.joint - 1], "°"
@@ -141,12 +141,12 @@ class JogScreen:
             elif not self.choice.press(key, len(self._arm.driven)) and key != " ":
                 self._said = f"the key {key!r} does nothing here"
         except (BoardError, InputError, PlanError) as error:
-            self._said = _words(error)
+            self._said = _short_error(error)
         except LinkError as error:
             if not isinstance(error, BoardError) and "unknown" not in error.problem:
                 click.echo()
                 raise
-            self._said = _words(error)
+            self._said = _short_error(error)
 
     def _move(self, key: str, sign: int) -> None:
         if self.choice.held:
@@ -216,9 +216,9 @@ class JogScreen:
         except LinkError as error:
             where = [error.problem]
         parts = (
-            [self.choice.words(names), self._said, *where]
+            [self.choice.describe(names), self._said, *where]
             if self._said
-            else [self.choice.words(names), *where]
+            else [self.choice.describe(names), *where]
         )
         click.echo(f"{_CLEAR_LINE}{fitted(parts, shutil.get_terminal_size().columns - 1)}", nl=False)
 
@@ -267,5 +267,5 @@ class _StopKeys:
         self._thread.join()
 
 
-def _words(error: ArmtempoError) -> str:
+def _short_error(error: ArmtempoError) -> str:
     return f"{error.problem}: {error.hint}" if error.hint else error.problem

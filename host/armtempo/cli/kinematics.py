@@ -14,7 +14,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.text import aligned
-from armtempo.cli import chosen, options, posture, results
+from armtempo.cli import options, posture, resolve, results
 from armtempo.cli.results import show_json
 from armtempo.kinematics import pose_file
 from armtempo.kinematics.chain import spread_deg
@@ -117,7 +117,7 @@ def ik(
     motor. Exit code 1 if a pose has no solution.
     """
     wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
-    solver = PoseSolver(chosen.arm_or_paper(arm_path, for_shape=True))
+    solver = PoseSolver(resolve.arm_or_paper(arm_path, for_shape=True))
     found = listings(solver, wanted, _posture(previous, solver), numerical)
     show = _print_json if as_json else _print_text
     show(solver, found)
@@ -230,14 +230,14 @@ def fk(
     (its start). Default: 'home'. Compare the frames with the real arm to find a wrong row.
     """
     if len(where) == 1 and posture.is_via(where[0]):
-        arm, job = chosen.arm_and_job(arm_path, job_path)
+        arm, job = resolve.arm_and_job(arm_path, job_path)
         angles_deg = spread_deg(arm, posture.via_deg(where[0], arm, job).tolist())
     elif len(where) == 1 and posture.is_named(where[0]):
         wanted = posture.NamedPosture.of(where[0], arm_path, altered)
-        arm = wanted.arm or chosen.arm_or_paper(arm_path, for_shape=True)
+        arm = wanted.arm or resolve.arm_or_paper(arm_path, for_shape=True)
         angles_deg = spread_deg(arm, wanted.angles_deg(arm, job_path).tolist())
     else:
-        arm = chosen.arm_or_paper(arm_path, for_shape=True)
+        arm = resolve.arm_or_paper(arm_path, for_shape=True)
         angles_deg = _angles(where, arm)
     if as_json:
         results.show_json(_values(arm, angles_deg))

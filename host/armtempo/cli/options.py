@@ -99,7 +99,9 @@ gamepad = click.option(
     "--gamepad", is_flag=True, help="Use a gamepad in addition to the keys (needs the extra 'gamepad')."
 )
 holds = click.option(
-    "--holds", metavar="NAME", help="Load of the arm file that the tool holds: it keeps to the room, too."
+    "--holds",
+    metavar="NAME",
+    help="Load of the arm file that the tool holds: it keeps to the workspace, too.",
 )
 job = click.option(
     "--job",

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 import click
 
 from armtempo.basics.errors import MissingPackageError
-from armtempo.cli import chosen, options
+from armtempo.cli import options, resolve
 from armtempo.cli.options import BoardOptions
 from armtempo.ports.names import is_sim, sim_flash
 
@@ -48,26 +48,26 @@ def panel(
     """
     try:
         from armtempo.panel.job_editor import JobEditor
-        from armtempo.panel.operator import Operator
+        from armtempo.panel.panel_board import PanelBoard
         from armtempo.panel.server import Panel, listen, reachable, url
     except ModuleNotFoundError as error:
         raise MissingPackageError("the panel", str(error.name), "panel") from None
     from armtempo.simulator import LaunchOptions, launch
 
-    arm = chosen.arm_or_paper(arm_path)
-    job = chosen.job_file(job_path)
-    name = chosen.port(port)
+    arm = resolve.arm_or_paper(arm_path)
+    job = resolve.job_file(job_path)
+    name = resolve.port(port)
     token = secrets.token_urlsafe(16)
     with ExitStack() as stack:
         listening = stack.enter_context(listen(host, web_port))
         if is_sim(name):  # real time, as on a board
             wanted = LaunchOptions(sim_flash(name), virtual_time=False, arm=arm)
             name = stack.enter_context(launch(wanted)).port
-        operator = Operator(
-            lambda sink, tell: chosen.board(BoardOptions(name), arm, sink=sink, tell=tell),
+        operator = PanelBoard(
+            lambda sink, tell: resolve.board(BoardOptions(name), arm, sink=sink, tell=tell),
             name,
             JobEditor(arm, Path(), job),
-            chosen.runs(None),
+            resolve.runs(None),
         )
         stack.callback(operator.close)
         bound, web_port = listening.getsockname()[:2]

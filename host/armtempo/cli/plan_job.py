@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 from armtempo import pipeline
 from armtempo.basics.atomic_file import check_not_input
 from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, results, sequences
+from armtempo.cli import resolve, results, sequences
 from armtempo.cli.results import ProgressBar
+from armtempo.encoding import engine_heap
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import is_sequence
 from armtempo.planning import checks, torque
 from armtempo.report import text_summary
-from armtempo.robot import engine_room
 
 
 class Order(NamedTuple):
@@ -42,7 +42,7 @@ def run(order: Order, changes: dict[str, Any]) -> None:
         sequences.refuse_job_options({**own, **changes})
         sequences.plan(order.source, order.arm, order.output, order.force, order.as_json)
         return
-    arm, job = chosen.arm_and_job(order.arm, order.source)
+    arm, job = resolve.arm_and_job(order.arm, order.source)
     job = _changed(job, changes)
     if order.use_torque and order.split:
         raise InputError(
@@ -95,8 +95,8 @@ def _save(made: dict[Path, Plan], force: bool) -> None:
 
 
 def _lines(file: Path, plan: Plan, verbose: bool) -> list[str]:
-    summary = [f"arm: {chosen.describe_arm(plan.arm)}", *pipeline.summary(plan, verbose)]
-    return [*summary, *([engine_room.of_arm(plan.arm)] if verbose else ()), f"written: {file}"]
+    summary = [f"arm: {resolve.describe_arm(plan.arm)}", *pipeline.summary(plan, verbose)]
+    return [*summary, *([engine_heap.of_arm(plan.arm)] if verbose else ()), f"written: {file}"]
 
 
 def _json(file: Path, plan: Plan) -> dict[str, Any]:

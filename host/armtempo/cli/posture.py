@@ -10,7 +10,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, options, results, state
+from armtempo.cli import options, resolve, results, state
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
 from armtempo.model import via_table
@@ -48,8 +48,8 @@ def goto(
             f"write them as one, with commas: armtempo goto {','.join(where)}",
         )
     wanted = NamedPosture.of(where[0], given.arm_path, given.altered)
-    with chosen.board(given, wanted.arm) as board:
-        arm = chosen.arm_of_board(board, wanted.arm).holding(holds)
+    with resolve.board(given, wanted.arm) as board:
+        arm = resolve.arm_of_board(board, wanted.arm).holding(holds)
         target_deg = wanted.angles_deg(arm, job_path)
         board.configure(arm, replace=given.replace_arm)
         try:
@@ -64,29 +64,37 @@ def goto(
 @click.command("home", cls=options.TakesNumbers)
 @click.argument("where", default=HOME, shell_complete=options.files)
 @click.option("--switches", is_flag=True, help="Find the position by moving to the limit switches.")
+@click.option("--joint", metavar="JOINT", help="Home this joint alone, by its number (from 1) or name.")
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
-def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions) -> None:
+def home(where: str, switches: bool, joint: str | None, job_path: Path | None, given: BoardOptions) -> None:
     """Declare the arm's position.
 
     WHERE: angles such as '0,-60,40', a posture of the arm file by its name, a via point of the job such as
     P0, or a trajectory file (its start). Default: the home posture of the arm file. Nothing moves; afterwards
     motions may start. With --switches the joints that have a switch of known angle move: to it, off it,
     slowly to it again, and to their home angle; in the order of 'homing' in the arm file, by default one
-    after the other.
+    after the other. With --joint only that joint, and those that are coupled with it, are homed or declared.
     """
+    if joint is not None and where != HOME:
+        raise InputError(
+            "WHERE and --joint exclude each other", "a joint alone is declared at its home angle"
+        )
     if switches and where != HOME:
         raise InputError(
             "WHERE and --switches exclude each other",
             "give the present posture as WHERE, or --switches to move to the limit switches",
         )
     wanted = NamedPosture.of(where, given.arm_path, given.altered)
-    with chosen.board(given, wanted.arm) as board:
-        arm = chosen.arm_of_board(board, wanted.arm)
+    with resolve.board(given, wanted.arm) as board:
+        arm = resolve.arm_of_board(board, wanted.arm)
         angles_deg = wanted.angles_deg(arm, job_path)
         board.configure(arm, replace=given.replace_arm)
         if switches:
-            board.home_to_switches(arm)
+            say = results.progress_printer(given.as_json)
+            board.home_to_switches(arm, joint=joint, progress=lambda text, done, whole: say(text))
+        elif joint is not None:
+            board.home(arm, joint=joint)
         else:
             board.home(arm, angles_deg)
         print_position(board, given.as_json)
@@ -118,14 +126,14 @@ class NamedPosture:
     def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
         """The posture of ``text``; raises InputError if its trajectory file or the arm cannot be read."""
         if text.endswith(".json") and is_sequence_plan(Path(text)):
-            sequence = chosen.load_sequence_plan(Path(text), arm_path)
+            sequence = resolve.load_sequence_plan(Path(text), arm_path)
             return cls(text, sequence.arm, None, sequence)
         if text.endswith(".json") or via_table.is_recording(Path(text)):
-            plan = chosen.load_plan(Path(text), arm_path, altered)
+            plan = resolve.load_plan(Path(text), arm_path, altered)
             return cls(text, plan.arm, plan)
         if not is_named(text):
             _numbers(text)  # a wrong posture is reported before a port is opened
-        arm = chosen.named_arm(arm_path)
+        arm = resolve.named_arm(arm_path)
         if arm is not None and is_named(text) and not is_via(text):
             arm.posture(text)  # the same
         return cls(text, arm, None)
@@ -141,7 +149,7 @@ class NamedPosture:
         if self.text == HOME:
             return point_to_point.posture(arm.home_deg, arm)
         if is_via(self.text):
-            return via_deg(self.text, arm, chosen.load_job(job_path, arm))
+            return via_deg(self.text, arm, resolve.load_job(job_path, arm))
         return point_to_point.posture(_numbers(self.text), arm)
 
 
@@ -163,11 +171,13 @@ def print_position(board: Board, as_json: bool = False) -> None:
     results.show(as_json, found.to_json(), lines)
 
 
-def words(angles_deg: Array, arm: Arm) -> str:
-    """A posture in one line: each driven joint's name, its angle and its steps."""
+def format_angles(angles_deg: Array, arm: Arm) -> str:
+    """A posture in one line: each driven joint's name, its angle and its motor's steps."""
     return ", ".join(
-        f"{joint.name} {round(angle, 2) + 0.0:.2f}° ({round(angle * joint.steps_per_deg)} steps)"
-        for joint, angle in zip(arm.driven, angles_deg, strict=True)
+        f"{joint.name} {round(angle, 2) + 0.0:.2f}° ({steps} steps)"
+        for joint, angle, steps in zip(
+            arm.driven, angles_deg, arm.transmission.whole_steps(angles_deg), strict=True
+        )
     )
 
 

@@ -113,8 +113,8 @@ class ProgressBar:
                 click.progressbar(length=1000, label=self._label, file=sys.stderr, width=0)
             )
         if self._bar is not None:
-            room = max(shutil.get_terminal_size().columns - len(self._label) - _BAR_COLUMNS, 0)
-            self._bar.label = f"{self._label} {note[:room]}".rstrip()
+            width = max(shutil.get_terminal_size().columns - len(self._label) - _BAR_COLUMNS, 0)
+            self._bar.label = f"{self._label} {note[:width]}".rstrip()
             now = int(1000 * done / whole)
             self._bar.update(now - self._shown)
             self._shown = now

@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 
 from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, options, results, sequences
-from armtempo.cli.live import Live, repetition_line
+from armtempo.cli import options, resolve, results, sequences
 from armtempo.cli.options import BoardOptions
+from armtempo.cli.run_progress import RunProgress, repetition_line
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import is_sequence_plan
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report import text_summary
 from armtempo.report.run import Run
 from armtempo.robot.board import Board
@@ -21,16 +21,11 @@ from armtempo.robot.board import Board
 @click.command("run")
 @click.argument("what", shell_complete=options.files)
 @click.option("--repeat", type=click.IntRange(1, 99), default=1, show_default=True, help="Repetitions.")
-@click.option(
-    "--live", is_flag=True, help="Open a window that plots the run (needs matplotlib and a display)."
-)
 @options.speed
 @options.force("another motion of this name on the board")
 @options.out
 @options.board(options.arm_of_file, options.replace_arm, options.altered)
-def run(
-    what: str, repeat: int, live: bool, percent: float, force: bool, out: Path | None, given: BoardOptions
-) -> None:
+def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, given: BoardOptions) -> None:
     """Replay a motion and record it, or run a sequence.
 
     WHAT: a trajectory file, a planned sequence, or the name of a motion or sequence on the board. The samples
@@ -39,35 +34,34 @@ def run(
     path. Ctrl-C, or 'armtempo stop' in another terminal, brakes; 'armtempo speed', 'pause' and 'resume' work
     there too.
     """
-    if chosen.is_file(what) and is_sequence_plan(Path(what)):
-        only_for_motions(repeat, live)
-        sequence = chosen.load_sequence_plan(Path(what), given.arm_path)
-        with chosen.board(given, sequence.arm) as board:
+    if resolve.is_file(what) and is_sequence_plan(Path(what)):
+        _refuse_repeat(repeat)
+        sequence = resolve.load_sequence_plan(Path(what), given.arm_path)
+        with resolve.board(given, sequence.arm) as board:
             board.configure(sequence.arm, replace=given.replace_arm)
-            results.progress_printer(given.as_json)(f"arm: {chosen.describe_arm(sequence.arm)}")
+            results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(sequence.arm)}")
             board.speed(percent / 100)
-            sequences.run_and_report(board, sequence, force, chosen.runs(out), given.as_json)
+            sequences.run_and_report(board, sequence, force, resolve.runs(out), given.as_json)
         return
-    plan = chosen.load_plan(Path(what), given.arm_path, given.altered) if chosen.is_file(what) else None
-    named = plan.arm if plan else chosen.named_arm(given.arm_path)
-    with chosen.board(given, named) as board:
-        arm = chosen.arm_of_board(board, named)
+    plan = resolve.load_plan(Path(what), given.arm_path, given.altered) if resolve.is_file(what) else None
+    named = plan.arm if plan else resolve.named_arm(given.arm_path)
+    with resolve.board(given, named) as board:
+        arm = resolve.arm_of_board(board, named)
         board.configure(arm, replace=given.replace_arm)
-        results.progress_printer(given.as_json)(f"arm: {chosen.describe_arm(arm)}")
+        results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
         if isinstance(motion, str) and _is_sequence(board, motion):
-            only_for_motions(repeat, live)
-            sequences.run_and_report(board, motion, False, chosen.runs(out), given.as_json)
+            _refuse_repeat(repeat)
+            sequences.run_and_report(board, motion, False, resolve.runs(out), given.as_json)
             return
-        run_and_report(board, motion, repeat, chosen.runs(out), live, given.as_json)
+        run_and_report(board, motion, repeat, resolve.runs(out), given.as_json)
 
 
-def only_for_motions(repeat: int, live: bool) -> None:
-    """Raise InputError for options that a sequence does not have: --repeat, --live."""
-    for name, given in (("--repeat", repeat != 1), ("--live", live)):
-        if given:
-            raise InputError(f"{name}: not for a sequence", "leave it out; repeat is a step of the sequence")
+def _refuse_repeat(repeat: int) -> None:
+    """Raise InputError for --repeat, which a sequence does not have."""
+    if repeat != 1:
+        raise InputError("--repeat: not for a sequence", "leave it out; repeat is a step of the sequence")
 
 
 def _is_sequence(board: Board, name: str) -> bool:
@@ -80,7 +74,6 @@ def run_and_report(
     motion: Plan | EncodedMotion | str,
     repeat: int,
     out: Path,
-    live: bool = False,
     as_json: bool = False,
 ) -> Run:
     """Run a motion, or the stored motion of that name, and print the progress and the result of each joint.
@@ -88,7 +81,7 @@ def run_and_report(
     ``as_json``: print the result as JSON, and the progress to stderr.
     """
     virtual = "a virtual board" if board.info.virtual else ""
-    with Live(window=live, where=virtual, aside=as_json) as watcher:
+    with RunProgress(virtual, aside=as_json) as watcher:
         run = board.run(motion, repeat, out, watcher=watcher)
     results.show(as_json, run.to_json(), text_summary.result_lines(run.results))
     return run
@@ -105,11 +98,13 @@ def fetch(what: str | None, out: Path | None, given: BoardOptions) -> None:
     that the button starts. Waits for the end of a motion that still runs. The samples can be fetched once.
     """
     plan = (
-        chosen.load_plan(Path(what), given.arm_path, given.altered) if what and chosen.is_file(what) else None
+        resolve.load_plan(Path(what), given.arm_path, given.altered)
+        if what and resolve.is_file(what)
+        else None
     )
-    named = plan.arm if plan else chosen.named_arm(given.arm_path)
-    with chosen.board(given, named) as board:
-        board.configure(chosen.arm_of_board(board, named))
-        run = board.fetch(plan or what, chosen.runs(out))
+    named = plan.arm if plan else resolve.named_arm(given.arm_path)
+    with resolve.board(given, named) as board:
+        board.configure(resolve.arm_of_board(board, named))
+        run = board.fetch(plan or what, resolve.runs(out))
         lines = [f"{run.name}: {run.path}", repetition_line(run.entries[-1])]
         results.show(given.as_json, run.to_json(), lines)

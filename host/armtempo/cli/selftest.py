@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from armtempo.basics.errors import InputError
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
 from armtempo.diagnosis.selftest.result import Measurement, SelfTest
@@ -41,7 +41,7 @@ def selftest(given: BoardOptions, out: Path | None, force: bool, with_motors: bo
         page.check_free(out, force)
     if given.arm_path is not None and not with_motors:
         raise InputError("--arm needs --with-motors", "leave it out: the board has its arm's record")
-    given = replace(given, port=chosen.port(given.port))
+    given = replace(given, port=resolve.port(given.port))
     found = _with_motors(given) if with_motors else _alone(given)
     if out is not None:
         page.write(found, out)
@@ -51,15 +51,15 @@ def selftest(given: BoardOptions, out: Path | None, force: bool, with_motors: bo
 
 
 def _alone(given: BoardOptions) -> SelfTest:
-    with chosen.board(given) as board, ProgressBar("self-test") as progress:
+    with resolve.board(given) as board, ProgressBar("self-test") as progress:
         return board.selftest(progress)
 
 
 def _with_motors(given: BoardOptions) -> SelfTest:
-    arm = chosen.named_arm(given.arm_path)
-    with chosen.board(given, arm) as board:
+    arm = resolve.named_arm(given.arm_path)
+    with resolve.board(given, arm) as board:
         return board.motor_test(
-            chosen.arm_of_board(board, arm),
+            resolve.arm_of_board(board, arm),
             ask=lambda question: click.confirm(question, err=True),
             tell=lambda what: results.echo(what, err=True),
         )
@@ -69,7 +69,7 @@ def _lines(found: SelfTest) -> list[str]:
     kind = ", a virtual one: its figures are simulated" if found.simulated else ""
     lines = [f"self-test of board {found.board_id}{kind}"]
     for line in found.lines:
-        lines.extend(_words(line))
+        lines.extend(_format_line(line))
     if to_correct := found.data.get(ARM_FILE):
         lines += ["to correct in the arm file:", *(f"  {line}" for line in to_correct)]
     wrong = len(found.failed)
@@ -77,7 +77,7 @@ def _lines(found: SelfTest) -> list[str]:
     return lines
 
 
-def _words(line: Measurement) -> list[str]:
+def _format_line(line: Measurement) -> list[str]:
     expected = f"   (expected: {line.expected})" if line.expected else ""
     words = [f"  {line.verdict.word:<6}{line.part:<8}{line.what}: {line.measured}{expected}"]
     return [*words, f"  {'':<14}-> {line.cure}"] if line.cure else words

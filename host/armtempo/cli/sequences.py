@@ -15,29 +15,30 @@ import armtempo
 from armtempo.basics.atomic_file import check_not_input
 from armtempo.basics.errors import ArmtempoError, InputError, LinkError
 from armtempo.basics.text import aligned
-from armtempo.cli import chosen, results
+from armtempo.cli import resolve, results
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.state import counted
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share
+from armtempo.model.steps import position, whole_cycles
 from armtempo.report import text_summary
 from armtempo.robot.board import Board
-from armtempo.robot.sequence_run import cycles, where
+from armtempo.robot.sequence_run import where
 from armtempo.robot.stop_request import Stopped
 
 
 def plan(file: Path, arm_path: Path | None, output: Path | None, force: bool, as_json: bool) -> None:
     """Plan a sequence file, print its times, and write it."""
     named = arm_path or arm_named(file)
-    arm = chosen.load_arm(named)
+    arm = resolve.load_arm(named)
     sequence = Sequence.load(file, arm)
     target = output or Path(f"{sequence.name}.json")
     check_not_input(target, (file, arm.source))
     with ProgressBar("planning") as progress:
         planned = armtempo.plan_sequence(arm, sequence, progress)
     planned.save(target, force)
-    found = [f"arm: {chosen.describe_arm(arm)}", *lines(planned), f"written: {target}"]
+    found = [f"arm: {resolve.describe_arm(arm)}", *lines(planned), f"written: {target}"]
     results.show(as_json, {"file": str(target), **values(planned)}, found)
 
 
@@ -122,9 +123,9 @@ class Shown:
         self.last = state
         doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
-            click.echo(f"\r\x1b[Kcycle {state.cycle}, step {state.step}{doing}", nl=False, err=True)
+            click.echo(f"\r\x1b[K{position(state.step, state.cycle)}{doing}", nl=False, err=True)
         elif state.cycle != self._cycle:
-            self._say(f"cycle {state.cycle}, step {state.step}{doing}")
+            self._say(f"{position(state.step, state.cycle)}{doing}")
         self._cycle = state.cycle
 
     def close(self) -> None:
@@ -164,7 +165,7 @@ def run_and_report(
             "find the cause, 'armtempo goto' its start, run it again",
         )
     result = _as_json(end, board, recorded.path if recorded else None)
-    results.show(as_json, result, [f"{end.ending} after {cycles(end)}{counted(board.counters)}"])
+    results.show(as_json, result, [f"{end.ending} after {whole_cycles(end.cycle)}{counted(board.counters)}"])
     return end
 
 

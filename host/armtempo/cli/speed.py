@@ -9,7 +9,7 @@ import click
 from armtempo_shared import wire
 
 from armtempo.basics.errors import BoardError, LinkError
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.robot.board import Board
 from armtempo.robot.shared_board import SharedBoard
@@ -44,7 +44,7 @@ class _Asked:
 
 def _change(given: BoardOptions, asked: _Asked) -> None:
     """Make the change, through the program that has the port if there is one, and print it."""
-    given = chosen.any_port(given)
+    given = resolve.any_port(given)
     program = _ask(given, asked)
     values = {"asked": asked.what, "speed_percent": asked.percent, "port": given.port, "program": program}
     results.show(given.as_json, values, [asked.words + (f", through {program}" if program else "")])
@@ -52,7 +52,7 @@ def _change(given: BoardOptions, asked: _Asked) -> None:
 
 def _ask(given: BoardOptions, asked: _Asked) -> str | None:
     """Make the change; returns the program that did it, None if over the port itself."""
-    with chosen.shared_or_own(given) as board:
+    with resolve.shared_or_own(given) as board:
         if asked.what == "speed" and not isinstance(board, SharedBoard) and not board.status().moving:
             raise LinkError("nothing moves", "'armtempo run --speed' starts at a lower speed")
         try:

@@ -6,13 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import click
+from armtempo_shared.sequence import ENDINGS, FINISHED
 
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.model.arm import Arm
+from armtempo.model.steps import position, whole_cycles
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 
 
@@ -23,8 +25,8 @@ def status(given: BoardOptions) -> None:
 
     Also while another armtempo program has the port.
     """
-    given = chosen.any_port(given)
-    found = _named(chosen.board_state(given), given.arm_path)
+    given = resolve.any_port(given)
+    found = _named(resolve.board_state(given), given.arm_path)
     if given.as_json:
         results.show_json(found.to_json())
         return
@@ -36,12 +38,12 @@ def _named(found: BoardState, arm_path: Path | None) -> BoardState:
     """The state in degrees, if the board is set up for the arm that is set, or for the paper's."""
     named: Arm | None = None
     try:
-        named = chosen.named_arm(arm_path)
+        named = resolve.named_arm(arm_path)
     except InputError as error:  # show the board's state nevertheless
         results.remark(f"armtempo: {error}")
     if named is not None and found.arm_crc and not found.arm and not found.named(named).arm:
         results.remark(
-            f"the board is set up for a different arm than {chosen.describe_arm(named)}; see 'armtempo configure'"
+            f"the board is set up for a different arm than {resolve.describe_arm(named)}; see 'armtempo configure'"
         )
     return found.named(named).named(Arm.paper())
 
@@ -57,7 +59,7 @@ def lines(state: BoardState) -> list[str]:
         f"arm       {_arm(state)}",
         f"free      {state.free_flash} bytes of flash, {state.free_heap} of heap",
         f"fastest   {state.max_rate} steps/s one joint, {state.max_rate_sum} all together, {_measured(state)}",
-        f"engine    {state.room}",
+        f"engine    {state.engine_memory}",
         *_wear(state),
         *motion_lines(state),
     ]
@@ -88,9 +90,10 @@ def motion_lines(state: BoardState) -> list[str]:
 
 
 def _sequence(stand: SequenceStand) -> str:
-    """Name, step, cycles and counters of a sequence."""
-    cycles = f"{stand.cycle} whole cycle{'s' * (stand.cycle != 1)}"
-    return f"{stand.name}: {stand.ending}, step {stand.step}, {cycles}{counted(stand.counters)}"
+    """Name, step, cycle and counters of a sequence."""
+    is_whole = stand.ending == ENDINGS[FINISHED]
+    where = whole_cycles(stand.cycle) if is_whole else position(stand.step, stand.cycle)
+    return f"{stand.name}: {stand.ending}, {where}{counted(stand.counters)}"
 
 
 def counted(counters: Mapping[str, int]) -> str:
@@ -118,10 +121,10 @@ def joint_lines(state: BoardState) -> list[str]:
     """One line per joint: name, angle (steps), encoder angle (counts); and a line for the tool."""
     rows = [_cells(joint) for joint in state.joints]
     lines = [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
-    return [*lines, f"tool at {tool_words(state.tool)}"] if state.tool else lines
+    return [*lines, f"tool at {format_tool(state.tool)}"] if state.tool else lines
 
 
-def tool_words(tool: ToolPlace) -> str:
+def format_tool(tool: ToolPlace) -> str:
     """The tool's pose in one line."""
     x, y, z = tool.position_mm
     roll, pitch, yaw = tool.rpy_deg
@@ -141,7 +144,7 @@ def _arm(state: BoardState) -> str:
         return "none; set the board up with 'armtempo configure'"
     record = f"{len(state.joints)} joints, record {state.arm_crc:08x}"
     if state.arm:
-        return f"{chosen.source_words(state.arm, state.arm_source)}: {record}"
+        return f"{resolve.describe_source(state.arm, state.arm_source)}: {record}"
     return f"{record}; give its file with --arm to see degrees"
 
 

@@ -7,7 +7,7 @@ import time
 import click
 
 from armtempo.basics.errors import ArmtempoError, LinkError, NoAnswerError, PortInUseError
-from armtempo.cli import chosen, options, results, state
+from armtempo.cli import options, resolve, results, state
 from armtempo.cli.options import BoardOptions
 from armtempo.model.arm import Arm
 from armtempo.ports import quick_stop
@@ -30,7 +30,7 @@ def stop(now: bool, given: BoardOptions) -> None:
 
     If another armtempo program has the port, that program stops the arm and ends its command.
     """
-    given = chosen.any_port(given)
+    given = resolve.any_port(given)
     answer = quick_stop.take_answer(given.port or "", now)
     if answer is not None:
         _tell(given, answer, now)
@@ -100,7 +100,7 @@ def _with_degrees(found: BoardState) -> BoardState:
     if found.arm or not found.arm_crc:
         return found
     try:
-        return found.named(chosen.named_arm(None)).named(Arm.paper())
+        return found.named(resolve.named_arm(None)).named(Arm.paper())
     except ArmtempoError:
         return found
 
@@ -109,7 +109,7 @@ def _with_degrees(found: BoardState) -> BoardState:
 @options.board()
 def clear(given: BoardOptions) -> None:
     """Clear the pending fault; its cause must be gone."""
-    with chosen.board(given) as board:
+    with resolve.board(given) as board:
         before = board.status()
         board.clear()
         after = board.status()

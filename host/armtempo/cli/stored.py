@@ -10,14 +10,14 @@ import numpy as np
 
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
-from armtempo.cli import chosen, options, posture, results
+from armtempo.cli import options, posture, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
+from armtempo.encoding import encoded_motion
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import is_sequence_plan
-from armtempo.records import encoded_motion
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot.board import Board
 from armtempo.robot.board_state import record_crc
 
@@ -34,8 +34,8 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
     FILE: written by 'armtempo plan'.
     """
     if is_sequence_plan(file):
-        plan = chosen.load_sequence_plan(file, given.arm_path, name)
-        with chosen.board(given, plan.arm) as board:
+        plan = resolve.load_sequence_plan(file, given.arm_path, name)
+        with resolve.board(given, plan.arm) as board:
             board.configure(plan.arm, replace=given.replace_arm)
             with ProgressBar("uploading") as progress:
                 board.upload_sequence(plan, as_default, progress, force)
@@ -43,8 +43,8 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
         values = {"name": plan.name, "sequence": True, "motions": len(plan.legs), "virtual": virtual}
         results.show(given.as_json, values, [f"{plan.name}: sequence and {len(plan.legs)} motions stored"])
         return
-    motion = encoded_motion.of_plan(chosen.load_plan(file, given.arm_path, given.altered), name)
-    with chosen.board(given, motion.arm) as board:
+    motion = encoded_motion.of_plan(resolve.load_plan(file, given.arm_path, given.altered), name)
+    with resolve.board(given, motion.arm) as board:
         board.configure(motion.arm, replace=given.replace_arm)
         with ProgressBar("uploading") as progress:
             board.upload(motion, default=as_default, progress=progress, replace=force)
@@ -61,7 +61,7 @@ def list_motions(given: BoardOptions) -> None:
 
     The default, which the board's button starts, is marked *.
     """
-    with chosen.board(given) as board:
+    with resolve.board(given) as board:
         found = board.list()
         if given.as_json:
             results.show_json({"virtual": board.info.virtual, "motions": [_listed(one) for one in found]})
@@ -89,14 +89,14 @@ def _listed(entry: StoredMotion) -> dict[str, Any]:
 
 def _arm_of(board: Board, arm_path: Path | None) -> Arm | None:
     """The arm that the board is set up for; None if it is not known."""
-    named = chosen.named_arm(arm_path)
+    named = resolve.named_arm(arm_path)
     if named is not None and record_crc(named) != board.info.arm_crc:
         results.remark(
-            f"the board is set up for a different arm than {chosen.describe_arm(named)}; see 'armtempo configure'"
+            f"the board is set up for a different arm than {resolve.describe_arm(named)}; see 'armtempo configure'"
         )
         named = None
     try:
-        return chosen.arm_of_board(board, named)
+        return resolve.arm_of_board(board, named)
     except InputError:
         return None
 
@@ -119,7 +119,7 @@ def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:
     except InputError as error:
         return [str(error)]
     ends = ("from", trajectory(0.0)), ("to", trajectory(trajectory.duration_s))
-    return [f"{word:<5}{posture.words(angles_deg, arm)}" for word, angles_deg in ends]
+    return [f"{word:<5}{posture.format_angles(angles_deg, arm)}" for word, angles_deg in ends]
 
 
 @click.command("show")
@@ -130,9 +130,9 @@ def show(name: str, given: BoardOptions) -> None:
 
     NAME: as 'armtempo list' shows it.
     """
-    named = chosen.named_arm(given.arm_path)
-    with chosen.board(given) as board:
-        motion = board.read(name, chosen.arm_of_board(board, named))
+    named = resolve.named_arm(given.arm_path)
+    with resolve.board(given) as board:
+        motion = board.read(name, resolve.arm_of_board(board, named))
     speeds = _top_speeds_deg_s(motion)
     results.show(given.as_json, motion_values(motion, speeds), motion_lines(motion, speeds))
 
@@ -166,8 +166,8 @@ def motion_lines(motion: EncodedMotion, speeds: list[float]) -> list[str]:
     found = [
         f"{motion.name}: {len(motion.data)} bytes, {trajectory.duration_s:.4f} s, "
         f"degree {trajectory.joints[0].degree}, {'shared' if trajectory.shared else 'per-joint'} timing",
-        f"from {posture.words(motion.start_deg, motion.arm)}",
-        f"to   {posture.words(trajectory(trajectory.duration_s), motion.arm)}",
+        f"from {posture.format_angles(motion.start_deg, motion.arm)}",
+        f"to   {posture.format_angles(trajectory(trajectory.duration_s), motion.arm)}",
     ]
     pairs = zip(motion.arm.driven, trajectory.joints, strict=True)
     lasting = aligned([(joint.name, f"{spline.duration_s:.4f}") for joint, spline in pairs], (12, 9))
@@ -182,7 +182,7 @@ def remove(names: tuple[str, ...], given: BoardOptions) -> None:
 
     NAMES: as 'armtempo list' shows them.
     """
-    with chosen.board(given) as board:
+    with resolve.board(given) as board:
         for name in names:
             board.remove(name)
             results.progress_printer(given.as_json)(f"{name}: removed")
@@ -199,6 +199,6 @@ def rename(old: str, new: str, given: BoardOptions) -> None:
 
     OLD: its name, as 'armtempo list' shows it. NEW: at most 24 of the characters a-z A-Z 0-9 - _.
     """
-    with chosen.board(given) as board:
+    with resolve.board(given) as board:
         board.rename(old, new)
     results.show(given.as_json, {"old": old, "new": new}, [f"{old} is now {new}"])

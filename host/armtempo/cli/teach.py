@@ -11,7 +11,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.basics.settings import ARM, ProjectSettings, missing_setting
-from armtempo.cli import chosen, jog, keys, options, results
+from armtempo.cli import jog, keys, options, resolve, results
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
 from armtempo.model import posture, shipped, taught
@@ -57,17 +57,17 @@ def teach(
         raise InputError("--gamepad is for teach JOB.toml by keys", "leave it out")
     if name is not None:
         file = _own_arm_file(arm_path, name)
-        arm = chosen.load_arm(arm_path)
-        with chosen.board(BoardOptions(port, log_traffic), arm) as board:
+        arm = resolve.load_arm(arm_path)
+        with resolve.board(BoardOptions(port, log_traffic), arm) as board:
             jog.prepare(board, arm)
             _write_posture(board, file, name, replace_old)
     elif job_file is not None:
         check_free(job_file, replace_old)
         if not keys.is_terminal():
             raise InputError("teach by keys needs a terminal", "run it in one")
-        named = chosen.named_arm(arm_path)
-        with chosen.board(BoardOptions(port, log_traffic), named) as board:
-            jog.prepare(board, chosen.arm_of_board(board, named))
+        named = resolve.named_arm(arm_path)
+        with resolve.board(BoardOptions(port, log_traffic), named) as board:
+            jog.prepare(board, resolve.arm_of_board(board, named))
             _write_job(board, job_file, by_hand, gamepad)
 
 

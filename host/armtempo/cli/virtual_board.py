@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from armtempo.basics.errors import LinkError
-from armtempo.cli import chosen, options
+from armtempo.cli import options, resolve
 from armtempo.simulator import LaunchOptions, launch
 
 _LOOK_S = 0.5
@@ -32,19 +32,6 @@ _LOOK_S = 0.5
     is_flag=True,
     help="Run the program in the flash (installed by 'armtempo deploy') instead of this installation's.",
 )
-@click.option(
-    "--hold-button",
-    type=click.FloatRange(0.0, 60.0),
-    default=0.0,
-    metavar="SECONDS",
-    help="Hold the user button this long from power-up: 0.9 starts in safe mode.",
-)
-@click.option(
-    "--sd-card",
-    type=click.Path(exists=True, file_okay=False, path_type=Path),
-    metavar="FOLDER",
-    help="Folder used as an SD card in the board.",
-)
 @options.arm
 @click.option("--ideal", is_flag=True, help="Use ideal motors, as without an arm file.")
 @click.option(
@@ -56,8 +43,6 @@ def virtual_board(
     edge_log: Path | None,
     interpreter: str | None,
     deployed: bool,
-    hold_button: float,
-    sd_card: Path | None,
     arm_path: Path | None,
     ideal: bool,
     seed: int,
@@ -72,11 +57,9 @@ def virtual_board(
         virtual_time=not real_time,
         edge_log=edge_log,
         interpreter=interpreter,
-        arm=None if ideal else chosen.named_arm(arm_path),
+        arm=None if ideal else resolve.named_arm(arm_path),
         seed=seed,
         deployed=deployed,
-        button_s=hold_button,
-        sd_card=sd_card,
     )
     with launch(wanted) as board:
         click.echo(board.port)

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link import traffic
 from armtempo.link.traffic import Chunk
@@ -26,8 +26,8 @@ def watch(given: BoardOptions) -> None:
 
     If no program has the port, it prints the board's state. Ctrl-C ends it; a running motion continues.
     """
-    given = chosen.any_port(given)
-    with chosen.shared_or_own(given, any_program=True) as board:
+    given = resolve.any_port(given)
+    with resolve.shared_or_own(given, any_program=True) as board:
         if isinstance(board, SharedBoard):
             _show_messages(board.watch("sample", "status", "event"), given.as_json)
             results.remark(f"{board.program} has closed {given.port}")
@@ -89,8 +89,8 @@ def monitor(file: Path | None, given: BoardOptions) -> None:
     if file is not None:
         _show_file(file, say)
         return
-    given = chosen.any_port(given)
-    with chosen.shared_or_own(given, any_program=True, sink=partial(_show_chunk, say)) as board:
+    given = resolve.any_port(given)
+    with resolve.shared_or_own(given, any_program=True, sink=partial(_show_chunk, say)) as board:
         if isinstance(board, SharedBoard):
             for message in board.watch("traffic"):
                 say(message["time_s"], message["direction"], message["words"])

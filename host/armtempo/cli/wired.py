@@ -10,13 +10,13 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import LinkError
-from armtempo.cli import chosen, options, results
+from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
 from armtempo.model.outputs import Input, Output
 from armtempo.robot.board_state import record_crc
-from armtempo.robot.outputs import BoardOutput, Way
+from armtempo.robot.outputs import BoardAccess, BoardOutput
 from armtempo.robot.shared_board import SharedBoard
 
 
@@ -33,7 +33,7 @@ def output(name: str | None, value: str | None, given: BoardOptions) -> None:
     """
     with _board(given) as board:
         if name is not None:
-            output = BoardOutput(board.way, board.arm, name)
+            output = BoardOutput(board.access, board.arm, name)
             if value is not None:
                 output.set(value)
         levels = board.levels().outputs
@@ -56,7 +56,7 @@ def _print(
         return
     if not lines:
         results.remark(
-            f"arm {chosen.describe_arm(arm)} has no {kind}s: write [{kind}.NAME] tables in its file"
+            f"arm {resolve.describe_arm(arm)} has no {kind}s: write [{kind}.NAME] tables in its file"
         )
     for line in lines:
         results.echo(line)
@@ -78,7 +78,7 @@ def _output_values(output: Output, raw: int) -> dict[str, Any]:
 
 def _output_lines(found: list[tuple[Output, int]]) -> list[str]:
     return [
-        f"{output.name:<12} {output.kind:<6} {output.pin:<4} {output.words(raw):<16} {_choices(output)}"
+        f"{output.name:<12} {output.kind:<6} {output.pin:<4} {output.describe(raw):<16} {_choices(output)}"
         for output, raw in found
     ]
 
@@ -119,26 +119,26 @@ def _input_lines(found: list[tuple[Input, bool]]) -> list[str]:
 
 @dataclass(frozen=True)
 class Wired:
-    """Access to a board that is set up for ``arm``."""
+    """BoardAccess to a board that is set up for ``arm``."""
 
-    way: Way
+    access: BoardAccess
     arm: Arm
 
     def levels(self) -> Levels:
         """The levels of its inputs and outputs."""
-        return self.way.levels()
+        return self.access.levels()
 
 
 @contextmanager
 def _board(given: BoardOptions) -> Iterator[Wired]:
-    """Access to the board; raises LinkError if it is set up for another arm than the one that is set."""
-    given = chosen.any_port(given)
-    named = chosen.named_arm(given.arm_path)
-    with chosen.shared_or_own(given, named) as found:
+    """BoardAccess to the board; raises LinkError if it is set up for another arm than the one that is set."""
+    given = resolve.any_port(given)
+    named = resolve.named_arm(given.arm_path)
+    with resolve.shared_or_own(given, named) as found:
         if isinstance(found, SharedBoard):
             yield Wired(found, _same_arm(found.state().arm_crc, named))
             return
-        arm = chosen.arm_of_board(found, named)
+        arm = resolve.arm_of_board(found, named)
         found.configure(arm)
         yield Wired(found.client, arm)
 
@@ -147,7 +147,7 @@ def _same_arm(arm_crc: int, named: Arm | None) -> Arm:
     arm = named or Arm.paper()
     if record_crc(arm) != arm_crc:
         raise LinkError(
-            f"the board is set up for a different arm than {chosen.describe_arm(arm)}",
+            f"the board is set up for a different arm than {resolve.describe_arm(arm)}",
             "give that arm's file with --arm",
         )
     return arm

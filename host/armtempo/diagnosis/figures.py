@@ -116,9 +116,9 @@ class JointFigures:
     step_at_tool_mm: float
     """Largest motion of the tool by one step."""
     top_steps_s: float
-    """Step rate at the speed limit."""
+    """Step rate of its motor at the speed limit, of coupled joints: at the limits of all that the motor moves."""
     motor_rpm: float
-    """Motor speed at the speed limit."""
+    """Motor speed, the same."""
     torque_margin: float | None
     """Torque of the motor divided by the needed torque; None: not known, infinite: none is needed."""
 
@@ -137,11 +137,11 @@ def of(arm: Arm) -> tuple[JointFigures, ...]:
             steps_per_deg=1.0 / resolution.step_deg,
             step_deg=resolution.step_deg,
             step_at_tool_mm=resolution.step_mm,
-            top_steps_s=drives.top_rate_steps_s(joint),
-            motor_rpm=drives.motor_rpm(joint),
-            torque_margin=torque.margin(joint),
+            top_steps_s=drives.top_rate_steps_s(motor),
+            motor_rpm=drives.motor_rpm(motor),
+            torque_margin=torque.margin(motor),
         )
-        for resolution in resolutions(arm)
+        for resolution, motor in zip(resolutions(arm), arm.motors, strict=True)
         for joint in (resolution.joint,)
     )
 

@@ -72,7 +72,7 @@ def _ends(arm: Arm) -> list[Finding]:
         if _gap_mm(end.points_mm, near) < near:
             crossing.append(where)
     found = []
-    next_step = "give [room] and radius_mm, so that motions are checked for it, or narrow range_deg"
+    next_step = "give [workspace] and radius_mm, so that motions are checked for it, or narrow range_deg"
     if below:
         found.append(
             note("ranges", f"from home, the arm goes below its base plane with {', '.join(below)}", next_step)

@@ -14,7 +14,7 @@ from armtempo.kinematics import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, planner, room_check
+from armtempo.planning import checks, planner, workspace_check
 
 
 def findings(arm: Arm, path: Path) -> list[Finding]:
@@ -29,15 +29,19 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
         text = "correct that; the rest of the job was not checked"
         return [*suspected, error("job", str(refused), text)]
     poses = [note("job", text, "change the pose, or accept it") for text in notes]
-    return [*suspected, *poses, *_steps(arm, via_deg), *_room(arm.holding(job.holds), via_deg)]
+    return [*suspected, *poses, *_steps(arm, via_deg), *_touching(arm.holding(job.holds), via_deg)]
 
 
-def _room(arm: Arm, via_deg: Array) -> list[Finding]:
+def _touching(arm: Arm, via_deg: Array) -> list[Finding]:
     """Via points at which the arm touches something."""
     return [
-        error("job", f"P{number}: {touch.words}", "move the via point, or correct [room] or radius_mm")
+        error(
+            "job",
+            f"P{number}: {touch.description}",
+            "move the via point, or correct [workspace] or radius_mm",
+        )
         for number, angles in enumerate(via_deg)
-        for touch in room_check.posture_touches(arm, angles)
+        for touch in workspace_check.posture_touches(arm, angles)
     ]
 
 

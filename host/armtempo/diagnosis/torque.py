@@ -19,7 +19,7 @@ _HEAVY_KG = 50.0
 
 
 def margin(joint: DrivenJoint) -> float | None:
-    """Torque of a joint's motor at its speed limit, divided by that needed for gravity and its acceleration limit.
+    """Torque of a motor at its speed limit, divided by that needed for gravity and its acceleration limit.
 
     By ``joint.model``; None if the torque is not known; infinite if none is needed.
     """
@@ -42,7 +42,7 @@ def gravity_nm(joint: DrivenJoint) -> float:
 
 def findings(arm: Arm) -> list[Finding]:
     """Findings about weak motors, unknown torques, and implausible dynamics."""
-    found = [finding for joint in arm.driven for finding in _of(joint)]
+    found = [finding for joint in arm.motors for finding in _of(joint)]
     unknown = [joint.name for joint in arm.driven if np.isnan(held_nm(joint, 0.0))]
     if unknown:
         next_step = (

@@ -72,7 +72,7 @@ def _closed_form_lines(choice: Choice) -> Iterator[str]:
 def _numerical_lines(search: NumericalSolutions) -> Iterator[str]:
     count = len(search.solutions)
     yield (
-        f"{search.target.words}: {count} posture{'' if count == 1 else 's'} found numerically from "
+        f"{search.target.description}: {count} posture{'' if count == 1 else 's'} found numerically from "
         f"{search.starts} start{'' if search.starts == 1 else 's'}"
         + (", of many: it leaves joints free" if search.leaves_free else "")
     )
@@ -90,10 +90,10 @@ def _tool_lines(answer: Answer) -> Iterator[str]:
     position = " ".join(_short(value, 4) for value in answer.tool[:3, 3])
     roll, pitch, yaw = (_short(value, 4) for value in to_rpy_deg(answer.tool))
     yield (
-        f"tool at {position} mm, roll {roll}, pitch {pitch}, yaw {yaw} deg: {_words(answer.miss)} from the pose"
+        f"tool at {position} mm, roll {roll}, pitch {pitch}, yaw {yaw} deg: {_describe_miss(answer.miss)} from the pose"
     )
-    if _words(answer.miss_driven) != _words(answer.miss):
-        yield f"with the joints that have no motor at home the tool is {_words(answer.miss_driven)} from the pose"
+    if (driven := _describe_miss(answer.miss_driven)) != _describe_miss(answer.miss):
+        yield f"with the joints that have no motor at home the tool is {driven} from the pose"
 
 
 def _heads(joints: int) -> str:
@@ -121,7 +121,7 @@ def _short(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
 
 
-def _words(miss: Miss) -> str:
+def _describe_miss(miss: Miss) -> str:
     """Describe the distance; rounding counts as 0."""
     position, rotation = (0.0 if value < 1e-6 else value for value in miss)
     return f"{position:.3g} mm and {rotation:.3g} deg"

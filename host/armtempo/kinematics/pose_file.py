@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError
 from armtempo.model.pose import LARGEST, checked, from_quaternion
 from armtempo.model.tool_pose import WHOLE, Pose
@@ -29,7 +29,7 @@ def read(path: Path | str) -> list[Pose]:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"{path}: cannot be read as text ({why(error)})",
+            f"{path}: cannot be read as text ({os_reason(error)})",
             "check the path, and that it is plain text in UTF-8",
         ) from error
     poses = []

@@ -31,7 +31,7 @@ class Hello:
     arm_crc: int
     program_crc: int
     boot: int
-    engine_room: int
+    engine_bytes: int
     """Bytes of heap that the engine for an arm can have, with its objects (``armtempo_shared.engine_memory``)."""
     features: int
     """One bit per optional feature of the program, see ``messages.FEATURES``."""

@@ -20,17 +20,17 @@ def refusal(what: str, code: int, joint: int = 255, value: int = 0) -> BoardErro
     where = f" (joint {joint + 1})" if joint < MAX_JOINTS else ""
     if name == "too_fast":
         meaning = _FASTER_JOINT if where else _FASTER_TOGETHER
-    detail = f" [{_words(name, where, value)}]" if value or name == "pin_taken" else ""
+    detail = f" [{_describe_detail(name, where, value)}]" if value or name == "pin_taken" else ""
     return BoardError(f"{what}: {meaning}{where}{detail}", cure, code)
 
 
-def fault_words(name: str) -> str:
+def describe_fault(name: str) -> str:
     """Meaning and cure of a fault, by its name; the name itself if this version does not know it."""
     found = (f"{meaning}: {cure}" for known, meaning, cure in wire.ERRORS.values() if known == name)
     return next(found, name)
 
 
-def _words(name: str, where: str, value: int) -> str:
+def _describe_detail(name: str, where: str, value: int) -> str:
     if name == "too_long" and where:
         return f"its numbers reach {value}"
     if name == "too_long":

@@ -19,7 +19,7 @@ from typing import Any, Self
 from armtempo_shared import wire
 from armtempo_shared.messages import MAX_COMMAND
 
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError
 from armtempo.link.transport import Transport
 
@@ -67,15 +67,15 @@ def describe(direction: str, sequence: int, number: int, payload: bytes) -> str:
     if entry is None:
         return f"{sequence} message {number:#04x}, unknown"
     try:
-        return f"{sequence} {_words(entry, payload)}"
+        return f"{sequence} {_describe_message(entry, payload)}"
     except wire.WireError:
         return f"{sequence} {entry[0]}, malformed"
 
 
-def _words(entry: tuple[Any, ...], payload: bytes) -> str:
+def _describe_message(entry: tuple[Any, ...], payload: bytes) -> str:
     values, tail = wire.decode(entry, payload)
     if entry[0] == "ok" and values[0] in wire.ANSWER_BY_ID:
-        return "ok " + _words(wire.ANSWER_BY_ID[values[0]], tail)
+        return "ok " + _describe_message(wire.ANSWER_BY_ID[values[0]], tail)
     if entry[0] == "error" and values[0] in wire.COMMAND_BY_ID:
         name = wire.ERRORS.get(values[1], (f"code {values[1]}",))[0]
         return f"error {wire.COMMAND_BY_ID[values[0]][0]} {name} joint={values[2]} value={values[3]}"
@@ -167,7 +167,7 @@ def read_log(path: Path) -> Iterator[Chunk]:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeError) as error:
         raise InputError(
-            f"{path}: the traffic log cannot be read: {why(error)}",
+            f"{path}: the traffic log cannot be read: {os_reason(error)}",
             "check the path and its permissions",
         ) from error
     if lines[0] != HEADER:

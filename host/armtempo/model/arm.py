@@ -9,18 +9,31 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
-from armtempo.model import boards, drive_limits, outputs_file, parts_file, pin_use, room, shipped, tool_pose
+from armtempo.model import (
+    boards,
+    drive_limits,
+    outputs_file,
+    parts_file,
+    pin_use,
+    shipped,
+    tool_pose,
+    transmission,
+    workspace,
+)
 from armtempo.model import posture as named
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
-from armtempo.model.room import ArmRoom
 from armtempo.model.tool_pose import Pose
+from armtempo.model.transmission import Transmission
+from armtempo.model.workspace import Workspace
 
 _REACHES_MM = 1e-6
 STILL_DEG = 0.01
@@ -45,7 +58,7 @@ class Arm:
     inputs: tuple[Input, ...] = field(default=(), metadata=json_codec.ADDED)
     postures: tuple[ArmPosture, ...] = field(default=(), metadata=json_codec.ADDED)
     """In the order of the file; not sent to the board."""
-    room: ArmRoom | None = field(default=None, metadata=json_codec.ADDED)
+    workspace: Workspace | None = field(default=None, metadata={**json_codec.ADDED, json_codec.KEY: "room"})
     """The space in which it may move; not sent to the board."""
     loads: tuple[Load, ...] = field(default=(), metadata=json_codec.ADDED)
     """What its tool may hold; the board knows nothing of them."""
@@ -53,6 +66,9 @@ class Arm:
     """What it holds; see ``holding``."""
     homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
     """Names of the joints in the order of homing, joints of an entry together; the other joints follow one by one."""
+    coupling: transmission.Matrix = field(default=(), metadata=json_codec.ADDED)
+    """Angles of the motors behind their gears (rows) by those of the driven joints (columns); (): each turns its own
+    joint."""
 
     def __post_init__(self) -> None:
         """Raise InputError for values that a file may not have either."""
@@ -70,6 +86,18 @@ class Arm:
                 f"{self.source or f'arm {self.name!r}'}: no dynamics of {', '.join(light)}, but of other joints",
                 "give each joint with a motor its dynamics, mass_kg = 0 for one without a mass; or none of them",
             )
+        if self.coupling:
+            self._check_coupling()
+
+    def _check_coupling(self) -> None:
+        """Raise InputError for a coupling that is none, or for what the board cannot do with coupled joints."""
+        joints = self.table_joints
+        names = [joint.name for joint in joints]
+        problem = transmission.coupling_problem(self.coupling, names) or _coupled_problem(
+            joints, self.homing, Transmission((1.0,) * len(joints), (), self.coupling)
+        )
+        if problem:
+            raise InputError(f"{self.source or f'arm {self.name!r}'}: {problem[0]}", problem[1])
 
     @classmethod
     def of(cls, arm: Arm | Path | str) -> Arm:
@@ -128,9 +156,11 @@ class Arm:
         board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
         outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
         postures = top.table("posture")
-        around = room.read(top.table("room"))
+        around = workspace.read(top)
         loads = parts_file.loads(top)
         homing = parts_file.homing(top, [joint.name for joint in joints])
+        driven = [joint.name for joint in joints if joint.motor is not None]
+        coupling = transmission.read(top.table("coupling"), driven, [joint.name for joint in joints])
         top.done()
         arm = cls(
             name,
@@ -141,9 +171,10 @@ class Arm:
             board,
             outputs,
             inputs,
-            room=around,
+            workspace=around,
             loads=loads,
             homing=homing,
+            coupling=coupling,
         )
         if not postures:
             return arm
@@ -155,9 +186,71 @@ class Arm:
         return cls.load(shipped.arm_path())
 
     @cached_property
+    def table_joints(self) -> tuple[Joint, ...]:
+        """The joints with a motor, in order, as the arm file has them."""
+        return tuple(joint for joint in self.joints if joint.motor is not None)
+
+    @cached_property
     def driven(self) -> tuple[DrivenJoint, ...]:
         """The joints with a motor, in order; raises InputError if one of them has no limits."""
-        return tuple(_driven(self, joint, joint.motor) for joint in self.joints if joint.motor is not None)
+        joints = self.table_joints
+        for joint in joints:
+            if joint.limits is None:
+                raise InputError(
+                    f"arm {self.name!r}: {joint.name} has a motor but no limits", "add a limits table"
+                )
+        limits = drive_limits.kept(joints, self.coupling, self.driver)
+        found = [_driven(joint, kept) for joint, kept in zip(joints, limits, strict=True)]
+        if not self.coupling:
+            return tuple(found)
+        per_deg = [joint.motor.steps_per_deg for joint in found]
+        step_deg = Transmission(tuple(per_deg), (), self.coupling).step_deg.tolist()
+        return tuple(
+            replace(joint, step_share=step * own)
+            for joint, step, own in zip(found, step_deg, per_deg, strict=True)
+        )
+
+    @cached_property
+    def motors(self) -> tuple[DrivenJoint, ...]:
+        """The driven joints, those that are coupled with range and limits of their motors behind the gears: what
+        they reach with each joint anywhere in its own."""
+        if not self.coupling:
+            return self.driven
+        gears = self.transmission
+        reached = (
+            np.array([joint.range_deg for joint in self.driven]).T[:, None, :] * gears.matrix
+        )  # (2, motors, joints)
+        ranges = np.stack([reached.min(axis=0).sum(axis=1), reached.max(axis=0).sum(axis=1)], axis=1).tolist()
+        limits = gears.largest_motors_deg(
+            np.array([joint.limits.values for joint in self.driven]).T
+        ).T.tolist()
+        return tuple(
+            replace(
+                joint,
+                name=self._motor_name(index),
+                range_deg=tuple(span),
+                limits=Limits(*most),
+                step_share=1.0,
+            )
+            for index, (joint, span, most) in enumerate(zip(self.driven, ranges, limits, strict=True))
+        )
+
+    def _motor_name(self, index: int) -> str:
+        names = [
+            joint.name for joint, factor in zip(self.driven, self.coupling[index], strict=True) if factor
+        ]
+        own = self.driven[index].name
+        names.remove(own)
+        return f"{own} (its motor, which also moves {' and '.join(names)})" if names else own
+
+    @cached_property
+    def transmission(self) -> Transmission:
+        """From the driven joints to their motors' steps and counts, and back."""
+        return Transmission(
+            tuple(joint.motor.steps_per_deg for joint in self.driven),
+            tuple(joint.counts_per_deg for joint in self.driven),
+            self.coupling,
+        )
 
     @cached_property
     def driven_indices(self) -> tuple[int, ...]:
@@ -249,19 +342,52 @@ class Arm:
         return ""
 
 
-def _driven(arm: Arm, joint: Joint, motor: Motor) -> DrivenJoint:
-    if joint.limits is None:
-        raise InputError(f"arm {arm.name!r}: {joint.name} has a motor but no limits", "add a limits table")
+def _driven(joint: Joint, limits: Limits) -> DrivenJoint:
+    assert joint.motor is not None
     return DrivenJoint(
         joint.name,
         joint.range_deg,
         joint.home_deg,
-        drive_limits.kept(joint.limits, motor, joint.encoder, arm.driver),
-        motor,
+        limits,
+        joint.motor,
         joint.encoder,
         joint.switches,
         joint.model,
     )
+
+
+def _coupled_problem(
+    joints: tuple[Joint, ...], homing: tuple[tuple[str, ...], ...], gears: Transmission
+) -> tuple[str, str] | None:
+    """What the board cannot do with coupled joints, and what to do; None for nothing.
+
+    It knows motors only: it compares an encoder with its own motor, and sees by the direction of one motor whether a
+    joint moves towards its switch.
+    """
+    for number, joint in enumerate(joints):
+        if gears.is_alone(number):
+            continue
+        others = ", ".join(joints[other].name for other in gears.group(number) if other != number)
+        if joint.encoder is not None and joint.encoder.on == "joint":
+            return (
+                f"{joint.name} is coupled with {others}, so its encoder cannot be on the joint",
+                'mount it on the motor, with on = "motor"',
+            )
+        if isinstance(joint.switches.low, int) or isinstance(joint.switches.high, int):
+            return (
+                f"{joint.name} is coupled with {others}, so its switches can be used for homing only",
+                'connect them to free pins such as "PD0" instead of the inputs 1 to 3',
+            )
+    for group in gears.groups:
+        names = {joints[number].name for number in group}
+        together = next((entry for entry in homing if len(names.intersection(entry)) > 1), ())
+        if together:
+            listed = ", ".join(name for name in together if name in names)
+            return (
+                f"homing: {listed} are coupled, so they cannot be homed together",
+                "list them one after the other",
+            )
+    return None
 
 
 def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo.basics import json_codec, json_text
-from armtempo.basics.atomic_file import replace_text, why
+from armtempo.basics.atomic_file import os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import boards, pin_use
 from armtempo.model.arm import Arm
@@ -30,7 +30,7 @@ def load(path: Path) -> Arm:
     try:
         content: Any = json_text.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}", _AGAIN) from None
+        raise InputError(f"{path}: cannot be read: {os_reason(error)}", _AGAIN) from None
     if not isinstance(content, dict) or (content.get("format"), content.get("version")) != (FORMAT, VERSION):
         raise InputError(f"{path}: is not an arm of format {FORMAT!r}, version {VERSION}", _AGAIN)
     arm: Arm = json_codec.decode(Arm, content.get("arm"), f"{path}: arm")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from armtempo_shared.limits import MAX_STEP_RATE, TICK_HZ, TURN_SLACK_TICKS
 
 from armtempo.model.parts import Driver, Encoder, Joint, Limits, Motor
+from armtempo.model.transmission import Matrix
 
 MOST_COUNTS_S = 1e6
 """Largest rate of an encoder: fewer than 32 768 counts between two readings (board/docs/hardware.md)."""
@@ -17,7 +19,7 @@ _SLACK_US = 1e6 * TURN_SLACK_TICKS / TICK_HZ
 
 
 class Bound(NamedTuple):
-    """A limit that hardware sets."""
+    """A limit that hardware sets, of a joint or of its motor."""
 
     key: str
     """Of ``Limits``."""
@@ -26,7 +28,7 @@ class Bound(NamedTuple):
 
 
 def bounds(motor: Motor, encoder: Encoder | None, driver: Driver) -> list[Bound]:
-    """The limits that the driver's timing and the encoder set, for the joint."""
+    """The limits that the driver's timing and the encoder set, for the motor behind its gear."""
     step_us = driver.pulse_us + driver.low_us
     turn_us = max(driver.pulse_us + driver.dir_hold_us + driver.dir_setup_us + 2.0 * _SLACK_US, step_us)
     found = [
@@ -52,17 +54,50 @@ def bounds(motor: Motor, encoder: Encoder | None, driver: Driver) -> list[Bound]
     return found
 
 
-def kept(limits: Limits, motor: Motor, encoder: Encoder | None, driver: Driver) -> Limits:
-    """The limits that motions keep."""
-    for bound in bounds(motor, encoder, driver):
-        if bound.value < getattr(limits, bound.key):
-            limits = replace(limits, **{bound.key: bound.value})
-    return limits
+def kept(joints: Sequence[Joint], coupling: Matrix, driver: Driver) -> list[Limits]:
+    """The limits that motions of the driven joints keep."""
+    found = []
+    for joint, bounds_of_joint in zip(joints, _of_joints(joints, coupling, driver), strict=True):
+        limits = joint.limits
+        assert limits is not None
+        for bound in bounds_of_joint:
+            if bound.value < getattr(limits, bound.key):
+                limits = replace(limits, **{bound.key: bound.value})
+        found.append(limits)
+    return found
 
 
-def exceeded(joint: Joint, driver: Driver) -> list[Bound]:
-    """The bounds that the limits of the joint's table exceed; none without a motor."""
-    if joint.motor is None or joint.limits is None:
-        return []
-    found = bounds(joint.motor, joint.encoder, driver)
-    return [bound for bound in found if bound.value < getattr(joint.limits, bound.key)]
+def exceeded(joints: Sequence[Joint], coupling: Matrix, driver: Driver) -> list[tuple[Joint, Bound]]:
+    """The bounds that limits in the tables of the driven joints exceed."""
+    return [
+        (joint, bound)
+        for joint, bounds_of_joint in zip(joints, _of_joints(joints, coupling, driver), strict=True)
+        for bound in bounds_of_joint
+        if bound.value < getattr(joint.limits, bound.key)
+    ]
+
+
+def _of_joints(joints: Sequence[Joint], coupling: Matrix, driver: Driver) -> list[list[Bound]]:
+    """The bounds of each joint.
+
+    A motor that several joints turn keeps its bounds if all of them move at their limits together, which are therefore
+    lowered in proportion.
+    """
+    motors = [bounds(joint.motor, joint.encoder, driver) if joint.motor else [] for joint in joints]
+    if not coupling:
+        return motors
+    found: list[list[Bound]] = [[] for _ in joints]
+    for row, joint, of_motor in zip(coupling, joints, motors, strict=True):
+        turned = [number for number, factor in enumerate(row) if factor]
+        names = " and ".join(joints[number].name for number in turned)
+        for bound in of_motor:
+            most = sum(abs(row[number]) * getattr(joints[number].limits, bound.key) for number in turned)
+            for number in turned:
+                value = getattr(joints[number].limits, bound.key) * bound.value / most
+                reason = (
+                    bound.reason
+                    if len(turned) == 1
+                    else f"the motor of {joint.name} moves {names}, and {bound.reason}"
+                )
+                found[number].append(Bound(bound.key, value, reason))
+    return found

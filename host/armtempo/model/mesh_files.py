@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 
@@ -46,7 +46,7 @@ def write(arm_file: Path, corners_mm: Mapping[int, Array]) -> list[Path]:
                 old.unlink()
         return [_write(folder / f"{row}.stl", corners) for row, corners in sorted(corners_mm.items())]
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {why(error)}", "choose another place") from None
+        raise InputError(f"{folder}: cannot be written: {os_reason(error)}", "choose another place") from None
 
 
 def _write(file: Path, corners_mm: Array) -> Path:

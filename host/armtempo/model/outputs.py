@@ -84,7 +84,7 @@ class Output:
         """The name of the state with the value ``raw``; "" if there is none."""
         return next((name for name, value in self.states if self.raw(value) == raw), "")
 
-    def words(self, raw: int) -> str:
+    def describe(self, raw: int) -> str:
         """Describe the value ``raw``: ``open (20 deg)``."""
         number = f"{self.value(raw):.4g} {self.unit}".rstrip()
         if self.kind == SWITCH:

@@ -11,7 +11,7 @@ from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
-from armtempo.basics.part import check, key
+from armtempo.basics.toml_section import check, key
 
 LEVELS = ("low", "high")
 NOTHING = "nothing"
@@ -232,11 +232,13 @@ class DrivenJoint:
     encoder: Encoder | None
     switches: LimitSwitches
     model: JointModel
+    step_share: float = 1.0
+    """How far it turns for a step of its motors, in steps of its own motor; not 1 for a coupled joint."""
 
     @property
     def steps_per_deg(self) -> float:
-        """Step pulses per degree of the joint."""
-        return self.motor.steps_per_deg
+        """Steps per degree of the joint: how finely it can be placed. Positions of motors: ``Arm.transmission``."""
+        return self.motor.steps_per_deg / self.step_share
 
     def placed(self, angle_deg: float, within_steps: float = END_STEPS) -> float:
         """The angle, or the end of the range if it is beyond it by no more than ``within_steps``."""
@@ -256,8 +258,9 @@ class DrivenJoint:
 
     @property
     def counts_per_deg(self) -> float:
-        """Encoder counts per degree of the joint; 0 without an encoder."""
-        return float(self.counts_per_step) * self.steps_per_deg
+        """Encoder counts per degree of the joint, of a coupled one: of its motor behind the gear; 0 without an
+        encoder."""
+        return float(self.counts_per_step) * self.motor.steps_per_deg
 
 
 @checked_fields

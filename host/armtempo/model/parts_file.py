@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from armtempo.basics import part
+from armtempo.basics import toml_section
 from armtempo.basics.arguments import fits
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
@@ -36,12 +36,12 @@ _LOCKED_DEG = 0.001
 
 def driver(table: Table | None) -> Driver:
     """[driver]. All functions here raise InputError, with file, key and value."""
-    return part.read(Driver, table) if table else Driver()
+    return toml_section.read(Driver, table) if table else Driver()
 
 
 def safety(table: Table | None) -> Safety:
     """[safety]."""
-    return part.read(Safety, table) if table else Safety()
+    return toml_section.read(Safety, table) if table else Safety()
 
 
 def joint(table: Table, number: int) -> Joint:
@@ -92,7 +92,7 @@ def _dynamics(table: Table | None) -> Dynamics | None:
     if table is None:
         return None
     centre = table.numbers("centre_mm", 3, *[] if table.peek("mass_kg") else [(0.0,) * 3])
-    return part.read(Dynamics, table, centre_mm=centre, inertia_kg_m2=_inertia(table))
+    return toml_section.read(Dynamics, table, centre_mm=centre, inertia_kg_m2=_inertia(table))
 
 
 def _inertia(table: Table) -> tuple[float, ...]:
@@ -102,7 +102,7 @@ def _inertia(table: Table) -> tuple[float, ...]:
 def loads(top: Table) -> tuple[Load, ...]:
     """The tables [load.NAME]."""
     return tuple(
-        part.read(
+        toml_section.read(
             Load,
             table,
             name=name,
@@ -130,7 +130,7 @@ def _locked(table: Table) -> tuple[float, float]:
 
 
 def _limits(table: Table | None) -> Limits | None:
-    return part.read(Limits, table) if table else None
+    return toml_section.read(Limits, table) if table else None
 
 
 def _motor(table: Table | None) -> Motor | None:
@@ -140,11 +140,11 @@ def _motor(table: Table | None) -> Motor | None:
     curve: Any = table.array("curve_rpm_nm", CURVE) if table.has("curve_rpm_nm") else ()
     if not fits(curve, Curve) or not is_curve(curve):
         raise table.fail("curve_rpm_nm", CURVE)
-    return part.read(Motor, table, curve_rpm_nm=tuple((float(rpm), float(nm)) for rpm, nm in curve))
+    return toml_section.read(Motor, table, curve_rpm_nm=tuple((float(rpm), float(nm)) for rpm, nm in curve))
 
 
 def _encoder(table: Table | None) -> Encoder | None:
-    return part.read(Encoder, table) if table else None
+    return toml_section.read(Encoder, table) if table else None
 
 
 def _switches(table: Table | None) -> LimitSwitches:
@@ -185,4 +185,4 @@ def _angle(table: Table, key: str) -> float | None:
 
 
 def _model(table: Table | None) -> JointModel:
-    return part.read(JointModel, table) if table else JointModel()
+    return toml_section.read(JointModel, table) if table else JointModel()

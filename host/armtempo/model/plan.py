@@ -20,7 +20,7 @@ from armtempo_shared.basis import BASIS
 from armtempo.basics import json_codec, json_text
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import check_replaceable, replace_text, why
+from armtempo.basics.atomic_file import check_replaceable, os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_json, exchange
 from armtempo.model.arm import Arm
@@ -200,7 +200,7 @@ def _read(path: Path | str) -> Any:
             f"check the path, or make it with: armtempo plan -o {path}",
         ) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}", "check its permissions") from None
+        raise InputError(f"{path}: cannot be read: {os_reason(error)}", "check its permissions") from None
     try:
         return json_text.loads(text)
     except ValueError as error:
@@ -238,12 +238,12 @@ def _check(plan: Plan, path: Path | str) -> None:
         raise InputError(f"{path}: searches name a joint that does not exist", "plan it again")
 
 
-def _check_spline(spline: JointSpline, stretches: int, where: str) -> None:
-    segments = stretches
+def _check_spline(spline: JointSpline, legs: int, where: str) -> None:
+    segments = legs
     if spline.via_segments is not None:
-        if len(spline.via_segments) != stretches + 1 or spline.via_segments[0] != 0:
+        if len(spline.via_segments) != legs + 1 or spline.via_segments[0] != 0:
             raise InputError(
-                f"{where}: via_segments must name {stretches + 1} via points, the first at 0", "plan it again"
+                f"{where}: via_segments must name {legs + 1} via points, the first at 0", "plan it again"
             )
         if np.any(np.diff(spline.via_segments) < 1):
             raise InputError(f"{where}: its via_segments do not increase", "plan it again")

@@ -14,7 +14,7 @@ from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
 from armtempo.basics import json_codec, json_text
 from armtempo.basics.arguments import checked
-from armtempo.basics.atomic_file import check_replaceable, replace_text, why
+from armtempo.basics.atomic_file import check_replaceable, os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
@@ -218,7 +218,7 @@ def _read(path: Path | str) -> Any:
         return json_text.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"{path}: cannot be read: {why(error)}", "check the path and its permissions"
+            f"{path}: cannot be read: {os_reason(error)}", "check the path and its permissions"
         ) from None
     except ValueError as error:
         raise InputError(f"{path}: damaged or cut: {error}", _AGAIN) from None

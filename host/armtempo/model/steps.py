@@ -148,3 +148,13 @@ Step = Goto | RunMotion | SetOutput | Hold | Wait | WaitInput | Count | Repeat
 def _check_wait(wait_s: float) -> None:
     if not 0.001 <= wait_s <= MOST_S:
         raise InputError(f"a wait of {wait_s:g} s is not allowed", f"give 0.001 to {MOST_S:g} s")
+
+
+def position(step: int, finished: int) -> str:
+    """Describe where a sequence is; ``finished``: the cycles before this one, which is counted from 1."""
+    return f"step {step} of cycle {finished + 1}"
+
+
+def whole_cycles(finished: int) -> str:
+    """Describe the number of finished cycles."""
+    return f"{finished} whole cycle{'s' * (finished != 1)}"

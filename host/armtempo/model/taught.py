@@ -10,7 +10,7 @@ from typing import Any
 
 from armtempo_shared.limits import MAX_NAME
 
-from armtempo.basics.atomic_file import replace_text, why
+from armtempo.basics.atomic_file import os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import posture as named
 from armtempo.model.arm import Arm
@@ -42,7 +42,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
         with path.open(encoding="utf-8", newline="") as file:
             text = file.read()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {why(error)}", "check the path") from None
+        raise InputError(f"{path}: cannot be read: {os_reason(error)}", "check the path") from None
     known = _parsed(text, path).get("posture", {})
     if name in known and not replace:
         raise InputError(
@@ -53,13 +53,17 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
 
 
 def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
-    """The angles with the fewest digits that give the same steps, within their ranges."""
-    found = []
-    for joint, angle in zip(arm.driven, angles_deg, strict=True):
+    """The angles with the fewest digits that give the same steps of all motors, within their ranges."""
+    gears, found = arm.transmission, list(angles_deg)
+    steps = gears.whole_steps(angles_deg)
+    for index, (joint, angle) in enumerate(zip(arm.driven, angles_deg, strict=True)):
         low, high = joint.range_deg
-        steps = round(angle * joint.steps_per_deg)
-        rounded = (min(max(round(angle, places), low), high) + 0.0 for places in range(2, 12))
-        found.append(next((value for value in rounded if round(value * joint.steps_per_deg) == steps), angle))
+        for places in range(2, 12):
+            found[index] = min(max(round(angle, places), low), high) + 0.0
+            if gears.whole_steps(found) == steps:
+                break
+        else:
+            found[index] = angle
     return found
 
 

@@ -62,8 +62,8 @@ def thinned(
             f"a tolerance of {tolerance_deg:g} degrees is not allowed",
             f"give one above 0, at most {LARGEST_DEG:g}",
         )
-    stretches, waits_s = _at_rests(points_deg, times_s, _STILL * tolerance_deg)
-    if not stretches:
+    legs, waits_s = _at_rests(points_deg, times_s, _STILL * tolerance_deg)
+    if not legs:
         raise InputError("all points are the same within the tolerance", "give a path that moves")
     low, high = (
         np.full((2, points_deg.shape[1]), np.inf) * [[-1.0], [1.0]] if ranges_deg is None else ranges_deg.T
@@ -74,8 +74,7 @@ def thinned(
     wanted, inside = tolerance_deg - beyond_deg, np.zeros(2)
     for _ in range(_TRIES):
         lines = [
-            _Polyline.of(np.clip(points, low + inside[0], high - inside[1]), times)
-            for points, times in stretches
+            _Polyline.of(np.clip(points, low + inside[0], high - inside[1]), times) for points, times in legs
         ]
         places = [_enough(line, wanted) for line in lines]
         via = [line.at(place) for line, place in zip(lines, places, strict=True)]
@@ -133,7 +132,7 @@ class _Polyline:
 def _at_rests(
     points: Array, times_s: Array | None, still_deg: float
 ) -> tuple[list[tuple[Array, Array | None]], list[float]]:
-    """The stretches between rests, points and times each, and the seconds of rest before, between and after them."""
+    """The legs between rests, points and times each, and the seconds of rest before, between and after them."""
     if times_s is None:
         return [(points, None)] if np.ptp(points, axis=0).max() > 0.0 else [], [0.0, 0.0]
     runs = _runs(points, times_s, still_deg)
@@ -141,12 +140,12 @@ def _at_rests(
         runs.insert(0, (0, 0))
     if runs[-1][1] < len(points) - 1:
         runs.append((len(points) - 1, len(points) - 1))
-    stretches: list[tuple[Array, Array | None]] = []
+    legs: list[tuple[Array, Array | None]] = []
     for (before, first), (last, after) in pairwise(runs):
         part = points[first : last + 1].copy()
         part[0], part[-1] = points[(before + first) // 2], points[(last + after) // 2]
-        stretches.append((part, times_s[first : last + 1]))
-    return stretches, [float(times_s[last] - times_s[first]) for first, last in runs]
+        legs.append((part, times_s[first : last + 1]))
+    return legs, [float(times_s[last] - times_s[first]) for first, last in runs]
 
 
 def _runs(points: Array, times_s: Array, still_deg: float) -> list[tuple[int, int]]:
@@ -224,7 +223,7 @@ def _offs(line: _Polyline, places: Array, segments: Sequence[int]) -> Array:
 
 
 def _whole(via: Sequence[Array]) -> Array:
-    """Control points of the spline through the via points of all stretches, as the planner joins them at rests."""
+    """Control points of the spline through the via points of all legs, as the planner joins them at rests."""
     if len(via) == 1:
         return bspline.fit(via[0], DEGREE)
     rows: list[Array] = []

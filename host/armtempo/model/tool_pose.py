@@ -85,7 +85,7 @@ class Pose:
         return CONSTRAINTS[self.fixed]
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Describe the constraints."""
         if self.fixed == WHOLE:
             return "whole pose"

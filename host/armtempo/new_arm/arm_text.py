@@ -74,12 +74,18 @@ def _joint(row: DhRow, chain: Chain, frame: Array, first: bool, radius_mm: float
         name = "base" if first else "tool"
         return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves", radius_mm)
     joint = chain.joints[row.joint]
-    note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
     name = _one_line(joint.name) or f"joint {row.joint + 1}"
-    text = _row_text(name, row, _inside(joint.range_deg), note, radius_mm)
+    if joint.is_linked:
+        note = "a linkage keeps its direction: it mimics the joint before"
+        text = _row_text(name, row, (-_STILL_DEG, _STILL_DEG), note, radius_mm) + "parallel_linkage = true\n"
+    else:
+        note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
+        text = _row_text(name, row, _inside(joint.range_deg), note, radius_mm)
     if any(each.body for each in chain.joints):
         text += _dynamics(joint.body.in_frame(frame) if joint.body else Dynamics(0.0))
-    return text + _placeholders(row.joint + 1, joint)
+    if joint.is_linked:
+        return text
+    return text + _placeholders(row.joint + 1 - sum(linked < row.joint for linked in chain.linked), joint)
 
 
 def _dynamics(body: Dynamics) -> str:

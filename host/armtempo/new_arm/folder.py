@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from armtempo.basics import toml_table
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
@@ -140,7 +140,7 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     try:
         _put(folder, files)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {why(error)}", "choose another place") from None
+        raise InputError(f"{folder}: cannot be written: {os_reason(error)}", "choose another place") from None
     return [folder / name for name in files]
 
 

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.model.parts_file import MAX_ANGLE_DEG
 from armtempo.new_arm import urdf_bodies
@@ -53,6 +53,8 @@ class TurningJoint:
     continuous: bool
     body: Body | None
     """The body up to the next joint; None without a mass."""
+    is_linked: bool = False
+    """Whether a linkage turns it by minus the angle of the joint before, so that its link keeps its direction."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +81,20 @@ class Chain:
             if max(map(abs, joint.range_deg)) > DOUBTFUL_DEG
         )
 
+    @property
+    def linked(self) -> tuple[int, ...]:
+        """Indices of the joints that a linkage turns."""
+        return tuple(index for index, joint in enumerate(self.joints) if joint.is_linked)
+
     def poses(self, angles_rad: Array) -> Array:
-        """The tip's poses by the reader's forward kinematics: (K, 4, 4) in mm for angles (K, joints) in rad."""
-        names = [joint.name for joint in self.joints]
+        """The tip's poses by the reader's forward kinematics: (K, 4, 4) in mm for angles (K, joints) in rad.
+
+        Those of joints that a linkage turns are 0.
+        """
+        moving = [(index, joint.name) for index, joint in enumerate(self.joints) if not joint.is_linked]
         poses = np.empty((len(angles_rad), 4, 4))
         for number, angles in enumerate(angles_rad):
-            self.model.update_cfg(dict(zip(names, angles, strict=True)))
+            self.model.update_cfg({name: angles[index] for index, name in moving})  # the others follow
             poses[number] = _transform(self.model, self.tip, self.base)
         return poses
 
@@ -117,7 +127,7 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
             "choose another chain with --base and --tip",
         )
     first, last = joints[0].parent, joints[-1].child
-    model.update_cfg({joint.name: 0.0 for joint in moving})
+    model.update_cfg({joint.name: 0.0 for joint in moving if joint.mimic is None})
     turning = tuple(map(partial(_turning, model, first), moving, [*moving[1:], None]))
     return Chain(model.robot.name, first, last, turning, _transform(model, last, first), model)
 
@@ -138,7 +148,7 @@ def _check_text(path: Path) -> None:
         raise InputError(f"{path}: no such file", "check the path") from None
     except OSError as error:
         raise InputError(
-            f"{path}: cannot be read: {why(error)}", "make it readable, or give a copy"
+            f"{path}: cannot be read: {os_reason(error)}", "make it readable, or give a copy"
         ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError(f"{path}: not valid XML: {error}", "correct the file there") from None
@@ -183,7 +193,7 @@ def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any
 
 def _refuse(path: Path, joints: list[Any]) -> None:
     """Raise InputError naming every joint that an arm file cannot describe."""
-    reasons = [f"\n  joint {joint.name!r}: {reason}" for joint in joints if (reason := _reason(joint))]
+    reasons = [f"\n  joint {joint.name!r}: {reason}" for joint, reason in _reasons(joints) if reason]
     if reasons:
         raise InputError(
             f"{path}: this chain does not fit an arm file:{''.join(reasons)}",
@@ -201,17 +211,35 @@ def _refuse_wheels(path: Path, moving: list[Any]) -> None:
         )
 
 
-def _reason(joint: Any) -> str:
-    """Why a joint does not fit; empty if it does."""
+def _reasons(way: Sequence[Any]) -> Iterator[tuple[Any, str]]:
+    """The joints of a chain, and why each does not fit; empty if it does."""
+    before = None
+    for joint in way:
+        yield joint, _reason(joint, before)
+        before = before if joint.type == "fixed" else joint
+
+
+def _reason(joint: Any, before: Any) -> str:
+    """Why a joint does not fit; ``before``: the joint that moves before it in the chain."""
     if joint.type == "fixed":
         return ""
     if joint.type not in ("revolute", "continuous"):
         return _REASONS.get(joint.type, f"its type is {joint.type!r}")
-    if joint.mimic is not None:
-        return f"it mimics {joint.mimic.joint!r}, and every joint of an arm file moves by itself"
     if joint.axis is not None and not 0.0 < np.linalg.norm(joint.axis) < math.inf:
         return "its axis has no direction"
+    if joint.mimic is not None:
+        return _mimic_reason(joint.mimic, before)
     return "" if joint.type == "continuous" else _range_reason(joint.limit)
+
+
+def _mimic_reason(mimic: Any, before: Any) -> str:
+    factor = 1.0 if mimic.multiplier is None else mimic.multiplier
+    if before is not None and before.name == mimic.joint and before.mimic is None and factor == -1.0:
+        return ""  # a parallelogram
+    return (
+        f"it mimics {mimic.joint!r} by a factor of {factor:g}; an arm file has only linkages that turn a joint by "
+        "minus the angle of the one before it, which moves by itself"
+    )
 
 
 def _range_reason(limit: Any) -> str:
@@ -228,11 +256,15 @@ def _turning(model: Any, base: str, joint: Any, after: Any) -> TurningJoint:
     frame = _transform(model, joint.child, base)
     axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis, dtype=np.float64)
     limit, continuous = joint.limit, joint.type == "continuous"
-    low_high = CONTINUOUS_DEG if continuous else (math.degrees(limit.lower), math.degrees(limit.upper))
+    if joint.mimic is not None:
+        low_high = (0.0, 0.0)
+    else:
+        low_high = CONTINUOUS_DEG if continuous else (math.degrees(limit.lower), math.degrees(limit.upper))
     speed = math.degrees(limit.velocity) if limit is not None and limit.velocity else None
     direction = frame[:3, :3] @ (axis / np.linalg.norm(axis))
     body = urdf_bodies.of_joint(model, base, joint, after)
-    return TurningJoint(joint.name, frame[:3, 3], direction, low_high, speed, continuous, body)
+    is_linked = joint.mimic is not None
+    return TurningJoint(joint.name, frame[:3, 3], direction, low_high, speed, continuous, body, is_linked)
 
 
 def _transform(model: Any, link: str, base: str) -> Array:
@@ -323,5 +355,5 @@ def _candidates(ways: Sequence[list[Any]]) -> Iterator[_Candidate]:
     """Links on whose way something turns, and nothing is there that an arm file cannot describe."""
     for way in ways:
         turning = tuple(joint.name for joint in way if joint.type != "fixed")
-        if turning and not any(map(_reason, way)):
+        if turning and not any(reason for _, reason in _reasons(way)):
             yield _Candidate(way[-1].child, turning, len(way))

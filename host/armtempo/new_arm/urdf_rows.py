@@ -61,9 +61,10 @@ def derive(axes: Sequence[AxisLine], tool: Array, near: Near) -> list[DhRow]:
     return _without_idle(_finish(rows, frame, tool))
 
 
-def geometry(rows: Sequence[DhRow]) -> Geometry:
-    """The rows as the kinematics take them, lengths in mm."""
+def geometry(rows: Sequence[DhRow], linked: Sequence[int] = ()) -> Geometry:
+    """The rows as the kinematics take them, lengths in mm; ``linked``: joints that a linkage turns."""
     return Geometry(
+        linked=tuple(number for number, row in enumerate(rows) if row.joint in linked),
         d=tuple(row.d_mm for row in rows),
         a=tuple(row.a_mm for row in rows),
         alpha=tuple(math.radians(row.alpha_deg) for row in rows),

@@ -19,8 +19,8 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import mesh_files
 from armtempo.model.arm import Arm
-from armtempo.model.room import FAR_MM
-from armtempo.planning.room_check import Bodies
+from armtempo.model.workspace import FAR_MM
+from armtempo.planning.workspace_check import Bodies
 
 COLOUR, GHOST, PATH, RUN, VIA, ROOM = "#4477aa", "#999999", "#228833", "#ee6677", "#ccbb44", "#aa3377"
 WAY = "#66ccee"
@@ -92,7 +92,7 @@ class ArmShape:
         ]
 
     @property
-    def room(self) -> list[tuple[Array, Array]]:
+    def workspace(self) -> list[tuple[Array, Array]]:
         """The corners, (3,), of each box to keep out of, and of each wall, which is flat."""
         found = []
         for box in Bodies(self.arm).obstacles:
@@ -151,7 +151,7 @@ class ArmScene:
                 [""] * len(shape.pieces) + self._meshes() if shape.meshes else self._capsules(COLOUR, 1.0)
             )
             self._ghost = self._capsules(GHOST, _GHOST_OPACITY)
-            self._room()
+            self._workspace()
         self._dots: list[tuple[Object3D, Object3D]] = []
         """A ball for each via point, and its name."""
         self.look("free")
@@ -176,9 +176,9 @@ class ArmScene:
             found.append(str(mesh.id))
         return found
 
-    def _room(self) -> None:
+    def _workspace(self) -> None:
         """The boxes to keep out of, and frames for the walls."""
-        for low, high in self._shape.room:
+        for low, high in self._shape.workspace:
             is_wall = not (high - low).all()
             width, height, depth = (high - low).tolist()
             box = self.scene.box(width, height, depth, wireframe=is_wall)

@@ -16,7 +16,7 @@ from armtempo.deploy.firmware import image, write
 from armtempo.link.board_messages import StoredMotion
 from armtempo.panel import words
 from armtempo.panel.live import Lines
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class BoardTab:
     def __init__(self, page: PanelPage) -> None:
         self._page = page
         self._operator = operator = page.operator
-        self._stored_of = ("", 0)
+        self._stored_of: tuple[object, ...] = ()
         self._tested: SelfTest | None = None
         ui.label(words.STATUS).classes("text-subtitle2")
         columns = [{"name": name, "label": "", "field": name, "align": "left"} for name in ("key", "value")]
@@ -86,8 +86,10 @@ class BoardTab:
             ]
             if rows != self._state.rows:
                 self._state.rows = rows
-            if self._stored_of != (now := (state.board_id, self._operator.ended)) and not self._operator.busy:
-                self._stored_of = now  # the command may have stored something
+            # A command here, or another program, may have stored something
+            now = state.board_id, state.free_flash, state.erasures, self._operator.ended
+            if self._stored_of != now and not self._operator.busy:
+                self._stored_of = now
                 background_tasks.create(self._read())
         tested = self._operator.tested
         if tested is not None and tested is not self._tested:

@@ -10,7 +10,7 @@ from nicegui import ui
 
 from armtempo.panel import words
 from armtempo.panel.file_editor import FileEditor
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from armtempo.panel import words
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.press import Press
 from armtempo.robot.jog import HeldJog
 
@@ -20,7 +20,7 @@ _STEP_S = 0.05
 class ButtonHold:
     """The held button; at most one in the whole panel."""
 
-    def __init__(self, operator: Operator) -> None:
+    def __init__(self, operator: PanelBoard) -> None:
         self._operator = operator
         self._presses = operator.presses
         self._client = ""

@@ -20,7 +20,7 @@ from armtempo.model.pose import to_rpy_deg
 from armtempo.panel import arm_scene, board_tab, job_tab, move_tab, problem, run_tab, sequence_tab, words
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.panel_page import LOOK_S, PanelPage, named
 from armtempo.panel.press import Press
 from armtempo.robot.board import Board
@@ -28,6 +28,8 @@ from armtempo.robot.board import Board
 TELL_S = 0.1
 OLD_S = 0.5
 """A state that is older than this is shown with its age."""
+LEFT_S = 1.0
+"""A slider that was not moved for this long is not being dragged."""
 _POINTS = 200
 _PRIMARY = "#2b5f8f"
 """Contrast with white: 6.6 to 1 (4.5 is required)."""
@@ -35,7 +37,7 @@ _SCRIPT = Path(__file__).with_name("panel.js").read_text(encoding="utf-8")
 _STYLE = Path(__file__).with_name("panel.css").read_text(encoding="utf-8")
 
 
-def build(operator: Operator, hold: ButtonHold, shape: ArmShape) -> PanelPage:
+def build(operator: PanelBoard, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     """The page of a client."""
     client = ui.context.client
     page = PanelPage(operator, hold, shape, client.id)
@@ -116,27 +118,30 @@ def _dock(page: PanelPage) -> None:
 
 
 def _speed(page: PanelPage) -> None:
-    """The board's speed, as it says; what is set here is shown once the board has it."""
-    operator = page.operator
+    """The board's speed, as it says; what is set here and is not taken goes back to that."""
+    operator, clock = page.operator, page.operator.presses.clock
     ui.label(words.SPEED_OF_MOTION).classes("text-caption")
     slider = ui.slider(min=1, max=100, value=100)
     named(slider.classes("armtempo-speed"), words.SPEED_OF_MOTION)
     value = ui.label("").classes("armtempo-percent")
     page.control(slider, Needs.BOARD)
-    shown: list[float | None] = [None]
+    shown = [0.0]
+    touched_s = [0.0]
+    slider.on_value_change(lambda: touched_s.__setitem__(0, clock()))
 
     def set_speed(press: Press, wanted: Any) -> Awaitable[object]:
-        shown[0] = None  # the board's is shown again, if this is refused
         return page.at_once(press, lambda board: board.speed(float(wanted) / 100))
 
     page.on_press(slider, "change", set_speed)
 
     def look() -> None:
         state = operator.live.state
-        if state is not None and state.speed_percent and state.speed_percent != shown[0]:
-            shown[0] = state.speed_percent
-            slider.set_value(state.speed_percent)
-            value.set_text(f"{state.speed_percent:g} %")
+        if state is None or not (percent := state.speed_percent):
+            return
+        if percent != shown[0] or (slider.value != percent and clock() - touched_s[0] > LEFT_S):
+            shown[0] = percent
+            slider.set_value(percent)
+            value.set_text(f"{percent:g} %")
 
     page.on_look(look)
 
@@ -182,8 +187,10 @@ def _tabs(page: PanelPage) -> None:
         """Build a tab when it is first shown, so that the first view does not wait for charts and tables."""
         page.shown = name
         if part := parts.pop(name, None):
+            page.built = name
             with places[name]:
                 part(page)
+            page.built = ""
         page.refresh()
 
     shown.on_value_change(lambda event: show(event.value))
@@ -216,7 +223,7 @@ def _events(page: PanelPage) -> None:
     ui.run_javascript(f"armtempo.begin({texts})")
 
 
-def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
+def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
     """The message to all pages: poses of the arm, and numbers that change during a motion."""
     live = operator.live
     angles, target = live.angles_deg, live.target_deg
@@ -242,7 +249,7 @@ def message(operator: Operator, shape: ArmShape) -> dict[str, Any]:
     }
 
 
-def position(operator: Operator) -> str:
+def position(operator: PanelBoard) -> str:
     """Where the tool and the joints are."""
     angles = operator.live.angles_deg
     where = "  ".join(f"{angle:.2f}°" for angle in angles)
@@ -254,7 +261,7 @@ def position(operator: Operator) -> str:
     return where
 
 
-def state_line(operator: Operator) -> str:
+def state_line(operator: PanelBoard) -> str:
     """The board's state in a line, with its age if that is more than OLD_S."""
     doing = f" · {operator.busy}" if operator.busy else ""
     if operator.busy and operator.progress:
@@ -265,10 +272,10 @@ def state_line(operator: Operator) -> str:
     age_s = operator.live.age_s
     old = f" · {words.OLD_STATE.format(age=age_s)}" if age_s > OLD_S else ""
     kind = f" ({words.VIRTUAL})" if state.virtual else ""
-    if state.moving and state.speed_percent != 100:
-        speed = (
-            words.AT_SPEED.format(percent=state.speed_percent) if state.speed_percent else words.IN_A_PAUSE
-        )
-        doing = f" {speed}{doing}"
+    name = state.state
+    if state.moving and not state.speed_percent:
+        name = words.PAUSED
+    elif state.moving and state.speed_percent != 100:
+        name += f" {words.AT_SPEED.format(percent=state.speed_percent)}"
     fault = f" · {state.fault}" if state.fault else ""
-    return f"{state.state}{doing}{old} · {state.port}{kind}{fault}"
+    return f"{name}{doing}{old} · {state.port}{kind}{fault}"

@@ -13,7 +13,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Event, Sample, SequenceState
-from armtempo.link.refusal import fault_words
+from armtempo.link.refusal import describe_fault
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.planning.jog import jog_motion
@@ -127,7 +127,7 @@ class LiveArm:
     @property
     def fault(self) -> str:
         """The pending fault and its cure; "" for none."""
-        return fault_words(self.state.fault) if self.state is not None and self.state.fault else ""
+        return describe_fault(self.state.fault) if self.state is not None and self.state.fault else ""
 
     def why_no_jog(self, move: JogMove) -> str:
         """Why this jog is not possible now; "" if it is."""

@@ -18,7 +18,7 @@ from armtempo.kinematics.of_arm import forward
 from armtempo.model.pose import to_rpy_deg
 from armtempo.panel import arm_scene, homing, teaching, words
 from armtempo.panel.hold import SHOWN_S
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import PanelPage, named
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.robot.goto import MovePace, Where, posture_deg

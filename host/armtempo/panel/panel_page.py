@@ -18,7 +18,7 @@ from armtempo.kinematics.chain import chains_mm
 from armtempo.panel import arm_scene, words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.hold import ButtonHold
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.press import Press
 from armtempo.robot.board import Board
 
@@ -64,7 +64,7 @@ class Asked:
 class PanelPage:
     """A browser's page: common parts of its tabs."""
 
-    operator: Operator
+    operator: PanelBoard
     hold: ButtonHold
     shape: ArmShape
     client: str
@@ -72,6 +72,8 @@ class PanelPage:
     """The controls that need something."""
     shown: str = ""
     """The tab that is shown."""
+    built: str = ""
+    """The tab that is being built; "" for what is in view on every tab."""
     listeners: list[tuple[str, Callable[[], None]]] = field(default_factory=list)
     """Called every LOOK_S while their tab is shown; without a tab, always."""
     holds: list[Callable[[Press], None]] = field(default_factory=list)
@@ -195,8 +197,8 @@ class PanelPage:
         return Asked(asked, place)
 
     def on_look(self, listener: Callable[[], None]) -> None:
-        """Call ``listener`` every LOOK_S while the tab that is being built is shown."""
-        self.listeners.append((self.shown, listener))
+        """Call ``listener`` every LOOK_S; from within a tab, only while that is shown."""
+        self.listeners.append((self.built, listener))
 
     def do(self, press: Press, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
         """Start a command of the operator; raises InputError if it is refused."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from armtempo.panel import words
-from armtempo.panel.operator import Needs, Operator
+from armtempo.panel.panel_board import Needs, PanelBoard
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -41,7 +41,7 @@ class Problem:
     """Whether it is shown in red; else it is a step that is still to be done."""
 
 
-def of(operator: Operator) -> Problem | None:
+def of(operator: PanelBoard) -> Problem | None:
     """The most important one; None if nothing is wrong."""
     live = operator.live
     if operator.trouble and not operator.busy:

@@ -16,10 +16,10 @@ from armtempo import pipeline
 from armtempo.basics.errors import InputError
 from armtempo.panel import past_runs, words
 from armtempo.panel.charts import CurveChart
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
 from armtempo.panel.past_runs import REPORT_PAGE, PastRun
-from armtempo.robot.board import MOST_REPETITIONS
+from armtempo.robot.motions import MOST_REPETITIONS
 
 if TYPE_CHECKING:
     from armtempo.model.plan import Plan

@@ -22,7 +22,7 @@ from armtempo.panel import layout, words
 from armtempo.panel.access import MOST_BYTES, Access, Policy
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
-from armtempo.panel.operator import Operator
+from armtempo.panel.panel_board import PanelBoard
 from armtempo.report.comparison import PAGE as COMPARISON
 
 _RECONNECT_S = 60.0
@@ -43,7 +43,7 @@ _SUFFIXES = (".html", ".svg", ".png", ".csv", ".json")
 class Panel:
     """The panel of one board; ``serve`` runs until it is ended."""
 
-    def __init__(self, operator: Operator) -> None:
+    def __init__(self, operator: PanelBoard) -> None:
         self._operator = operator
         self._shape = ArmShape(operator.arm)
         self._hold = ButtonHold(operator)

@@ -21,7 +21,7 @@ from armtempo.model.pose import from_rpy
 from armtempo.model.posture import name_problem
 from armtempo.model.tool_pose import Pose
 from armtempo.panel import words
-from armtempo.panel.operator import Needs
+from armtempo.panel.panel_board import Needs
 from armtempo.planning import planner
 
 if TYPE_CHECKING:

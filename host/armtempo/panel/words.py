@@ -22,7 +22,7 @@ NO_FAULT = "No fault is pending."
 NOT_HOMED = "The arm's position is unknown: home it first."
 MOVING = "The arm is moving."
 AT_REST = "Nothing moves."
-IN_A_PAUSE, AT_SPEED = "in a pause", "at {percent:g} %"
+PAUSED, AT_SPEED = "paused", "at {percent:g} %"
 NO_BOARD, NO_BOARD_HINT = "The board is not connected.", "wait until it is"
 WAIT = "try again when that is over"
 DONE = "{what}: done"
@@ -78,12 +78,14 @@ VIEW = "View"
 SPEED_OF_MOTION = "Speed"
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
 HOMING = "Home…"
+WHICH_JOINTS, ALL_JOINTS = "Home", "All joints"
+NO_SWITCH = "{joint} has no switch whose angle is known: say where it is instead."
 HOME_BY_SWITCHES = "Home by the switches"
-BY_SWITCHES = "Or let the arm find its switches, in this order: {order}. It moves; clear its room."
-SURE = "Does the arm stand as the grey one in the picture? If so, its joints are at:"
+BY_SWITCHES = "Or let the arm find its switches, in this order: {order}. It moves; clear its workspace."
+SURE = "Compare the arm with the grey one in the picture. If it stands so, its joints are at:"
 
 DRAG_HINT = "Drag a via point in the picture, or click it to see the other postures that reach it."
-POSTURES_OF = "P{number}: postures of the arm with the tool there, {count}; the nearest is taken"
+POSTURES_OF = "P{number}: postures that reach it: {count}. The nearest is used; choose another:"
 NEW_VIA, FROM_ARM, DELETE = "Add a via point", "Take the arm's posture", "Delete"
 PASTE, PASTE_HINT = "Paste", "Rows of angles from a spreadsheet, one row a via point"
 PASTED = "the pasted rows"
@@ -136,7 +138,7 @@ CHOICES = {
     "shared": "shared by all joints",
     "per-joint": "one for each joint",
 }
-MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {floor:.3f} s."
+MOTION_TIME = "Motion time {total:.3f} s; no motion along this path is shorter than {bound:.3f} s."
 PLAY, PLAY_TIME = "Play on the model", "Time on the model"
 TIME_S, ANGLE, SPEED, ACCELERATION, JERK = (
     "s",
@@ -182,7 +184,6 @@ STEP_KEYS = {
     "timeout_s": "time-out, s",
     "on_timeout": "then",
 }
-STEP_NOW = "Step {step}, cycle {cycle}"
 ADD_HERE = "Add where the arm is"
 TOTAL_TIME, CYCLE_TIME = "{time:.2f} s in all, without waits for inputs", "{time:.2f} s a cycle"
 

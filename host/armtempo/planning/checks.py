@@ -37,6 +37,9 @@ ESTIMATED = "(estimated; 'armtempo selftest' measures your board)"
 TOLERANCE = 1e-9
 """Allowance for rounding: relative excess over a limit, and excess over a range in degrees."""
 
+COUPLED_AXES = "the arm has coupled joints, whose motors need one time axis for all joints"
+SHARE = 'take timing = "shared" (--timing shared)'
+
 MOVE_VIAS = "move the via points away from the end of the range, or add one where it swings out"
 """Hint of ``check_ranges``."""
 
@@ -58,21 +61,22 @@ def limits_of(arm: Arm) -> list[Limits]:
                 f"arm {arm.name!r}: the limits of {joint.name} must be positive numbers, not {values}",
                 "set speed_deg_s, acceleration_deg_s2 and jerk_deg_s3 in the arm file",
             )
-        _check_step_rate(arm, joint, joint.limits.speed_deg_s)
         limits.append(joint.limits)
     if not limits:
         raise InputError(
             f"arm {arm.name!r}: no joint has a motor, so there is nothing to plan",
             "give at least one joint a motor in the arm file",
         )
+    for motor in arm.motors:
+        _check_step_rate(arm, motor)
     return limits
 
 
-def _check_step_rate(arm: Arm, joint: DrivenJoint, speed_deg_s: float) -> None:
-    rate = speed_deg_s * joint.steps_per_deg
+def _check_step_rate(arm: Arm, motor: DrivenJoint) -> None:
+    rate = motor.limits.speed_deg_s * motor.steps_per_deg
     if rate > MAX_STEP_RATE:
         raise InputError(
-            f"arm {arm.name!r}: {joint.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
+            f"arm {arm.name!r}: {motor.name} at its speed limit of {motor.limits.speed_deg_s:g} deg/s needs {rate:.0f} "
             f"steps/s; the board supports at most {MAX_STEP_RATE} {ESTIMATED}",
             "check the unit, lower the limit, or use fewer microsteps",
         )
@@ -83,14 +87,15 @@ def hardware_notes(arm: Arm) -> tuple[str, ...]:
     return tuple(
         f"{joint.name}: {bound.key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: planned with "
         f"{bound.value:.4g}"
-        for joint in arm.joints
-        for bound in drive_limits.exceeded(joint, arm.driver)
+        for joint, bound in drive_limits.exceeded(arm.table_joints, arm.coupling, arm.driver)
     )
 
 
 def check_job(arm: Arm, job: Job) -> None:
     """Raise InputError for settings that contradict, or that the board cannot hold."""
     refine = 1 if isinstance(job.refine, str) else job.refine
+    if arm.coupling and job.timing != "shared":
+        raise InputError(f"job {job.name!r}: {COUPLED_AXES}", SHARE)
     _check_path(job)
     kind = job.parameters.get("fitness", FITNESS[0])
     if kind not in FITNESS:
@@ -121,9 +126,11 @@ def leads_tool(job: Job) -> bool:
     return bool(job.ways) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
 
 
-def has_stretches(job: Job) -> bool:
-    """Whether the job is planned as stretches: it leads the tool, or its spline rests at via points."""
-    return leads_tool(job) or (bool(job.stops) and not is_free(job))
+def planner_of(job: Job) -> str:
+    """The planner of ``planner.PLANNERS`` for a job: "line" if it leads the tool, or its spline rests at via points."""
+    if leads_tool(job) or (job.stops and not is_free(job)):
+        return "line"
+    return "free" if is_free(job) else "through"
 
 
 def _check_ways(job: Job, where: str) -> None:
@@ -177,10 +184,10 @@ def _check_path(job: Job) -> None:
         )
     if leads_tool(job):
         _check_ways(job, where)
-    elif has_stretches(job) and (job.timing != "shared" or job.degree != 5):
+    elif planner_of(job) == "line" and (job.timing != "shared" or job.degree != 5):
         raise InputError(
             f'{where}: a stop needs timing = "shared" and degree 5',
-            "leave timing and degree out, or plan the stretches between the stops one by one with --split",
+            "leave timing and degree out, or plan the legs between the stops one by one with --split",
         )
     _check_stops(job, where)
     if is_free(job):
@@ -274,8 +281,8 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int, hint: str = MOV
     low, high = extremes.range_of(np.moveaxis(bspline.polynomials(angle_points_deg, degree), 2, 0))
     for joint, lowest, highest in zip(arm.driven, low, high, strict=True):
         least, most = joint.range_deg
-        room = TOLERANCE * max(1.0, abs(least), abs(most))
-        if lowest < least - room or highest > most + room:
+        margin = TOLERANCE * max(1.0, abs(least), abs(most))
+        if lowest < least - margin or highest > most + margin:
             raise PlanError(
                 f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} degrees, its range is "
                 f"{least:g} to {most:g}",
@@ -294,17 +301,16 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
             )
     rates = step_rates(arm, reached)
     if rates > MAX_STEP_RATE_SUM:
-        raise PlanError(rate_words(rates), "lower the speed limits or use fewer microsteps")
+        raise PlanError(format_rate(rates), "lower the speed limits or use fewer microsteps")
 
 
 def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
-    """Sum of the highest step rates of all joints, steps/s."""
-    return sum(
-        extreme.speed_deg_s * joint.steps_per_deg for joint, extreme in zip(arm.driven, reached, strict=True)
-    )
+    """Sum of the highest step rates of all motors, steps/s; of coupled joints, as if they were fastest together."""
+    speeds: list[float] = arm.transmission.largest_motors_deg([most.speed_deg_s for most in reached]).tolist()
+    return sum(speed * joint.motor.steps_per_deg for speed, joint in zip(speeds, arm.driven, strict=True))
 
 
-def rate_words(rates: float) -> str:
+def format_rate(rates: float) -> str:
     """Text: a sum of step rates compared with the board's."""
     return f"the joints together need up to {rates:.0f} steps/s; the board supports {MAX_STEP_RATE_SUM} {ESTIMATED}"
 
@@ -321,12 +327,31 @@ def check_time(trajectory: Trajectory) -> None:
 
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
     """Raise PlanError if a control point exceeds the range of the board's integers."""
-    for joint_spline, joint in zip(trajectory.joints, arm.driven, strict=True):
+    all_steps = motor_points_steps(trajectory, arm)
+    for number, (joint_spline, joint, steps) in enumerate(
+        zip(trajectory.joints, arm.driven, all_steps, strict=True)
+    ):
         where = f"trajectory {trajectory.name!r}, {joint.name}"
-        _check_times(where, joint_spline)
-        steps = joint_spline.angle_points_deg * joint.steps_per_deg
-        if np.max(np.abs(steps)) >= MOST_STEPS or _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS:
+        if not (number and trajectory.shared):
+            _check_times(where, joint_spline)
+        stands = bool(np.all(steps == steps[0]))
+        if np.max(np.abs(steps)) >= MOST_STEPS or (
+            not stands and _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS
+        ):
             raise PlanError(f"{where}: more steps than the board can count", "use fewer microsteps")
+
+
+def motor_points_steps(trajectory: Trajectory, arm: Arm) -> list[Array]:
+    """The control points of each motor's spline in steps, (n + degree,); exact, as they are linear in the joints'.
+
+    Raises InputError for coupled joints whose time axes differ.
+    """
+    points = [joint.angle_points_deg for joint in trajectory.joints]
+    if arm.coupling:
+        if not trajectory.shared:
+            raise InputError(f"trajectory {trajectory.name!r}: {COUPLED_AXES}", SHARE)
+        points = [*arm.transmission.motors_deg(np.stack(points, axis=-1)).T]
+    return [of_motor * joint.motor.steps_per_deg for of_motor, joint in zip(points, arm.driven, strict=True)]
 
 
 def _check_times(where: str, joint_spline: JointSpline) -> None:

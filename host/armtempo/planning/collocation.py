@@ -8,7 +8,7 @@ from math import perm
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.planning.fitness import stretch_of
+from armtempo.planning.fitness import scale_of
 from armtempo.planning.variables import Index
 from armtempo.splines import bspline, extremes, time_axis
 
@@ -115,10 +115,10 @@ class Curve:
         segment, u = time_axis.parameter(self.time, time_s)
         return np.stack([bspline.evaluate(angle, segment, u) for angle in self.angle], axis=1)
 
-    def stretch(self) -> float:
+    def scale(self) -> float:
         """The factor on time with which the motion just keeps its limits, proven."""
         ratios = extremes.magnitudes(self.angle, self.time) / self.limits
-        return float(stretch_of(ratios.T).max())
+        return float(scale_of(ratios.T).max())
 
 
 def grid(segments: int, parts: int, ends: bool = True) -> Points:

@@ -74,14 +74,14 @@ class Fitness:
         return np.asarray(intervals_s.sum(axis=1) + _PENALTY * excess)
 
     def stretched(self, intervals_s: Array) -> Array:
-        """Motion time after X is stretched or shrunk to just keep the limits, (N,) for X (N, m)."""
-        return np.asarray(intervals_s.sum(axis=1) * self.stretch(intervals_s))
+        """Motion time after X is scaled or shrunk to just keep the limits, (N,) for X (N, m)."""
+        return np.asarray(intervals_s.sum(axis=1) * self.scale(intervals_s))
 
-    def stretch(self, intervals_s: Array) -> Array:
+    def scale(self, intervals_s: Array) -> Array:
         """The factor on X with which it just keeps the limits on the grid: (N,)."""
         ratios = self.ratios(intervals_s)
         everywhere = (1, 2, 3)
-        return stretch_of(np.maximum(_tops(ratios).max(axis=everywhere), ratios.max(axis=everywhere)))
+        return scale_of(np.maximum(_tops(ratios).max(axis=everywhere), ratios.max(axis=everywhere)))
 
 
 def _tops(ratios: Array) -> Array:
@@ -101,7 +101,7 @@ def _tops(ratios: Array) -> Array:
     return tops
 
 
-def stretch_of(ratios: Array) -> Array:
+def scale_of(ratios: Array) -> Array:
     """Least factor on time with which ``ratios`` (3, ...) of speed, acceleration and jerk are at most 1."""
     return np.asarray(np.maximum(np.maximum(ratios[0], np.sqrt(ratios[1])), np.cbrt(ratios[2])))
 

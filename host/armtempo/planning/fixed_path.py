@@ -98,16 +98,16 @@ class FixedPath:
         """Its motion time."""
         return float(self._weights @ differences_s)
 
-    def stretched(self, differences_s: Array) -> Array:
+    def scaled(self, differences_s: Array) -> Array:
         """The axis scaled so that the motion just keeps every limit, proven."""
-        return np.asarray(differences_s * self.curve(differences_s).stretch())
+        return np.asarray(differences_s * self.curve(differences_s).scale())
 
     def optimum(self, differences_s: Array, gap: float) -> Optimum:
-        """The local optimum from a start (m + degree - 1,), which is stretched first; never slower than that.
+        """The local optimum from a start (m + degree - 1,), which is scaled first; never slower than that.
 
         Ends within a relative ``gap`` of the bound, or if further rounds do not help.
         """
-        best = self.stretched(differences_s)
+        best = self.scaled(differences_s)
         parts = max(_LEAST_PARTS, min(_PARTS // self.refine, _POINTS // self.variables.segments))
         points = collocation.grid(self.variables.segments, parts, ends=self.degree == 3)
         settings, bound, here = _COARSE, 0.0, best
@@ -118,13 +118,13 @@ class FixedPath:
             seen.append(here)
             here, bound = self._solve(seen, points, settings)
             curve = self.curve(here)
-            stretch = curve.stretch()
-            if self.duration_s(here) * stretch < self.duration_s(best):
-                best = here * stretch
+            scale = curve.scale()
+            if self.duration_s(here) * scale < self.duration_s(best):
+                best = here * scale
             if bound and self.duration_s(best) <= bound * (1.0 + gap):
                 break
             points += collocation.peaks(curve, _PEAK_GRID_FACTOR * parts, _PEAK_THRESHOLD).points
-            here = here * stretch
+            here = here * scale
             settings = Schedule(_AGAIN, min(_AGAIN, 0.3 * gap))
         return Optimum(best, self.duration_s(best), min(bound, self.duration_s(best)))
 

@@ -29,8 +29,8 @@ _WORK = 10_000
 class Floor:
     """A proven lower bound of a motion time under speed, acceleration and jerk limits.
 
-    ``kind``: ``"rests"``: from turn to turn of one joint; ``"path"``: along the common path; through the via points,
-    for any path, ``"vias"``: of one joint, ``"together"``: of all of them.
+    ``kind``: ``"rests"``: of one joint between its reversals; ``"path"``: along the common path; through the via
+    points, for any path, ``"vias"``: of one joint, ``"together"``: of all of them.
     """
 
     time_s: float
@@ -40,7 +40,7 @@ class Floor:
 def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> Floor:
     """The highest lower bound for joints that move together on a path; ``about_s``: approximate motion time.
 
-    ``angle_points_deg``: (n + degree, J). Bounds: each joint from turn to turn, where it stands still; for
+    ``angle_points_deg``: (n + degree, J). Bounds: each joint between its reversals, where it stands still; for
     several joints, also the dual bound of all time laws along the path.
     """
     found = []
@@ -108,7 +108,7 @@ def of_vias(
 ) -> Floor:
     """A lower bound for all motions through via angles (n + 1, J), on any path.
 
-    The sum over stretches between stops (dwells in seconds by via point) of the largest, over joints, of the
+    The sum over legs between stops (dwells in seconds by via point) of the largest, over joints, of the
     least time through its turning via angles under its three limits: at a turning via angle the joint stands
     still there or beyond. With several joints and ``times_s`` (n + 1,), when a plan arrives at the via points, or
     what ``via_bound`` proves for the joints together, if that is more. ``loose`` via points, which may be passed at

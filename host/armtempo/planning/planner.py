@@ -18,8 +18,9 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_way import ToolWay
-from armtempo.planning import checks, path_deviation, room_check, through_plan
+from armtempo.planning import checks, path_deviation, through_plan, workspace_check
 from armtempo.planning.free import around
+from armtempo.planning.through_plan import Planned
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
@@ -27,6 +28,16 @@ _SWING_DEG = 1.0
 """A joint that goes farther than this beyond the via points on both sides of it is told."""
 _LINE_REFINE = 4
 """Time segments per path segment of a straight line: within 1 % of the fastest, and planned quickly."""
+
+
+def _by_lines(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
+    from armtempo.planning.line import line_plan  # here, because most jobs need no kinematics
+
+    return line_plan.motion(arm, job, via_deg, progress)
+
+
+PLANNERS = {"through": through_plan.motion, "free": around.motion, "line": _by_lines}
+"""What plans a job, by ``checks.planner_of``: from arm, job and via angles (n + 1, J) in degrees."""
 
 
 @np.errstate(all="ignore")  # an overflow becomes NaN, which every check refuses
@@ -41,19 +52,15 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     holding = arm.holding(job.holds)
     checks.check_job(arm, job)
     via, notes = via_angles(arm, job)
-    way = around.motion if checks.is_free(job) else through_plan.motion
-    if checks.has_stretches(job):
-        from armtempo.planning.line import line_plan  # here, because most jobs need no kinematics
-
-        way = line_plan.motion
+    motion = PLANNERS[checks.planner_of(job)]
     with watched(progress) as watch:
-        planned = way(arm, job, via, watch)
+        planned = motion(arm, job, via, watch)
     trajectory = planned.trajectory
     checks.check_time(trajectory)
     reached = extremes.of_joints(trajectory.joints)
     checks.check_reached(arm, reached)
     speeds_deg_s = np.array([each.speed_deg_s for each in reached])
-    room_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
+    workspace_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
     notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, trajectory))
     return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
 

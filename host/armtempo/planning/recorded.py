@@ -15,7 +15,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan, Search
-from armtempo.planning import checks, lower_bounds, planner, room_check
+from armtempo.planning import checks, lower_bounds, planner, workspace_check
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
@@ -38,9 +38,9 @@ def plan(
 ) -> Plan:  # fmt: skip
     """The motion through recorded angles (n, J) at their times (n,), within ``tolerance_deg`` at each of them.
 
-    It begins and ends at rest. If it would exceed a limit, all times are stretched by the same factor, which a note
+    It begins and ends at rest. If it would exceed a limit, all times are scaled by the same factor, which a note
     states. Raises PlanError if the spline cannot be near enough, as for a recording that begins in motion, or if the
-    arm would leave its ranges or its room.
+    arm would leave its ranges or its workspace.
     """
     limits = checks.limits_of(arm)
     times = times_s - times_s[0]
@@ -62,7 +62,7 @@ def plan(
     reached = extremes.of_joints(splines)
     checks.check_ranges(arm, points, DEGREE)
     checks.check_reached(arm, reached)
-    room_check.check(arm, trajectory)
+    workspace_check.check(arm, trajectory)
     via = np.stack([points[index : index + DEGREE] for index in range(segments + 1)])
     via_deg = np.einsum("c,scj->sj", bspline.basis(DEGREE)[0, :-1], via)
     job = Job(name, via_deg=via_deg.tolist(), path="through", timing="shared", refine=1, optimiser=GRADIENT)

@@ -30,12 +30,12 @@ def floor_s(angles_deg: Array, limits: Limits, from_rest: bool = True, to_rest: 
     distances = np.maximum(np.abs(np.diff(angles_deg)) - _ROUNDING * float(np.max(np.abs(angles_deg))), 0.0)
     last = len(distances) - 1
     return sum(
-        _stretch_s(float(distance), limits, from_rest and number == 0, to_rest and number == last)
+        _leg_s(float(distance), limits, from_rest and number == 0, to_rest and number == last)
         for number, distance in enumerate(distances)
     )
 
 
-def _stretch_s(distance: float, limits: Limits, from_rest: bool, to_rest: bool) -> float:
+def _leg_s(distance: float, limits: Limits, from_rest: bool, to_rest: bool) -> float:
     """Least time over one monotone interval: accelerate, perhaps cruise, decelerate."""
     low, high = 0.0, limits.speed_deg_s
     up, way_up = _ramp(high, limits, from_rest)

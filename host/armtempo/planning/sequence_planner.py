@@ -18,7 +18,7 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, planner, room_check, via_points
+from armtempo.planning import checks, planner, via_points, workspace_check
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
@@ -180,8 +180,8 @@ class _Compiler:
         start, end = _angles(trajectory(0.0)), _angles(trajectory(trajectory.duration_s))
         if here.angles_deg is not None and not self._same(here.angles_deg, start):
             raise InputError(
-                f"{step.where}run: {motion.name} begins at {_words(start)}, but the arm is at "
-                f"{here.name or _words(here.angles_deg)} ({_words(here.angles_deg)})",
+                f"{step.where}run: {motion.name} begins at {_format_angles(start)}, but the arm is at "
+                f"{here.name or _format_angles(here.angles_deg)} ({_format_angles(here.angles_deg)})",
                 f"put a step before it that goes there: goto with the same file as run, {motion.name!r}",
             )
         holds = _job(motion).holds or self._holds
@@ -208,7 +208,7 @@ class _Compiler:
         elif isinstance(target, list | tuple):
             if problem := self.arm.angles_problem(target):
                 raise InputError(f"{step.where}goto: {problem}", "give one angle for each joint with a motor")
-            target = ArmPosture(_words(target), tuple(target))
+            target = ArmPosture(_format_angles(target), tuple(target))
         if isinstance(target, ArmPosture):
             return self.posture(target, f"{step.where}goto: ")
         motion = self._motion(target)
@@ -223,11 +223,11 @@ class _Compiler:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
-        # A plan with another load is accepted if it keeps to the room
+        # A plan with another load is accepted if it keeps to the workspace
         for (known, _), found in self._plans.items():
             arm = self.arm.holding(_job(motion).holds or self._holds)
             outwards = _job(motion).start_touches
-            if known == id(motion) and room_check.touch_of(arm, found, None, outwards) is None:
+            if known == id(motion) and workspace_check.touch_of(arm, found, None, outwards) is None:
                 return found
         found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
         return found
@@ -239,7 +239,7 @@ class _Compiler:
                     f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
                 )
             arm = self.arm.holding(source.job.holds or self._holds)
-            room_check.check(arm, source.trajectory, source.job.start_touches)
+            workspace_check.check(arm, source.trajectory, source.job.start_touches)
             return source.trajectory
         job = replace(source, holds=source.holds or self._holds)
         found = planner.plan(self.arm, job, self.progress).trajectory
@@ -293,10 +293,8 @@ class _Compiler:
         return len(self.legs) - 1
 
     def _same(self, one: Angles, other: Angles) -> bool:
-        return all(
-            abs(a - b) * joint.steps_per_deg <= _SAME_STEPS
-            for a, b, joint in zip(one, other, self.arm.driven, strict=True)
-        )
+        off_steps = self.arm.transmission.steps(np.array(one) - np.array(other))
+        return bool(np.all(np.abs(off_steps) <= _SAME_STEPS))
 
 
 def _job(motion: SourceMotion) -> Job:
@@ -311,5 +309,5 @@ def _angles(values: np.ndarray) -> Angles:
     return tuple(float(value) for value in values)
 
 
-def _words(angles: Angles) -> str:
+def _format_angles(angles: Angles) -> str:
     return ", ".join(f"{round(angle, 3) + 0.0:g}" for angle in angles) + "°"

@@ -20,7 +20,7 @@ _ROOM = 0.98
 
 
 def at_all_stops(job: Job, via_deg: Array) -> list[Job]:
-    """A job for each stretch between stops; ``via_deg``: (n + 1, J), the angles at the via points.
+    """A job for each leg between stops; ``via_deg``: (n + 1, J), the angles at the via points.
 
     Raises PlanError if there is no stop.
     """
@@ -30,7 +30,7 @@ def at_all_stops(job: Job, via_deg: Array) -> list[Job]:
 def at_few_stops(job: Job, via_deg: Array, whole: Trajectory) -> list[Job]:
     """The fewest jobs that fit the board, from the times at which ``whole`` passes the stops.
 
-    Raises PlanError if there is no stop, or one stretch is too long.
+    Raises PlanError if there is no stop, or one leg is too long.
     """
     times = whole.joints[0].via_times_s
     cuts: list[int] = []

@@ -114,7 +114,7 @@ def _searched(group: Group, job: Job, stages: _Stages, last: bool) -> Timed:
     found = interval_search.search(group.angle_points_deg, group.limits, job, rng, stages.within)
     stages.done()
     path = FixedPath(group.angle_points_deg, job.degree, group.limits, mirrored=True)
-    differences = path.stretched(path.of_intervals(found.result.x))
+    differences = path.scaled(path.of_intervals(found.result.x))
     searched = path.duration_s(differences)
     optimum = Optimum(differences, searched, 0.0)
     if job.polish and last:
@@ -153,14 +153,14 @@ def _refined(group: Group, job: Job, axis: Timed, before: int, refine: int) -> T
 
 
 def _long_enough(axis: Timed) -> Timed:
-    stretch = max(1.0, MIN_DURATION_S / axis.total_s)
-    if stretch == 1.0:
+    scale = max(1.0, MIN_DURATION_S / axis.total_s)
+    if scale == 1.0:
         return axis
     return replace(
         axis,
-        time_points_s=axis.time_points_s * stretch,
-        intervals_s=axis.intervals_s * stretch,
-        total_s=axis.total_s * stretch,
+        time_points_s=axis.time_points_s * scale,
+        intervals_s=axis.intervals_s * scale,
+        total_s=axis.total_s * scale,
         optimum_s=MIN_DURATION_S if axis.optimum_s else 0.0,
     )
 

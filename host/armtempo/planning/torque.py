@@ -46,7 +46,7 @@ class LeastMargin(NamedTuple):
     held_nm: float
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Describe it, without the joint."""
         return (
             f"at {self.time_s:.2f} s its motor needs {self.needed_nm:.3g} Nm and holds {self.held_nm:.3g}, "
@@ -102,8 +102,8 @@ def held_nm(joint: DrivenJoint, motor_rad_s: ArrayLike) -> Array:
 def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
     """The torques of a motion, None for an arm without ``dynamics``.
 
-    At the motor: the joint's torque from inverse dynamics and friction, divided by the gear ratio, plus the
-    rotor's inertia.
+    At the motor: the joint's torque from inverse dynamics and friction (of coupled joints: the sum that does the same
+    work), divided by the gear ratio, plus the rotor's inertia.
     """
     if not any(joint.dynamics for joint in arm.joints):
         return None
@@ -117,8 +117,9 @@ def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
     gear = np.array([joint.motor.gear_ratio for joint in driven])
     rotor = np.array([joint.model.rotor_inertia_kg_m2 for joint in driven])
     at_joint = joint_torques(arm, angles, rates, changes)[:, indices]
-    needed = at_joint / gear + rotor * gear * changes[:, indices]
-    speeds = gear * rates[:, indices]
+    gears = arm.transmission
+    needed = gears.motor_loads(at_joint) / gear + rotor * gear * gears.motors_deg(changes[:, indices])
+    speeds = gear * gears.motors_deg(rates[:, indices])
     held = np.stack([held_nm(joint, speed) for joint, speed in zip(driven, speeds.T, strict=True)], axis=1)
     return MotorTorques(tuple(joint.name for joint in driven), times, needed, held)
 
@@ -148,7 +149,7 @@ def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan
         found = planner.plan(_scaled(arm, factor), job, part(progress, number, _TRIES))
         least = least_margin(found.holding, found.trajectory)
         if least is not None and least.margin < ENOUGH:
-            high, short = factor, f"{least.joint}: {least.words}"
+            high, short = factor, f"{least.joint}: {least.description}"
         elif best is not None and found.total_s > best.total_s * (1.0 - _PAYS):
             break
         else:

@@ -1,6 +1,6 @@
 """A proven lower bound of the motion time through via points: all joints together, for any path.
 
-Consider one stretch, of duration T, between two via points. For a joint with displacement d, velocity v, acceleration a
+Consider one leg, of duration T, between two via points. For a joint with displacement d, velocity v, acceleration a
 and jerk j, any constant h and functions k(t), l(t) satisfy
 
     h d + [k v + l a] = integral of (h + k') v + (k + l') a + l j dt
@@ -12,11 +12,11 @@ multipliers of displacement, velocity and acceleration. With
     E(T) = T + sum over joints of (h d - integral of V |h + k'| + A |k + l'| + J |l| dt)
 
 it follows that T >= E(T) + sum over joints of [k v + l a]. If k and l are continuous at via points, those terms cancel
-in the sum over all stretches of a motion from rest to rest. So no motion is shorter than the sum of min over T of E(T),
-whatever k and l are at the via points, and whatever h, k and l are inside a stretch for each T.
+in the sum over all legs of a motion from rest to rest. So no motion is shorter than the sum of min over T of E(T),
+whatever k and l are at the via points, and whatever h, k and l are inside a leg for each T.
 
 Good multipliers are found by Newton's method with smoothed absolute values: first k and l at the via points, for a few
-T near those of a plan (``_best``), then, with these fixed, the multipliers inside each stretch for many T (``_Scan``).
+T near those of a plan (``_best``), then, with these fixed, the multipliers inside each leg for many T (``_Scan``).
 They need not be optimal: E is evaluated for what was found, with integrals rounded upwards. Between two neighbouring T,
 h and, as functions of t / T, k and l are interpolated linearly; because of the products with T, E is then at least its
 linear interpolation minus s (1 - s) (T2 - T1) integral of V |dh| + A |dk| + J |dl|, 0 <= s <= 1. Beyond the largest T
@@ -34,7 +34,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.progress import alive
 
 _CELLS = 8
-"""Cells of a stretch; on each k is linear, l quadratic."""
+"""Cells of a leg; on each k is linear, l quadratic."""
 _TRIAL_TIMES = np.array([0.97, 1.0, 1.03])
 """Durations for which k and l at via points are optimised, relative to the expected ones."""
 _GRID_TIMES = np.array([0.5, 0.75, 0.9, 1.0, 1.1, 1.3, 2.0, 3.0])
@@ -44,7 +44,7 @@ _EXTENSION = 2.0
 _MOST_REFINEMENTS = 6
 """How often durations are added where E may be lower between two of them."""
 _FIRST_SMOOTHING, _LAST_SMOOTHING, _SMOOTHING_FACTOR = 0.05, 3e-5, 0.3
-"""Smoothing of absolute values relative to the mean duration of a stretch: first, last, factor from one to the next."""
+"""Smoothing of absolute values relative to the mean duration of a leg: first, last, factor from one to the next."""
 _WARM_SMOOTHING = 1e-2
 """First smoothing if the multipliers of a similar duration are the start."""
 _MOST_STEPS = 60
@@ -61,7 +61,7 @@ _ROUNDING = 1e-9
 """Bound of the rounding error of E, relative to the sum of its terms."""
 
 _INNER = 3 * _CELLS - 1
-"""Multipliers of a joint inside a stretch: h, k and l between cells, middle Bernstein coefficients of l. After them
+"""Multipliers of a joint inside a leg: h, k and l between cells, middle Bernstein coefficients of l. After them
 come k and l at the start and at the end."""
 _COLUMNS = _INNER + 4
 _K = np.array([_INNER, *range(1, _CELLS), _INNER + 2])
@@ -91,7 +91,7 @@ _PATTERNS = _patterns()
 def floor_s(via_deg: Array, limits: Array, times_s: Array, rests: bool = True) -> float:
     """Lower bound of the time of motions from rest through via angles (n + 1, J), to rest if ``rests``; 0: none.
 
-    ``limits``: (J, 3). ``times_s``: (n,), expected durations of the stretches; they decide how tight the bound is.
+    ``limits``: (J, 3). ``times_s``: (n,), expected durations of the legs; they decide how tight the bound is.
     """
     moves = np.ptp(via_deg, axis=0) > 0.0
     if not moves.any():
@@ -112,7 +112,7 @@ def floor_s(via_deg: Array, limits: Array, times_s: Array, rests: bool = True) -
 
 @dataclass(frozen=True, eq=False)
 class _Cost:
-    """E as a function of the multipliers x (..., J, C), for any stretches and durations.
+    """E as a function of the multipliers x (..., J, C), for any legs and durations.
 
     ``distances``: (..., J); ``times``: (...); ``rows``: (..., J, 6 N, C).
     """
@@ -199,7 +199,7 @@ def _best(distances: Array, limits: Array, times: Array, rests: bool) -> Array:
 
 
 def _gaps(e: Array, smoothing: float) -> Array:
-    """E - y, (n, M), where y is the smoothed minimum of each stretch."""
+    """E - y, (n, M), where y is the smoothed minimum of each leg."""
     above = e - e.min(axis=1, keepdims=True)
     down = np.full((len(e), 1), smoothing)
     for _ in range(30):  # Newton's method from the left on a convex function
@@ -212,7 +212,7 @@ def _gaps(e: Array, smoothing: float) -> Array:
 
 
 def _step(weight: Array, smoothing: float, gradient: Array, curvature: Array, rests: bool) -> Array:
-    """Newton step (n, M, J, C). Multipliers inside stretches and the changes of the weights are eliminated.
+    """Newton step (n, M, J, C). Multipliers inside legs and the changes of the weights are eliminated.
 
     ``weight``: (n, M), of each duration. A banded system of k and l at the via points remains.
     """
@@ -247,28 +247,28 @@ def _step(weight: Array, smoothing: float, gradient: Array, curvature: Array, re
 
 
 def _banded(matrix: Array, right: Array, joints: int, rests: bool) -> Array:
-    """Solve for k and l at both ends of each stretch, (n, J, 4), equal at via points; 0 at an end without rest."""
+    """Solve for k and l at both ends of each leg, (n, J, 4), equal at via points; 0 at an end without rest."""
     from scipy.linalg import solveh_banded  # here: importing it takes longer than most commands
 
     order = np.arange(4 * joints).reshape(joints, 2, 2).swapaxes(0, 1).ravel()  # order: end, joint, k or l
     matrix, right = matrix[:, order][:, :, order], right[:, order]
-    half, stretches = 2 * joints, len(matrix)
-    band, total = np.zeros((2 * half, half * (stretches + 1))), np.zeros(half * (stretches + 1))
+    half, legs = 2 * joints, len(matrix)
+    band, total = np.zeros((2 * half, half * (legs + 1))), np.zeros(half * (legs + 1))
     for row in range(2 * half):
-        total[row : row + half * stretches : half] += right[:, row]
+        total[row : row + half * legs : half] += right[:, row]
         for column in range(row + 1):
-            band[row - column, column : column + half * stretches : half] += matrix[:, row, column]
+            band[row - column, column : column + half * legs : half] += matrix[:, row, column]
     band[0] *= 1.0 + 1e-12
     if not rests:
         band[0, -half:], total[-half:] = 1e30 * band[0].max(), 0.0
-    found = solveh_banded(band, total, lower=True).reshape(stretches + 1, joints, 2)
+    found = solveh_banded(band, total, lower=True).reshape(legs + 1, joints, 2)
     return np.concatenate([found[:-1], found[1:]], axis=-1)
 
 
 class _Scan:
-    """E of each stretch as a function of its duration, with fixed k and l at via points.
+    """E of each leg as a function of its duration, with fixed k and l at via points.
 
-    Sorted rows, one for each stretch and duration: ``stretch``, ``times``, ``e`` (B,), ``x`` (B, J, C).
+    Sorted rows, one for each leg and duration: ``leg``, ``times``, ``e`` (B,), ``x`` (B, J, C).
     """
 
     def __init__(self, distances: Array, limits: Array, times: Array, chosen: Array) -> None:
@@ -277,7 +277,7 @@ class _Scan:
         cost = _Cost.of(distances[:, None], limits, times)
         self._expected = times[:, len(_TRIAL_TIMES) // 2]
         self._least = cost.exact(chosen, cost.arguments(chosen)).min(axis=1)
-        self.stretch = np.empty(0, dtype=np.intp)
+        self.leg = np.empty(0, dtype=np.intp)
         self.times, self.e = np.empty(0), np.empty(0)
         self.x = np.empty((0, *chosen.shape[2:]))
         # The multipliers of a duration that is too short for any motion diverge; those of the longest are used.
@@ -285,47 +285,47 @@ class _Scan:
         chosen = np.where((size > _DIVERGED * size[:, -1:])[..., None, None], chosen[:, -1:], chosen)
         shortest = np.max(np.abs(distances) / limits[:, 0], axis=1) * (1.0 - _ROUNDING)
         scanned = self._expected[:, None] * _GRID_TIMES
-        stretch, column = np.nonzero(scanned > shortest[:, None])
+        leg, column = np.nonzero(scanned > shortest[:, None])
         nearest = np.abs(_GRID_TIMES[:, None] - _TRIAL_TIMES).argmin(axis=1)
         target = self._least + _MARGIN * self._expected
-        self._add(stretch, scanned[stretch, column], chosen[stretch, nearest[column]], target)
-        first = np.searchsorted(self.stretch, np.arange(len(distances)))
+        self._add(leg, scanned[leg, column], chosen[leg, nearest[column]], target)
+        first = np.searchsorted(self.leg, np.arange(len(distances)))
         self._add(
             np.arange(len(distances)), shortest, self.x[first], self._least + _TOLERANCE * self._expected
         )
 
     def floor(self) -> Array:
-        """Proven minimum of E over all durations, by stretch: (n,)."""
+        """Proven minimum of E over all durations, by leg: (n,)."""
         low, last = self._between(), self._after()
         for _ in range(_MOST_REFINEMENTS):
             alive()
-            least = np.minimum(self._least, self._lowest(self.e, self.stretch))
+            least = np.minimum(self._least, self._lowest(self.e, self.leg))
             target = least - _TOLERANCE * self._expected
-            wide = np.flatnonzero(low < target[self.stretch[:-1]])
+            wide = np.flatnonzero(low < target[self.leg[:-1]])
             longer = np.flatnonzero(last < target)
             if not len(wide) and not len(longer):
                 break
-            ends = np.searchsorted(self.stretch, longer, side="right") - 1
-            stretch = np.concatenate([self.stretch[wide], longer])
+            ends = np.searchsorted(self.leg, longer, side="right") - 1
+            leg = np.concatenate([self.leg[wide], longer])
             times = np.concatenate(
                 [0.5 * (self.times[wide] + self.times[wide + 1]), _EXTENSION * self.times[ends]]
             )
             self._add(
-                stretch,
+                leg,
                 times,
                 np.concatenate([0.5 * (self.x[wide] + self.x[wide + 1]), self.x[ends]]),
                 least + _MARGIN * self._expected,
             )
             low, last = self._between(), self._after()
-        return np.minimum(self._lowest(low, self.stretch[:-1]), last)
+        return np.minimum(self._lowest(low, self.leg[:-1]), last)
 
-    def _lowest(self, values: Array, stretch: NDArray[np.intp]) -> Array:
+    def _lowest(self, values: Array, leg: NDArray[np.intp]) -> Array:
         found = np.full(len(self._distances), np.inf)
-        np.minimum.at(found, stretch, values)
+        np.minimum.at(found, leg, values)
         return found
 
     def _between(self) -> Array:
-        """Lower bound of E from each row to the next: (B - 1,), infinite if they are of different stretches."""
+        """Lower bound of E from each row to the next: (B - 1,), infinite if they are of different legs."""
         first, second = self.e[:-1], self.e[1:]
         speed, acceleration, jerk = self._limits.T
         change = np.abs(np.diff(self.x, axis=0))
@@ -344,11 +344,11 @@ class _Scan:
         with np.errstate(all="ignore"):
             s = np.clip(np.nan_to_num(0.5 * (1.0 - (second - first) / sag), nan=0.0), 0.0, 1.0)
         low = np.minimum(np.minimum(first, second), first + s * (second - first) - s * (1.0 - s) * sag)
-        return np.where(np.diff(self.stretch) == 0, low, np.inf)
+        return np.where(np.diff(self.leg) == 0, low, np.inf)
 
     def _after(self) -> Array:
-        """Lower bound of E beyond the largest duration, by stretch: (n,)."""
-        row = np.searchsorted(self.stretch, np.arange(len(self._distances)), side="right") - 1
+        """Lower bound of E beyond the largest duration, by leg: (n,)."""
+        row = np.searchsorted(self.leg, np.arange(len(self._distances)), side="right") - 1
         speed, acceleration, jerk = self._limits.T[:, None, :, None]
         x = np.abs(self.x[row])
         waiting = np.min(speed * x[..., :1] + acceleration * x[..., _K] + jerk * x[..., _L], axis=-1).sum(
@@ -359,13 +359,13 @@ class _Scan:
         ends = (speed * x[..., _K[[0, -1]]] + acceleration * x[..., _L[[0, -1]]]).sum(axis=(-1, -2))
         return np.asarray(np.maximum(waits, self.times[row] - ends * (1.0 + _ROUNDING)))
 
-    def _add(self, stretch: NDArray[np.intp], times: Array, x: Array, target: Array) -> None:
+    def _add(self, leg: NDArray[np.intp], times: Array, x: Array, target: Array) -> None:
         """Add rows; Newton's method raises E from multipliers x up to ``target`` (n,)."""
-        cost = _Cost.of(self._distances[stretch], self._limits, times)
-        x, e = _improved(cost, x, target[stretch])
-        stretch, times = np.concatenate([self.stretch, stretch]), np.concatenate([self.times, times])
-        order = np.lexsort([times, stretch])
-        self.stretch, self.times = stretch[order], times[order]
+        cost = _Cost.of(self._distances[leg], self._limits, times)
+        x, e = _improved(cost, x, target[leg])
+        leg, times = np.concatenate([self.leg, leg]), np.concatenate([self.times, times])
+        order = np.lexsort([times, leg])
+        self.leg, self.times = leg[order], times[order]
         self.x, self.e = np.concatenate([self.x, x])[order], np.concatenate([self.e, e])[order]
 
 

@@ -133,10 +133,10 @@ def resolve(arm: Arm, job: Job) -> Resolved:
 
 def _led(arm: Arm, job: Job, number: int, before_deg: Array, setup: _Setup) -> Array:
     """Where the line to a via point leads to from driven angles (J,): all joints, (joints,) in rad."""
-    from armtempo.planning.line import stretches  # here, because most jobs have no lines
+    from armtempo.planning.line import legs  # here, because most jobs have no lines
 
     found = setup.home.copy()
-    found[setup.driven] = np.radians(stretches.end_deg(arm, job, number, before_deg))
+    found[setup.driven] = np.radians(legs.end_deg(arm, job, number, before_deg))
     return found
 
 

@@ -10,8 +10,8 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics import Geometry, all_frames, forward
 from armtempo.kinematics.chain import outline_mm
 from armtempo.model.arm import Arm
-from armtempo.model.room import FAR_MM, ArmRoom
-from armtempo.planning.room_check import Bodies
+from armtempo.model.workspace import FAR_MM, Workspace
+from armtempo.planning.workspace_check import Bodies
 from armtempo.report.drawing import PAGE_COLOUR
 from armtempo.report.plots import COLOURS, new_figure
 
@@ -111,7 +111,7 @@ def arm_picture(arm: Arm) -> Figure:
 def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) -> None:
     """The home posture; ``seen``: which of x, y, z point to the right and up."""
     _draw(axis, arm, np.array(arm.all_home_deg), np.eye(3)[list(seen)], HOME, size)
-    _draw_room(axis, arm, seen)
+    _draw_workspace(axis, arm, seen)
     _draw_capsules(axis, arm, seen)
     if seen[1] == 2:
         axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
@@ -120,18 +120,18 @@ def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) 
     _frame(axis, title)
 
 
-def _draw_room(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
+def _draw_workspace(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
     """The boxes, and the walls as lines."""
     from matplotlib.patches import Rectangle
 
-    room = arm.room or ArmRoom()
-    for box in room.keep_out:
+    workspace = arm.workspace or Workspace()
+    for box in workspace.keep_out:
         low, high = np.array(box.low_mm)[list(seen)], np.array(box.high_mm)[list(seen)]
         axis.add_patch(Rectangle(tuple(low), *(high - low), color=HIGH, alpha=0.25, zorder=0))
         axis.update_datalim([low, high])
         axis.annotate(box.name, tuple(low), fontsize=7, color=HIGH)
     for place, draw in zip(seen, (axis.axvline, axis.axhline), strict=True):
-        for end in (room.low_mm[place], room.high_mm[place]):
+        for end in (workspace.low_mm[place], workspace.high_mm[place]):
             if abs(end) < FAR_MM:
                 draw(end, color=HIGH, linewidth=1.0, zorder=0)
 

@@ -13,7 +13,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.report import analysis, peaks, replayed, run_reader
-from armtempo.report.run_folder import COMPLETE
+from armtempo.report.run_folder import COMPLETE, transmission
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
 
@@ -51,8 +51,7 @@ class Evaluation:
         """``[joint]``: speed and acceleration next to the limits; empty if the arm is not known."""
         if not self.limits:
             return []
-        counts = [joint.counts_per_deg for joint in self.run.joints]
-        resolutions = [1.0 / per_deg if per_deg else np.nan for per_deg in counts]
+        resolutions = transmission(self.run.joints).count_deg.tolist()
         return peaks.limit_checks(self.curves, self.trajectory, self.limits, resolutions)
 
     @property

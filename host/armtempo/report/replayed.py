@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import why
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.encoding import decode
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.records import decode
+from armtempo.report import run_folder
 from armtempo.report.run_folder import ARM, MOTION
 from armtempo.report.run_reader import RepetitionData, RunData
 from armtempo.splines.trajectory import Trajectory
@@ -36,10 +37,13 @@ def trajectory_of(run: RunData) -> Trajectory:
     """
     path = run.path / MOTION
     try:
-        return decode.trajectory(path.read_bytes(), run.joints, str(run.meta["name"]))
+        return decode.trajectory(
+            path.read_bytes(), run_folder.transmission(run.joints), str(run.meta["name"])
+        )
     except OSError as error:
         raise RunFolderError(
-            f"{run.path}: neither a plan nor {MOTION} can be read ({why(error)}), so the planned motion is not known",
+            f"{run.path}: neither a plan nor {MOTION} can be read ({os_reason(error)}), "
+            "so the planned motion is not known",
             "restore one of them from a copy, or run again",
         ) from error
     except InputError as error:
@@ -58,7 +62,7 @@ class JointResult:
 
     name: str
     steps_sent: int
-    """Step pulses from start to end, signed."""
+    """Step pulses of its motor from start to end, signed."""
     angle_deg: float
     """Final angle from the encoder; without one, from the steps."""
     error_deg: float
@@ -70,24 +74,27 @@ def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
     last = run.entries[-1] if run.entries else None
     steps, counts = (last.commanded_steps, last.counts) if last else ((), ())
     start_deg, end_deg = trajectory(0.0), trajectory(trajectory.duration_s)
-    found = []
-    for joint, scale in enumerate(run.joints[: len(steps)]):
-        angle_deg = steps[joint] / scale.steps_per_deg
-        if scale.counts_per_deg:
-            angle_deg = counts[joint] / scale.counts_per_deg
-        sent = steps[joint] - round(start_deg[joint] * scale.steps_per_deg)
-        found.append(JointResult(scale.name, sent, angle_deg, float(angle_deg - end_deg[joint])))
-    return tuple(found)
+    if len(steps) != len(run.joints):
+        return ()
+    gears = run_folder.transmission(run.joints)
+    angles_deg = np.where(gears.measured, gears.angles_of_counts(counts), gears.angles_of_steps(steps))
+    start_steps = gears.whole_steps(start_deg)
+    return tuple(
+        JointResult(
+            scale.name, steps[joint] - start_steps[joint], float(angle_deg), float(angle_deg - end_deg[joint])
+        )
+        for joint, (scale, angle_deg) in enumerate(zip(run.joints, angles_deg, strict=True))
+    )
 
 
-def is_stretched(repetition: RepetitionData) -> bool:
+def is_scaled(repetition: RepetitionData) -> bool:
     """Whether the speed was ever below 100 %."""
     return bool(np.any(np.abs(repetition.time_s - repetition.path_s) > _EQUAL_S))
 
 
 def path_times(repetition: RepetitionData, times_s: Array) -> Array:
     """The motion's own time (K,) at real times (K,), interpolated and extrapolated linearly."""
-    if len(repetition.time_s) < 2 or not is_stretched(repetition):
+    if len(repetition.time_s) < 2 or not is_scaled(repetition):
         return times_s
     inside = np.interp(times_s, repetition.time_s, repetition.path_s)
     return np.where(times_s > repetition.time_s[-1], repetition.path_s[-1], inside)
@@ -109,7 +116,7 @@ def theory(trajectory: Trajectory, times_s: Array, path_s: Array) -> Array:
 
 def speed_note(repetition: RepetitionData) -> str:
     """Text on the speed of a repetition; "" for the planned speed."""
-    if not is_stretched(repetition):
+    if not is_scaled(repetition):
         return ""
     passed_s = np.diff(repetition.time_s)
     whole = passed_s > _SHORT_S  # the last sample may come shortly after another

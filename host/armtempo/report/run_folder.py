@@ -33,6 +33,7 @@ from armtempo.basics.installation import installed_version
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.link.follow import Gap
 from armtempo.model.arm import Arm
+from armtempo.model.transmission import Transmission
 
 FORMAT = "armtempo run"
 VERSION = 1
@@ -45,16 +46,36 @@ RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrup
 
 @dataclass(frozen=True)
 class JointScale:
-    """Scales of a joint's steps and counts; ``counts_per_deg`` 0: no encoder."""
+    """Scales of the steps and counts of a joint's motor; ``counts_per_deg`` 0: no encoder."""
 
     name: str
     steps_per_deg: float
     counts_per_deg: float
+    coupling: tuple[float, ...] = ()
+    """Of a motor that other joints turn too: its angle by those of all joints."""
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The entry of run.json."""
+        return {name: value for name, value in vars(self).items() if name != "coupling" or value}
 
 
 def scales(arm: Arm) -> tuple[JointScale, ...]:
     """The scales of an arm's driven joints."""
-    return tuple(JointScale(joint.name, joint.steps_per_deg, joint.counts_per_deg) for joint in arm.driven)
+    rows = arm.coupling or [()] * len(arm.driven)
+    return tuple(
+        JointScale(joint.name, joint.motor.steps_per_deg, joint.counts_per_deg, tuple(row))
+        for joint, row in zip(arm.driven, rows, strict=True)
+    )
+
+
+def transmission(joints: Sequence[JointScale]) -> Transmission:
+    """From the joints' angles to steps and counts, and back."""
+    return Transmission(
+        tuple(joint.steps_per_deg for joint in joints),
+        tuple(joint.counts_per_deg for joint in joints),
+        tuple(joint.coupling for joint in joints) if any(joint.coupling for joint in joints) else (),
+    )
 
 
 def columns(joints: Sequence[JointScale]) -> dict[str, str]:
@@ -65,16 +86,23 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
         "time_s": "the same in seconds",
         "path_s": "the motion's own time in seconds: behind the clock where the speed was below 100 %",
     }
-    for number, joint in enumerate(joints, start=1):
+    measured = transmission(joints).measured
+    for number, (joint, seen) in enumerate(zip(joints, measured, strict=True), start=1):
+        same = (
+            "angle of the joint by the steps of all motors"
+            if joint.coupling
+            else "the same in degrees of the joint"
+        )
+        of_motor = "of its motor" if joint.coupling else ""
         found |= {
-            f"j{number}_commanded_steps": f"{joint.name}: step pulses made, signed",
-            f"j{number}_commanded_deg": f"{joint.name}: the same in degrees of the joint",
+            f"j{number}_commanded_steps": f"{joint.name}: step pulses made{of_motor and ' ' + of_motor}, signed",
+            f"j{number}_commanded_deg": f"{joint.name}: {same}",
         }
         if joint.counts_per_deg:
-            found |= {
-                f"j{number}_counts": f"{joint.name}: encoder counts",
-                f"j{number}_angle_deg": f"{joint.name}: the same in degrees of the joint",
-            }
+            found[f"j{number}_counts"] = f"{joint.name}: encoder counts{of_motor and ' ' + of_motor}"
+        if seen:
+            same = same.replace("steps of all motors", "encoders of all motors")
+            found[f"j{number}_angle_deg"] = f"{joint.name}: {same}"
     return found
 
 
@@ -82,12 +110,15 @@ def row(sample: Sample, joints: Sequence[JointScale]) -> list[str]:
     """One line of a sample file."""
     cells = [str(sample.index), str(sample.ticks), f"{sample.ticks / limits.TICK_HZ:.9f}"]
     cells.append(f"{sample.path_ticks / limits.TICK_HZ:.9f}")
-    for joint, steps, counts in zip(
-        joints, sample.positions.commanded_steps, sample.positions.counts, strict=True
-    ):
-        cells += [str(steps), f"{steps / joint.steps_per_deg:.6f}"]
+    gears, positions = transmission(joints), sample.positions
+    commanded_deg = gears.angles_of_steps(positions.commanded_steps)
+    measured_deg = gears.angles_of_counts(positions.counts)
+    for number, joint in enumerate(joints):
+        cells += [str(positions.commanded_steps[number]), f"{commanded_deg[number]:.6f}"]
         if joint.counts_per_deg:
-            cells += [str(counts), f"{counts / joint.counts_per_deg:.6f}"]
+            cells.append(str(positions.counts[number]))
+        if gears.measured[number]:
+            cells.append(f"{measured_deg[number]:.6f}")
     return cells
 
 
@@ -132,7 +163,7 @@ class RunFolder:
             "format": FORMAT,
             "version": VERSION,
             **written_head(self.name, self.started),
-            "joints": [vars(joint) for joint in self.joints],
+            "joints": [joint.values for joint in self.joints],
             "columns": columns(self.joints),
             **self.origin,
             "repetitions": [vars(repetition) for repetition in self.repetitions],

@@ -16,7 +16,8 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import RunFolderError
 from armtempo.basics.text import visible
 from armtempo.link.follow import Gap
-from armtempo.report.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition
+from armtempo.model.transmission import coupling_problem
+from armtempo.report.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition, transmission
 from armtempo.report.sequence_folder import FORMAT as SEQUENCE_FORMAT
 
 RESTORE = "restore the folder from a copy, or run again"
@@ -129,12 +130,18 @@ def wrong(where: Path, error: Exception) -> RunFolderError:
 
 def scales(meta: Mapping[str, Any]) -> tuple[JointScale, ...]:
     """The joints' scales in run.json; raises LookupError, TypeError or ValueError if they are wrong."""
-    return tuple(map(_scale, meta["joints"]))
+    found = tuple(map(_scale, meta["joints"]))
+    coupling = tuple(joint.coupling for joint in found if joint.coupling)
+    problem = coupling_problem(coupling, [joint.name for joint in found]) if coupling else None
+    if problem:
+        raise ValueError(problem[0])
+    return found
 
 
 def _scale(joint: Mapping[str, Any]) -> JointScale:
     name = visible(str(joint["name"]))
-    found = JointScale(name, finite(joint["steps_per_deg"]), finite(joint["counts_per_deg"]))
+    row = tuple(map(finite, joint.get("coupling", ())))
+    found = JointScale(name, finite(joint["steps_per_deg"]), finite(joint["counts_per_deg"]), row)
     if not found.steps_per_deg:
         raise ValueError("steps_per_deg is 0")
     return found
@@ -202,8 +209,8 @@ def parsed(
         return np.array(cells).reshape(len(joints), len(rows)).T
 
     angle_deg = np.full((len(rows), len(joints)), np.nan)
-    for number, joint in enumerate(joints):
-        if joint.counts_per_deg:
+    for number, seen in enumerate(transmission(joints).measured):
+        if seen:
             angle_deg[:, number] = column(f"j{number + 1}_angle_deg", _LARGEST)
     return RepetitionData(
         path.name,

@@ -77,7 +77,7 @@ def _of_arm(arm: Arm, trajectory: Trajectory) -> dict[str, tuple[Figure, str]]:
         drawn["torque"] = (
             plots.torque(torques, torque.ENOUGH),
             f"Torque that each motor holds of what the plan needs. {least.joint} has the least to spare: "
-            f"{least.words}. Below 1 steps are lost, from {torque.ENOUGH:g} on it is prudent (dashed).",
+            f"{least.description}. Below 1 steps are lost, from {torque.ENOUGH:g} on it is prudent (dashed).",
         )
     if len(arm.joints) > 1:
         times = np.linspace(0.0, trajectory.duration_s, _PATH_POINTS)

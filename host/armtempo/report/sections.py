@@ -10,6 +10,7 @@ from armtempo.model.plan import Plan
 from armtempo.planning import checks, path_deviation
 from armtempo.report import analysis, html_page, peaks, verdict
 from armtempo.report.evaluation import Evaluation
+from armtempo.report.run_folder import transmission
 
 _MEASURED = {
     "joint": "",
@@ -23,9 +24,9 @@ _MEASURED = {
 }
 _STEPS = {
     "joint": "",
-    "steps planned": "step pulses from the start of the motion to its end; negative: downwards",
+    "steps planned": "step pulses of its motor from the start of the motion to its end; negative: downwards",
     "steps made": "what the board counted in the last repetition",
-    "one step (°)": "what one step turns the joint by",
+    "one step (°)": "what one step turns the joint by; a coupled joint: one step of each of its motors",
     "command off plan (°)": "largest difference of the commanded from the planned angle at a sample: half a step is "
     "rounding",
 }
@@ -50,7 +51,7 @@ _COLOURS = {
 _EXTREMES = {
     "joint": "",
     "motion time (s)": "when the joint arrives",
-    "floor (s)": "no motion of this joint along its path keeps the limits in less time",
+    "at least (s)": "no motion of this joint along its path keeps the limits in less time",
     "speed (°/s)": "the largest magnitude in the plan, exact, of what the arm file allows",
     "acceleration (°/s²)": "the same",
     "jerk (°/s³)": "the same",
@@ -100,9 +101,10 @@ def _measured(sheet: html_page.Page, found: Evaluation) -> None:
 def _steps(sheet: html_page.Page, found: Evaluation) -> None:
     start, end = verdict.planned_steps(found)
     made = found.last.commanded_steps[-1] - start
+    step_deg = transmission(found.run.joints).step_deg
     off = np.abs(found.last.commanded_deg - found.trajectory(found.last.path_s)).max(axis=0)
     rows = [
-        [joint.name, str(end[n] - start[n]), str(made[n]), f"{1 / joint.steps_per_deg:.4f}", f"{off[n]:.4f}"]
+        [joint.name, str(end[n] - start[n]), str(made[n]), f"{step_deg[n]:.4f}", f"{off[n]:.4f}"]
         for n, joint in enumerate(found.run.joints)
     ]
     sheet.table(tuple(_STEPS), rows, "Step pulses", _STEPS)

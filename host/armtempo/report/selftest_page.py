@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from armtempo.basics.atomic_file import replace_text, why
+from armtempo.basics.atomic_file import os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.diagnosis.finding import Level
 from armtempo.diagnosis.selftest.pulse_part import CYCLES_PER_US, PULSES, SAFETY
@@ -30,7 +30,7 @@ def check_free(folder: Path, force: bool) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {why(error)}", "choose another place") from None
+        raise InputError(f"{folder}: cannot be made: {os_reason(error)}", "choose another place") from None
 
 
 def write(found: SelfTest, folder: Path) -> None:

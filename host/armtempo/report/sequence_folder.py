@@ -112,7 +112,7 @@ class SequenceFolder:
             **run_folder.written_head(self.name, self.started),
             "state": self.state,
             "ended": self.ended,
-            "joints": [vars(joint) for joint in self.joints],
+            "joints": [joint.values for joint in self.joints],
             "rows": [
                 {"step": step, "motion": motion, "words": words}
                 for step, motion, words in zip(self.steps, self.motions, self.words, strict=True)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.basics.text import visible
-from armtempo.records import decode
+from armtempo.encoding import decode
 from armtempo.report import run_reader
-from armtempo.report.run_folder import JointScale
+from armtempo.report.run_folder import JointScale, transmission
 from armtempo.report.run_reader import RESTORE, RepetitionData
 from armtempo.report.sequence_folder import FORMAT, ROWS, SAMPLES, VERSION, leg_file
 from armtempo.splines.trajectory import Trajectory
@@ -116,7 +116,9 @@ class SequenceRun:
         for number in range(1, count + 1):
             path = self.path / leg_file(number)
             try:
-                found.append(decode.trajectory(path.read_bytes(), self.joints, f"motion {number}"))
+                found.append(
+                    decode.trajectory(path.read_bytes(), transmission(self.joints), f"motion {number}")
+                )
             except OSError as error:
                 raise RunFolderError(f"{path}: cannot be read: {error.strerror}", RESTORE) from error
             except ArmtempoError as error:

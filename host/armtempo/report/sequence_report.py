@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import replace_text
+from armtempo.model.steps import position, whole_cycles
 from armtempo.report import html_page
+from armtempo.report.run_folder import transmission
 from armtempo.report.run_report import PAGE
 from armtempo.report.sequence_reader import SequenceRun
 from armtempo.report.verdict import BAD, GOOD, OPEN, STEPS_OFF, Verdict, VerdictItem
@@ -71,8 +73,7 @@ def _results(found: SequenceRun) -> Iterator[LegResult]:
 def _leg(found: SequenceRun, number: int, chosen: NDArray[np.int64]) -> LegResult:
     samples, leg = found.samples, found.legs[number - 1]
     planned = leg(np.minimum(samples.path_s[chosen], leg.duration_s))
-    steps_per_deg = np.array([joint.steps_per_deg for joint in found.joints])
-    command = np.abs(samples.commanded_deg[chosen] - planned) * steps_per_deg
+    command = np.abs(transmission(found.joints).steps(samples.commanded_deg[chosen] - planned))
     measured = np.abs(samples.angle_deg[chosen] - planned)
     runs = found.run[chosen]
     at_end = samples.path_s[chosen] >= leg.duration_s - END_S
@@ -141,9 +142,9 @@ def render(found: SequenceRun) -> str:
 
 def _ending(found: SequenceRun) -> VerdictItem:
     ended = found.meta.get("ended") or {}
-    where = f"in step {ended['step']} after {ended['cycle']} whole cycles" if ended else _last(found)
+    where = f"in {position(ended['step'], ended['cycle'])}" if ended else _last(found)
     if found.state == "finished":
-        return VerdictItem(GOOD, f"finished after {ended['cycle']} whole cycles")
+        return VerdictItem(GOOD, f"finished after {whole_cycles(ended['cycle'])}")
     if found.state == "stopped":
         return VerdictItem(OPEN, f"stopped {where}")
     code = f" ({ended['code']})" if ended.get("code") else ""
@@ -154,7 +155,7 @@ def _last(found: SequenceRun) -> str:
     last = found.last
     if last is None:
         return "before its first row was reported"
-    return f"after row {last.row} ({last.words}), step {last.step}, {last.cycle} whole cycles, was reported"
+    return f"after row {last.row} ({last.words}), {position(last.step, last.cycle)}, was reported"
 
 
 def _losses(found: SequenceRun, legs: tuple[LegResult, ...]) -> Iterator[VerdictItem]:
@@ -202,9 +203,9 @@ def _rows(found: SequenceRun, leg: LegResult) -> Iterator[list[object]]:
 def _course(found: SequenceRun) -> Iterator[tuple[str, str]]:
     ended = found.meta.get("ended") or {}
     yield "ended", found.state
-    for key in ("step", "cycle"):
-        if key in ended:
-            yield key, str(ended[key])
+    if ended:
+        yield "last step", str(ended["step"])
+        yield "whole cycles", str(ended["cycle"])
     for name, value in (ended.get("counters") or {}).items():
         yield f"counter {name}", str(value)
     yield "reported rows", str(found.last.passed if found.last else 0)

@@ -28,7 +28,7 @@ _HEAD = (
 _WIDTHS = (12, 8, 10, 16, 16, 17)
 _RESULT_WIDTHS = (11, 11, 12, 12)
 _BOUNDS = {
-    "rests": "from turn to turn of a joint under its speed, acceleration and jerk limits",
+    "rests": "of one joint between its reversals, under its speed, acceleration and jerk limits",
     "path": "along the path under the speed, acceleration and jerk limits of all its joints",
     "together": "through the via points under the speed, acceleration and jerk limits of all joints, whatever the path",
     "vias": "through the via angles of a joint under its speed, acceleration and jerk limits, whatever the path",
@@ -66,7 +66,7 @@ def _details(plan: Plan) -> list[str]:
         *(_polished(search) for search in plan.searches if search.optimum_s),
         *(_started(search) for search in plan.searches if len(search.starts_s)),
         f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes",
-        checks.rate_words(checks.step_rates(plan.arm, plan.extremes)),
+        checks.format_rate(checks.step_rates(plan.arm, plan.extremes)),
     ]
 
 
@@ -78,7 +78,7 @@ def torque_lines(motions: Iterable[tuple[Arm, Trajectory]]) -> list[str]:
     least = min(found)
     level = "warning" if least.margin < torque.ENOUGH else "torque"
     prudent = f"; {torque.ENOUGH:g} is prudent" if least.margin < torque.ENOUGH else ""
-    return [f"{level}: {least.joint} has the least to spare: {least.words}{prudent}"]
+    return [f"{level}: {least.joint} has the least to spare: {least.description}{prudent}"]
 
 
 def result_lines(results: Iterable[JointResult]) -> list[str]:
@@ -113,7 +113,7 @@ def _settings(plan: Plan, verbose: bool) -> list[str]:
     job, first = plan.job, plan.trajectory.joints[0]
     auto = " (auto)" if job.refine == AUTO else ""
     pieces = len(first.angle_points_deg) - first.degree
-    if checks.has_stretches(job):
+    if checks.planner_of(job) == "line":
         path = "tool led" if checks.leads_tool(job) else "with stops"
         more = [f"{pieces} pieces", f"refine {first.refine}{auto}"]
     elif checks.is_free(job):
@@ -152,14 +152,14 @@ def _polished(search: Search) -> str:
     joints = ", ".join(str(joint + 1) for joint in search.joints)
     return (
         f"polished, driven joint {joints}: {search.searched_s:.4f} s to {search.total_s:.4f} s, "
-        f"within {gap:.1e} of the best nearby with {len(search.intervals_s)} variables"
+        f"{100 * gap:.2g} % above the local optimum of its {len(search.intervals_s)} variables"
     )
 
 
 def _faster(plan: Plan) -> list[str]:
     """What a free path, or stopping at every via point, would take, if the spline through them loses much to either."""
     job, total_s = plan.job, plan.total_s
-    if job.path != "through" or checks.has_stretches(job):
+    if job.path != "through" or checks.planner_of(job) == "line":
         return []
     limits = [joint.limits for joint in plan.arm.driven]
     others = {
@@ -189,7 +189,7 @@ def _free_s(plan: Plan) -> float:
 def _separation(plan: Plan) -> list[str]:
     """For per-joint timing: differences of the joints' times at the via points, and the tool's deviation."""
     spread = ", ".join(f"{value:.2f}" for value in path_deviation.via_spread_s(plan.trajectory))
-    apart = f"joints pass the via points apart by {spread} s"
+    apart = f"time from the first to the last joint at each via point: {spread} s"
     if checks.is_free(plan.job):
         return [apart]
     stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)

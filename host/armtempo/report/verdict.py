@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armtempo.report import peaks, replayed
 from armtempo.report.evaluation import Evaluation
-from armtempo.report.run_folder import COMPLETE
+from armtempo.report.run_folder import COMPLETE, transmission
 
 GOOD, BAD, OPEN = "good", "bad", "open"
 """States of a finding: as it should be, not so, undecided by what was recorded."""
@@ -102,9 +102,8 @@ def _steps(found: Evaluation) -> Iterator[VerdictItem]:
 
 def planned_steps(found: Evaluation) -> NDArray[np.int64]:
     """Steps (2, J) at the motion's start and end."""
-    scale = np.array([joint.steps_per_deg for joint in found.run.joints])
     ends = np.stack([found.trajectory(0.0), found.trajectory(found.trajectory.duration_s)])
-    return np.asarray(np.rint(ends * scale), dtype=np.int64)
+    return np.asarray(np.rint(transmission(found.run.joints).steps(ends)), dtype=np.int64)
 
 
 def _commanded(found: Evaluation) -> Iterator[VerdictItem]:

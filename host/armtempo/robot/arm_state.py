@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from armtempo_shared import armrecord, wire
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
+from armtempo.encoding import encode, engine_heap
+from armtempo.encoding.engine_heap import EngineHeap
 from armtempo.link import Client
+from armtempo.link.board_messages import Status
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.records import encode
-from armtempo.robot import engine_room
 
 _WORDS = {
     "channel": "motor channel",
@@ -55,7 +56,7 @@ def configure(client: Client, arm: Arm, replace: bool) -> None:
         raise _other_arm(arm, client.fetch(wire.ARM_RECORD_NAME), data)
     if arm.outputs or arm.inputs:
         client.need("outputs", f"the outputs and inputs of arm {arm.name!r}")
-    engine_room.check(arm, client.info)
+    engine_heap.check(arm, EngineHeap(client.info.engine_bytes))
     client.upload(wire.ARM_RECORD_NAME, data)
     client.hello()
 
@@ -74,18 +75,34 @@ def home(client: Client, arm: Arm, angles_deg: ArrayLike | None = None) -> None:
     Raises InputError for a posture that does not fit the arm, BoardError during a motion.
     """
     posture = point_to_point.posture(arm.home_deg if angles_deg is None else angles_deg, arm)
-    client.home([round(steps) for steps in posture * _steps_per_deg(arm)])
+    client.home(arm.transmission.whole_steps(posture))
 
 
 def home_unknown(client: Client, arm: Arm) -> None:
     """Declare that every joint whose position is unknown is at home."""
     status = client.status()
-    steps = [
-        None if status.joint_known(index) else round(joint.home_deg * joint.steps_per_deg)
-        for index, joint in enumerate(arm.driven)
-    ]
-    if any(value is not None for value in steps):
-        client.home(steps)
+    known = known_joints(status, arm)
+    if all(known):
+        return
+    _declare_home(client, arm, ~np.array(known))
+
+
+def home_joint(client: Client, arm: Arm, joint: int) -> None:
+    """Declare that a joint, from 0, and those that are coupled with it are at home; the others stay as they are."""
+    _declare_home(client, arm, np.isin(np.arange(len(arm.driven)), arm.transmission.group(joint)))
+
+
+def _declare_home(client: Client, arm: Arm, chosen: NDArray[np.bool_]) -> None:
+    """Declare that joints, (J,), are at home, by all motors that turn them."""
+    here = arm.transmission.angles_of_steps(client.status().positions.commanded_steps)
+    wanted = arm.transmission.whole_steps(np.where(chosen, arm.home_deg, here))
+    turned = (arm.transmission.matrix != 0.0) @ chosen
+    client.home([steps if moved else None for steps, moved in zip(wanted, turned, strict=True)])
+
+
+def known_joints(status: Status, arm: Arm) -> list[bool]:
+    """Whether the position of each driven joint is known: that of every motor that turns it."""
+    return arm.transmission.known(status.joint_known(motor) for motor in range(len(arm.driven)))
 
 
 def posture_deg(client: Client, arm: Arm) -> Array:
@@ -94,26 +111,40 @@ def posture_deg(client: Client, arm: Arm) -> Array:
     Raises LinkError if a position is unknown.
     """
     status = client.status()
-    unknown = [joint.name for index, joint in enumerate(arm.driven) if not status.joint_known(index)]
+    known = known_joints(status, arm)
+    unknown = [joint.name for joint, is_known in zip(arm.driven, known, strict=True) if not is_known]
     if unknown:
         raise LinkError(
             f"the position of {', '.join(unknown)} is unknown",
             "move the arm to its home posture and run 'armtempo home'",
         )
-    angles = np.array(status.positions.commanded_steps, dtype=float) / _steps_per_deg(arm)
+    return angles_deg(status, arm)
+
+
+def angles_deg(status: Status, arm: Arm) -> Array:
+    """Joint angles by the motors' steps, (J,), as ``posture_deg``; also of joints whose position is unknown."""
+    steps = status.positions.commanded_steps
     # the end of a range may lie between two steps
+    if arm.coupling:
+        return _coupled_angles_deg(steps, arm)
+    angles = arm.transmission.angles_of_steps(steps)
     return np.array(
         [joint.placed(angle, _HALF_STEP) for joint, angle in zip(arm.driven, angles, strict=True)]
     )
 
 
 def is_at(client: Client, arm: Arm, target_deg: Array) -> bool:
-    """Whether every joint is within half a step of ``target_deg`` (J,); raises LinkError if a position is unknown."""
-    return bool(np.all(np.abs(posture_deg(client, arm) - target_deg) * _steps_per_deg(arm) <= 0.5))
+    """Whether every motor is within half a step of ``target_deg`` (J,); raises LinkError if a position is unknown."""
+    return bool(np.all(np.abs(arm.transmission.steps(posture_deg(client, arm) - target_deg)) <= 0.5))
 
 
-def _steps_per_deg(arm: Arm) -> Array:
-    return np.array([joint.steps_per_deg for joint in arm.driven])
+def _coupled_angles_deg(steps: tuple[int, ...], arm: Arm) -> Array:
+    """The joints' angles within their ranges, unless the motors say that they are beyond them by more than rounding."""
+    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    found = arm.transmission.within(steps, low, high)
+    if np.all(np.abs(arm.transmission.steps(found) - steps) <= _HALF_STEP):
+        return found
+    return arm.transmission.angles_of_steps(steps)
 
 
 def difference(old: bytes, new: bytes) -> str:
@@ -125,9 +156,9 @@ def difference(old: bytes, new: bytes) -> str:
         return "the board's record is of another version"
     if len(old_joints) != len(new_joints):
         return f"it has {len(new_joints)} driven joints, the board's arm {len(old_joints)}"
-    found = [_words(old_head, new_head)]
+    found = [_describe_change(old_head, new_head)]
     for number, rows in enumerate(zip(old_joints, new_joints, strict=True), 1):
-        words = _words(*rows)
+        words = _describe_change(*rows)
         found.append(f"joint {number}: {words}" if words else "")
     found += [
         what for what, (before, after) in zip(("outputs", "inputs"), wiring, strict=True) if before != after
@@ -145,5 +176,5 @@ def consequence(old: bytes, new: bytes) -> str:
     return _KEEPS if same else _LOSES
 
 
-def _words(old: dict[str, int], new: dict[str, int]) -> str:
+def _describe_change(old: dict[str, int], new: dict[str, int]) -> str:
     return ", ".join(dict.fromkeys(_WORDS.get(key, key) for key in old if old[key] != new[key]))

@@ -26,13 +26,13 @@ class JointState:
     known: bool
     """Whether the position is known."""
     steps: int
-    """Steps commanded."""
+    """Steps commanded, of its own motor."""
     angle_deg: float | None
-    """The commanded steps in degrees; None if the arm is not known."""
+    """The commanded angle; None if the arm is not known."""
     counts: int
-    """Encoder counts; 0 without an encoder."""
+    """Encoder counts; 0 without an encoder. Of a coupled joint: of its own motor."""
     encoder_deg: float | None
-    """The encoder counts in degrees; None without an encoder, or if the arm is not known."""
+    """The angle by the encoders; None without one, or if the arm is not known."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class BoardState:
     """Highest step rate of all joints together, steps/s."""
     rates_measured: bool
     """Whether the step rates were measured by its self-test; otherwise they are estimates."""
-    room: str
+    engine_memory: str
     """Text: which arms fit into its memory."""
     arm_problem: str
     """Why a stored arm record is not used; "" if it is used, or there is none."""
@@ -130,14 +130,19 @@ class BoardState:
         """The state in degrees and with the joints' names, if the board is set up for ``arm``; else unchanged."""
         if arm is None or self.arm or record_crc(arm) != self.arm_crc:
             return self
+        gears = arm.transmission
+        known = gears.known(joint.known for joint in self.joints)
+        angles = gears.angles_of_steps([joint.steps for joint in self.joints]).tolist()
+        measured = gears.angles_of_counts([joint.counts for joint in self.joints]).tolist()
         joints = tuple(
             replace(
                 joint,
                 name=driven.name,
-                angle_deg=joint.steps / driven.steps_per_deg,
-                encoder_deg=joint.counts / driven.counts_per_deg if driven.encoder else None,
+                known=known[number],
+                angle_deg=angles[number],
+                encoder_deg=measured[number] if gears.measured[number] else None,
             )
-            for joint, driven in zip(self.joints, arm.driven, strict=True)
+            for number, (joint, driven) in enumerate(zip(self.joints, arm.driven, strict=True))
         )
         tool = _tool(arm, joints) if all(joint.known for joint in joints) else None
         return replace(self, arm=arm.name, arm_source=arm.source, joints=joints, tool=tool)
@@ -155,8 +160,8 @@ def _tool(arm: Arm, joints: tuple[JointState, ...]) -> ToolPlace:
 
 def read(client: Client, port: str) -> BoardState:
     """The board's present state, in steps and counts."""
+    from armtempo.encoding.engine_heap import EngineHeap
     from armtempo.link.program_version import own_crc
-    from armtempo.robot import engine_room
     from armtempo.robot.stored_motion import fault_name
 
     info, status = client.info, client.status()
@@ -176,7 +181,7 @@ def read(client: Client, port: str) -> BoardState:
         max_rate=info.max_rate,
         max_rate_sum=info.max_rate_sum,
         rates_measured=info.rates_measured,
-        room=engine_room.Room.of_board(info).words(),
+        engine_memory=EngineHeap(info.engine_bytes).describe(),
         arm_problem=_arm_problem(info),
         state=status.state,
         moving=status.moving,
@@ -220,6 +225,6 @@ def record_crc(arm: Arm) -> int:
     """The checksum by which a board identifies an arm."""
     from armtempo_shared import wire
 
-    from armtempo.records import encode
+    from armtempo.encoding import encode
 
     return int(wire.record_crc(encode.arm_record(arm)))

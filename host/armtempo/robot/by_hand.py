@@ -6,7 +6,6 @@ import time
 from types import TracebackType
 from typing import Self
 
-import numpy as np
 from armtempo_shared.meanings import BUTTON_NOTICE
 
 from armtempo.basics.arrays import Array
@@ -54,8 +53,7 @@ class HandGuided:
 
     def angles_deg(self) -> Array:
         """Joint angles from the encoders, degrees (J,)."""
-        counts = np.array(self._client.status().positions.counts, dtype=float)
-        return np.asarray(counts / [joint.counts_per_deg for joint in self._arm.driven])
+        return self._arm.transmission.angles_of_counts(self._client.status().positions.counts)
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
@@ -63,10 +61,9 @@ class HandGuided:
         """Switch the current on and declare the position; raises LinkError if a joint is outside its range."""
         self._client.drivers(True)
         time.sleep(SETTLES_S)
-        scale = np.array([joint.steps_per_deg for joint in self._arm.driven])
         angles = self.angles_deg()
         try:
-            self._client.home([round(steps) for steps in angles * scale])
+            self._client.home(self._arm.transmission.whole_steps(angles))
         except BoardError as error:
             if value is None:
                 raise LinkError(

@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
+from armtempo.encoding import encoded_motion
+from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.planning import point_to_point, room_check, via_points
+from armtempo.planning import point_to_point, via_points, workspace_check
 from armtempo.ports.names import is_sim
-from armtempo.records import encoded_motion
-from armtempo.records.encoded_motion import EncodedMotion, MotionKey
 from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import SampleSink, put_once, raise_fault, replay
@@ -55,7 +55,7 @@ def go_to(
     """Move straight to a posture (J,); does nothing if the arm is there.
 
     Raises LinkError if the position is unknown, BoardError if the board refuses or a fault ends the move,
-    PlanError if the arm would leave its room, or the tool cannot reach it in a straight line.
+    PlanError if the arm would leave its workspace, or the tool cannot reach it in a straight line.
     """
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
@@ -67,8 +67,8 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
     """The motion from one posture (J,) to another; errors as in ``go_to``."""
     if not pace.line:
         found = point_to_point.straight(_NAME, here_deg, target_deg, arm, pace.speed)
-        room_check.tell_start(arm, here_deg)
-        room_check.check(arm, found, outwards=True)
+        workspace_check.tell_start(arm, here_deg)
+        workspace_check.check(arm, found, outwards=True)
         return found
     from armtempo.planning import planner  # imported here, because it loads everything that plans
 

@@ -3,24 +3,31 @@
 The board accepts these motions while a joint's position is unknown: it assumes that the joint is at the
 motion's start, and marks the position as unknown again at the end, until it is declared. A switch that trips
 ends the motion of all its joints; the others continue in another motion.
+
+Coupled joints are homed one after the other: each moves alone, by all motors that turn it. The positions of these
+motors are declared, and the joints move home, when the angles of all coupled joints are known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
-from armtempo_shared.messages import START_HOMING
+import numpy as np
+from armtempo_shared.messages import START_HOMING, START_SWITCHES_BIT
 
 from armtempo.basics.errors import InputError, LinkError
+from armtempo.encoding import encoded_motion
 from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.planning import point_to_point
-from armtempo.records import encoded_motion
+from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import put_once, raise_fault, replay
 
+HomingProgress = Callable[[str, int, int], object]
+"""Called with what happens now or was seen, by joint; how many joints are at home, and how many are homed."""
 FAST, SLOW = 0.2, 0.04
 """Fractions of the joint's limits in the first and in the second approach."""
 BACK_DEG = 3.0
@@ -51,20 +58,62 @@ class _Switch:
         return max(0.0, self.side * (self.trip_deg - self.edge_deg))
 
 
-def home_to_switches(client: Client, arm: Arm, stop: StopRequest) -> None:
+def silent(text: str, done: int, whole: int) -> None:
+    """Nobody is told."""
+
+
+def home_to_switches(
+    client: Client,
+    arm: Arm,
+    stop: StopRequest,
+    joint: int | None = None,
+    progress: HomingProgress = silent,
+) -> None:
     """Home every joint that has a switch of known angle, in the order of ``arm.homing``; the others do not move.
 
-    Ends at the home posture. Raises InputError if no joint has such a switch, LinkError if a switch does not
-    trip, BoardError if the board refuses or a fault ends it, Stopped after a stop request.
+    ``joint``: only this one, from 0, and those that are coupled with it. Ends at the home posture. Raises InputError
+    if no joint has such a switch, LinkError if a switch does not trip, BoardError if the board refuses or a fault
+    ends it, Stopped after a stop request.
     """
-    groups = _groups(arm)
+    wanted = range(len(arm.driven)) if joint is None else arm.transmission.group(joint)
+    groups = [{index: group[index] for index in group if index in wanted} for group in _groups(arm)]
+    groups = [group for group in groups if group]
+    _check_coupled(arm, {index for group in groups for index in group})
     if not groups:
+        of = f"arm {arm.name!r}" if joint is None else arm.driven[joint].name
         raise InputError(
-            f"arm {arm.name!r} has no limit switch whose angle is known",
+            f"{of} has no limit switch whose angle is known",
             "give low_deg or high_deg in a joint's [switches], or home by hand",
         )
+    told = _Told(progress, sum(map(len, groups)))
+    found_deg: dict[int, float] = {}
     for group in groups:
-        _GroupHoming(client, arm, stop, group).run()
+        _GroupHoming(client, arm, stop, group, found_deg, told).run()
+
+
+class _Told:
+    """Counts the joints that are at home for the progress."""
+
+    def __init__(self, progress: HomingProgress, whole: int) -> None:
+        self._progress, self._whole, self._done = progress, whole, 0
+
+    def __call__(self, text: str, home: int = 0) -> None:
+        """What happens; ``home``: how many more joints are at home."""
+        self._done += home
+        self._progress(text, self._done, self._whole)
+
+
+def _check_coupled(arm: Arm, fitted: set[int]) -> None:
+    """Raise InputError if only some of the joints that are coupled can be homed."""
+    for group in arm.transmission.groups:
+        missing = [arm.driven[index].name for index in group if index not in fitted]
+        if missing and len(missing) < len(group):
+            others = ", ".join(arm.driven[index].name for index in group if index in fitted)
+            raise InputError(
+                f"{', '.join(missing)}: no limit switch whose angle is known, but coupled with {others}: their motors' "
+                "positions follow only from the angles of all of them",
+                "give each of them a switch with low_deg or high_deg, or home by hand",
+            )
 
 
 def _groups(arm: Arm) -> list[dict[int, _Switch]]:
@@ -95,6 +144,9 @@ class _GroupHoming:
     arm: Arm
     stop: StopRequest
     switches: dict[int, _Switch]
+    found_deg: dict[int, float]
+    """Angles of joints that are found, but not declared: their motors turn other joints too."""
+    told: _Told
 
     def run(self) -> None:
         """Make both approaches, back off, declare the positions, and move the joints home."""
@@ -102,12 +154,22 @@ class _GroupHoming:
             index: abs(switch.far_deg - switch.edge_deg) + switch.outside_deg + MARGIN_DEG
             for index, switch in self.switches.items()
         }
-        self._approach(whole, FAST)
+        self.told(f"{self._names(whole)}: on the way to the switch")
+        gone_deg = self._approach(whole, FAST)
+        for index, way_deg in gone_deg.items():
+            self.told(f"{self._names([index])}: switch seen after {way_deg:.1f}°; once more, slowly")
         self._approach_again()
         away_deg = {index: BACK_DEG + switch.outside_deg for index, switch in self.switches.items()}
         self._leave(away_deg)
-        self._declare(away_deg)
-        self._go_home()
+        for index, way_deg in away_deg.items():
+            switch = self.switches[index]
+            self.found_deg[index] = switch.trip_deg - switch.side * way_deg
+        coupled = [self.arm.transmission.group(index) for index in self.switches]
+        found = [index for group in coupled if set(group) <= self.found_deg.keys() for index in group]
+        if found:
+            self._declare(found)
+            self._go_home(found)
+            self.told(f"{self._names(found)}: at home", len(found))
 
     def _approach_again(self) -> None:
         """Back off and approach slowly; a joint whose switch trips at once started on it, and backs off further."""
@@ -181,17 +243,16 @@ class _GroupHoming:
             ways[index] = (switch.edge_deg, switch.edge_deg - switch.side * way_deg)
         self._move(ways, FAST)
 
-    def _declare(self, away_deg: dict[int, float]) -> None:
-        """Declare that the joints are this far from their switches, and move them home."""
-        steps: list[int | None] = [None] * len(self.arm.driven)
-        for index, way_deg in away_deg.items():
-            switch, joint = self.switches[index], self.arm.driven[index]
-            steps[index] = round((switch.trip_deg - switch.side * way_deg) * joint.steps_per_deg)
-        self.client.home(steps)
+    def _declare(self, found: list[int]) -> None:
+        """Declare that joints are at the angles that were found for them."""
+        angles = np.zeros(len(self.arm.driven))
+        angles[found] = [self.found_deg.pop(index) for index in found]
+        steps = self.arm.transmission.whole_steps(angles)
+        self.client.home([value if motor in found else None for motor, value in enumerate(steps)])
 
-    def _go_home(self) -> None:
+    def _go_home(self, found: list[int]) -> None:
         stands_deg = self._posture_deg()
-        ways = {index: (stands_deg[index], self.arm.driven[index].home_deg) for index in self.switches}
+        ways = {index: (stands_deg[index], self.arm.driven[index].home_deg) for index in found}
         ends, _ = self._move(ways, FAST)
         stopped = [index for index, end_deg in ends.items() if abs(end_deg - ways[index][1]) > _TOLERANCE_DEG]
         if stopped:
@@ -217,20 +278,27 @@ class _GroupHoming:
         slow_arm = _slowed(self.arm, fraction)
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
         motion = encoded_motion.of_trajectory(trajectory, self.arm)
-        end = replay(self.client, put_once(self.client, motion.data), self.stop, flags=START_HOMING)
+        end = replay(self.client, put_once(self.client, motion.data), self.stop, flags=self._flags(ways_deg))
         tripped = self.client.status().fault_joint
         raise_fault(end)
         self.stop.check()
-        steps = end.positions.commanded_steps
-        return {index: steps[index] / self.arm.driven[index].steps_per_deg for index in ways_deg}, tripped
+        ends_deg = self.arm.transmission.angles_of_steps(end.positions.commanded_steps)
+        return {index: float(ends_deg[index]) for index in ways_deg}, tripped
+
+    def _flags(self, moving: Iterable[int]) -> int:
+        """The flags of the start: also whose switches end it, if motors turn that do not show who moves."""
+        if not self.arm.coupling:
+            return START_HOMING
+        return START_HOMING | sum(1 << index for index in moving) << START_SWITCHES_BIT
 
     def _posture_deg(self) -> list[float]:
-        """The joints' angles; joints of unknown position, which do not move, get their home angle."""
+        """The joints' angles; of joints of unknown position, which do not move, those found or their home angles."""
         status = self.client.status()
-        joints = enumerate(zip(self.arm.driven, status.positions.commanded_steps, strict=True))
+        here_deg = arm_state.angles_deg(status, self.arm).tolist()
+        known = arm_state.known_joints(status, self.arm)
         return [
-            steps / joint.steps_per_deg if status.joint_known(index) else joint.home_deg
-            for index, (joint, steps) in joints
+            here_deg[index] if known[index] else self.found_deg.get(index, joint.home_deg)
+            for index, joint in enumerate(self.arm.driven)
         ]
 
 

@@ -13,6 +13,8 @@ from armtempo_shared.messages import START_HELD
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import BoardError, LinkError
+from armtempo.encoding import encode
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
 from armtempo.link.refusal import refusal
@@ -20,8 +22,6 @@ from armtempo.link.session import OnLoss
 from armtempo.model.arm import Arm
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMotion, JogMove
-from armtempo.records import encode
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.robot import arm_state, goto, stored_motion
 from armtempo.robot.stop_request import StopRequest
 
@@ -88,7 +88,6 @@ class HeldJog:
         self.ends = ""
         """Why it ended by itself, known after the context; "" if it did not."""
         self._client = client
-        self._steps_per_deg = np.array([joint.steps_per_deg for joint in arm.driven])
         self._run = 0
         self._said_s = 0.0
         self._silent_s = 0.0  # the longest time between two holds
@@ -108,7 +107,7 @@ class HeldJog:
             self.moving = True
             self._said_s = client.session.clock()
             for _ in range(_FIRST):
-                self._say_so()
+                self._send_hold()
             self._ends = ends.pop_all()
         return self
 
@@ -122,7 +121,7 @@ class HeldJog:
         """Commanded joint angles by the last message of the board, degrees (J,)."""
         if self._positions is None:
             return self.motion.trajectory(0.0)
-        return np.asarray(np.array(self._positions.commanded_steps, dtype=float) / self._steps_per_deg)
+        return self.arm.transmission.angles_of_steps(self._positions.commanded_steps)
 
     def hold(self, seconds: float = 0.05) -> bool:
         """Hold the jog for ``seconds`` and read the board's messages; returns False once it has ended.
@@ -134,14 +133,14 @@ class HeldJog:
         while self.moving:
             now_s = session.clock()
             if now_s - self._said_s >= HOLD_S:
-                self._say_so()
+                self._send_hold()
             left_s = min(until_s, self._said_s + HOLD_S) - session.clock()
             self._take(session.poll(max(0.0, left_s)))
             if session.clock() >= until_s:
                 break
         return self.moving
 
-    def _say_so(self) -> None:
+    def _send_hold(self) -> None:
         now_s = self._client.session.clock()
         self._silent_s, self._said_s = max(self._silent_s, now_s - self._said_s), now_s
         try:
@@ -163,7 +162,8 @@ class HeldJog:
         """Why it has ended by itself."""
         if self.fault is not None:
             return "a fault"
-        if np.all(np.abs(self.angles_deg - self.motion.end_deg) * self._steps_per_deg < _AT_END_STEPS):
+        off_steps = self.arm.transmission.steps(self.angles_deg - self.motion.end_deg)
+        if np.all(np.abs(off_steps) < _AT_END_STEPS):
             return self.motion.ends
         if self._silent_s > HOLD_TIMEOUT_MS / 1000.0:
             return f"this program was busy for {self._silent_s:.1f} s and did not hold it"
@@ -191,7 +191,7 @@ class HeldJog:
     def _make_a_step(self) -> None:
         """Go on until a joint has moved by a step: the shortest press moves something."""
         session = self._client.session
-        start = np.rint(self.motion.trajectory(0.0) * self._steps_per_deg)
+        start = np.rint(self.arm.transmission.steps(self.motion.trajectory(0.0)))
         limit_s = session.clock() + _FIRST_STEP_S
         while self.moving and session.clock() < limit_s:
             status = self._client.status()

@@ -15,10 +15,10 @@ from armtempo_shared import wire
 from armtempo.basics import json_codec
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError, LinkError
+from armtempo.encoding import encode
 from armtempo.link.client import Client
 from armtempo.model.arm import Arm
 from armtempo.ports import names
-from armtempo.records import encode
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class KeptPosition:
         """Where the motors of ``arm`` stand; None if it is another arm: at home."""
         if arm is None or wire.record_crc(encode.arm_record(arm)) != self.arm_crc:
             return None
-        return [count / joint.steps_per_deg for count, joint in zip(self.steps, arm.driven, strict=True)]
+        return [float(angle) for angle in arm.transmission.angles_of_steps(self.steps)]
 
 
 def _file(port: str) -> Path | None:

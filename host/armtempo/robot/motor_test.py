@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from typing import NamedTuple
 
 from armtempo_shared import codes
 
@@ -56,6 +57,13 @@ def way_deg(joint: DrivenJoint, at_deg: float) -> float:
     return size_deg if high_deg - at_deg >= at_deg - low_deg else -size_deg
 
 
+class Moved(NamedTuple):
+    """What a joint's motor and encoder did in a move."""
+
+    steps: int
+    counts: int
+
+
 class MotorTest:
     """``ask``: asks the person at the arm, True for yes; ``tell``: prints what to do."""
 
@@ -92,26 +100,50 @@ class MotorTest:
         return self.found
 
     def _joint(self, joint: DrivenJoint, by_deg: float) -> None:
-        steps, counts = self._moved(joint, by_deg)
+        """Move a joint there and back, each in two halves: the first takes up the play of its gear, the second is
+        without it."""
+        self._moved(joint, 0.5 * by_deg)
+        there = self._moved(joint, 0.5 * by_deg)
         way = "larger" if by_deg > 0 else "smaller"
         is_right = self._ask(f"did {joint.name} just turn towards {way} angles?")
-        self._moved(joint, -by_deg)
+        reversed_ = self._moved(joint, -0.5 * by_deg)
+        back = self._moved(joint, -0.5 * by_deg)
+        cure, lines = (
+            "change the motor's direction in the arm file",
+            [f"motor: direction = {-joint.motor.direction}"],
+        )
+        is_coupled = self._is_coupled(joint)
+        if is_coupled:
+            cure = (
+                "change the direction of a motor that turns it, or the signs in [coupling], in the arm file"
+            )
+            lines = []
         motor = judged(
             PART, f"{joint.name}: direction", "as in the arm file" if is_right else "the other way",
-            "as in the arm file", is_right, "change the motor's direction in the arm file",
+            "as in the arm file", is_right, cure,
         )  # fmt: skip
-        turned, encoder = judge_encoder(joint, steps, counts if is_right else -counts)
-        self.found.add([motor, turned])
-        lines = [] if is_right else [f"motor: direction = {-joint.motor.direction}"]
-        self.found.data[ARM_FILE] += [f"{joint.name}: {line}" for line in (*lines, *encoder)]
+        sign = 1 if is_right or is_coupled else -1
+        steps, counts = there.steps - back.steps, sign * (there.counts - back.counts)
+        found = [judge_encoder(joint, steps, counts)]
+        if joint.encoder and joint.encoder.on == "joint":
+            play, of_play = judge_backlash(joint, reversed_, back)
+            if play and play.verdict is Level.ERROR:
+                found = []  # nothing moved the encoder as far as it should count
+            found += [(play, of_play)] if play else []
+        self.found.add([motor, *(line for line, _ in found)])
+        lines = [*([] if is_right else lines), *(line for _, of_line in found for line in of_line)]
+        self.found.data[ARM_FILE] += [f"{joint.name}: {line}" for line in lines]
 
-    def _moved(self, joint: DrivenJoint, by_deg: float) -> tuple[int, int]:
-        """Jog a joint; returns its steps and encoder counts."""
+    def _is_coupled(self, joint: DrivenJoint) -> bool:
+        return len(self._arm.transmission.group(self._arm.driven.index(joint))) > 1
+
+    def _moved(self, joint: DrivenJoint, by_deg: float) -> Moved:
+        """Jog a joint; returns what its motor and encoder did."""
         index = self._arm.driven.index(joint)
         before = self._client.status().positions
         self._jog(joint, by_deg, _SPEED)
         after = self._client.status().positions
-        return (
+        return Moved(
             after.commanded_steps[index] - before.commanded_steps[index],
             after.counts[index] - before.counts[index],
         )
@@ -183,6 +215,32 @@ def judge_encoder(joint: DrivenJoint, steps: int, counts: int) -> tuple[Measurem
         else "check its plug, its coupling, its channel; does the motor turn?"
     )
     return Measurement(PART, what, measured, expected, Level.ERROR, cure), lines
+
+
+def judge_backlash(
+    joint: DrivenJoint, reversed_: Moved, further: Moved
+) -> tuple[Measurement | None, list[str]]:
+    """The backlash of a joint, by the encoder on it; also returns lines for the arm file.
+
+    ``reversed_``: a move in the other direction than the one before; ``further``: one as far in the same direction,
+    with the play taken up. Both ends of a move are counts that may be off by one. None if the encoder does not count.
+    """
+    what, within_deg = f"{joint.name}: backlash", _NOISE_COUNTS / joint.counts_per_deg
+    seen, whole = abs(reversed_.counts), abs(further.counts)
+    lost_deg = (whole - seen) / joint.counts_per_deg
+    if whole <= _NOISE_COUNTS:
+        return None, []
+    if lost_deg <= within_deg:
+        return Measurement(PART, what, f"none that its encoder shows, less than {within_deg:.2g}°"), []
+    if seen <= _NOISE_COUNTS:
+        size_deg = abs(reversed_.steps) / joint.steps_per_deg
+        measured = f"it did not move in the first {size_deg:.2g}° after it was reversed"
+        cure = "look for a loose coupling, belt or set screw; its encoder was not checked"
+        return judged(PART, what, measured, f"less than {size_deg:.2g}°", False, cure), []
+    measured = f"{lost_deg:.2g}° within {within_deg:.2g}°, of the joint against its motor"
+    return Measurement(PART, what, measured), [
+        f"model: backlash_deg = {lost_deg:.2g} or so, for the virtual arm"
+    ]
 
 
 def _corrections(joint: DrivenJoint, due: float, counts: int) -> Iterator[str]:

@@ -13,8 +13,8 @@ from armtempo.model.outputs import Input, Output
 _LOOK_S = 0.02
 
 
-class Way(Protocol):
-    """Access to the board: a client, or a program that has its port."""
+class BoardAccess(Protocol):
+    """BoardAccess to the board: a client, or a program that has its port."""
 
     def set_output(self, number: int, value: int) -> None:
         """Set an output of the arm record, from 0, to a value of 0 to 65535."""
@@ -26,8 +26,8 @@ class Way(Protocol):
 class BoardOutput:
     """One output; ``Board.output`` gives it. Every method raises BoardError if the board refuses."""
 
-    def __init__(self, way: Way, arm: Arm, name: str) -> None:
-        self._way = way
+    def __init__(self, access: BoardAccess, arm: Arm, name: str) -> None:
+        self._access = access
         self._number = arm.output(name)
         self.output: Output = arm.outputs[self._number]
         """Its description in the arm file."""
@@ -38,12 +38,12 @@ class BoardOutput:
 
         Raises InputError for a value outside its range, BoardError while a fault is pending.
         """
-        self._way.set_output(self._number, self.output.raw(value))
+        self._access.set_output(self._number, self.output.raw(value))
 
     @property
     def raw(self) -> int:
         """The value that the board last set, 0 to 65535 for its whole range."""
-        return self._way.levels().outputs[self._number]
+        return self._access.levels().outputs[self._number]
 
     @property
     def value(self) -> float:
@@ -59,15 +59,15 @@ class BoardOutput:
 class BoardInput:
     """One input; ``Board.input`` gives it."""
 
-    def __init__(self, way: Way, arm: Arm, name: str) -> None:
-        self._way = way
+    def __init__(self, access: BoardAccess, arm: Arm, name: str) -> None:
+        self._access = access
         self._number = arm.input(name)
         self.input: Input = arm.inputs[self._number]
         """Its description in the arm file."""
 
     def read(self) -> bool:
         """Whether it is active, debounced."""
-        return self._way.levels().active(self._number)
+        return self._access.levels().active(self._number)
 
     def wait(self, active: bool = True, timeout_s: float | None = None) -> None:
         """Wait until the input is ``active``; raises LinkError after ``timeout_s``."""

@@ -10,13 +10,13 @@ from armtempo_shared.limits import TICK_HZ
 
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
+from armtempo.encoding import encoded_motion
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
-from armtempo.records import encoded_motion
-from armtempo.records.encoded_motion import EncodedMotion
 from armtempo.report import run_folder
 from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
 from armtempo.robot.goto import move_once

@@ -11,12 +11,12 @@ from armtempo_shared import sequence, wire
 from armtempo_shared.sequence import ACTIVE, FAULT_THEN, NEXT_THEN, SequenceData, SequenceError
 
 from armtempo.basics.errors import InputError
+from armtempo.encoding import encoded_sequence
 from armtempo.link import Client
 from armtempo.link.board_messages import Event, RowBegun, Sample, SequenceState
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.records import encoded_sequence
 from armtempo.report import run_folder, sequence_folder
 from armtempo.report.sequence_folder import SequenceFolder
 from armtempo.robot.recording import origin
@@ -54,7 +54,7 @@ class SequenceContent:
         if self.plan is not None:
             return tuple(row.words for row in self.plan.rows)
         names = [output.name for output in self.arm.outputs], [one.name for one in self.arm.inputs]
-        return row_words(self.record, *names)
+        return describe_rows(self.record, *names)
 
 
 def of_plan(plan: SequencePlan) -> SequenceContent:
@@ -132,12 +132,14 @@ class _FolderRecorder(Recorder):
 _THEN = {NEXT_THEN: "next", FAULT_THEN: "fault"}
 
 
-def row_words(record: SequenceData, outputs: Sequence[str], inputs: Sequence[str]) -> tuple[str, ...]:
+def describe_rows(record: SequenceData, outputs: Sequence[str], inputs: Sequence[str]) -> tuple[str, ...]:
     """One text per row; ``outputs``, ``inputs``: names in the order of the arm file."""
-    return tuple(_words(record, record.row(index), outputs, inputs) for index in range(record.rows))
+    return tuple(_describe_row(record, record.row(index), outputs, inputs) for index in range(record.rows))
 
 
-def _words(record: SequenceData, row: tuple[int, ...], outputs: Sequence[str], inputs: Sequence[str]) -> str:
+def _describe_row(
+    record: SequenceData, row: tuple[int, ...], outputs: Sequence[str], inputs: Sequence[str]
+) -> str:
     op, number, value, amount, _ = row
     if op == sequence.MOVE:
         return f"run {record.motion(number)[0]}"

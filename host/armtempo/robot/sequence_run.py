@@ -10,11 +10,12 @@ from armtempo_shared import wire
 
 from armtempo.basics.errors import LinkError, OtherBoardError
 from armtempo.basics.progress import Progress
+from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link import Client
 from armtempo.link.board_messages import SequenceState, StoredMotion
 from armtempo.link.refusal import refusal
-from armtempo.records.encoded_motion import MotionKey
-from armtempo.records.encoded_sequence import EncodedSequence
+from armtempo.model.steps import position
 from armtempo.robot import stored_motion
 from armtempo.robot.sequence_recording import Recorder
 from armtempo.robot.stop_request import StopRequest
@@ -156,10 +157,5 @@ def _take_events(client: Client, recorder: Recorder) -> None:
 
 
 def where(state: SequenceState) -> str:
-    """Describe step and cycles."""
-    return f"in step {state.step} after {cycles(state)}"
-
-
-def cycles(state: SequenceState) -> str:
-    """Describe the number of cycles."""
-    return f"{state.cycle} whole cycle{'s' * (state.cycle != 1)}"
+    """Describe step and cycle."""
+    return f"in {position(state.step, state.cycle)}"

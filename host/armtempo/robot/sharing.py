@@ -158,14 +158,12 @@ def sample_json(sample: Sample, arm: Arm | None) -> dict[str, Any]:
         "counts": list(counts),
     }
     if arm is not None and len(arm.driven) == len(steps):
-        joints = arm.driven
-        found["joints"] = [joint.name for joint in joints]
-        found["commanded_deg"] = [
-            value / joint.steps_per_deg for value, joint in zip(steps, joints, strict=True)
-        ]
+        gears = arm.transmission
+        angles = gears.angles_of_counts(counts).tolist()
+        found["joints"] = [joint.name for joint in arm.driven]
+        found["commanded_deg"] = gears.angles_of_steps(steps).tolist()
         found["angle_deg"] = [
-            value / joint.counts_per_deg if joint.encoder else None
-            for value, joint in zip(counts, joints, strict=True)
+            angle if seen else None for angle, seen in zip(angles, gears.measured, strict=True)
         ]
     return found
 

@@ -11,12 +11,12 @@ from armtempo_shared.messages import ONCE_NAME, PERMILLE
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.basics.progress import Progress
+from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import CHECK_S, Follower, RunEnd
 from armtempo.link.refusal import refusal
 from armtempo.link.session import RECONNECT_S, OnLoss
-from armtempo.records.encoded_motion import MotionKey
 from armtempo.robot.stop_request import StopRequest
 
 _End = TypeVar("_End")

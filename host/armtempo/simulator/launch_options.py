@@ -13,10 +13,10 @@ from armtempo_shared import armrecord
 
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.ports.names import VIRTUAL_ID
-from armtempo.records import encode
 
 DEFAULT_MACHINE = "STM32F4DISC with STM32F407"
 
@@ -140,17 +140,23 @@ def unique_id(seed: int) -> str:
 
 
 def describe(arm: Arm, start_deg: Sequence[float] | None = None) -> dict[str, Any]:
-    """The fields of the arm record and, for each joint, its angle at power-up and its drive's model.
+    """The fields of the arm record and, for each joint, its motor's angle at power-up, its drive's model, and its angle
+    by those of all motors (none for a joint that has its motor alone).
 
     ``start_deg`` (J,): None for the home posture. Raises InputError for an impossible model.
     """
     head, rows, _ = armrecord.unpack(encode.arm_record(arm))
-    angles = start_deg if start_deg is not None else [joint.home_deg for joint in arm.driven]
+    gears = arm.transmission
+    angles = gears.motors_deg(start_deg if start_deg is not None else arm.home_deg).tolist()
+    shares = [[] if gears.is_alone(number) else row for number, row in enumerate(gears.inverse.tolist())]
+    for number, row in enumerate(rows):
+        if gears.matrix[number, number] < 0.0:  # the record's switches are those of the motor's directions
+            row["limit_low"], row["limit_high"] = row["limit_high"], row["limit_low"]
     return {
         "head": head,
         "joints": [
-            {**row, "start_deg": float(angle), **_joint(joint)}
-            for row, angle, joint in zip(rows, angles, arm.driven, strict=True)
+            {**row, "start_deg": angle, "by_motors": by_motors, **_joint(joint)}
+            for row, angle, by_motors, joint in zip(rows, angles, shares, arm.driven, strict=True)
         ],
     }
 
@@ -169,4 +175,5 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
         "low_deg": joint.switches.low_deg,
         "high_deg": joint.switches.high_deg,
         "model": asdict(model),
+        "encoder_on_motor": joint.encoder is not None and joint.encoder.on == "motor",
     }

@@ -17,7 +17,7 @@ import numpy as np
 from armtempo import optimise
 from armtempo.kinematics import chain
 from armtempo.model import engine_pins
-from armtempo.model.room import FAR_MM, ArmRoom, KeepOut
+from armtempo.model.workspace import FAR_MM, KeepOut, Workspace
 from armtempo.report import plots, run_report
 from armtempo.report.arm_picture import arm_picture
 from armtempo.report.evaluation import evaluate
@@ -114,14 +114,14 @@ def lines() -> Figure:
     return figure
 
 
-def room() -> Figure:
+def workspace() -> Figure:
     """An arm and a box between two via points: the tool on a free path without it and with it."""
     radii_mm = (45.0, 40.0, 35.0, 30.0, 30.0, 25.0)
     bare = armtempo.Arm.load("parol6")
     joints = (replace(joint, radius_mm=radius) for joint, radius in zip(bare.joints, radii_mm, strict=True))
     bare = replace(bare, joints=tuple(joints))
     box = KeepOut("feeder", (-40.0, 130.0, 0.0), (40.0, 300.0, 290.0))
-    arm = replace(bare, room=ArmRoom((box,), low_mm=(-FAR_MM, -FAR_MM, 0.0)))
+    arm = replace(bare, workspace=Workspace((box,), low_mm=(-FAR_MM, -FAR_MM, 0.0)))
     vias = np.tile(arm.home_deg, (2, 1))
     vias[:, 0] += (-33.0, 33.0)
     vias[:, 1] += 25.0
@@ -210,7 +210,7 @@ DRAWN: dict[str, Callable[[], Figure]] = {
     "solutions.png": solutions,
     "motion.png": motion,
     "lines.png": lines,
-    "room.png": room,
+    "workspace.png": workspace,
     "searches.png": searches,
     "steps.png": steps,
     "tracking.png": tracking,

@@ -52,8 +52,7 @@ def test_the_manifest_takes_every_module_of_the_program(tmp_path: Path) -> None:
     assert every - there == {f"{PACKAGES[0]}/{name}" for name in outside}
     for name, source in program_files.modules().items():
         if not name.endswith("program_hash.py"):
-            lines = [path.read_text().count("\n") for path in (folder / name, source)]
-            assert lines[0] == lines[1], "the sources' lines as they are"
+            assert (folder / name).read_bytes() == source.read_bytes(), f"{name} as it is"
 
 
 @pytest.mark.slow
@@ -64,6 +63,7 @@ def test_the_frozen_program_tells_the_hash_of_the_sources() -> None:
     assert b"import CRC" in frozen.files()["armtempo_shared/program_hash.py"]
 
 
+@pytest.mark.slow
 def test_a_boards_own_manifest_is_kept(micropython: Path) -> None:
     found = checkout.board(checkout.look(micropython), "PYBV11")
     assert found.manifest == "$(PORT_DIR)/boards/PYBV10/manifest.py"
@@ -71,6 +71,7 @@ def test_a_boards_own_manifest_is_kept(micropython: Path) -> None:
     assert included == [found.manifest]
 
 
+@pytest.mark.slow
 def test_a_build_makes_a_whole_folder(micropython: Path, tools: Callable[..., Path], tmp_path: Path) -> None:
     tools()
     out = tmp_path / "out"
@@ -104,6 +105,7 @@ def test_a_firmware_in_one_piece_has_no_number() -> None:
     assert build._pieces(definition) == (image.Piece("firmware.bin", 0x08000000),)
 
 
+@pytest.mark.slow
 def test_a_chip_without_the_programs_pins_is_told(
     micropython: Path, tools: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -123,6 +125,7 @@ def test_releases_bring_the_boards_that_are_named() -> None:
     assert f"--branch {checkout.RELEASE} " in page
 
 
+@pytest.mark.slow
 def test_a_board_definition_of_ones_own_is_taken(
     micropython: Path, tools: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -135,6 +138,7 @@ def test_a_board_definition_of_ones_own_is_taken(
     assert f"BOARD_DIR={own}" in (tmp_path / "make.log").read_text()
 
 
+@pytest.mark.slow
 def test_a_firmware_too_large_for_the_chip_is_refused(
     micropython: Path, tools: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -228,6 +232,7 @@ def test_a_missing_compiler_is_named(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_no_gcc_is_needed_where_mpy_cross_is_built(
     micropython: Path, tools: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -247,6 +252,7 @@ def test_a_compiler_without_its_library_is_named(
         build.build(micropython, "STM32F4DISC", tmp_path / "out", no_progress)
 
 
+@pytest.mark.slow
 def test_a_build_that_fails_leaves_nothing(
     micropython: Path, tools: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

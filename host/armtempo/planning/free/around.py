@@ -17,10 +17,10 @@ from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import room_check
+from armtempo.planning import workspace_check
 from armtempo.planning.free import free_plan
-from armtempo.planning.room_check import Bodies, Touch
 from armtempo.planning.through_plan import Planned
+from armtempo.planning.workspace_check import Bodies, Touch
 
 _ROUNDS = 5
 """Largest number of planned motions, each closer to the collision-free way."""
@@ -44,7 +44,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
     """The motion of ``free_plan.motion``, around obstacles if a way is found.
 
     Otherwise the motion that touches something. ``nearest``: as near to what is in the way as is fastest; else
-    with room for the changes of a path that becomes part of another.
+    with a distance for the changes of a path that becomes part of another.
     """
     first = planned = free_plan.motion(arm, job, via_deg, progress)
     holding = arm.holding(job.holds)
@@ -61,15 +61,15 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
     for _ in range(_ROUNDS):
         names.add(touch.other)
         stage(f"looking for a way around {touch.other}")
-        stretch, part = _place(planned, touch, ways)
-        if len(ways[stretch]) == 2:
-            found = space.way(ways[stretch][0], ways[stretch][1], rng)
+        leg, part = _place(planned, touch, ways)
+        if len(ways[leg]) == 2:
+            found = space.way(ways[leg][0], ways[leg][1], rng)
             if found is None:
                 break
-            ways[stretch] = found
+            ways[leg] = found
         else:  # the path cuts a corner too much: keep it closer to the way
-            middle = 0.5 * (ways[stretch][part] + ways[stretch][part + 1])
-            ways[stretch] = np.insert(ways[stretch], part + 1, middle, axis=0)
+            middle = 0.5 * (ways[leg][part] + ways[leg][part + 1])
+            ways[leg] = np.insert(ways[leg], part + 1, middle, axis=0)
         helped = _helped(job, ways)
         angles = np.concatenate([ways[0], *(way[1:] for way in ways[1:])])
         try:
@@ -86,7 +86,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
 
 def _touch(arm: Arm, job: Job, planned: Planned) -> Touch | None:
     """What a motion touches."""
-    return room_check.touch_of(arm.holding(job.holds), planned.trajectory, None, job.start_touches)
+    return workspace_check.touch_of(arm.holding(job.holds), planned.trajectory, None, job.start_touches)
 
 
 def _loosened(
@@ -118,12 +118,12 @@ def _places(ways: Sequence[Array]) -> Array:
 
 
 def _place(planned: Planned, touch: Touch, ways: Sequence[Array]) -> tuple[int, int]:
-    """The stretch in which a motion touches something, and the part of its way."""
+    """The leg in which a motion touches something, and the part of its way."""
     times = planned.trajectory.joints[0].via_times_s
     part = int(np.clip(np.searchsorted(times, touch.time_s) - 1, 0, len(times) - 2))
     places = _places(ways)
-    stretch = int(np.searchsorted(places, part, side="right")) - 1
-    return stretch, part - int(places[stretch])
+    leg = int(np.searchsorted(places, part, side="right")) - 1
+    return leg, part - int(places[leg])
 
 
 def _helped(job: Job, ways: Sequence[Array]) -> Job:

@@ -39,8 +39,8 @@ _PEAK_THRESHOLDS = 0.95, 0.999
 _TIGHTENED = 2
 """After so many solves peaks not only become points: next to them the limit is lowered too, until they keep it."""
 _AWAY, _LEAST_AWAY = 0.01, 1e-5
-"""Fraction by which time is stretched before each solve, for a start within the limits: twice what the last one was
-stretched by, within these."""
+"""Fraction by which time is scaled before each solve, for a start within the limits: twice what the last one was
+scaled by, within these."""
 _SMOOTHING, _SMOOTHED = 0.075, 0.1
 """Weight of steps between time differences in the first solve, per segment and via point; fraction of it later."""
 _LEAST_STEP = 1e-3
@@ -98,14 +98,14 @@ class Demand:
         return np.asarray(np.ptp(self.via_deg, axis=0))
 
     @property
-    def room_deg(self) -> Array:
+    def margin_deg(self) -> Array:
         """Distance of each via point from the nearer end of its joint's range: (n + 1, J)."""
         return np.minimum(self.via_deg - self.low_deg, self.high_deg - self.via_deg)
 
     @property
     def turning(self) -> NDArray[np.bool_]:
         """Via points at the end of a joint's range, where the joint must turn: (n + 1, J)."""
-        return np.asarray(self.room_deg <= _AT_END * self.size_deg)
+        return np.asarray(self.margin_deg <= _AT_END * self.size_deg)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,14 +139,14 @@ class FreeMotion:
         return np.append(times[self.layout.arrivals[:-1], 0], times[-1].sum())
 
     @property
-    def stretch_times_s(self) -> Array:
+    def leg_times_s(self) -> Array:
         """Time from each via point to the next, without dwells: (n,)."""
         dwells = [self.layout.stops.get(via, 0.0) for via in range(len(self.layout.pieces))]
         return np.asarray(np.diff(self.via_times_s) - np.array(dwells))
 
-    def stretched(self, limits: Array) -> FreeMotion:
+    def scaled(self, limits: Array) -> FreeMotion:
         """The motion with time scaled so that it just keeps every limit, proven."""
-        return self.slower(self.curve(limits).stretch())
+        return self.slower(self.curve(limits).scale())
 
     def slower(self, factor: float) -> FreeMotion:
         """The motion with time scaled, except in dwells: the difference that acts only on a dwell compensates.
@@ -255,22 +255,22 @@ class Improver:
         fine = self.layout.segments >= _FINE * (len(self.demand.via_deg) - 1)
         parts = _PARTS if fine else _COARSE_PARTS
         at = Ratios.grid(self.layout.segments, len(self._size), parts)
-        best = here = motion.stretched(self.demand.limits)
-        stretch, known = np.inf, np.empty((2, 0))
+        best = here = motion.scaled(self.demand.limits)
+        scale, known = np.inf, np.empty((2, 0))
         for number in range(rounds):
             known = np.concatenate([known, np.full((2, len(at.kind) - known.shape[1]), np.nan)], axis=1)
-            solved, known = self._solve(here, at, stretch, known)
+            solved, known = self._solve(here, at, scale, known)
             here = self._inside(solved, best)
             curve = here.curve(self.demand.limits)
-            stretch = curve.stretch()
+            scale = curve.scale()
             least = _PEAK_THRESHOLDS[min(number, 1)]
             peaks = collocation.peaks(curve, _PEAK_PARTS, least)
             if number >= _TIGHTENED:
                 at = at.tightened(curve, peaks)
             at += peaks
-            here = here.slower(stretch)
+            here = here.slower(scale)
             best = min(best, here, key=lambda candidate: candidate.total_s)
-            if stretch < 1.0 + _NEAR:
+            if scale < 1.0 + _NEAR:
                 break
         return best
 
@@ -318,17 +318,15 @@ class Improver:
         high = np.where(at + near > self._high, self._high, np.inf)
         return angle_bounds.forms(self.variables, low / self._size, high / self._size).rows(self.variables)
 
-    def _solve(
-        self, motion: FreeMotion, at: Ratios, stretch: float, known: Array
-    ) -> tuple[FreeMotion, Array]:
+    def _solve(self, motion: FreeMotion, at: Ratios, scale: float, known: Array) -> tuple[FreeMotion, Array]:
         """The motion that keeps R ratios within their limits, and the multipliers of these, (2, R).
 
-        ``known``: multipliers of the solve before, NaN of new ratios; ``stretch``: how much it exceeded the limits, as
+        ``known``: multipliers of the solve before, NaN of new ratios; ``scale``: how much it exceeded the limits, as
         a factor on time, inf for the first.
         """
         unit_s = motion.total_s / self.layout.segments
         limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
-        first, excess = stretch == np.inf, stretch - 1.0
+        first, excess = scale == np.inf, scale - 1.0
         smoothing = self._smoothing() * (1.0 if first else _SMOOTHED)
         steps = motion.differences_s / unit_s * (1.0 + min(2.0 * excess + _LEAST_AWAY, _AWAY))
         least = min(_LEAST_STEP, 0.5 * float(steps.min()))

@@ -19,13 +19,13 @@ from armtempo.splines import bspline
 
 _COARSE_PIECES = 8
 _PIECES, _LEAST = 32, 96
-"""Segments of an automatic layout: per stretch between via points, and least total."""
+"""Segments of an automatic layout: per leg between via points, and least total."""
 _EVEN_PIECES = 24
-"""Segments per stretch if all have the same number."""
+"""Segments per leg if all have the same number."""
 _ROUNDS = 6
 """Solves on the final segments, each with the peaks of the one before; fewer if the limits hold between points."""
 _SPREAD = 0.5
-"""Standard deviation of the logarithm of the random factors on the stretches' times."""
+"""Standard deviation of the logarithm of the random factors on the legs' times."""
 _INSIDE = 0.998
 """Fraction of the tool's corridor used at points, so that it holds between them."""
 _DRAWN = 8
@@ -90,31 +90,29 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     return Shortest(final, np.array(times))
 
 
-def automatic_pieces(stretches: int, most: int) -> int:
+def automatic_pieces(legs: int, most: int) -> int:
     """Segments between two via points if all have the same number."""
-    return max(min(_EVEN_PIECES, most // stretches), LEAST_PIECES)
+    return max(min(_EVEN_PIECES, most // legs), LEAST_PIECES)
 
 
 def _starts(demand: Demand, effort: Effort, even: bool) -> list[Callable[[], FreeMotion]]:
     """Functions that make start motions."""
-    stretches = len(demand.via_deg) - 1
+    legs = len(demand.via_deg) - 1
     if effort.along_s is not None:
         return [partial(free_start.on_time_axis, demand, effort.along_s)]
-    pieces = min(_COARSE_PIECES, max(effort.most // stretches, LEAST_PIECES))
+    pieces = min(_COARSE_PIECES, max(effort.most // legs, LEAST_PIECES))
     if even:
-        pieces = effort.pieces or automatic_pieces(stretches, effort.most)
-    level = np.ones(stretches)
+        pieces = effort.pieces or automatic_pieces(legs, effort.most)
+    level = np.ones(legs)
     ways: list[Callable[[], FreeMotion]] = [partial(free_start.along_spline, demand, pieces, level)]
     needed = rest_to_rest.needed_s(demand.via_deg, demand.limits)
     for number in range(1, effort.starts):
-        factors = (
-            np.exp(_SPREAD * effort.rng.standard_normal(stretches)) if number > 1 else np.ones(stretches)
-        )
+        factors = np.exp(_SPREAD * effort.rng.standard_normal(legs)) if number > 1 else np.ones(legs)
         shares = needed * factors
         if _in_corridor(demand):
             ways.append(partial(free_start.along_spline, demand, pieces, shares))
             continue
-        chosen = layout.uniform(stretches + 1, pieces, demand.stops)
+        chosen = layout.uniform(legs + 1, pieces, demand.stops)
         if not even:
             chosen = layout.shared_out(shares, chosen.segments, demand.stops)
         ways.append(partial(free_start.smooth, demand, chosen, shares))
@@ -125,11 +123,11 @@ def _finished(demand: Demand, motion: FreeMotion, effort: Effort, even: bool) ->
     """The motion optimised on the final number of segments."""
     tightened = _tightened(demand)
     if not even:
-        stretches = len(demand.via_deg) - 1
-        segments = min(effort.most, max(_PIECES * stretches, _LEAST))
-        finer = layout.shared_out(motion.stretch_times_s, segments, demand.stops)
+        legs = len(demand.via_deg) - 1
+        segments = min(effort.most, max(_PIECES * legs, _LEAST))
+        finer = layout.shared_out(motion.leg_times_s, segments, demand.stops)
         motion = min(
-            (_resampled(tightened, finer, motion), motion.stretched(demand.limits)),
+            (_resampled(tightened, finer, motion), motion.scaled(demand.limits)),
             key=lambda each: each.total_s,
         )
     else:
@@ -166,7 +164,7 @@ def _within_corridor(demand: Demand, motion: FreeMotion) -> FreeMotion:
             break
         part = _INSIDE * demand.corridor_mm / reached
         points = middle + part * (motion.angle_points_deg - middle)
-        motion = replace(motion, angle_points_deg=points).stretched(demand.limits)
+        motion = replace(motion, angle_points_deg=points).scaled(demand.limits)
     raise PlanError(
         f"no path could be proven to stay within corridor_mm = {demand.corridor_mm:g}",
         "widen the corridor, or "

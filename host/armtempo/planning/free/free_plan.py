@@ -112,7 +112,7 @@ def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planne
 
 
 def _axis_s(demand: Demand, spline: Planned, pieces: int) -> Array:
-    """Differences of the optimal time axis with ``pieces`` segments per stretch of the spline."""
+    """Differences of the optimal time axis with ``pieces`` segments per leg of the spline."""
     joint = spline.trajectory.joints[0]
     start = time_axis.cut(np.diff(joint.time_points_s), joint.refine, pieces, DEGREE)
     limits = [Limits(*values) for values in demand.limits]
@@ -142,7 +142,7 @@ def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
     via = via_deg[:, joints]
     driven = [arm.driven[joint] for joint in joints]
     low, high = np.array([joint.range_deg for joint in driven]).T
-    room = _WIDER * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
+    margin = _WIDER * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
     span = np.ptp(via, axis=0)
     tool = Tool(arm, joints, via_deg[0])
     tolerances = _tolerances(job, via, tool)
@@ -150,8 +150,8 @@ def _demand(arm: Arm, job: Job, via_deg: Array, joints: list[int]) -> Demand:
         names=tuple(joint.name for joint in driven),
         via_deg=via,
         limits=np.array([joint.limits.values for joint in driven]),
-        low_deg=np.maximum(low - room, via.min(axis=0) - _BEYOND * span),
-        high_deg=np.minimum(high + room, via.max(axis=0) + _BEYOND * span),
+        low_deg=np.maximum(low - margin, via.min(axis=0) - _BEYOND * span),
+        high_deg=np.minimum(high + margin, via.max(axis=0) + _BEYOND * span),
         stops={stop.via: stop.dwell_s for stop in job.stops},
         corridor_deg=np.inf if job.corridor_deg is None else job.corridor_deg,
         corridor_mm=np.inf if job.corridor_mm is None else job.corridor_mm,
@@ -192,9 +192,9 @@ def _trajectory(job: Job, via_deg: Array, groups: list[list[int]], found: list[S
 
 
 def _kept(arm: Arm, trajectory: Trajectory) -> Trajectory:
-    """The trajectory, stretched slightly if rounding of control points exceeds a limit.
+    """The trajectory, scaled slightly if rounding of control points exceeds a limit.
 
-    For a very small move, the stretched times may be rounded differently: then it is stretched again, each time more.
+    For a very small move, the scaled times may be rounded differently: then it is scaled again, each time more.
     """
     for margin in _MARGINS:
         factors = [
@@ -220,8 +220,8 @@ def _joint(motion: FreeMotion, column: int) -> JointSpline:
 
 
 def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
-    stretch = max(1.0, MIN_DURATION_S / motion.total_s)
-    times = time_points(motion.differences_s * stretch, DEGREE)
+    scale = max(1.0, MIN_DURATION_S / motion.total_s)
+    times = time_points(motion.differences_s * scale, DEGREE)
     return JointSpline(DEGREE, 1, angle_points_deg, times, tuple(map(int, motion.layout.arrivals)))
 
 

@@ -31,8 +31,8 @@ less similar: otherwise Newton's equations of the following solve lose all digit
 _WIDER = 2.0
 """Bounds are widened by this factor times the path's excess."""
 _BETTER, _STEPS = 0.99, 60
-_ROOM, _MOST_ROOM = 0.25, 1e-7
-"""Margin to the bounds: fraction of the room, and largest value in the unit of the angles."""
+_MARGIN, _MOST_MARGIN = 0.25, 1e-7
+"""Margin to the bounds: fraction of the margin, and largest value in the unit of the angles."""
 
 
 def along_spline(demand: Demand, pieces: int, times_s: Array) -> FreeMotion:
@@ -45,10 +45,10 @@ def along_spline(demand: Demand, pieces: int, times_s: Array) -> FreeMotion:
 
 
 def on_time_axis(demand: Demand, differences_s: Array) -> FreeMotion:
-    """The spline through the via points on a time axis (S + 4,) with the same number of segments per stretch."""
-    stretches = len(demand.via_deg) - 1
-    pieces = (len(differences_s) - DEGREE + 1) // stretches
-    return replace(along_spline(demand, pieces, np.ones(stretches)), differences_s=differences_s)
+    """The spline through the via points on a time axis (S + 4,) with the same number of segments per leg."""
+    legs = len(demand.via_deg) - 1
+    pieces = (len(differences_s) - DEGREE + 1) // legs
+    return replace(along_spline(demand, pieces, np.ones(legs)), differences_s=differences_s)
 
 
 def smooth(demand: Demand, layout: Layout, times_s: Array) -> FreeMotion:
@@ -66,7 +66,7 @@ def resampled(demand: Demand, layout: Layout, motion: FreeMotion) -> FreeMotion:
     curve = motion.curve(demand.limits)
     times = motion.via_times_s
     leaves = times + np.array([motion.layout.stops.get(via, 0.0) for via in range(len(times))])
-    steps_s = motion.stretch_times_s / layout.pieces
+    steps_s = motion.leg_times_s / layout.pieces
     knots = [np.array([0.0])]
     for via, (step, count) in enumerate(zip(steps_s, layout.pieces, strict=True)):
         if layout.arrivals[via] < layout.departures()[via]:
@@ -126,9 +126,9 @@ def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
         one = slice(joint, joint + 1)
         forms = angle_bounds.forms(variables, low[..., one] / size[joint], high[..., one] / size[joint])
         fixed = layout.angle_equalities(variables, vias.joint(joint))
-        rooms = demand.room_deg[~demand.turning[:, joint], joint]
-        room = min(rooms.min(initial=np.inf), demand.corridor_deg) / size[joint]
-        found = _nearest(forms, room, fixed, points[:, joint] / size[joint])
+        margins = demand.margin_deg[~demand.turning[:, joint], joint]
+        margin = min(margins.min(initial=np.inf), demand.corridor_deg) / size[joint]
+        found = _nearest(forms, margin, fixed, points[:, joint] / size[joint])
         if found is None:
             raise PlanError(
                 f"{name}: no path with {layout.pieces.min()} pieces between via points stays within its range and "
@@ -139,24 +139,24 @@ def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
     return replace(motion, angle_points_deg=points)
 
 
-def _nearest(forms: Forms, room: float, fixed: Equalities, wanted: Array) -> Array | None:
+def _nearest(forms: Forms, margin: float, fixed: Equalities, wanted: Array) -> Array | None:
     """Control points (C,) that meet ``fixed``, keep each form within its bounds, and are nearest to ``wanted`` (C,).
 
     The distance is the sum of squared third differences. The bounds are first widened until ``wanted``, which
     meets ``fixed``, keeps them, and then narrowed again around their middle until the path keeps a margin, a
-    fraction of ``room``, which is the distance of the fixed values from the bounds. None if that is not
+    fraction of ``margin``, which is the distance of the fixed values from the bounds. None if that is not
     possible.
     """
-    x, room = wanted, min(_ROOM * room, _MOST_ROOM)
-    excess = _excess(forms, x) + room
-    if excess < min(room - _TOO_NEAR, 0.0):
+    x, margin = wanted, min(_MARGIN * margin, _MOST_MARGIN)
+    excess = _excess(forms, x) + margin
+    if excess < min(margin - _TOO_NEAR, 0.0):
         return x
     for _ in range(_STEPS):
-        if excess <= 0.5 * room:
+        if excess <= 0.5 * margin:
             break
-        program = _Alike(forms, _WIDER * excess - room, fixed, wanted)
+        program = _Alike(forms, _WIDER * excess - margin, fixed, wanted)
         x = interior_point.minimise(program, x, _CENTRE).x
-        before, excess = excess, _excess(forms, x) + room
+        before, excess = excess, _excess(forms, x) + margin
         if not excess < _BETTER * before:
             return None
     program = _Alike(forms, 0.0, fixed, wanted)

@@ -62,7 +62,7 @@ class ToolRows:
         self._near = np.flatnonzero(np.isfinite(targets.tolerance_mm))
         self._turned = np.flatnonzero(np.isfinite(targets.tolerance_deg))
         self.count = len(self._near) + len(self._turned)
-        self._room = 1.0 - np.cos(np.radians(targets.tolerance_deg[self._turned]))
+        self._span = 1.0 - np.cos(np.radians(targets.tolerance_deg[self._turned]))
 
     def values(self, x: Array) -> Array:
         """First those of the position, then those of the orientation."""
@@ -70,7 +70,7 @@ class ToolRows:
         away = (state.position_mm - targets.position_mm)[self._near] / targets.tolerance_mm[self._near, None]
         cosine = 0.5 * (np.einsum("pij,pij->p", state.rotation, targets.rotation) - 1.0)
         return np.concatenate(
-            [1.0 - np.sum(away**2, axis=1), 1.0 - (1.0 - cosine[self._turned]) / self._room]
+            [1.0 - np.sum(away**2, axis=1), 1.0 - (1.0 - cosine[self._turned]) / self._span]
         )
 
     def linearise(self, x: Array) -> LinearisedTool:
@@ -85,12 +85,12 @@ class ToolRows:
             [both[:, 1, 2] - both[:, 2, 1], both[:, 2, 0] - both[:, 0, 2], both[:, 0, 1] - both[:, 1, 0]]
         )
         axes = state.axes_deg[turned] * self._unit
-        by_turn = 0.5 * np.einsum("ip,pij->pj", twist, axes) / self._room[:, None]
+        by_turn = 0.5 * np.einsum("ip,pij->pj", twist, axes) / self._span[:, None]
         gradient = np.concatenate([-2.0 * np.einsum("pi,pij->pj", away, slope), by_turn])
         curvature = np.concatenate(
             [
                 2.0 * np.einsum("pij,pik->pjk", slope, slope),
-                np.einsum("pij,pik->pjk", axes, axes) / self._room[:, None, None],
+                np.einsum("pij,pik->pjk", axes, axes) / self._span[:, None, None],
             ]
         )
         return LinearisedTool(self, gradient, curvature)

@@ -15,7 +15,7 @@ from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
-from armtempo.planning import brake_time, move_law, point_to_point, room_check
+from armtempo.planning import brake_time, move_law, point_to_point, workspace_check
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.planning.jog.jog_line import AXES, STRAY_DEG, STRAY_MM, FollowedLine, ToolLine
 from armtempo.planning.move_law import DEGREE, WayLimits
@@ -31,7 +31,7 @@ _SHORTER = 0.98
 _TRIES = 6
 _INSIDE_STEPS = 1e-6
 _SHORTENED, _NEARER = 8, 0.9
-"""A jog that would leave the room is shortened up to this often, each time to this fraction of the way to the
+"""A jog that would leave the workspace is shortened up to this often, each time to this fraction of the way to the
 touch."""
 
 
@@ -53,7 +53,7 @@ class JogMove:
         """Unit of ``by``."""
         return "deg" if self.joint is not None or self.about else "mm"
 
-    def words(self, arm: Arm) -> str:
+    def describe(self, arm: Arm) -> str:
         """Describe what moves."""
         if self.joint is not None:
             return arm.driven[self.joint].name
@@ -98,7 +98,7 @@ def move_of(
 def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: float = SPEED) -> JogMotion:
     """The jog from rest at ``here_deg`` (J,), at the fraction ``speed`` of the arm's speed limits.
 
-    It ends early at the end of a range, before it would leave the arm's room, and, for a line of the tool,
+    It ends early at the end of a range, before it would leave the arm's workspace, and, for a line of the tool,
     where the arm cannot follow. Raises InputError for a move that is none, or if there is no way to go.
     """
     start = np.array(here_deg, dtype=float)
@@ -110,13 +110,13 @@ def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: f
         raise InputError("a jog by 0 moves nothing", "give a distance in degrees or mm")
     if (move.joint is None) == (not move.axis):
         raise InputError("a jog moves either a joint or the tool", "name a joint, or an axis")
-    trajectory, ends = _in_room(name, arm, start, move, speed)
+    trajectory, ends = _in_workspace(name, arm, start, move, speed)
     limits = [joint.limits for joint in arm.driven]
     return JogMotion(trajectory, brake_time.of_motion(trajectory, limits), ends)
 
 
 def problem(arm: Arm, here_deg: Sequence[float], move: JogMove) -> str:
-    """Why a jog cannot begin at ``here_deg`` (J,), without a check of the room; "" if it can."""
+    """Why a jog cannot begin at ``here_deg`` (J,), without a check of the workspace; "" if it can."""
     start = np.array(here_deg, dtype=float)
     try:
         if move.joint is not None:
@@ -128,15 +128,15 @@ def problem(arm: Arm, here_deg: Sequence[float], move: JogMove) -> str:
     return ""
 
 
-def _in_room(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
-    """The jog, shortened to stay in the room, and why it ends early."""
+def _in_workspace(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
+    """The jog, shortened to stay in the workspace, and why it ends early."""
     why = ""
     for _ in range(_SHORTENED):
         way = _joint if move.joint is not None else _tool
         trajectory, ends = way(name, arm, start, move, speed)
-        touch = room_check.touch_of(arm, trajectory, outwards=True)
+        touch = workspace_check.touch_of(arm, trajectory, outwards=True)
         if touch is None:
-            room_check.tell_start(arm, start)
+            workspace_check.tell_start(arm, start)
             return trajectory, why or ends
         why = f"{touch.link} would touch {touch.other}"
         part = _NEARER * _passed(arm, trajectory, touch.time_s, move)
@@ -257,15 +257,15 @@ def _line_limits(followed: FollowedLine, length: float, speed: float) -> WayLimi
 
 
 def _within(trajectory: Trajectory, arm: Arm) -> bool:
-    times = np.linspace(0.0, trajectory.duration_s, 8 * len(trajectory.joints[0].time_polynomials) + 1)
-    angles = trajectory(times)
+    powers = np.vander(np.linspace(0.0, 1.0, 9), DEGREE + 1, increasing=True).T
+    angles = np.stack([(joint.angle_polynomials @ powers).ravel() for joint in trajectory.joints], axis=1)
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     low, high = np.minimum(low, angles[0]), np.maximum(high, angles[0])  # a whole step may lie just beyond
     return bool(np.all(angles >= low - 1e-9) and np.all(angles <= high + 1e-9))
 
 
 def _slowed(trajectory: Trajectory, arm: Arm, speed: float) -> Trajectory:
-    """The motion stretched so that every joint keeps its fraction of the limits."""
+    """The motion scaled so that every joint keeps its fraction of the limits."""
     factor = 0.0
     for reached, joint in zip(extremes.of_joints(trajectory.joints), arm.driven, strict=True):
         most = joint.limits

@@ -1,4 +1,4 @@
-"""The path of a stretch without a line or arc of the tool: the spline through its via points, or a free path."""
+"""The path of a leg without a line or arc of the tool: the spline through its via points, or a free path."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import checks
 from armtempo.planning.free import around
-from armtempo.planning.line.stretches import Stretch
+from armtempo.planning.line.legs import Leg
 from armtempo.planning.lower_bounds import Floor
 from armtempo.splines import bspline
 from armtempo.splines.bspline import REST_PIECES
@@ -22,7 +22,7 @@ DEGREE = 5
 
 @dataclass(frozen=True, eq=False)
 class Between:
-    """The path of such a stretch."""
+    """The path of such a leg."""
 
     angle_points_deg: Array
     """(S + 5, J)."""
@@ -43,22 +43,22 @@ class Between:
         return np.concatenate([pieces[:, 0], pieces[-1:].sum(axis=1)])
 
 
-def between(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progress) -> Between:
-    """The path of a stretch of a job with via angles (n + 1, J); PlanError if no free one stays in the ranges."""
-    own = via_deg[stretch.first : stretch.last + 1]
+def between(arm: Arm, job: Job, leg: Leg, via_deg: Array, progress: Progress) -> Between:
+    """The path of a leg of a job with via angles (n + 1, J); PlanError if no free one stays in the ranges."""
+    own = via_deg[leg.first : leg.last + 1]
     if checks.is_free(job) and np.any(np.ptp(own, axis=0) > checks.TOLERANCE):
-        return _free(arm, job, stretch, own, progress)
+        return _free(arm, job, leg, own, progress)
     points = bspline.refined(bspline.fit(own, DEGREE), REST_PIECES, DEGREE)
     return Between(points, tuple(REST_PIECES * via for via in range(len(own))))
 
 
-def _free(arm: Arm, job: Job, stretch: Stretch, via_deg: Array, progress: Progress) -> Between:
-    """The free path of a separate job from rest to rest, on few segments, as all stretches share the board's
+def _free(arm: Arm, job: Job, leg: Leg, via_deg: Array, progress: Progress) -> Between:
+    """The free path of a separate job from rest to rest, on few segments, as all legs share the board's
     memory."""
     ends = [tuple(angles.tolist()) for angles in via_deg[[0, -1]]]
     alone = replace(
         job,
-        via=(ends[0], *job.via[stretch.first + 1 : stretch.last], ends[1]),
+        via=(ends[0], *job.via[leg.first + 1 : leg.last], ends[1]),
         refine=job.refine if isinstance(job.refine, int) else REST_PIECES,
         stops=(),
         ways=(),

@@ -1,4 +1,4 @@
-"""Dwells between two stretches: inserted segments in which only time passes."""
+"""Dwells between two legs: inserted segments in which only time passes."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The joints' spline of a job with lines of the tool, with enough segments to prove that the tool stays near its way.
 
-Each stretch from rest to rest is a separate spline: at a rest between two, five control points are equal.
+Each leg from rest to rest is a separate spline: at a rest between two, five control points are equal.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import checks
 from armtempo.planning.free.angle_bounds import of_path
-from armtempo.planning.line import stretches as cut
+from armtempo.planning.line import legs as cut
 from armtempo.planning.line.between import Between
 from armtempo.planning.line.deviation import LineDeviation, proven
 from armtempo.planning.line.dwell import DWELL_SEGMENTS
 from armtempo.planning.line.follow import Followed, follow
-from armtempo.planning.line.stretches import Stretch
+from armtempo.planning.line.legs import Leg
 from armtempo.splines import bspline
 
 DEGREE = 5
@@ -41,9 +41,9 @@ _TABLE = 512
 
 @dataclass(frozen=True, eq=False)
 class Led:
-    """A stretch with a line or arc of the tool, and the postures along its way."""
+    """A leg with a line or arc of the tool, and the postures along its way."""
 
-    stretch: Stretch
+    leg: Leg
     followed: Followed
     places: Array
     """Fractions of the way at equal steps of u, (_TABLE + 1,), for its knots."""
@@ -56,53 +56,53 @@ class Led:
 
     def keeps(self, away: LineDeviation) -> bool:
         """Whether a deviation is within the job's tolerance."""
-        enough = self.stretch.enough
+        enough = self.leg.enough
         return away.position_mm <= enough.position_mm and away.rotation_deg <= enough.rotation_deg
 
 
 @dataclass(frozen=True, eq=False)
 class LinePath:
-    """The joints' spline of all stretches."""
+    """The joints' spline of all legs."""
 
     angle_points_deg: Array
     """(S + 5, J)."""
     way_points: Array
-    """Control points of the ways of all stretches, with the same knots: (S + 5,)."""
+    """Control points of the ways of all legs, with the same knots: (S + 5,)."""
     knots: tuple[int, ...]
-    """Segments before each stretch, and in total."""
+    """Segments before each leg, and in total."""
     arrivals: tuple[int, ...]
     """Segments before each via point; approximate for a cut corner."""
 
     def deviation(self, number: int, led: Led) -> LineDeviation:
-        """Bound of the tool's deviation in a stretch."""
+        """Bound of the tool's deviation in a leg."""
         first, last = self.knots[number], self.knots[number + 1]
         angles = of_path(self.angle_points_deg, DEGREE)[first:last]
         ways = of_path(self.way_points[:, None], DEGREE)[first:last, :, 0]
         course, tool = led.followed.course, led.followed.tool
-        return proven(angles, ways - ways[0, 0], tool, course.path, course.fixed, led.stretch.enough)
+        return proven(angles, ways - ways[0, 0], tool, course.path, course.fixed, led.leg.enough)
 
 
-def led_stretches(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
-    """The stretches of a job with lines or arcs of the tool, by number; raises PlanError if the arm cannot follow."""
+def led_legs(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
+    """The legs of a job with lines or arcs of the tool, by number; raises PlanError if the arm cannot follow."""
     speeds = np.array([limit.speed_deg_s for limit in checks.limits_of(arm)])
     found = {}
-    for number, stretch in enumerate(cut.of_job(job)):
-        if stretch.ways:
-            followed = _followed(arm, job, stretch, via_deg)
-            found[number] = Led(stretch, followed, _places(followed, speeds))
+    for number, leg in enumerate(cut.of_job(job)):
+        if leg.ways:
+            followed = _followed(arm, job, leg, via_deg)
+            found[number] = Led(leg, followed, _places(followed, speeds))
     return found
 
 
-def _followed(arm: Arm, job: Job, stretch: Stretch, via_deg: Array) -> Followed:
-    first_deg, last_deg = via_deg[stretch.first], via_deg[stretch.last]
-    found = follow(cut.course(arm, job, stretch, first_deg), first_deg, last_deg)
-    off = np.abs(found.end_deg - via_deg[stretch.last])
+def _followed(arm: Arm, job: Job, leg: Leg, via_deg: Array) -> Followed:
+    first_deg, last_deg = via_deg[leg.first], via_deg[leg.last]
+    found = follow(cut.course(arm, job, leg, first_deg), first_deg, last_deg)
+    off = np.abs(found.end_deg - via_deg[leg.last])
     worst = int(np.argmax(off))
     if off[worst] > _SAME_DEG:
         raise PlanError(
-            f"{stretch.name}: along the line the arm comes to P{stretch.last} with {arm.driven[worst].name} at "
-            f"{found.end_deg[worst]:.4g} degrees, not {via_deg[stretch.last, worst]:.4g}",
-            f"give P{stretch.last} as a pose, or the angles of the branch of P{stretch.first}; or leave line out",
+            f"{leg.name}: along the line the arm comes to P{leg.last} with {arm.driven[worst].name} at "
+            f"{found.end_deg[worst]:.4g} degrees, not {via_deg[leg.last, worst]:.4g}",
+            f"give P{leg.last} as a pose, or the angles of the branch of P{leg.first}; or leave line out",
         )
     return found
 
@@ -128,7 +128,7 @@ def _places(found: Followed, speeds: Array) -> Array:
 
 
 class Proven(NamedTuple):
-    """A spline within the tolerance, and the proven deviation of each stretch with lines."""
+    """A spline within the tolerance, and the proven deviation of each leg with lines."""
 
     path: LinePath
     away: dict[int, LineDeviation]
@@ -142,27 +142,27 @@ def proven_paths(
     From the fewest to ``finest`` a line, if the board holds them: so a wider tolerance only adds splines. At least
     one. Raises PlanError if the board cannot hold it.
     """
-    stretches = cut.of_job(job)
+    legs = cut.of_job(job)
     led = {number: one for number, one in parts.items() if isinstance(one, Led)}
     most = _most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
     pieces = [
-        one.segments if isinstance(one, Between) else _LINE_PIECES * len(stretch.ways)
-        for stretch, (_, one) in zip(stretches, sorted(parts.items()), strict=True)
+        one.segments if isinstance(one, Between) else _LINE_PIECES * len(leg.ways)
+        for leg, (_, one) in zip(legs, sorted(parts.items()), strict=True)
     ]
     if sum(pieces) > most:
         raise PlanError(
             f"job {job.name!r}: its lines and the ways between them need {sum(pieces)} segments at least, the board "
             f"holds {most}",
-            "use fewer via points, or plan the stretches between rests one by one with --split",
+            "use fewer via points, or plan the legs between rests one by one with --split",
         )
     found: list[Proven] = []
     while True:
-        path = _path(stretches, pieces, via_deg, parts)
+        path = _path(legs, pieces, via_deg, parts)
         away = {number: path.deviation(number, one) for number, one in led.items()}
         wide = [number for number, one in led.items() if not one.keeps(away[number])]
         if not wide:
             found.append(Proven(path, away))
-        short = [number for number in led if 2 * pieces[number] <= finest * len(stretches[number].ways)]
+        short = [number for number in led if 2 * pieces[number] <= finest * len(legs[number].ways)]
         before, pieces = (
             pieces,
             [2 * count if number in (wide or short) else count for number, count in enumerate(pieces)],
@@ -171,7 +171,7 @@ def proven_paths(
             return found
         if sum(pieces) > most:
             raise PlanError(
-                f"{led[wide[0]].stretch.name}: with {before[wide[0]]} segments the tool is only proven to stay "
+                f"{led[wide[0]].leg.name}: with {before[wide[0]]} segments the tool is only proven to stay "
                 f"within {away[wide[0]].position_mm:.3g} mm and {away[wide[0]].rotation_deg:.3g} deg of its way, and "
                 f"the board holds {most} in all",
                 "widen tolerance_mm and tolerance_deg, keep away from singular postures, or plan with --split",
@@ -187,13 +187,13 @@ def _most_segments(arm: Arm) -> int:
 
 
 def _path(
-    stretches: Sequence[Stretch], pieces: Sequence[int], via_deg: Array, parts: Mapping[int, Led | Between]
+    legs: Sequence[Leg], pieces: Sequence[int], via_deg: Array, parts: Mapping[int, Led | Between]
 ) -> LinePath:
-    """The spline through the postures of all stretches, with rests between them."""
+    """The spline through the postures of all legs, with rests between them."""
     knots, arrivals = [0], [0]
     rows = []
     before = 0.0
-    for number, (stretch, count) in enumerate(zip(stretches, pieces, strict=True)):
+    for number, (leg, count) in enumerate(zip(legs, pieces, strict=True)):
         one = parts[number]
         if isinstance(one, Led):
             ways = one.ways(count)
@@ -203,7 +203,7 @@ def _path(
             ways = np.linspace(0.0, 1.0, count + 1)
             angles = one.at_knots
             passed = list(one.arrivals[1:])
-        angles[[0, -1]] = via_deg[[stretch.first, stretch.last]]
+        angles[[0, -1]] = via_deg[[leg.first, leg.last]]
         rows.append(np.column_stack([angles, before + ways])[0 if number == 0 else 1 :])
         before += float(ways[-1])
         arrivals += [knots[-1] + knot for knot in passed]
@@ -213,7 +213,7 @@ def _path(
 
 
 def _passed(one: Led, ways: Array) -> list[int]:
-    """The knots of a stretch nearest to each of its via points except the first, increasing."""
+    """The knots of a leg nearest to each of its via points except the first, increasing."""
     found: list[int] = []
     for place in one.followed.course.path.starts[1:]:
         nearest = int(np.argmin(np.abs(ways - place)))

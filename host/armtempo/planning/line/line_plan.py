@@ -19,12 +19,12 @@ from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.fixed_path import Along, FixedPath, Optimum
 from armtempo.planning.free.angle_bounds import of_path
-from armtempo.planning.line import stretches as cut
+from armtempo.planning.line import legs as cut
 from armtempo.planning.line.between import between
 from armtempo.planning.line.deviation import LineDeviation
 from armtempo.planning.line.dwell import DWELL_SEGMENTS, TimedPath
 from armtempo.planning.line.follow import passed
-from armtempo.planning.line.line_path import DEGREE, Led, LinePath, Proven, led_stretches, proven_paths
+from armtempo.planning.line.line_path import DEGREE, Led, LinePath, Proven, led_legs, proven_paths
 from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
 from armtempo.planning.lower_bounds import Floor
 from armtempo.planning.through_plan import Planned
@@ -49,11 +49,11 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     cannot be proven.
     """
     stage("following the tool's way")
-    led = led_stretches(arm, job, via_deg)
+    led = led_legs(arm, job, via_deg)
     others = {
-        number: between(arm, job, stretch, via_deg, progress)
-        for number, stretch in enumerate(cut.of_job(job))
-        if not stretch.ways
+        number: between(arm, job, leg, via_deg, progress)
+        for number, leg in enumerate(cut.of_job(job))
+        if not leg.ways
     }
     finest = _FINEST if job.refine == AUTO else 0
     paths = proven_paths(arm, job, via_deg, {**led, **others}, finest)
@@ -69,13 +69,13 @@ def _fastest(arm: Arm, job: Job, paths: Sequence[Proven], progress: Progress) ->
     says otherwise: the same for the same path, whatever the tolerance."""
     limits = checks.limits_of(arm)
     dwells = DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
-    stretches, found = cut.of_job(job), []
+    legs, found = cut.of_job(job), []
     for number, proven in enumerate(paths):
         path = proven.path
         moving = _moving(path)
         tool = Tool(arm, list(range(len(limits))), path.angle_points_deg[0])
         finest = max(
-            ((path.knots[led + 1] - path.knots[led]) // len(stretches[led].ways) for led in proven.away),
+            ((path.knots[led + 1] - path.knots[led]) // len(legs[led].ways) for led in proven.away),
             default=1,
         )
         most = time_parameterization.most_refine(job, path.knots[-1] + dwells, len(limits))
@@ -95,7 +95,9 @@ def _moving(path: LinePath) -> Index:
 
 def _away(led: Led, found: LineDeviation) -> str:
     turned = f" and {found.rotation_deg:.2g} deg" if led.followed.course.fixed else ""
-    return f"{led.stretch.name}: the tool leaves its way by no more than {found.position_mm:.2g} mm{turned} (proven)"
+    return (
+        f"{led.leg.name}: the tool leaves its way by no more than {found.position_mm:.2g} mm{turned} (proven)"
+    )
 
 
 def _timed(
@@ -114,21 +116,21 @@ def _timed(
     tool_limits = _tool_limits(job, path)
     dwells_s = {stop.via: stop.dwell_s for stop in job.stops if stop.dwell_s > 0.0}
     found = best.found
-    stretch = max(1.0, time_parameterization.MIN_DURATION_S / found.total_s)
+    scale = max(1.0, time_parameterization.MIN_DURATION_S / found.total_s)
     if tool_limits.any:
         stage("proving the tool's limits")
         angles = of_path(bspline.refined(path.angle_points_deg, best.refine, DEGREE), DEGREE)
         axis = of_path(time_points(found.differences_s, DEGREE)[:, None], DEGREE)[:, :, 0]
-        stretch = max(stretch, excess(angles, axis, tool, tool_limits.refined(best.refine)))
-        notes += _limit_notes(job, path, angles, axis * stretch, tool)
-    timed = TimedPath(path.angle_points_deg, found.differences_s * stretch, path.arrivals, best.refine)
+        scale = max(scale, excess(angles, axis, tool, tool_limits.refined(best.refine)))
+        notes += _limit_notes(job, path, angles, axis * scale, tool)
+    timed = TimedPath(path.angle_points_deg, found.differences_s * scale, path.arrivals, best.refine)
     timed = timed.with_dwells(dwells_s)
     times = time_points(timed.differences_s, DEGREE)
     joints = tuple(
         JointSpline(DEGREE, best.refine, np.ascontiguousarray(column), times, timed.arrivals)
         for column in timed.angle_points_deg.T
     )
-    waits_s = joints[0].duration_s - found.total_s * stretch
+    waits_s = joints[0].duration_s - found.total_s * scale
     floor = _floor(points, path.knots, own, found.total_s, floors)
     search = Search(
         joints=tuple(map(int, moving)),
@@ -193,15 +195,15 @@ def _floor(
     about_s: float,
     floors: Mapping[int, Floor | None],
 ) -> Floor:
-    """Lower bound for all time laws on the path with rests between stretches; ``floors``: known bounds of
-    stretches."""
+    """Lower bound for all time laws on the path with rests between legs; ``floors``: known bounds of
+    legs."""
     parts = []
     for number, (first, last) in enumerate(pairwise(knots)):
-        stretch = points[first : last + DEGREE]
-        moving = np.ptp(stretch, axis=0) > checks.TOLERANCE
+        leg = points[first : last + DEGREE]
+        moving = np.ptp(leg, axis=0) > checks.TOLERANCE
         own = [limit for limit, moves in zip(limits, moving, strict=True) if moves]
         share = about_s * (last - first) / knots[-1]
-        parts.append(floors.get(number) or lower_bounds.of_path(stretch[:, moving], DEGREE, own, share))
+        parts.append(floors.get(number) or lower_bounds.of_path(leg[:, moving], DEGREE, own, share))
     return Floor(sum(part.time_s for part in parts), parts[0].kind)
 
 

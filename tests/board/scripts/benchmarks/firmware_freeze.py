@@ -64,7 +64,7 @@ def main(registers):
     sampler.configure(len(JOINTS), ())
     inputs = Inputs(head, JOINTS, sampler)
     block = sampler.block
-    block[isr.PORT_A_BEHIND] = _CLOCK_AS_PORT
+    block[isr.PORT_A_OFFSET] = _CLOCK_AS_PORT
     for name, line in LINES:
         inputs.thaw()
         inputs.watch(1)

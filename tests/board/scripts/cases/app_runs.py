@@ -215,6 +215,18 @@ def case_the_heap_is_collected_often_but_while_something_moves():
         assert 0 < gc.threshold() < (gc.mem_alloc() + gc.mem_free()) // 60
 
 
+def case_a_homing_start_names_whose_switches_end_it():
+    app, host = connected()
+    crc = wire.record_crc(host.record)
+    engine = app.controller.board.engine
+    for mask, watched in ((0, 0b11), (0b10, 0b10)):  # without a mask: of both joints, which move
+        flags = messages.START_HOMING | mask << messages.START_SWITCHES_BIT
+        assert host.ask("start", (flags, crc), "feed")[0] == "ok"
+        assert engine.homing == watched
+        engine.finish()
+        host.turn(10)
+
+
 def hold_one(flags=0):
     app, host = connected(flags=flags)
     crc = wire.record_crc(host.record)

@@ -80,7 +80,7 @@ def case_without_room_it_is_refused():
     module.gc = stand_in.Module()
     module.gc.collect = gc.collect
     module.gc.mem_free = lambda: 10_000
-    assert begin(host) == ("error", "no_sequence_room", 255, 12000)
+    assert begin(host) == ("error", "no_sequence_memory", 255, 12000)
     assert not app.controller.sequence and state(host) == "idle"
     assert host.ask("sequence")[:2] == ("error", "unknown_command")
     module.gc.mem_free = lambda: 24_000
@@ -96,7 +96,7 @@ def case_no_memory_for_it_is_said_so():
     import armtempo_board.app.sequence_start as module
 
     module.sequencer, kept = none, module.sequencer
-    assert begin(host)[:2] == ("error", "no_sequence_room")
+    assert begin(host)[:2] == ("error", "no_sequence_memory")
     module.sequencer = kept
     assert host.ask("start", (0, wire.record_crc(host.record)), "feed")[0] == "ok"
 

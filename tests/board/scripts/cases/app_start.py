@@ -92,24 +92,24 @@ def case_what_the_board_has_not_is_named():  # not emulated
 class Cramped:
     """A board with less memory for engines."""
 
-    room = engine_memory.needed_bytes([1])
+    size = engine_memory.needed_bytes([1])
     is_short = True
 
 
 def case_a_record_that_no_longer_fits_is_named():  # not emulated
     arm = stand_in.arm()
     root = folder_with(arm)
-    room = sys.modules["armtempo_board.app.room"]
-    room.workspace, before = Cramped, room.workspace
+    memory_shares = sys.modules["armtempo_board.app.memory_shares"]
+    memory_shares.for_engine, before = Cramped, memory_shares.for_engine
     try:
         _, host, hello = started(root)
     finally:
-        room.workspace = before
+        memory_shares.for_engine = before
     needed = engine_memory.needed_bytes([1, 1])
-    assert (wire.ERRORS[hello[PROBLEM]][0], hello[VALUE]) == ("no_room", needed)
+    assert (wire.ERRORS[hello[PROBLEM]][0], hello[VALUE]) == ("no_engine_memory", needed)
     small = stand_in.arm(joints=1)
     assert host.upload("/arm", small)[-1] == ("ok", (), b"")
-    assert host.upload("/arm", arm)[-1] == ("error", "no_room", 255, needed)
+    assert host.upload("/arm", arm)[-1] == ("error", "no_engine_memory", 255, needed)
     assert host.hello()[1][ARM_CRC] == wire.record_crc(small)
     with open(root + "/arm.ata", "rb") as file:
         assert file.read() == small, "what does not fit does not take the old one's place"
@@ -155,9 +155,9 @@ def leaves_by_ctrl_c(app, host):
     """Within a few turns; what comes after is left to the prompt."""
     host.port.inbox.extend(CTRL_C)
     for _ in range(10):
-        if not app.left():
+        if not app.leave_requested():
             host.turn(1)
-    assert app.left()
+    assert app.leave_requested()
     assert bytes(host.port.inbox) == b"\x01"
 
 
@@ -167,10 +167,10 @@ def case_repl_is_reached_by_ctrl_c_when_idle_only():  # not emulated
     host.turn(1000)
     host.port.inbox.extend(CTRL_C)
     host.turn(1000)
-    assert not app.left()
+    assert not app.leave_requested()
     app.controller.board.engine.finish()
     host.turn(1000)
-    assert not app.left()
+    assert not app.leave_requested()
     leaves_by_ctrl_c(app, host)
 
 
@@ -182,7 +182,7 @@ def case_noise_does_not_open_the_repl():  # not emulated
         host.turn(40)
         host.port.inbox.extend(wire.frame(1, 2, b""))
         host.turn(1000)
-        assert not app.left(), noise
+        assert not app.leave_requested(), noise
 
 
 def case_line_ends_alone_do_not_open_the_repl():  # not emulated
@@ -206,7 +206,7 @@ def case_repl_is_reached_right_behind_a_frame():  # not emulated
 def case_leave_answers_first():  # not emulated
     app, host = connected()
     assert host.ask("leave") == ("ok", (), b"")
-    assert app.left()
+    assert app.leave_requested()
 
 
 class Here:
@@ -255,7 +255,7 @@ def case_begun_again_it_waits_for_a_greeting():  # not emulated
     app, host = connected()
     host.ask("leave")
     app.enter()
-    assert not app.left()
+    assert not app.leave_requested()
     assert host.ask("status")[:2] == ("error", "no_session")
     assert host.hello()[0] == "ok"
     assert host.ask("status")[0] == "ok"

@@ -11,10 +11,10 @@ import stm
 import uctypes
 
 from armtempo_board.stepgen.step_generator import StepGenerator  # isort: skip  as program.py: the deepest first
-from armtempo_board.app import room
+from armtempo_board.app import memory_shares
 from armtempo_board.hardware import backup_sram, registers
 from armtempo_board.memory import Memory
-from armtempo_board.motion.workspace import Workspace
+from armtempo_board.motion.engine_memory import EngineMemory
 from armtempo_shared import engine_memory
 from machine import mem32
 
@@ -22,9 +22,9 @@ SEED = 5
 LARGE = 3 * 1026
 
 
-def workspace(words, address):
+def engine_memory_of(words, address):
     """With a memory of that many words."""
-    made = Workspace(engine_memory.LARGEST_BYTES, address)
+    made = EngineMemory(engine_memory.LARGEST_BYTES, address)
     made.make_memory(words)
     return made
 
@@ -46,7 +46,7 @@ def parts_of(generator):
 def case_the_backup_sram_is_found():
     bare_board.start()
     assert backup_sram.find() == stm.BKPSRAM
-    assert workspace(LARGE, stm.BKPSRAM).memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
+    assert engine_memory_of(LARGE, stm.BKPSRAM).memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
 
 
 def case_a_memory_that_keeps_nothing_is_not_used():
@@ -57,7 +57,7 @@ def case_a_memory_that_keeps_nothing_is_not_used():
         registers.BACKUP_SRAM = rows[:missing] + rows[missing + 1 :]
         assert backup_sram.find() == 0
     registers.BACKUP_SRAM = rows
-    memory = workspace(LARGE, 0).memory
+    memory = engine_memory_of(LARGE, 0).memory
     part = memory.take_for_processor(engine_memory.PROCESSOR_WORDS)
     assert begin_of(part) == -1
     assert memory.take(1026) is not None, "it is no part of the blocks"
@@ -91,7 +91,7 @@ def case_an_engine_takes_what_the_formula_counts():
         words = engine_memory.words(rates)
         while not engine_memory.lasting_ms(rates, words):
             words += 1
-        made = workspace(words, address)
+        made = engine_memory_of(words, address)
         rings = made.rings(rates)
         generators = [StepGenerator(made.memory) for _ in rates]
         assert [begin_of(ring) for ring in rings] == [-1] * len(rings)
@@ -112,31 +112,31 @@ def words_of(part):
 
 def case_without_it_there_is_less_for_arms():
     """The words that no other memory has come out of the heap that arms have."""
-    before = room._free
-    room._free = lambda: 40_000
+    before = memory_shares._free
+    memory_shares._free = lambda: 40_000
     try:
         bare_board.start()
-        with_it = room.workspace().room
+        with_it = memory_shares.for_engine().size
         backup_sram.find, find = lambda: 0, backup_sram.find
-        without = room.workspace().room
+        without = memory_shares.for_engine().size
         backup_sram.find = find
     finally:
-        room._free = before
+        memory_shares._free = before
     assert with_it - without == 4 * engine_memory.PROCESSOR_WORDS
 
 
 def case_fewer_joints_leave_more_for_rings_where_memory_is_short():
     bare_board.start()
-    before = room._free
-    for free, is_short in ((200_000, False), (room._RESERVE + 8_000, True)):
-        room._free = lambda: free  # noqa: B023
+    before = memory_shares._free
+    for free, is_short in ((200_000, False), (memory_shares._RESERVE + 8_000, True)):
+        memory_shares._free = lambda: free  # noqa: B023
         try:
-            made = room.workspace()
+            made = memory_shares.for_engine()
         finally:
-            room._free = before
+            memory_shares._free = before
         sizes = []
         for joints in (3, 1, 3):
-            room.share(made, joints)
+            memory_shares.resize(made, joints)
             sizes.append(made.memory.size)
         more = 2 * (engine_memory.object_bytes(2) - engine_memory.object_bytes(1)) // 4
         assert (sizes[1] - sizes[0], sizes[2] - sizes[0]) == ((more, 0) if is_short else (0, 0))
@@ -155,11 +155,11 @@ class Collector:
 
 
 def case_samples_take_their_share_of_what_a_collection_leaves():
-    kept, room.gc = room.gc, Collector()
+    kept, memory_shares.gc = memory_shares.gc, Collector()
     try:
-        assert room.sample_bytes() == 96_000 // 48
+        assert memory_shares.sample_bytes() == 96_000 // 48
     finally:
-        room.gc = kept
+        memory_shares.gc = kept
 
 
 cases.run(globals())

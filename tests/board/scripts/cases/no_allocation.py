@@ -18,15 +18,15 @@ from arm_rows import HEAD, arm
 from armtempo_board.hardware import isr, registers  # noqa: F401  they are forgotten again: not counted
 from armtempo_board.motion import motion_check  # noqa: F401  they are forgotten again: not counted
 from armtempo_board.motion.engine import Engine
+from armtempo_board.motion.engine_memory import EngineMemory
 from armtempo_board.motion.engine_parts import EngineParts
-from armtempo_board.motion.workspace import Workspace
 from armtempo_shared import armrecord, engine_memory  # noqa: F401
 from brake_motion import record
 
 STEP_TICKS = 30_000
 BUFFER = array("i", [0] * 10)
-WORKSPACE = Workspace(engine_memory.LARGEST_BYTES)
-WORKSPACE.make_memory(12 * 1026)
+ENGINE_MEMORY = EngineMemory(engine_memory.LARGEST_BYTES)
+ENGINE_MEMORY.make_memory(12 * 1026)
 
 
 def compare_of(ring):
@@ -92,7 +92,7 @@ def locked(function, argument=None):
 def run(joints, brake_at):
     """A whole motion, braked at a time (or not)."""
     stm.BLOCKS["TIM1"][isr.CNT] = 0
-    engine = Engine(EngineParts(HEAD, joints, WORKSPACE))
+    engine = Engine(EngineParts(HEAD, joints, ENGINE_MEMORY))
     engine.home(7, [0, 0, 0])
     motion = record()
     engine.load(motion)
@@ -120,7 +120,7 @@ def heap(count):
     """Bytes that an engine with that many joints keeps."""
     gc.collect()
     before = gc.mem_alloc()
-    engine = Engine(EngineParts(HEAD, arm(count), WORKSPACE))
+    engine = Engine(EngineParts(HEAD, arm(count), ENGINE_MEMORY))
     gc.collect()
     return gc.mem_alloc() - before if engine else 0
 

@@ -297,7 +297,7 @@ def frozen(line, levels, high_a=0, high_b=0, runs=1, before=0):
     block, registers = words(isr.BLOCK_WORDS), words(PORT_E + 8)
     address = uctypes.addressof(registers)
     block[isr.TIM2_AT], block[isr.TIM2_AT + 1] = address & 0x3FFFFFFF, address >> 30
-    block[isr.PORT_A_BEHIND] = 4 * PORT_A
+    block[isr.PORT_A_OFFSET] = 4 * PORT_A
     for of_line, low, mask, release in (
         (7, isr.ALWAYS, isr.ALWAYS, 0),
         (8, 1 << 10, 1 << 7 | 1 << 10, 0),

@@ -38,8 +38,8 @@ sys.modules["time"] = Time()
 
 from armtempo_board.app.app import App  # noqa: E402
 
-ROOM = 12_000
-"""Bytes of memory for engines, about as on MicroPython's own firmware."""
+FREE_BYTES = 12_000
+"""Bytes of memory for engines, about as on stock MicroPython."""
 
 
 def arm_of(rates, outputs):
@@ -62,7 +62,7 @@ def motion_of(arm, segments):
         [points] * arm[5],
         [times] * arm[5],
         1,
-        ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14),
+        ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14, 0),
         wire.record_crc(arm),
     )
 
@@ -74,7 +74,7 @@ def change(host, rates, segments, outputs):
     answer = host.upload("/arm", arm)[-1]
     if answer[0] == "error":
         needed = engine_memory.needed_bytes(rates)
-        assert answer[1] == "no_room" and answer[3] == needed, answer
+        assert answer[1] == "no_engine_memory" and answer[3] == needed, answer
         assert host.hello()[1][9] == before[9], "the old arm stays in force"
         return False
     record = motion_of(arm, segments)
@@ -92,10 +92,10 @@ def change(host, rates, segments, outputs):
 
 def main(root, count, seed):
     random.seed(seed)
-    from armtempo_board.app import room
+    from armtempo_board.app import memory_shares
 
-    room._free = lambda: ROOM + room._RESERVE + engine_memory.object_bytes(6)
-    room._USUAL_JOINTS = 6
+    memory_shares._free = lambda: FREE_BYTES + memory_shares._RESERVE + engine_memory.object_bytes(6)
+    memory_shares._USUAL_JOINTS = 6
     port = stand_in.Port()
     app = App(port, root)
     host = stand_in.Host(app, port)

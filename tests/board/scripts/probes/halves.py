@@ -43,9 +43,9 @@ def walk(motion, joint, parts, number):
         deepest = max(deepest, level)
         number = (number * 1103515245 + 12345) & 0x3FFFFFFF
         if level < 2 or (level < DEEPEST and number >> 16 & 15 < 5):
-            parts.go_on(subdivision.SPLIT)
+            parts.advance(subdivision.SPLIT)
         else:
-            parts.go_on(subdivision.SKIP)
+            parts.advance(subdivision.SKIP)
     return count, deepest
 
 

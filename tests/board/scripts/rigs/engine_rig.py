@@ -30,7 +30,7 @@ class Steps:
         first, gap, _, direction = self.blocks[place[0]]
         return first + place[1] * gap, direction
 
-    def go_on(self, place, steps=1):
+    def advance(self, place, steps=1):
         """Move a place on; not beyond the end of its block."""
         place[1] += steps
         if place[1] == self.blocks[place[0]][2]:
@@ -113,7 +113,7 @@ class StepGenerator:
             step_queue.put_single(self.queue, (time >> 12) + bezier.BIAS, time & 4095)
             if steps > 1:
                 self._lengthen(time, gap, steps)
-            self._steps.go_on(self._place, steps)
+            self._steps.advance(self._place, steps)
             self.ended = self._steps.at(self._place) is None
 
     def _lengthen(self, time, gap, steps):
@@ -262,7 +262,7 @@ class Rig:
             Pulses(self, joint, pins.STEP[joint["channel"]][0], pins.DIR[joint["channel"]])
             for joint in joints
         ]
-        self.workspace = self._workspace()
+        self.engine_memory = self._engine_memory()
         self.make_engine(joints)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
 
@@ -271,14 +271,14 @@ class Rig:
         from armtempo_board.motion.engine import Engine
         from armtempo_board.motion.engine_parts import EngineParts
 
-        self.engine = Engine(EngineParts(self.head, joints, self.workspace))
+        self.engine = Engine(EngineParts(self.head, joints, self.engine_memory))
 
     @staticmethod
-    def _workspace():
-        from armtempo_board.motion.workspace import Workspace
+    def _engine_memory():
+        from armtempo_board.motion.engine_memory import EngineMemory
         from armtempo_shared.engine_memory import LARGEST_BYTES
 
-        made = Workspace(LARGEST_BYTES)
+        made = EngineMemory(LARGEST_BYTES)
         made.make_memory(12 * 1026)
         return made
 

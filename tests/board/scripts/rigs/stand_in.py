@@ -92,10 +92,10 @@ def install():
     engine.Engine = Engine
     parts = Module()
     parts.EngineParts = lambda *parts: parts
-    room = Module()
-    room.workspace = Workspace
-    room.sample_bytes = lambda: 4096
-    room.share = lambda workspace, joints: None
+    memory_shares = Module()
+    memory_shares.for_engine = EngineMemory
+    memory_shares.sample_bytes = lambda: 4096
+    memory_shares.resize = lambda made, joints: None
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
@@ -107,7 +107,7 @@ def install():
     sys.modules["pyb"] = pyb
     sys.modules["armtempo_board.motion.engine"] = engine
     sys.modules["armtempo_board.motion.engine_parts"] = parts
-    sys.modules["armtempo_board.app.room"] = room
+    sys.modules["armtempo_board.app.memory_shares"] = memory_shares
     sys.modules["armtempo_board.motion.endpoints"] = ends
     sys.modules["armtempo_board.motion.next_motion"] = ahead
     sys.modules["time"] = _install_time()
@@ -115,10 +115,10 @@ def install():
         sys.print_exception = lambda error, file: file.write(repr(error))
 
 
-class Workspace:
+class EngineMemory:
     """Says only how large it is."""
 
-    room = engine_memory.LARGEST_BYTES
+    size = engine_memory.LARGEST_BYTES
     is_short = False
 
 
@@ -205,6 +205,7 @@ class Engine:
             assert ready.is_ready and ready.motion is motion and ready.rate == rate
         self.calls.append("load ready" if ready else "load unchecked" if self.skip_check else "load")
         self.rates.wanted = rate
+        self.homing = homing
         if self.refusal:
             from armtempo_board.errors import Refused
 
@@ -403,5 +404,5 @@ def record(arm_record, joints=2, segments=3):
     angles = [list(range(segments + 5)) for _ in range(joints)]
     crc = armrecord.unpack(arm_record)[2]
     return motion.pack(
-        5, angles, angles, 1, ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14), crc
+        5, angles, angles, 1, ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14, 0), crc
     )

@@ -48,7 +48,7 @@ class Encoder:
         self.counts += counts
 
 
-def stepper(seed=1, **changed):
+def stepper(seed=1, on_motor=False, **changed):
     """A motor with the paper's first joint after it, and its DIR line and encoder."""
     joint = {
         "dir_inverted": 0,
@@ -60,6 +60,7 @@ def stepper(seed=1, **changed):
         "gear_ratio": 2.0,
         "microsteps": MICROSTEPS,
         "model": dict(MODEL, **changed),
+        "encoder_on_motor": on_motor,
     }
     direction, encoder = Line(1), Encoder()
     motor = Stepper(Line(), direction, Line(), encoder, joint, seed)
@@ -163,6 +164,14 @@ def case_backlash_is_lost_at_a_reversal():
     run(motor, 3000, 6000)
     assert abs(up - (320 / STEPS_PER_DEG - 0.45)) < 0.03
     assert abs(motor.angle_deg() - 0.45) < 0.03
+
+
+def case_an_encoder_on_the_motor_sees_no_backlash():
+    for on_motor, lost in ((False, 0.45), (True, 0.0)):
+        motor, _, encoder = stepper(on_motor=on_motor, backlash_deg=0.9, damping_nm_s=20.0)
+        steps(motor, [MS * number for number in range(320)])
+        run(motor, 0, 3000)
+        assert abs(encoder.counts - (320 - lost * STEPS_PER_DEG) * 5 / 16) < 2, (on_motor, encoder.counts)
 
 
 def case_scatter_differs_between_motions_and_repeats_with_the_seed():

@@ -15,14 +15,14 @@ _SEEN_TICKS = 168  # 2 us: two samples of a capture at 1 MHz
 _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 
 
-def make_engine(record, switches=False, rates=None, encoders=False, workspace=None):
+def make_engine(record, switches=False, rates=None, encoders=False, engine_memory=None):
     """(engine, rows of its joints); it only steps the pins of this arm, and the arm's E-stop stops it.
 
     ``switches``: with E-stop and limit switch 1 for the first joint, whatever the arm has. ``rates``: of this number of
     joints, instead of the arm's, without ranges. ``encoders``: read them, without a check of the following error.
-    ``workspace``: that of a running program.
+    ``engine_memory``: that of a running program.
     """
-    from armtempo_board.app import room
+    from armtempo_board.app import memory_shares
     from armtempo_board.motion.engine import Engine
     from armtempo_board.motion.engine_parts import EngineParts
 
@@ -42,11 +42,11 @@ def make_engine(record, switches=False, rates=None, encoders=False, workspace=No
         joints = joints[: len(rates)]
         for joint, rate in zip(joints, rates):
             joint["max_rate"], joint["min_steps"], joint["max_steps"] = rate, -_RANGE, _RANGE
-    if workspace is None:
-        workspace = room.workspace()
+    if engine_memory is None:
+        engine_memory = memory_shares.for_engine()
     else:
-        room.share(workspace, len(joints))
-    engine = Engine(EngineParts(head, joints, workspace))
+        memory_shares.resize(engine_memory, len(joints))
+    engine = Engine(EngineParts(head, joints, engine_memory))
     engine.inputs.enable_pin = NoPin()
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         pull_inactive(engine)

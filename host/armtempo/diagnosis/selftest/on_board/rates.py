@@ -44,7 +44,7 @@ def measure(record, motion, rates, frames, idle_us, watch=()):
     captures = captured(record, len(rates), 0, watch[0])[0] if watch else []
     host = Host([unhexlify(frame) for frame in frames])
     app = App(host, "/none")  # no arm is stored there: no pin is touched
-    engine, _ = make_engine(record, rates=rates, workspace=app.controller.board.workspace)
+    engine, _ = make_engine(record, rates=rates, engine_memory=app.controller.board.engine_memory)
     hand_over(app.controller, engine, len(rates))
     engine.skip_check = True  # a rate is tried that is not allowed
     longest = 0

@@ -54,8 +54,11 @@ class ArmOnPins:
         if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
             set_level(self._pins.ESTOP, 0 if head["flags"] & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 1)
         self._switches = []
-        for motor, joint in zip(self.motors, joints):
-            self._switches.extend(limit_switches(motor, joint, self._pins))
+        for number, joint in enumerate(joints):
+            turned = self.motors[number]
+            if joint.get("by_motors"):
+                turned = CoupledJoint(self.motors, joint["by_motors"])
+            self._switches.extend(limit_switches(turned, joint, self._pins))
         self.follow()
 
     def _motor(self, number, joint, enable):
@@ -89,11 +92,21 @@ class ArmOnPins:
         """An input changed: nothing to do."""
 
 
+class CoupledJoint:
+    """A joint whose angle is the sum of the ``motors``' angles times ``shares``."""
+
+    def __init__(self, motors, shares):
+        self._parts = [part for part in zip(motors, shares) if part[1]]
+
+    def angle_deg(self):
+        return sum([share * motor.angle_deg() for motor, share in self._parts])
+
+
 class LimitSwitch:
     """The switch at one end: it trips at ``trip_deg`` and above (``side`` 1) or below (-1)."""
 
-    def __init__(self, motor, side, trip_deg, pin, active_high):
-        self._motor = motor
+    def __init__(self, joint, side, trip_deg, pin, active_high):
+        self._joint = joint
         self._side = side
         self._trip = side * trip_deg
         self._pin = pin
@@ -102,14 +115,14 @@ class LimitSwitch:
 
     def look(self):
         """Set the input from the joint's angle."""
-        tripped = self._side * self._motor.angle_deg() >= self._trip
+        tripped = self._side * self._joint.angle_deg() >= self._trip
         if tripped != self._tripped:
             self._tripped = tripped
             set_level(self._pin, self._active if tripped else 1 - self._active)
 
 
-def limit_switches(motor, joint, pins):
-    """The joint's switches of known angle; the inputs of others stay untripped."""
+def limit_switches(turned, joint, pins):
+    """The joint's switches of known angle, by the angle of what is ``turned``; the inputs of others stay untripped."""
     found = []
     for side, channel, trip_deg in (
         (-1, joint["limit_low"], joint.get("low_deg")),
@@ -121,5 +134,5 @@ def limit_switches(motor, joint, pins):
         if trip_deg is None:
             set_level(pin, 1 - joint["limit_active_high"])
         else:
-            found.append(LimitSwitch(motor, side, trip_deg, pin, joint["limit_active_high"]))
+            found.append(LimitSwitch(turned, side, trip_deg, pin, joint["limit_active_high"]))
     return found

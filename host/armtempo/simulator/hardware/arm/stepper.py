@@ -6,7 +6,8 @@ The field pulls the rotor like a spring that slips (P. Acarnley, Stepping Motors
     J x'' = T(v) sin(2 pi (c - x) / 4 m) - D (v - c') - T_load(x)
 
 with x the rotor's angle and c the command, both in microsteps, m microsteps a step. ``T(v)`` falls with speed
-as the winding's inductance limits the current. The joint follows the rotor through gear and backlash.
+as the winding's inductance limits the current. The joint follows the rotor through gear and backlash; the encoder is on
+one of the two.
 
 The integration (drift-kick-drift) starts with each motion, in steps of 1 ms, or smaller ones if the rotor
 oscillates fast. Each step uses the mean of the command within it, so that a pulse acts from its own time on.
@@ -115,6 +116,7 @@ class Stepper(IdealMotor):
         self._play = model["backlash_deg"] * self._steps_per_deg / 2
         self._phase = model["encoder_phase_counts"]
         self._ratio = self._num / self._den
+        self._on_motor = joint["encoder_on_motor"]
         self._parts = max(1, ceil(sqrt(self._pull * self._electrical) * _DT_S / _FINEST))
         self._noise = Noise(seed)
         self._scatter = model["scatter_deg"] * self._steps_per_deg
@@ -229,7 +231,8 @@ class Stepper(IdealMotor):
             self.moved = False
 
     def _reading(self):
-        return int((self._joint * self._ratio + self._phase) // 1)
+        turned = self._x if self._on_motor else self._joint
+        return int((turned * self._ratio + self._phase) // 1)
 
     def _show(self):
         counts = self._reading()

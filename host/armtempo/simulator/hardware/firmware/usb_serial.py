@@ -84,10 +84,10 @@ class Serial(SilentPort):
             if written:
                 self.sending = self.sending[written:]
         while not self.ended:
-            room = BUFFER - 1 - len(self.received)
-            if self.rts and room < 65:
+            space = BUFFER - 1 - len(self.received)
+            if self.rts and space < 65:
                 return
-            piece = self._chunk[: min(room, _CHUNK)] if self.rts else self._chunk
+            piece = self._chunk[: min(space, _CHUNK)] if self.rts else self._chunk
             try:
                 count = self._in.readinto(piece)
             except OSError:  # the other end of the pseudo terminal is closed
@@ -96,17 +96,17 @@ class Serial(SilentPort):
                 self.ended = count == 0
                 return
             self.pieces += 1
-            self._take_in(bytes(piece[:count]), room)
+            self._take_in(bytes(piece[:count]), space)
             if count < len(piece):
                 return
 
-    def _take_in(self, data, room):
+    def _take_in(self, data, space):
         if self.attached and self.interrupt_char >= 0:
             found = data.find(bytes((self.interrupt_char,)))
             if found >= 0:
                 data = data[:found] + data[found + 1 :]
                 machine_state.board.interrupted = True
-        self.received.extend(data if self.rts else data[:room])
+        self.received.extend(data if self.rts else data[:space])
 
 
 class USB_VCP:

@@ -1,0 +1,299 @@
+"""What moves the arm of a board: moves, jogs, runs, stops, the speed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from armtempo_shared.messages import RESUME
+
+from armtempo.basics.arguments import checked_as
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
+from armtempo.basics.progress import Progress
+from armtempo.encoding import encoded_motion
+from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.link.board_messages import SequenceState
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
+from armtempo.planning.jog.jog_motion import SPEED, move_of
+from armtempo.report.run import Run
+from armtempo.report.sequence_reader import SequenceRun
+from armtempo.robot import arm_state, goto, jog, recording, sequence_recording, sequence_run, stored_motion
+from armtempo.robot.by_hand import HandGuided
+from armtempo.robot.connection import Connection
+from armtempo.robot.goto import Where, posture_deg
+from armtempo.robot.jog import HeldJog
+from armtempo.robot.recording import Watcher
+from armtempo.robot.sequence_run import SequenceWatcher
+from armtempo.robot.speed import change_speed, permille
+from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.store import BoardStore, stored_name
+
+MOST_REPETITIONS = 99
+"""Their files are numbered with two digits."""
+
+
+@checked_as("Board")
+class Motions:
+    """``Board.motions``: what moves the arm, and what it recorded."""
+
+    def __init__(self, board: Connection, store: BoardStore) -> None:
+        self._board = board
+        self._store = store
+        self.last_jog_ends = ""
+        """Why the last jog ended early; "" if it did not."""
+        self._last_folder: Path | None = None
+        self._last_sequence: Path | None = None
+
+    def goto(
+        self,
+        where: Where,
+        progress: Progress | None = None,
+        stop: StopRequest | None = None,
+        speed: float = 1.0,
+        line: bool = False,
+    ) -> None:
+        """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
+
+        ``where``: a posture, or a plan, sequence or its file (the start). ``speed``: fraction of the fastest
+        move, 0.01 to 1. ``line``: move the tool in a straight line. Raises LinkError if the position is
+        unknown, InputError for a posture that does not fit the arm, PlanError if the arm cannot follow the
+        line.
+        """
+        permille(speed)  # raises InputError for an invalid speed
+        arm = self._board.known_arm()
+        target_deg = posture_deg(where, arm)
+        with self._board.stoppable(stop) as wanted:
+            self._board.start.home_virtual_arm(arm)
+            goto.go_to(self._board.client, arm, target_deg, wanted, progress, goto.MovePace(speed, line))
+
+    def jog(
+        self,
+        joint: int | str | None = None,
+        by_deg: float | None = None,
+        axis: str | None = None,
+        by_mm: float | None = None,
+        speed: float = SPEED,
+        stop: StopRequest | None = None,
+    ) -> Array:
+        """Move a joint or the tool: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
+
+        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y",
+        "tool-z": the tool moves along it by ``by_mm``, or turns about it by ``by_deg``; ``speed``: fraction
+        of the speed limits, 0.01 to 1. The jog ends early at the end of a range, or if the tool cannot
+        continue along the line (``last_jog_ends`` says why). Returns the posture in degrees, (J,). Raises
+        LinkError if the position is unknown, InputError if no motion in that direction is possible.
+        """
+        arm = self._board.known_arm()
+        move = move_of(arm, joint, axis, by_deg, by_mm)
+        with self._board.stoppable(stop) as wanted:
+            self._board.start.home_virtual_arm(arm)
+            self.last_jog_ends = jog.step(self._board.client, arm, move, speed, wanted).ends
+        return self._posture_deg()
+
+    def jog_to(
+        self, joint: int | str, angle_deg: float, speed: float = SPEED, stop: StopRequest | None = None
+    ) -> Array:
+        """Move a joint to an angle; nothing moves if it is there. The rest as in ``jog``."""
+        arm = self._board.known_arm()
+        self._board.start.home_virtual_arm(arm)
+        by_deg = jog.distance_deg(self._posture_deg(), arm, joint, angle_deg)
+        if by_deg:
+            return self.jog(joint, by_deg, speed=speed, stop=stop)
+        self.last_jog_ends = ""
+        return self._posture_deg()
+
+    def held_jog(
+        self,
+        joint: int | str | None = None,
+        axis: str | None = None,
+        direction: int = 1,
+        turn: bool = False,
+        speed: float = SPEED,
+    ) -> HeldJog:
+        """A jog towards the end of the range that continues only while its ``hold`` is called; use it in ``with``.
+
+        ``direction``: 1 or -1; ``turn``: about ``axis`` instead of along it; the rest as in ``jog``. If the
+        calls stop, the board brakes. Leaving the context brakes and waits for rest.
+        """
+        arm = self._board.known_arm()
+        by = math.copysign(math.inf, direction)
+        along = None if turn or joint is not None else by
+        move = move_of(arm, joint, axis, None if along else by, along)
+        self._board.start.home_virtual_arm(arm)
+        return HeldJog(self._board.client, arm, jog.plan(self._board.client, arm, move, speed))
+
+    def by_hand(self) -> HandGuided:
+        """A context without motor current: move the arm by hand, and read the encoders with ``angles_deg()``.
+
+        Hold the arm before: it sinks.
+
+        Raises InputError for a driven joint without an encoder, LinkError if the position is unknown.
+        """
+        return HandGuided(self._board.client, self._board.known_arm())
+
+    def run(
+        self,
+        motion: Plan | EncodedMotion | Path | str,
+        repeat: int = 1,
+        out: Path | str = "runs",
+        progress: Progress | None = None,
+        watcher: Watcher | None = None,
+        stop: StopRequest | None = None,
+    ) -> Run:
+        """Replay a motion ``repeat`` times, 1 to 99, and record it in a new run folder in ``out``.
+
+        ``motion``: a plan, its file (FILE.json), or the name of a motion on the board. The arm must be homed
+        and at the start of the motion; the arm of a virtual board is moved there. Between repetitions it
+        returns along the same path. The speed is that of the last ``speed`` call. ``progress`` counts seconds
+        of motion; ``watcher`` is called with folder, samples and repetitions. If the run ends early, it
+        raises, and ``last_run`` holds the recording. Raises LinkError if the arm is not homed or not at the
+        start, the board has another motion of this name (``upload`` can replace it), or is set up for another
+        arm.
+        """
+        if not 1 <= repeat <= MOST_REPETITIONS:
+            raise InputError(f"repeat: {repeat} is not in the range 1<=x<={MOST_REPETITIONS}", "change it")
+        encoded = self._encoded(motion)
+        seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
+        with self._board.stoppable(stop) as wanted:
+            self._bring_to_start(encoded, wanted)
+            folder = recording.new_run(Path(out), encoded, self._board.port, self._board.client)
+            self._last_folder = folder.path
+            seen.begin(encoded, folder)
+            for _ in recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen):
+                pass
+        return Run.load(folder.path)
+
+    def run_sequence(
+        self,
+        sequence: SequencePlan | str,
+        watcher: SequenceWatcher = lambda _: None,
+        stop: StopRequest | None = None,
+        replace: bool = False,
+        out: Path | str | None = None,
+    ) -> SequenceState:
+        """Run a planned sequence, or the stored sequence of that name; returns its last state.
+
+        Its rows and samples are recorded in a new run folder in ``out``; None: not recorded. ``watcher`` is
+        called with each new state. The arm must be homed and at the start of the sequence, otherwise
+        LinkError or BoardError; the arm of a virtual board is moved there. If a wait for an input times out,
+        the sequence ends as ``timed_out`` or raises BoardError, as its step says. After Stopped,
+        ``client.sequence()`` has the last state.
+        """
+        with self._board.stoppable(stop) as wanted:
+            key = self._sequence(sequence, wanted, replace)
+            if out is None:
+                return sequence_run.run(self._board.client, key, wanted, watcher)
+            content = (
+                sequence_recording.fetched(self._board.client, sequence, self._board.known_arm())
+                if isinstance(sequence, str)
+                else sequence_recording.of_plan(sequence)
+            )
+            with sequence_recording.recorder(
+                self._board.client, content, Path(out), self._board.port
+            ) as recorder:
+                self._last_sequence = recorder.path
+                return sequence_run.run(self._board.client, key, wanted, watcher, recorder)
+
+    def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
+        """Store the sequence if it is a plan, and move a virtual arm to its start; returns its key."""
+        if isinstance(sequence, str):
+            found = self._board.client.find(stored_name(sequence))
+            if found is None or not found.sequence:
+                raise InputError(f"the board has no sequence {sequence!r}", "see 'armtempo list'")
+            if self._board.arm is not None:
+                self._board.start.home_virtual_arm(self._board.arm)
+            return MotionKey(found.name, found.crc)
+        key = self._store.upload_sequence(sequence, replace=replace)
+        self._board.start.take(
+            sequence.arm,
+            None if sequence.start_deg is None else np.array(sequence.start_deg),
+            f"sequence {sequence.name!r}",
+            "move it there with 'armtempo goto' and the sequence's file",
+            stop,
+        )
+        return key
+
+    @property
+    def last_run(self) -> Run | None:
+        """The last run that this object recorded, even if it ended early; None before the first."""
+        return Run.load(self._last_folder) if self._last_folder else None
+
+    @property
+    def last_sequence(self) -> SequenceRun | None:
+        """The last sequence that this object recorded, even if it ended early; None before the first."""
+        return SequenceRun.load(self._last_sequence) if self._last_sequence else None
+
+    def fetch(self, motion: Plan | EncodedMotion | Path | str | None = None, out: Path | str = "runs") -> Run:
+        """Write the samples that the board kept of its last run into a new run folder in ``out``.
+
+        ``motion``: the motion of that run; None: the motion that the button starts. Waits for the end of a
+        run that is still in progress. Raises LinkError if the board has no samples.
+        """
+        encoded = self._encoded(self._default() if motion is None else motion)
+        folder = recording.fetch(self._board.client, encoded, Path(out), self._board.port)
+        self._last_folder = folder.path
+        return Run.load(folder.path)
+
+    def stop(self, now: bool = False) -> None:
+        """Brake along the path (``now``: freeze the outputs), and wait until the arm is at rest.
+
+        For motions that no call of this object waits for, such as one started by the button. To stop ``run``,
+        give it a ``StopRequest``.
+        """
+        stored_motion.stop(self._board.client, now)
+
+    def request_stop(self, now: bool = False, by: str = "another thread") -> bool:
+        """Stop a motion from a thread other than the one that waits for it, where Stopped is raised. Does not wait.
+
+        ``by``: who asks for the stop, for messages. Returns whether something moved. Raises NoAnswerError if
+        the board does not answer.
+        """
+        return stored_motion.request_stop(self._board.client, self._board.stops, now, by)
+
+    def speed(self, fraction: float) -> None:
+        """Set the speed as a fraction of the planned speed, 0.01 to 1, for the running and all later motions.
+
+        The path does not change; a running motion changes its speed smoothly, within its brake time. Call it
+        from a ``Watcher``, from a thread other than the one that waits in ``run``, or for a motion started by
+        the button. Raises InputError for another fraction, BoardError if the board refuses.
+        """
+        change_speed(self._board.client, permille(fraction))
+
+    def pause(self) -> None:
+        """Bring the motion to rest on its path; ``resume`` continues it. Raises BoardError if nothing moves."""
+        change_speed(self._board.client, 0)
+
+    def resume(self) -> None:
+        """Continue along the path at the speed before the pause; raises BoardError if nothing moves."""
+        change_speed(self._board.client, RESUME)
+
+    def _encoded(self, motion: Plan | EncodedMotion | Path | str) -> EncodedMotion:
+        """The motion for a board that is set up for its arm."""
+        if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
+            motion = Plan.load(motion)
+        if isinstance(motion, str):
+            return self._store.read(motion)
+        encoded = encoded_motion.of_plan(motion) if isinstance(motion, Plan) else motion
+        self._board.configure(encoded.arm)
+        return encoded
+
+    def _default(self) -> str:
+        for entry in self._board.client.stored():
+            if entry.default:
+                return entry.name
+        raise InputError(
+            "no motion given, and no default motion is set for the board's button",
+            "give the motion's name: armtempo fetch NAME; 'armtempo list' shows the names",
+        )
+
+    def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
+        """Store the motion; move a virtual arm to its start; raises LinkError if a real arm is not there."""
+        stored_motion.store(self._board.client, motion.name, motion.data)
+        advice = "move it there with 'armtempo goto'"
+        self._board.start.take(motion.arm, motion.start_deg, repr(motion.name), advice, stop)
+
+    def _posture_deg(self) -> Array:
+        return arm_state.posture_deg(self._board.client, self._board.known_arm())

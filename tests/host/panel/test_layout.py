@@ -1,0 +1,74 @@
+"""What is in view on every tab: the board's, whatever the page has done."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from armtempo.panel import words
+from armtempo.panel.panel_board import PanelBoard
+
+from tests.host.panel.fakes import board_state, unhomed
+from tests.host.panel.pages import pages
+
+TABS = (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD)
+
+
+@pytest.mark.parametrize("tab", TABS)
+def test_the_speed_follows_the_board_on_every_tab(operator: PanelBoard, tab: str) -> None:
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        page.show(tab)
+        slider: Any = page.named(words.SPEED_OF_MOTION)
+        for percent in (30.0, 100.0):
+            operator.live.state = board_state(speed_percent=percent)
+            page.look()
+            assert slider.value == percent
+            assert f"{percent:g} %" in page.texts()
+
+
+def test_a_speed_that_was_not_taken_goes_back_to_the_boards(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armtempo.panel.layout.LEFT_S", -1.0)
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        page.press(words.SPEED_OF_MOTION, 40, "change", late_s=5.0)
+        slider: Any = page.named(words.SPEED_OF_MOTION)
+        page.fire(slider, "update:modelValue", 40)  # a browser says a little later where it was dragged
+        assert slider.value == 40
+        page.look()
+        assert slider.value == 100.0
+        assert "100 %" in page.texts()
+
+
+def test_a_slider_that_is_dragged_stays_with_the_finger(operator: PanelBoard) -> None:
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        page.look()
+        slider: Any = page.named(words.SPEED_OF_MOTION)
+        page.fire(slider, "update:modelValue", 40)
+        page.look()
+        assert slider.value == 40
+
+
+def test_a_page_that_is_loaded_again_shows_what_the_board_says(operator: PanelBoard) -> None:
+    operator.live.state = board_state(speed_percent=21.0, moving=True)
+    for _ in range(2):
+        with pages(operator) as page:
+            page.look()
+            assert page.named(words.SPEED_OF_MOTION).value == 21.0
+            assert page.named(words.PAUSE).enabled
+
+
+@pytest.mark.parametrize("tab", TABS)
+def test_pause_and_homing_follow_the_board_on_every_tab(operator: PanelBoard, tab: str) -> None:
+    operator.live.state = unhomed()
+    with pages(operator) as page:
+        page.show(tab)
+        assert words.FIRST_HOME in page.texts()
+        assert not page.named(words.PAUSE).enabled
+        operator.live.state = board_state(moving=True)
+        page.look()
+        assert words.FIRST_HOME not in page.texts()
+        assert page.named(words.PAUSE).enabled

@@ -1,0 +1,117 @@
+"""What is shown is what the board said."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from armtempo.basics import toml_table
+from armtempo.link.board_messages import Positions, Sample
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
+from armtempo.panel import layout, problem
+from armtempo.panel.arm_scene import ArmShape
+from armtempo.panel.live import LiveArm
+from armtempo.panel.panel_board import PanelBoard
+from armtempo.panel.problem import Cure
+
+from tests.host.panel.fakes import ARM, Telling, board_state, unhomed
+
+
+def test_curves_that_are_read_stay_whole_when_a_run_begins() -> None:
+    live = LiveArm(ARM)
+    for number in range(4):
+        sample = Sample(number // 3, 0, number, number, 0, Positions((0, 0, 0), (0, 0, 0)))
+        before = live.curves
+        live.take_event(sample)
+    assert live.curves is not before
+    assert [len(rows) for rows in (before.time_s, before.thinned(9).angle_deg, live.curves.angle_deg)] == [
+        3,
+        3,
+        1,
+    ]
+
+
+def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: PanelBoard) -> None:
+    operator.live.ask(Telling(unhomed()))  # type: ignore[arg-type]
+    shape = ArmShape(ARM)
+    told = layout.message(operator, shape)
+    assert (told["links"], told["tool"], told["unknown"]) == (None, None, True)
+    assert told["ghost"] == shape.poses(np.array(ARM.home_deg))
+    assert told["texts"]["armtempo-where"] == "position unknown"
+    assert told["texts"]["armtempo-angle-1"] == "?"
+    operator.live.ask(Telling(board_state()))  # type: ignore[arg-type]
+    told = layout.message(operator, shape)
+    assert told["links"] == shape.poses(np.array(ARM.home_deg))
+    assert told["texts"]["armtempo-angle-2"] == "-60.00°"
+
+
+def test_a_state_that_is_old_says_how_old(operator: PanelBoard) -> None:
+    operator.live.ask(Telling(board_state(state="moving", moving=True, speed_percent=20.0)))  # type: ignore[arg-type]
+    assert layout.state_line(operator) == "moving at 20 % · port"
+    operator.live.heard_s -= 3.0
+    assert re.fullmatch(r"moving at 20 % · last heard 3\.\d s ago · port", layout.state_line(operator))
+
+
+def test_a_pause_is_named_as_one(operator: PanelBoard) -> None:
+    operator.live.state = board_state(state="moving", moving=True, speed_percent=0.0)
+    assert layout.state_line(operator).startswith("paused")
+
+
+def test_outputs_and_inputs_are_those_of_the_board() -> None:
+    text = (
+        shipped.arm_path().read_text()
+        + """
+[output.gripper]
+kind = "servo"
+pin = "PB8"
+pulse_us = [500, 2500]
+angles_deg = [0, 180]
+states = { open = 0.0, closed = 180.0 }
+safe = "open"
+
+[input.part]
+pin = "PD0"
+"""
+    )
+    live = LiveArm(Arm.of_table(toml_table.parse(text, "arm.toml")))
+    live.ask(Telling(board_state(arm="paper")))  # type: ignore[arg-type]
+    assert (live.outputs, live.inputs) == ({"gripper": "closed"}, {"part": True})
+
+
+@pytest.mark.parametrize(
+    ("what", "said", "cures", "is_fault"),
+    [
+        ("nothing", "", (), False),
+        ("cable", "the cable is out", (), True),
+        ("no program", "another program runs", (Cure.DEPLOY,), True),
+        ("fault", "E-stop", (Cure.CLEAR,), True),
+        ("frozen", "may have moved on", (Cure.HOME,), True),
+        ("failed", "run: the arm is elsewhere", (Cure.DISMISS,), True),
+        ("unhomed", "Home it", (Cure.HOME,), False),
+    ],
+)
+def test_the_banner_says_what_is_wrong_and_has_the_button_that_helps(
+    operator: PanelBoard, what: str, said: str, cures: tuple[Cure, ...], is_fault: bool
+) -> None:
+    live = operator.live
+    live.state = board_state()
+    if what == "cable":
+        operator.trouble = "the cable is out"
+    elif what == "no program":
+        operator.trouble, operator._board = "another program runs", None
+    elif what == "fault":
+        live.state = board_state(fault="estop")
+    elif what == "frozen":
+        live.doubt = "joint 1 may have moved on"
+    elif what == "failed":
+        operator.failure = "run: the arm is elsewhere"
+    elif what == "unhomed":
+        live.state = unhomed()
+    found = problem.of(operator)
+    assert (found is None) == (what == "nothing")
+    if found is not None:
+        assert said in found.text
+        assert (found.cures, found.is_fault) == (cures, is_fault)
+        assert "'armtempo" not in found.text

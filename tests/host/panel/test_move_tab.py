@@ -1,0 +1,118 @@
+"""Targets and homing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from armtempo.basics import toml_table
+from armtempo.basics.errors import PlanError
+from armtempo.kinematics.of_arm import forward
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
+from armtempo.panel import homing, teaching, words
+from armtempo.panel.panel_board import PanelBoard
+
+from tests.host.panel import fakes
+from tests.host.panel.fakes import ARM, board_state, unhomed
+from tests.host.panel.pages import pages
+
+
+def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
+    here = np.array([10.0, -60.0, 40.0])
+    place = forward(ARM, (20.0, -70.0, 50.0))[:3, 3].tolist()
+    found = teaching.nearest(ARM, place, (0.0, 0.0, 0.0), here)
+    assert forward(ARM, found)[:3, 3] == pytest.approx(place, abs=0.1)
+    with pytest.raises(PlanError):
+        teaching.nearest(ARM, [9999.0, 0.0, 0.0], (0.0, 0.0, 0.0), here)
+
+
+def test_what_the_switches_home_is_named_in_its_order() -> None:
+    assert homing.switches(ARM) == []
+    ar4 = Arm.of("ar4")
+    groups = homing.switches(ar4)
+    assert sorted(name for group in groups for name in group.split(", ")) == sorted(
+        joint.name for joint in ar4.driven
+    )
+    assert groups[: len(ar4.homing)] == [", ".join(group) for group in ar4.homing]
+
+
+ARM_TEXT = """
+[output.gripper]
+kind = "servo"
+pin = "PB8"
+pulse_us = [500, 2500]
+angles_deg = [0, 180]
+states = { open = 0.0, closed = 180.0 }
+safe = "open"
+"""
+
+
+def test_an_output_is_marked_as_the_board_says_and_set_by_a_press(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    arm = Arm.of_table(toml_table.parse(shipped.arm_path().read_text() + ARM_TEXT, "arm.toml"))
+    operator, board = fakes.operator(made := fakes.Board(), tmp_path, arm), made
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        page.press("gripper: closed")
+        assert board.calls == [("output", "gripper", "closed")]
+        pressed = page.named("gripper: closed").props
+        assert pressed["aria-pressed"] == "false"  # until the board says it
+        operator.live.outputs = {"gripper": "closed"}
+        page.look()
+        assert pressed["aria-pressed"] == "true"
+    operator.close()
+
+
+def test_a_jog_that_is_not_possible_is_grey_with_the_reason(operator: PanelBoard) -> None:
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        assert page.named("joint 1 +").enabled
+        assert not page.named("⟳ x +").enabled
+        reasons = [control.reason for control in page.of.controls if control.element is page.named("⟳ x +")]
+        assert "the arm cannot turn the tool about x from here" in reasons[0]
+
+
+def test_homing_names_and_shows_the_posture_of_home_first(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    operator.live.state = unhomed()
+    with pages(operator) as page:
+        shown: list[Any] = []
+        monkeypatch.setattr(page.of, "show_ghost", shown.append)
+        page.press(words.HOMING)
+        assert "joint 1 0°, joint 2 -60°, joint 3 40°" in page.texts()
+        assert shown[0] == pytest.approx(np.array(operator.arm.home_deg))
+        assert operator.board.homes == []  # type: ignore[attr-defined]
+        page.answer(words.HOME)
+        page.done()
+        assert operator.board.homes == [None]  # type: ignore[attr-defined]
+
+
+def test_a_joint_is_homed_alone(operator: PanelBoard) -> None:
+    operator.live.state, operator.live.doubt = unhomed(), "it may be elsewhere"
+    with pages(operator) as page:
+        page.press(words.HOMING)
+        page.named(words.WHICH_JOINTS).set_value("joint 2")
+        assert "joint 2 -60°" in page.texts()
+        page.answer(words.HOME)
+        page.done()
+        assert operator.board.homes == ["joint 2"]  # type: ignore[attr-defined]
+        assert operator.live.doubt  # of the others
+
+
+def test_homing_by_switches_tells_each_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    operator = fakes.operator(fakes.Board(), tmp_path, Arm.of("ar4"))
+    with pages(operator) as page:
+        page.press(words.HOMING)
+        page.named(words.WHICH_JOINTS).set_value(operator.arm.driven[2].name)
+        page.press(words.HOME_BY_SWITCHES)
+        page.done()
+        assert any("switch seen" in line for line in operator.log.last)
+        assert operator.progress == 0.5
+    operator.close()

@@ -1,0 +1,111 @@
+"""Runs: of the plan, and past ones."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from armtempo import pipeline
+from armtempo.basics.errors import RunFolderError
+from armtempo.panel import layout, past_runs, words
+from armtempo.panel.panel_board import PanelBoard
+from armtempo.report.comparison import PAGE as COMPARISON
+from nicegui import ui
+
+from tests.host.panel.fakes import ARM, board_state
+from tests.host.panel.pages import Page, pages
+
+
+def test_runs_of_the_command_line_are_listed_the_newest_first(tmp_path: Path) -> None:
+    for number, (name, state) in enumerate({"feed-001": "complete", "feed-002": "fault"}.items()):
+        (tmp_path / name).mkdir()
+        made = {"duration_s": 6.8, "fault": "" if state == "complete" else "estop", "state": state}
+        meta = {"format": "armtempo run", "started": "2026-01-02T03:04:05+00:00", "repetitions": [made, made]}
+        (tmp_path / name / "run.json").write_text(json.dumps(meta))
+        os.utime(tmp_path / name / "run.json", (1000 + number, 1000 + number))
+    for name, text in (("damaged", "{"), ("other", "[1]"), ("empty", "{}")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "run.json").write_text(text)
+        os.utime(tmp_path / name / "run.json", (1, 1))
+    rows = past_runs.listed(tmp_path)
+    assert [(row.folder.name, row.duration, row.ending) for row in rows[:2]] == [
+        ("feed-002", "13.6 s", "estop"),
+        ("feed-001", "13.6 s", "complete"),
+    ]
+    assert {row.ending for row in rows[2:]} == {"cannot be read"}
+    with pytest.raises(RunFolderError, match="cannot be read"):
+        past_runs.report(tmp_path / "damaged")
+
+
+def planned(operator: PanelBoard) -> None:
+    """A plan of the job as it is, whose curves nobody looks at."""
+    plan: Any = type(
+        "Planned",
+        (),
+        {"job": type("Job", (), {"name": "feed"}), "total_s": 6.79, "arm": ARM, "trajectory": None},
+    )()
+    operator.live.state = board_state()
+    operator.jobs.planned(plan, operator.jobs.version)
+
+
+@pytest.fixture
+def run_page(operator: PanelBoard, monkeypatch: pytest.MonkeyPatch) -> Iterator[Page]:
+    """A page on the tab, which draws no path of the plan."""
+    monkeypatch.setattr(layout, "tool_path_mm", lambda *_: np.empty((0, 3)))
+    planned(operator)
+    with pages(operator) as page:
+        page.show(words.TAB_RUN)
+        page.look()
+        yield page
+
+
+def test_the_plan_is_named_with_its_duration_and_file(operator: PanelBoard, run_page: Page) -> None:
+    assert f"feed: 6.790 s · {words.NOT_SAVED}" in run_page.texts()
+    operator.jobs.set_angle(0, 0, "5")
+    run_page.look()
+    assert words.PLAN_IS_OLD in run_page.texts()
+    assert not run_page.named(words.RUN).enabled
+
+
+@pytest.mark.parametrize("number", [0, 100, 1.5, None])
+def test_a_number_of_repetitions_that_is_not_possible_is_refused(
+    operator: PanelBoard, run_page: Page, number: float | None
+) -> None:
+    run_page.named(words.REPEAT).set_value(number)
+    run_page.press(words.RUN)
+    run_page.done()
+    wrong = f"Repetitions: {number or 0:g} are not possible; give 1 to 99"
+    assert any(wrong in text for text in run_page.texts())
+    assert operator.board.calls == []  # type: ignore[attr-defined]
+    run_page.press(words.DISMISS)
+    run_page.look()
+    assert not any(wrong in text for text in run_page.texts())
+
+
+def test_reports_and_comparisons_open_where_the_server_has_them(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b"):
+        (operator.runs / name).mkdir(parents=True)
+        for file in ("run.json", past_runs.REPORT_PAGE):
+            (operator.runs / name / file).write_text("{}")
+    opened: list[str] = []
+    compared: list[list[Path]] = []
+    monkeypatch.setattr(
+        pipeline, "compare", lambda folders: compared.append(folders) or operator.runs / COMPARISON
+    )
+    monkeypatch.setattr(ui.navigate, "to", lambda address, new_tab: opened.append(address))
+    with pages(operator) as page:
+        page.show(words.TAB_RUN)
+        page.look()
+        page.fire(page.named(f"{words.REPORT}: a"), "click", {})
+        for name in ("a", "b"):
+            page.named(f"{words.COMPARE}: {name}").set_value(True)
+        page.fire(page.named(words.COMPARE), "click", {})
+    assert opened == [f"/runs/a/{past_runs.REPORT_PAGE}", f"/runs/{COMPARISON}"]
+    assert compared == [[operator.runs / "a", operator.runs / "b"]]

@@ -1,0 +1,115 @@
+"""The sequence that is edited."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from armtempo.basics.errors import InputError
+from armtempo.link.board_messages import SequenceState
+from armtempo.panel import words
+from armtempo.panel.panel_board import PanelBoard
+from armtempo.panel.sequence_editor import SequenceEditor
+
+from tests.host.panel.fakes import ARM, board_state
+from tests.host.panel.pages import pages
+
+SEQUENCE = """# all day
+name = "day"  # its name
+
+[[step]]
+repeat = 2  # twice
+
+# the tray
+[[step]]
+goto = [10, -60, 40]
+
+[[step]]
+wait_s = 0.5  # it settles
+
+[[step]]
+end = "repeat"
+"""
+
+
+@pytest.fixture
+def steps(tmp_path: Path) -> SequenceEditor:
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    (tmp_path / "job.toml").write_text('name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n')
+    (tmp_path / "damaged.toml").write_text("[[step")
+    desk = SequenceEditor(ARM, tmp_path)
+    assert desk.files() == ["day.toml"]
+    desk.open("day.toml")
+    return desk
+
+
+def test_steps_are_edited_and_comments_stay(steps: SequenceEditor) -> None:
+    steps.set(0, "repeat", "for ever")
+    steps.set(1, "goto", "[12.5, -60, 40]")
+    steps.move(2, -1)
+    steps.move(0, -1)  # it is the first
+    steps.add(1)
+    steps.set_kind(1, "wait_s")
+    steps.set(1, "wait_s", "0.25")
+    file = steps.save()
+    text = file.read_text()
+    assert text.index("# it settles") < text.index("# the tray")  # each goes with its step
+    assert steps.depths == [0, 1, 1, 1, 0]
+    for comment in ("# all day", "# its name", "# twice", "# the tray", "# it settles"):
+        assert comment in text
+    steps.open("day.toml")
+    assert steps.steps == [
+        {"repeat": "for ever"},
+        {"wait_s": "0.25"},
+        {"wait_s": "0.5"},
+        {"goto": "[12.5, -60, 40]"},
+        {"end": "repeat"},
+    ]
+    steps.delete(0)
+    steps.delete(3)
+    assert len(steps.sequence().steps) == 3
+
+
+def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceEditor) -> None:
+    steps.delete(3)
+    with pytest.raises(InputError, match="repeat without an end"):
+        steps.save()
+    assert steps.file is not None
+    assert steps.file.read_text() == SEQUENCE
+    steps.undo()
+    assert steps.text == SEQUENCE
+    steps.copy(1)
+    assert steps.steps[1] == steps.steps[2] == {"goto": "[10, -60, 40]"}
+    steps.new("fresh")
+    assert steps.save().name == "fresh.toml"
+    assert steps.files() == ["day.toml", "fresh.toml"]
+    with pytest.raises(InputError, match="no such sequence"):
+        steps.open("../day.toml")
+
+
+@pytest.mark.parametrize(
+    ("ending", "cycle", "said"),
+    [("running", 0, "running: step 2 of cycle 1"), ("finished", 2, "finished: 2 whole cycles")],
+)
+def test_cycles_are_counted_from_one(operator: PanelBoard, ending: str, cycle: int, said: str) -> None:
+    operator.live.sequence = SequenceState(ending, 0, 2, 1, cycle, "day")
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        assert said in page.texts()
+
+
+def test_what_is_being_typed_into_a_step_stays_when_another_changes(
+    operator: PanelBoard, tmp_path: Path
+) -> None:
+    operator.live.state = board_state()
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    operator.sequences.open("day.toml")
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        typed = page.named("step 3: wait_s")
+        page.fire(typed, "update:value", "7")
+        operator.sequences.set(0, "repeat", "5")  # on another page
+        page.look()
+        assert page.named("step 1: repeat").value == "5"
+        assert page.named("step 3: wait_s") is typed
+        assert typed.value == "7"

@@ -1,0 +1,55 @@
+"""The panel's texts, and texts from files and boards."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+from armtempo.panel import layout, words
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("remove its cause, then 'armtempo clear'", "remove its cause, then ‘Clear the fault’"),
+        ("move it there with 'armtempo goto'", "move it there with ‘Go to the start’"),
+        ("'armtempo list' shows the names", "‘Stored motions’ shows the names"),
+        ("see 'armtempo help recovery'", "see 'armtempo help recovery' in a terminal"),
+        ("nothing to do", "nothing to do"),
+    ],
+)
+def test_commands_are_the_panels_buttons(text: str, wanted: str) -> None:
+    assert words.of_text(text) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("job.toml: refine = 'banana' is not allowed", "job.toml: ‘Segments’ = 'banana' is not allowed"),
+        (
+            "job.toml: via P1.blend_mm = 0 is not allowed",
+            "job.toml: via P1.‘Corner cut by, mm’ = 0 is not allowed",
+        ),
+        ("no motion along this path is shorter", "no motion along this path is shorter"),
+        ("the stop at P1 is 5 s", "the stop at P1 is 5 s"),
+    ],
+)
+def test_keys_are_the_panels_fields(text: str, wanted: str) -> None:
+    assert words.of_job(text) == wanted
+
+
+def test_what_turns_the_direction_of_a_line_is_seen() -> None:
+    assert words.plain("a\u202eb\x1b\u200bc 'ü' <b>") == "a□b□□c 'ü' <b>"
+
+
+def test_texts_are_no_properties() -> None:
+    """A string of properties is code: a name in it could leave its quotes. ``look`` and icons are the panel's own."""
+    allowed = {"look", "len(self.holds)", "number + 1", "icon"}
+    for path in Path(layout.__file__).parent.glob("*.py"):
+        for call in ast.walk(ast.parse(path.read_text())):
+            if not (isinstance(call, ast.Call) and getattr(call.func, "attr", "") == "props"):
+                continue
+            for part in ast.walk(call):
+                if isinstance(part, ast.FormattedValue) and not isinstance(part.value, ast.IfExp):
+                    assert ast.unparse(part.value) in allowed, f"{path.name}: {ast.unparse(part)}"
