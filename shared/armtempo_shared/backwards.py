@@ -7,12 +7,13 @@ the same, and only the ramps are sent. ``way_back.py``, which the board never lo
 ::
 
     offset  type   field
-    0       4s     magic  b"ATB1"
+    0       4s     magic  b"ATB2"
     4       I      crc32 of the stored motion
     8       B      lengths of ramps count in 2 ** this ticks
-    9       B      time axes
-    10      H[96]  ramps of the way back, as in the motion record
-    202     q[]    origin of each time axis, ticks / 2**16
+    9       B      e, the times of the ramps, as in the motion record
+    10      B      time axes
+    11      H[96]  ramps of the way back, as in the motion record
+    203     q[]    origin of each time axis, ticks / 2**16
     ..      s      name of the stored motion
     end     I      crc32 over all before it
 """
@@ -21,10 +22,17 @@ import struct
 
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_JOINTS
-from armtempo_shared.motion import LEAST_RAMP_BITS, MOST_RAMP_BITS, OTHER_ENTRIES, REST_ENTRIES, MotionError
+from armtempo_shared.motion import (
+    LEAST_RAMP_BITS,
+    MOST_RAMP_BITS,
+    OTHER_ENTRIES,
+    REST_ENTRIES,
+    MotionError,
+    is_edge,
+)
 
-MAGIC = b"ATB1"
-HEAD = "<4sIBB"
+MAGIC = b"ATB2"
+HEAD = "<4sIBBB"
 ORIGIN_BYTES = 8
 _RAMPS_AT = struct.calcsize(HEAD)
 _ORIGINS_AT = _RAMPS_AT + 2 * (REST_ENTRIES + OTHER_ENTRIES)
@@ -32,7 +40,7 @@ _CRC_BYTES = 4
 
 
 class WayBack:
-    """The content of such a record; ``name`` and ``stored_crc`` of the motion, ``ramps`` and ``ramp_bits`` as in it.
+    """The content of such a record; ``name``, ``stored_crc``: of the motion; ``ramps`` and their bits: as in it.
 
     Raises MotionError if the record is incomplete or damaged.
     """
@@ -41,9 +49,13 @@ class WayBack:
         if len(data) < _ORIGINS_AT + ORIGIN_BYTES + _CRC_BYTES:
             raise MotionError("too short")
         self.crc = motion.checked_crc(data)
-        magic, self.stored_crc, self.ramp_bits, axes = struct.unpack_from(HEAD, data, 0)
+        magic, self.stored_crc, self.ramp_bits, self.edge_bits, axes = struct.unpack_from(HEAD, data, 0)
         name_at = _ORIGINS_AT + ORIGIN_BYTES * axes
-        if magic != MAGIC or not LEAST_RAMP_BITS <= self.ramp_bits <= MOST_RAMP_BITS:
+        if (
+            magic != MAGIC
+            or not LEAST_RAMP_BITS <= self.ramp_bits <= MOST_RAMP_BITS
+            or not is_edge(self.edge_bits)
+        ):
             raise MotionError("not a record of this version")
         if not 1 <= axes <= MAX_JOINTS or len(data) <= name_at + _CRC_BYTES:
             raise MotionError("length does not fit the header")

@@ -1,6 +1,6 @@
 """Constants of the wire protocol; its messages are in ``table.py``, its frames in ``wire.py``."""
 
-PROTOCOL_VERSION = 6
+PROTOCOL_VERSION = 7
 """Never 3: each ``hello`` contains it, and MicroPython takes this byte for Ctrl-C."""
 SYNC = 0xA5
 MAX_PAYLOAD = 256

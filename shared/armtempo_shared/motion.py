@@ -9,17 +9,21 @@ steps / 2**28, times in ticks / 2**16.
     0       4s     magic  b"ATM4"
     4       B      degree k, 3 or 5
     5       B      joints
-    6       B      flags: bit 0, all joints share one time axis
+    6       B      flags: bit 0, all joints share one time axis; bits 1 to 4: e
     7       B      lengths of ramps count in 2 ** this ticks, 6 to 19
     8       H      segments n of the angle splines
     10      H      refine R: the time axes have n * R segments
     12      I      crc32 of the arm record it was made for
-    16      H[64]  ramps to rest that begin at 64 equidistant times from start to end. Low 11 bits: length,
-                   interpolated linearly. High bits: shape (RAMP_SHAPES), up to the next time. All 0: not possible
+    16      H[64]  ramps to rest that begin at 64 times from start to end. Low 11 bits: length, interpolated
+                   linearly. High bits: shape (RAMP_SHAPES), up to the next time. All 0: not possible
     144     H[32]  the same at 32 times for all other changes of speed
     208     q[]    per joint: n + k angle control points; its n * R + k time control points,
                    or, with a shared axis, those once after the last joint
     end     I      crc32 over all before it
+
+With e = 0, the times of ramps are equidistant; else those in the first and in the last duration / 2 ** e, and those
+between. Each end then has four ninths of the spaces between them (``edge_parts``): a motion with a long middle of
+constant speed can brake quickly in its ramps, too.
 """
 
 import io
@@ -33,10 +37,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import BinaryIO
 
-    Ramps = tuple[Sequence[int], Sequence[int], int]
+    Ramps = tuple[Sequence[int], Sequence[int], int, int]
 
 MAGIC = b"ATM4"
 SHARED_AXIS = 1
+_EDGE_BIT = 1
+LEAST_EDGE_BITS = 2
+MOST_EDGE_BITS = 15
 REST_ENTRIES = 64
 OTHER_ENTRIES = 32
 RAMP_LENGTH = 2047
@@ -64,6 +71,9 @@ RAMP_WAYS = (
 determines s1 and s2."""
 EVEN_RAMP = 0
 """The shape of ramps that do not end at rest."""
+_MOST_PLACES = 1 << 18
+"""Times of a motion are counted so that this is more than those between which the entries are equidistant: their
+products with lengths, and with numbers of entries, are then small integers of MicroPython."""
 
 
 class MotionError(ValueError):
@@ -77,9 +87,9 @@ def size(degree: int, joints: int, shared: bool, segments: int, refine: int) -> 
     return HEAD_SIZE + 8 * points + 4
 
 
-def no_ramps() -> "tuple[tuple[int, ...], tuple[int, ...], int]":
+def no_ramps() -> "tuple[tuple[int, ...], tuple[int, ...], int, int]":
     """Ramps of a motion that can neither brake nor change its speed."""
-    return (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS
+    return (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS, 0
 
 
 def pack(
@@ -94,11 +104,11 @@ def pack(
 
     ``angles``: per joint its n + k control points (int, steps * 2**28); ``times``: per joint, or one for
     all, its n * R + k control points (int, ticks * 2**16). ``ramps``: REST_ENTRIES entries of ramps to rest,
-    OTHER_ENTRIES of others, and the bits of their unit.
+    OTHER_ENTRIES of others, the bits of their unit, and e.
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
-    flags = SHARED_AXIS if shared else 0
+    flags = (SHARED_AXIS if shared else 0) | ramps[3] << _EDGE_BIT
     head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, ramps[2], segments, refine, arm_crc)
     head += struct.pack(_RAMPS, *ramps[0], *ramps[1])
     body: "list[int]" = []
@@ -110,6 +120,16 @@ def pack(
         body.extend(times[0])
     data = head + struct.pack("<%dq" % len(body), *body)
     return data + struct.pack("<I", crc32(data))
+
+
+def edge_parts(parts: int) -> int:
+    """How many of the ``parts`` between entries each end has, if its entries are closer than those in the middle."""
+    return parts * 4 // 9
+
+
+def is_edge(edge_bits: int) -> bool:
+    """Whether this is an e of a record."""
+    return edge_bits == 0 or LEAST_EDGE_BITS <= edge_bits <= MOST_EDGE_BITS
 
 
 def checked_crc(data: "bytes | memoryview") -> int:
@@ -135,7 +155,12 @@ class MotionHead:
             raise MotionError("too short")
         (magic, self.degree, self.joints, flags, self.ramp_bits, self.segments, self.refine,
          self.arm_crc) = struct.unpack_from(_HEAD, head, 0)  # fmt: skip
-        if magic != MAGIC or not LEAST_RAMP_BITS <= self.ramp_bits <= MOST_RAMP_BITS or flags & ~SHARED_AXIS:
+        self.edge_bits = flags >> _EDGE_BIT
+        if (
+            magic != MAGIC
+            or not LEAST_RAMP_BITS <= self.ramp_bits <= MOST_RAMP_BITS
+            or not is_edge(self.edge_bits)
+        ):
             raise MotionError("not a motion record of this version")
         if self.degree not in (3, 5) or not 1 <= self.joints <= MAX_JOINTS:
             raise MotionError("unknown degree or number of joints")
@@ -150,21 +175,41 @@ class MotionHead:
     def ramp(self, at: int, duration: int, to_rest: bool) -> int:
         """The entry for a change of speed that begins at time ``at`` of the motion; its length is interpolated.
 
-        ``at`` (rounded down) and the motion's ``duration`` (rounded up) are in a unit in which the duration is below
-        8192, so that all are small integers of MicroPython. If the next entry is longer, it is interpolated for a time
-        up to 2 units later.
+        ``at`` is rounded down, the motion's ``duration`` up to 1024 ticks. The length is interpolated for a time a
+        little earlier or later, with which it is longer.
         """
         parts = (REST_ENTRIES if to_rest else OTHER_ENTRIES) - 1
-        at = parts * min(max(at, 0), duration)
-        first = min(at // duration, parts - 1)
-        at -= first * duration
-        place = 2 * first + (0 if to_rest else 2 * REST_ENTRIES)
+        place = 0 if to_rest else REST_ENTRIES
+        at = min(max(at, 0), duration)
+        width = duration
+        if self.edge_bits:
+            side = edge_parts(parts)
+            width >>= self.edge_bits
+            if at < width:
+                parts = side
+            elif at >= duration - width:
+                at -= duration - width
+                place += parts - side
+                parts = side
+            else:
+                at -= width
+                width = duration - 2 * width
+                place += side
+                parts -= 2 * side
+        while width >= _MOST_PLACES:
+            at >>= 1
+            width = (width >> 1) + 1
+        width = max(width, 1)
+        at *= parts
+        first = min(at // width, parts - 1)
+        at -= first * width
+        place = 2 * (place + first)
         ramps = self.ramps
         entry = ramps[place] + (ramps[place + 1] << 8)
         less = (entry & RAMP_LENGTH) - (ramps[place + 2] + (ramps[place + 3] << 8) & RAMP_LENGTH)
-        if less < 0:
-            at = min(at + 2 * parts, duration)
-        return entry - less * at // duration
+        # as all of this is rounded
+        at = min(at + 4 * parts, width) if less < 0 else max(at - 2 * parts, 0)
+        return entry - less * at // width
 
     def angle_offset(self, joint: int) -> int:
         """Byte offset of the joint's first angle control point."""

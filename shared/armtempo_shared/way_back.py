@@ -17,7 +17,7 @@ def pack(data: bytes, name: str, ramps: "Ramps") -> bytes:
     """The record of the way back along the motion record ``data``, stored as ``name``; ``ramps``: of the way back."""
     stored = motion.Motion(data)
     origins = [_end(stored, axis) for axis in range(1 if stored.shared else stored.joints)]
-    body = struct.pack(HEAD, MAGIC, stored.crc, ramps[2], len(origins))
+    body = struct.pack(HEAD, MAGIC, stored.crc, ramps[2], ramps[3], len(origins))
     body += struct.pack("<%dH" % (REST_ENTRIES + OTHER_ENTRIES), *ramps[0], *ramps[1])
     body += struct.pack("<%dq" % len(origins), *origins) + name.encode()
     return body + struct.pack("<I", crc32(body))

@@ -25,7 +25,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Limits
 from armtempo.planning import brake_time, planner
-from armtempo.planning.brake_time import EXCESS, LONGEST_S, TO_REST
+from armtempo.planning.brake_time import TO_REST
+from armtempo.planning.ramp_excess import EXCESS, LONGEST_S, Ramps
 from armtempo.splines.trajectory import Trajectory
 from armtempo_shared.motion import EVEN_RAMP, REST_ENTRIES
 from scipy.optimize import linprog
@@ -37,6 +38,7 @@ MOMENTS = 20
 SHORTER = 0.97
 ROUNDS = 12
 SAMPLES = 4000
+PHASES = 10
 SHORTEST_S = 1e-3
 SPACES = 5
 ROUNDED = 1e-9
@@ -79,12 +81,13 @@ def ratios(trajectory: Trajectory, limits: Sequence[Limits]) -> Array:
     moments = (np.arange(MOMENTS) + 0.5) / MOMENTS
     record = brake_time.of_motion(trajectory, limits)
     record_s = record.rest_s(moments * trajectory.duration_s)
-    ramps = brake_time._Ramps(trajectory, allowed)
+    ramps = Ramps(trajectory, allowed)
     lawful_s = ramps.shortest_s(
-        moments,
+        moments * trajectory.duration_s,
+        record_s,
         TO_REST[:1],
-        np.full(MOMENTS, SHORTEST_S),
         record.rest_shapes(moments * trajectory.duration_s),
+        PHASES,
     )
     any_s = [
         Shortest(trajectory, allowed, [moment])(time) for moment, time in zip(moments, lawful_s, strict=True)
@@ -98,8 +101,12 @@ def table_ratios(trajectory: Trajectory, limits: Sequence[Limits], parts: int) -
     allowed = np.array([limit.values for limit in limits])
     spaces = np.linspace(1, REST_ENTRIES - 3, SPACES).astype(int)[:, None]
     starts = (spaces + np.array([0.0, 0.5, 1.0])) / (REST_ENTRIES - 1)
-    lawful_s = brake_time._Ramps(trajectory, allowed).shortest_s(
-        starts[:, 1], TO_REST[:1], np.full(SPACES, SHORTEST_S), EVEN_RAMP
+    lawful_s = Ramps(trajectory, allowed).shortest_s(
+        starts[:, 1] * trajectory.duration_s,
+        np.full(SPACES, SHORTEST_S),
+        TO_REST[:1],
+        np.full(SPACES, EVEN_RAMP),
+        PHASES,
     )
     found = []
     for space, known_s in zip(starts, lawful_s, strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -19,10 +20,13 @@ from armtempo.planning import (
     lower_bounds,
     planner,
     point_to_point,
+    ramp_excess,
     rest_to_rest,
     via_bound,
 )
 from armtempo.planning.dual_bound import Cells, Multipliers
+from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.splines import bspline
 from armtempo.splines.trajectory import Trajectory
 from armtempo_shared.motion import EVEN_RAMP
@@ -166,7 +170,7 @@ def random_motion(seed: int, most: int = 25) -> tuple[Arm, Job]:
 
 
 @pytest.mark.slow
-@pytest.mark.seeds(*range(6))
+@pytest.mark.seeds(*range(2))
 def test_no_plan_is_below_its_floor(seed: int) -> None:
     arm, job = random_motion(seed)
     plan = planner.plan(arm, job)
@@ -314,11 +318,11 @@ def test_every_change_keeps_its_limits_from_anywhere_and_quicker_ones_do_not(nam
             shapes = np.full(len(starts), EVEN_RAMP) if rate[1] else brakes.rest_shapes(starts)
             found = changed_excess(plan.trajectory, limits, starts, lengths, rate, shapes)
             assert found[:, 0].max() <= 1 + 1e-6
-            assert found[:, 1].max() <= brake_time.EXCESS * 1.02, rate
+            assert found[:, 1].max() <= ramp_excess.EXCESS * 1.02, rate
     quicker = changed_excess(
         plan.trajectory, limits, starts, 0.85 * brakes.rest_s(starts), (1.0, 0.0), brakes.rest_shapes(starts)
     )
-    assert np.mean(quicker[:, 1] > brake_time.EXCESS) > 0.6
+    assert np.mean(quicker[:, 1] > ramp_excess.EXCESS) > 0.6
 
 
 def test_braking_near_an_end_is_quick() -> None:
@@ -328,6 +332,26 @@ def test_braking_near_an_end_is_quick() -> None:
     brakes = brake_time.of_motion(motion, [joint.limits for joint in arm.driven])
     late = brakes.rest_s(0.9 * motion.duration_s)
     assert late < 0.3 * brakes.longest_rest_s
+
+
+def test_a_long_slow_jog_brakes_within_its_limits_in_its_ramps() -> None:
+    """Its ramps are a thousandth of it: with equidistant entries, braking in them took 1.85 times what is allowed."""
+    arm = Arm.load("moveo")
+    limits = [joint.limits for joint in arm.driven]
+    motion = jog_motion.plan("jog", arm, arm.home_deg, JogMove(math.inf, joint=3), 0.01).trajectory
+    brakes = brake_time.of_motion(motion, limits)
+    ramps_s = np.linspace(0.0, 0.4, 20)
+    starts = np.concatenate(
+        [ramps_s, motion.duration_s - ramps_s[1:], np.linspace(1.0, motion.duration_s - 1.0, 9)]
+    )
+    for lengths, rate, shapes in (
+        (brakes.rest_s(starts), (1.0, 0.0), brakes.rest_shapes(starts)),
+        (brakes.change_s(starts), (0.0, 1.0), np.full(len(starts), EVEN_RAMP)),
+    ):
+        assert (
+            changed_excess(motion, limits, starts, lengths, rate, shapes)[:, 1].max()
+            <= 1.02 * ramp_excess.EXCESS
+        )
 
 
 def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
@@ -344,7 +368,7 @@ def test_the_worst_change_of_rate_needs_the_whole_brake_time() -> None:
             (brakes.change_s(starts), (0.0, 1.0), np.full(len(starts), EVEN_RAMP)),
         )
     )
-    assert 0.97 * brake_time.EXCESS <= worst <= 1.01 * brake_time.EXCESS
+    assert 0.97 * ramp_excess.EXCESS <= worst <= 1.01 * brake_time.EXCESS
 
 
 def test_a_motion_beyond_its_limits_has_no_brake_times() -> None:
@@ -364,21 +388,21 @@ def test_a_brake_beyond_the_longest_ramp_has_the_longest() -> None:
     )
     motion = point_to_point.straight("go", [0.0, -60.0, 40.0], [60.0, -50.0, 50.0], slow)
     brakes = brake_time.of_motion(motion, [limits] * 3)
-    assert brakes.longest_rest_s == pytest.approx(brake_time.LONGEST_S)
+    assert brakes.longest_rest_s == pytest.approx(ramp_excess.LONGEST_S)
     assert brakes.rest_s(0.0) < 1.0
 
 
 def evaluated(trajectory: Trajectory, limits: list[Limits], monkeypatch: pytest.MonkeyPatch) -> int:
     """How many pairs of acceleration and jerk the brake times of a motion take."""
-    excess, found = brake_time._Ramps.excess, []
+    excess, found = ramp_excess.Ramps.excess, []
 
-    def counted(ramps: brake_time._Ramps, starts: Array, *rest: Any) -> Array:
+    def counted(ramps: ramp_excess.Ramps, starts: Array, *rest: Any) -> Array:
         _, rates, _, phases = rest
         found.append(len(starts) * len(rates) * 3 * phases * len(ramps._joints))
         return excess(ramps, starts, *rest)
 
     with monkeypatch.context() as patched:
-        patched.setattr(brake_time._Ramps, "excess", counted)
+        patched.setattr(ramp_excess.Ramps, "excess", counted)
         brake_time.of_motion(trajectory, limits)
     return sum(found)
 
@@ -386,14 +410,14 @@ def evaluated(trajectory: Trajectory, limits: list[Limits], monkeypatch: pytest.
 def test_joints_that_stand_still_or_move_in_proportion_cost_no_brake_times(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A bisection for every shape, start and joint took some 15 million for six joints."""
+    """A bisection for every shape, start and joint took some 15 million for six joints, the same starts for all 1."""
     arm = Arm.load("ar4")
     limits = [joint.limits for joint in arm.driven]
     here = np.array([20.0, 10.0, -20.0, 15.0, 40.0, 30.0])
     one = point_to_point.straight("go", here, here + np.array([0, 9, 0, 0, 0, 0]), arm)
     all_of_them = point_to_point.straight("go", here, here + np.array([9, 9, -9, 9, 9, -9]), arm)
     alone = evaluated(one, limits, monkeypatch)
-    assert alone < 1_000_000
+    assert alone < 150_000
     assert evaluated(all_of_them, limits, monkeypatch) < 1.2 * alone
     for single, whole in zip(
         brake_time.of_motion(one, limits).to_rest,

@@ -17,7 +17,7 @@ from armtempo.cli.keys import INTERRUPT, WindowsKeys
 from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
-from armtempo.planning import move_law
+from armtempo.planning import brake_time, move_law
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_line import FollowedLine
 from armtempo.planning.jog.jog_motion import JogMotion, JogMove
@@ -25,6 +25,8 @@ from armtempo.planning.move_law import WayLimits
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared.engine_memory import ONCE_BYTES
+from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.motion import Motion
 
 PAPER, AR4 = Arm.paper(), Arm.load("ar4")
 ELBOW_DEG = [20.0, 10.0, -20.0, 15.0, 40.0, 30.0]
@@ -168,6 +170,50 @@ def test_a_held_jog_goes_never_less_far_at_a_higher_speed(name: str) -> None:
     for joint in range(len(arm.driven)):
         ways = np.array([held(arm, joint, percent / 100) for percent in range(1, 101)])
         assert np.diff(ways, axis=0).min() >= -1e-9
+
+
+def rest_s(limits: WayLimits, speed: float, acceleration: float) -> float:
+    """The shortest time to rest from a speed that still rises."""
+    most = speed + 0.5 * acceleration**2 / limits.jerk
+    return acceleration / limits.jerk + limits.ramp_s(most)
+
+
+@pytest.mark.parametrize("name", OPTIMUM_DEG)
+def test_a_released_jog_is_soon_at_rest(name: str) -> None:
+    """From any moment of the ramp, of slow and long jogs too, whose ramps are a small part of them."""
+    arm = Arm.load(name)
+    driven = arm.driven[OPTIMUM_DEG[name][0]].limits
+    for percent in (1, 10, 100):
+        limits = move_law.of_joints([driven], [1.0], percent / 100)
+        law = move_law.law(400.0, limits)
+        spline = JointSpline(move_law.DEGREE, 1, law.way, law.time_s)
+        brakes = brake_time.of_motion(Trajectory(name, (spline,), True), [driven])
+        times_s = np.append(limits.ramp_s(limits.speed) * np.linspace(0.1, 0.9, 9), 0.4 * spline.duration_s)
+        for time_s in times_s:
+            shortest_s = rest_s(limits, float(spline(time_s, 1)), float(spline(time_s, 2)))
+            assert brakes.rest_s(time_s) <= 1.15 * shortest_s, (percent, time_s)
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.05, 0.25])
+def test_the_board_reads_what_was_planned(speed: float) -> None:
+    """From any moment, both kinds of changes, with entries that are close at the ends."""
+    motion = jog_motion.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(INF, joint=0), speed)
+    brakes = motion.brakes
+    record = Motion(encode.motion_record(motion.trajectory, AR4, brakes))
+    assert record.edge_bits == brakes.edge_bits > 1
+    duration_s = motion.trajectory.duration_s
+    seed = 5
+    print("seed", seed)
+    times = np.random.default_rng(seed).uniform(0.0, 1.0, 200)
+    times = duration_s * np.concatenate(
+        [times, times * 2.0**-brakes.edge_bits, 1.0 - times * 2.0**-brakes.edge_bits]
+    )
+    unit_s = 2**brakes.unit_bits / TICK_HZ
+    for to_rest, lengths in ((True, brakes.rest_s(times)), (False, brakes.change_s(times))):
+        for time_s, length_s in zip(times, lengths, strict=True):
+            at, end = int(time_s * TICK_HZ) >> 10, int(duration_s * TICK_HZ) >> 10
+            found_s = unit_s * (record.ramp(at, end + 1, to_rest) % 2048)
+            assert -1e-9 <= found_s - length_s <= 1.01 * unit_s + 0.02 * length_s
 
 
 @pytest.mark.slow

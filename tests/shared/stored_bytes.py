@@ -18,7 +18,7 @@ from armtempo.link.board_messages import Positions, Sample
 from armtempo.report import run_folder
 from armtempo_shared import armrecord, motion, sequence, way_back, wire
 
-RAMPS = tuple(range(1000, 65000, 1000)), tuple(range(1, 33)), 14
+RAMPS = tuple(range(1000, 65000, 1000)), tuple(range(1, 33)), 14, 0
 NAMED = {"engine_bytes": "engine_room"}
 """Fields by the names that their numbers follow from: those they had when their bytes were kept."""
 KEPT = Path(__file__).with_name("stored_bytes.json")
@@ -50,8 +50,10 @@ def _records() -> Iterator[tuple[str, str]]:
         times = [[100 * (axis + 1) + place for place in range(5)] for axis in range(axes)]
         record = motion.pack(3, [[1, 2, 3, 4, 5], [6, 7, 8, 9, 10]], times, 1, RAMPS, 12)
         yield f"motion record {record[:4].decode()}, time axes {axes}", record.hex()
-        back = way_back.pack(record, "feed", RAMPS)
+        back = way_back.pack(record, "feed", (*RAMPS[:3], 3))
         yield f"record of the way back {back[:4].decode()}, time axes {axes}", back.hex()
+    close = motion.pack(3, [[1, 2, 3, 4, 5]], [[100, 101, 102, 103, 104]], 1, (*RAMPS[:3], 3), 12)
+    yield f"motion record {close[:4].decode()}, entries close at the ends", close.hex()
     record = sequence.pack(1, [(2, 3, 4, 5, 6), (7, 8, 9, 10, 11)], [("ä", 12)], ["b"])
     yield f"sequence record {record[:4].decode()}", record.hex()
 

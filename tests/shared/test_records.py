@@ -32,7 +32,7 @@ from tests.shared import stored_bytes
 
 BITS = {"B": 8, "H": 16, "I": 32, "i": 31}
 ARM_CRC = 0x12345678
-RAMPS = tuple(range(1, 65)), tuple(range(1000, 65000, 2000)), 14
+RAMPS = tuple(range(1, 65)), tuple(range(1000, 65000, 2000)), 14, 0
 Row = tuple[int, int, int, int, int]
 LARGEST = {
     sequence.MOVE: (0, 0),
@@ -191,7 +191,7 @@ def test_any_other_length_is_refused() -> None:
         (5, 0, "degree"),
         (5, limits.MAX_JOINTS + 1, "degree"),
         (6, 2, "version"),
-        (6, 4, "version"),
+        (6, 32, "version"),
         (7, 5, "version"),
         (7, 20, "version"),
         (0, ord("B"), "version"),
@@ -299,7 +299,7 @@ def test_versions_are_those_of_files_that_exist() -> None:
         "sequence run": 1,
         "claim": 1,
         "arm record": 2,
-        "protocol": 6,
+        "protocol": 7,
     }
 
 

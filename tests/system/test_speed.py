@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import BoardError, InputError
 from armtempo.link.board_messages import Sample
-from armtempo.planning import brake_time
+from armtempo.planning import brake_time, ramp_excess
 from armtempo.report import replayed, run_report
 from armtempo.report.run import Run
 from armtempo.robot.recording import Watcher
@@ -155,4 +155,4 @@ def test_changes_keep_the_brake_times_limits() -> None:
                 values = np.diff(values, axis=0) / step
                 if order:
                     worst = max(worst, float(np.max(np.abs(values[: -3 or None]) / allowed[:, order])))
-        assert worst < brake_time.EXCESS * 1.02, worst
+        assert worst < ramp_excess.EXCESS * 1.02, worst

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 _RAMP_LENGTH = const(2047)
 _RAMP_SHAPE_BIT = const(11)
 
-_MOST_PARTS = const(8190)  # of a motion's time, to look up its ramps
-
 
 class Override:
     """``law`` is what the joints follow; ``rate`` that after its ramp, steady from ``steady_kiticks`` on."""
@@ -48,10 +46,7 @@ class Override:
         """Stand at time 0 of a motion, a ``MotionHead``, which says how long its ramps are."""
         self._motion = motion
         self._duration_ticks = duration_ticks
-        self._shift = 10
-        while duration_ticks >> self._shift > _MOST_PARTS:
-            self._shift += 1
-        self._parts = (duration_ticks >> self._shift) + 1
+        self._duration_kiticks = (duration_ticks >> 10) + 1
         self._motion_ticks = self._real_ticks = 0  # at the end of the last ramp
         self._motion_kiticks = self._real_kiticks = 0
         self.rate = rate
@@ -72,7 +67,7 @@ class Override:
         since = max(from_kiticks - self._real_kiticks, 0)
         at = self._motion_kiticks + since // PERMILLE * self.rate + since % PERMILLE * self.rate // PERMILLE
         motion = self._motion
-        units: int = motion.ramp(at >> (self._shift - 10), self._parts, True) & _RAMP_LENGTH
+        units: int = motion.ramp(at, self._duration_kiticks, True) & _RAMP_LENGTH
         # RAMP_GRID_TICKS are 1000 << 6
         grid: int = ((units << motion.ramp_bits - 6) + PERMILLE - 1) // PERMILLE
         return self._real_kiticks + since + (125 * grid >> 1)
@@ -85,7 +80,7 @@ class Override:
         """Length, rounded up to the grid, and shape of a ramp that begins at a time of the motion."""
         grid = time_law.RAMP_GRID_TICKS
         motion = self._motion
-        entry: int = motion.ramp(at_ticks >> self._shift, self._parts, rate == 0)
+        entry: int = motion.ramp(at_ticks >> 10, self._duration_kiticks, rate == 0)
         return -(-((entry & _RAMP_LENGTH) << motion.ramp_bits) // grid) * grid, entry >> _RAMP_SHAPE_BIT
 
     def ramp(self, from_ticks: int, rate: int) -> None:

@@ -65,6 +65,7 @@ class Backwards(MotionFile):
         self.crc = way.crc
         self.ramps = way.ramps
         self.ramp_bits = way.ramp_bits
+        self.edge_bits = way.edge_bits
         self.can_brake = any(way.ramps)
         self._origins = way.origins
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from binascii import crc32
-from dataclasses import asdict
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -75,12 +75,12 @@ def way_back(data: bytes, name: str, brakes: BrakeTimes) -> bytes:
 
 
 def _ramps(brakes: BrakeTimes | None) -> motion.Ramps:
-    """Ramp entries, to rest and others, as integers, and the bits of their unit."""
+    """Ramp entries, to rest and others, as integers, the bits of their unit, and e (``armtempo_shared.motion``)."""
     if brakes is None:
         return motion.no_ramps()
     shapes = (motion.RAMP_LENGTH + 1) * np.append(brakes.shapes, motion.EVEN_RAMP)
     to_rest = [int(entry) for entry in brakes.to_rest + shapes]
-    return to_rest, [int(entry) for entry in brakes.others], brakes.unit_bits
+    return to_rest, [int(entry) for entry in brakes.others], brakes.unit_bits, brakes.edge_bits
 
 
 def _fixed(points: NDArray[np.float64], bits: int) -> list[int]:
@@ -119,19 +119,21 @@ def _head(arm: Arm) -> dict[str, Any]:
 
 def _identity(arm: Arm) -> int:
     """A hash of everything that maps joint angles to the arm's position: all except names, limits and models."""
-    joints = [{k: v for k, v in asdict(joint).items() if k not in _NOT_IDENTITY} for joint in arm.joints]
+    joints = [_as_floats(joint) for joint in arm.joints]
     for joint in joints:
+        for name in _NOT_IDENTITY:
+            joint.pop(name, None)
         if joint["encoder"]:
             del joint["encoder"]["following_error_deg"]
-    facts = [joints, arm.coupling] if arm.coupling else joints
-    text = json.dumps(_as_floats(facts), sort_keys=True)
+    facts = [joints, _as_floats(arm.coupling)] if arm.coupling else joints
+    text = json.dumps(facts, sort_keys=True)
     return crc32(text.encode())
 
 
 def _as_floats(value: Any) -> Any:
-    """The value with all numbers as floats, as 20 and 20.0 are the same gear ratio."""
-    if isinstance(value, dict):
-        return {key: _as_floats(entry) for key, entry in value.items()}
+    """The value as JSON has it, with all numbers as floats, as 20 and 20.0 are the same gear ratio."""
+    if is_dataclass(value):
+        return {entry.name: _as_floats(getattr(value, entry.name)) for entry in fields(value)}
     if isinstance(value, list | tuple):
         return [_as_floats(entry) for entry in value]
     return float(value) if isinstance(value, int | float) else value

@@ -328,10 +328,16 @@ def check_time(trajectory: Trajectory) -> None:
 def check_held(trajectory: Trajectory, arm: Arm) -> None:
     """Raise PlanError if a control point exceeds the range of the board's integers."""
     all_steps = motor_points_steps(trajectory, arm)
-    for joint_spline, joint, steps in zip(trajectory.joints, arm.driven, all_steps, strict=True):
+    for number, (joint_spline, joint, steps) in enumerate(
+        zip(trajectory.joints, arm.driven, all_steps, strict=True)
+    ):
         where = f"trajectory {trajectory.name!r}, {joint.name}"
-        _check_times(where, joint_spline)
-        if np.max(np.abs(steps)) >= MOST_STEPS or _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS:
+        if not (number and trajectory.shared):
+            _check_times(where, joint_spline)
+        stands = bool(np.all(steps == steps[0]))
+        if np.max(np.abs(steps)) >= MOST_STEPS or (
+            not stands and _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS
+        ):
             raise PlanError(f"{where}: more steps than the board can count", "use fewer microsteps")
 
 

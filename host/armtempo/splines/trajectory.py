@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,15 +70,21 @@ class JointSpline:
 
         Units as in ``__call__``; quicker than that, as no u has to be found.
         """
-        u = np.linspace(0.0, 1.0, parts)
+        powers = _powers(parts)
 
         def at(coefficients: Array, order: int) -> Array:
             found = bspline.derivative(coefficients, order)
-            return np.asarray((found @ np.vander(u, found.shape[1], increasing=True).T).ravel())
+            return np.asarray((found @ powers[: found.shape[1]]).ravel())
 
         angle = [at(self.angle_polynomials, order) for order in range(1, 4)]
         time = [at(self.time_polynomials, order) for order in range(4)]
         return time[0], np.stack(_by_time(angle, time[1:]))
+
+
+@cache
+def _powers(parts: int) -> Array:
+    """Powers 0 to 5 of equidistant u, (6, parts)."""
+    return np.vander(np.linspace(0.0, 1.0, parts), max(bspline.DEGREES) + 1, increasing=True).T.copy()
 
 
 def _by_time(angle: Sequence[Array], time: Sequence[Array]) -> tuple[Array, Array, Array]:

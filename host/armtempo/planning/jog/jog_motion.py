@@ -257,8 +257,8 @@ def _line_limits(followed: FollowedLine, length: float, speed: float) -> WayLimi
 
 
 def _within(trajectory: Trajectory, arm: Arm) -> bool:
-    times = np.linspace(0.0, trajectory.duration_s, 8 * len(trajectory.joints[0].time_polynomials) + 1)
-    angles = trajectory(times)
+    powers = np.vander(np.linspace(0.0, 1.0, 9), DEGREE + 1, increasing=True).T
+    angles = np.stack([(joint.angle_polynomials @ powers).ravel() for joint in trajectory.joints], axis=1)
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     low, high = np.minimum(low, angles[0]), np.maximum(high, angles[0])  # a whole step may lie just beyond
     return bool(np.all(angles >= low - 1e-9) and np.all(angles <= high + 1e-9))

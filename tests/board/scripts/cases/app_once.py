@@ -18,7 +18,7 @@ from armtempo_board.storage.motion_file import MotionFile
 from armtempo_shared import backwards, engine_memory, messages, motion, way_back, wire
 
 SEED = 20261127
-RAMPS = ((5,) * motion.REST_ENTRIES, (7,) * motion.OTHER_ENTRIES, 15)
+RAMPS = ((5,) * motion.REST_ENTRIES, (7,) * motion.OTHER_ENTRIES, 15, 0)
 lock = getattr(micropython, "heap_lock", gc.collect)
 unlock = getattr(micropython, "heap_unlock", gc.collect)
 

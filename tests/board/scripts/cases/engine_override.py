@@ -63,13 +63,25 @@ def some_ramps():
         [random.randrange(300, longest) + 2048 * random.randrange(len(RAMP_SHAPES)) for longest in lengths]
         for lengths in RAMPS[:2]
     ]
-    return ramps[0], ramps[1], RAMP_BITS
+    return ramps[0], ramps[1], RAMP_BITS, random.choice([0, 0, 2, 3, 5])
+
+
+def place_of(parts, edge_bits, share):
+    """Where a share of the motion's duration lies among the entries."""
+    if not edge_bits:
+        return parts * share
+    side, edge = parts * 4 // 9, 0.5**edge_bits
+    if share > 0.5:
+        return parts - place_of(parts, edge_bits, 1.0 - share)
+    if share < edge:
+        return side * share / edge
+    return side + (parts - 2 * side) * (share - edge) / (1.0 - 2 * edge)
 
 
 def by_table(motion, to_rest, duration, at):
     """How long a change takes that begins at a time of the motion, in ticks, and the shape just before and after it."""
     ramps = struct.unpack_from("<64H" if to_rest else "<32H", motion.data, 16 if to_rest else 144)
-    place = (len(ramps) - 1) * min(at / duration, 1.0)
+    place = place_of(len(ramps) - 1, motion.data[6] >> 1, min(at / duration, 1.0))
     first = min(int(place), len(ramps) - 2)
     length, after = [ramp % 2048 for ramp in ramps[first : first + 2]]
     shapes = [ramps[max(int(place - 0.02), 0)] // 2048, ramps[first] // 2048]
@@ -111,9 +123,9 @@ def begin(motion, rate=1000):
         ramp(from_ticks, to)
         assert override.steady_ticks() == end
         length, shapes = by_table(motion, to == 0, override._duration_ticks, passed)
-        near = 2**RAMP_BITS * (1 + 725 * 63 * 2 / 4096)  # two places of 4096
+        near = 2**RAMP_BITS * (1 + 725 * 28 * 32 * 5 * 1024 / override._duration_ticks)  # 5 times 1024 ticks
         assert -near < end - start - length <= 64000 + near, (start, end, length)
-        shape = motion.ramp(int(passed) >> override._shift, override._parts, to == 0) >> 11
+        shape = motion.ramp(int(passed) >> 10, (override._duration_ticks >> 10) + 1, to == 0) >> 11
         assert shape in shapes, (shape, shapes)
         rig.laws.append((start, passed, end - start, before, to, shape))
 

@@ -62,7 +62,7 @@ def motion_of(arm, segments):
         [points] * arm[5],
         [times] * arm[5],
         1,
-        ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14),
+        ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14, 0),
         wire.record_crc(arm),
     )
 

@@ -8,7 +8,7 @@ SEGMENTS = 9
 BRAKE_TICKS = TICK_HZ // 5
 RAMP_BITS = 14
 _LENGTH = (BRAKE_TICKS >> RAMP_BITS,)
-RAMPS = _LENGTH * motion.REST_ENTRIES, _LENGTH * motion.OTHER_ENTRIES, RAMP_BITS
+RAMPS = _LENGTH * motion.REST_ENTRIES, _LENGTH * motion.OTHER_ENTRIES, RAMP_BITS, 0
 # steps at the control points, seconds at those of the time axis
 ANGLES = (
     (0, 0, 0, 0, 0, 400, 1800, 2500, 3000, 3000, 3000, 3000, 3000, 3000),

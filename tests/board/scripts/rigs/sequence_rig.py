@@ -58,7 +58,7 @@ def leg(first, last, arm_crc=ARM_CRC):
         [points, points],
         [times],
         1,
-        ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14),
+        ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14, 0),
         arm_crc,
     )
 

@@ -404,5 +404,5 @@ def record(arm_record, joints=2, segments=3):
     angles = [list(range(segments + 5)) for _ in range(joints)]
     crc = armrecord.unpack(arm_record)[2]
     return motion.pack(
-        5, angles, angles, 1, ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14), crc
+        5, angles, angles, 1, ((6,) * motion.REST_ENTRIES, (6,) * motion.OTHER_ENTRIES, 14, 0), crc
     )

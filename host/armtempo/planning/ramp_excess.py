@@ -1,0 +1,255 @@
+"""Acceleration and jerk of a motion while the rate of its own time changes, relative to what is allowed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.motion import (
+    LEAST_EDGE_BITS,
+    MOST_EDGE_BITS,
+    MOST_RAMP_BITS,
+    RAMP_LENGTH,
+    RAMP_SHAPES,
+    RAMP_WAYS,
+    edge_parts,
+)
+from numpy.typing import NDArray
+
+from armtempo.basics.arrays import Array
+from armtempo.splines.trajectory import JointSpline, Trajectory
+
+EXCESS = 1.25
+"""Multiple of the acceleration and jerk limits that braking and changes of speed may reach. A motion at its
+limits could brake only very slowly within them, as braking adds to the acceleration and jerk of the path."""
+
+Rates = tuple[tuple[float, float], ...]
+Single = NDArray[np.float32]
+Shapes = NDArray[np.int64]
+"""Numbers of RAMP_SHAPES."""
+
+LONGEST_S = (RAMP_LENGTH << MOST_RAMP_BITS) / TICK_HZ
+MOST_S = 2.0 * LONGEST_S
+SHORTEST_S = 0.01
+_LONGER, _MUCH_LONGER = 1.01, 1.1
+_SAMPLES_PER_SEGMENT, _LEAST_SAMPLES, _MOST_SAMPLES = 50, 1000, 4000
+_SECANTS, _MOST_TRIES = 4, 6
+_FEW_LEFT = 0.15  # of the starts, which may be _MUCH_LONGER
+_CLOSE = 0.015  # below the most allowed
+_ALIKE = 1e-9  # differences of control points over their largest distance
+_LEAST_EXCESS = 1e-6
+_QUIET = 0.1  # of the largest acceleration and jerk: between the ramps at a motion's ends there is no more
+_AROUND = 1.2  # times those ramps is where a table's entries are close
+_SHAPES, _WAYS = np.frombuffer(RAMP_SHAPES, np.uint8), np.frombuffer(RAMP_WAYS, np.uint8)
+
+
+def entry_times_s(parts: int, duration_s: float, edge_bits: int) -> Array:
+    """Times of a table's entries in a motion, (parts + 1,) (``armtempo_shared.motion``)."""
+    if not edge_bits:
+        return np.linspace(0.0, duration_s, parts + 1)
+    side, edge_s = edge_parts(parts), duration_s / 2**edge_bits
+    ends_s = [0.0, edge_s, duration_s - edge_s, duration_s]
+    return np.asarray(np.interp(np.arange(parts + 1), [0, side, parts - side, parts], ends_s))
+
+
+class Ramps:
+    """Acceleration and jerk of a motion during changes of its rate, relative to EXCESS times the ``limits`` (J, 3).
+
+    ``edge_bits``: where entries are close, from the motion; ``worst_of_motion``: its own largest ratio to the limits.
+    """
+
+    def __init__(self, trajectory: Trajectory, limits: Array) -> None:
+        self.duration_s = trajectory.duration_s
+        splines, most = _essential(trajectory, limits)
+        segments = max((len(spline.time_polynomials) for spline in splines), default=1)
+        count = min(max(_SAMPLES_PER_SEGMENT * segments, _LEAST_SAMPLES), _MOST_SAMPLES)
+        sampled = [spline.sampled(-(-count // len(spline.time_polynomials))) for spline in splines]
+        loads = [
+            np.max(np.abs(rows[1:]) / limit[1:, None], axis=0)
+            for (_, rows), limit in zip(sampled, most, strict=True)
+        ]
+        self.worst_of_motion = max((float(load.max()) for load in loads), default=0.0)
+        self.edge_bits = _edge_bits([at_s for at_s, _ in sampled], loads, self.duration_s)
+        self._last = count - 1
+        side, edge_s = edge_parts(self._last), self.duration_s / 2**self.edge_bits
+        self._edge_s, self._middle_s = np.float32(edge_s), np.float32(self.duration_s - 2.0 * edge_s)
+        self._per_s, self._less_per_s = self._last / self.duration_s, 0.0  # samples
+        if self.edge_bits:
+            self._per_s = side / edge_s
+            self._less_per_s = (self._last - 2 * side) / float(self._middle_s) - self._per_s
+        time_s = entry_times_s(self._last, self.duration_s, self.edge_bits)
+        # of each joint: speed, acceleration and jerk, each over the most of the jerk, with their differences; 0 after
+        # the end; and the factor for those of the acceleration
+        self._joints = []
+        for (at_s, rows), limit in zip(sampled, most, strict=True):
+            scaled = [np.interp(time_s, at_s, row, right=0.0) / (EXCESS * limit[2]) for row in rows]
+            self._joints.append((_with_differences(scaled), np.float32(limit[2] / limit[1])))
+
+    def _places(self, time_s: Single) -> Single:
+        """Numbers of samples at times of the motion, float32."""
+        at = time_s * np.float32(self._per_s)
+        if self.edge_bits:
+            beyond = np.clip(time_s - self._edge_s, np.float32(0.0), self._middle_s)
+            at += beyond * np.float32(self._less_per_s)
+        return np.asarray(np.minimum(at, np.float32(self._last + 1.0)))
+
+    def shortest_s(self, starts_s: Array, guess_s: Array, rates: Rates, shapes: Shapes, phases: int) -> Array:
+        """Shortest lengths, to 1 %, (N,), of ramps from ``starts_s`` with ``shapes``, found from a guess, all (N,)."""
+        low, high = np.full(len(starts_s), SHORTEST_S), np.full(len(starts_s), np.inf)
+        below, above = np.full(len(starts_s), 1.0), np.zeros(len(starts_s))  # logarithms of the excess there
+        tried = np.clip(guess_s, SHORTEST_S, MOST_S)
+        left = np.arange(len(starts_s))
+        tries = 0
+        while len(left):
+            tries += 1
+            length = tried[left]
+            excess = np.log(self.excess(starts_s[left], length, rates, shapes[left], phases))
+            enough = excess <= 0.0
+            now, later = left[enough], left[~enough]
+            high[now], above[now] = length[enough], excess[enough]
+            low[later], below[later] = length[~enough], excess[~enough]
+            close = (above[left] > -_CLOSE) | (high[left] < _LONGER * low[left])
+            close |= tries >= _MOST_TRIES
+            left = left[~(close & np.isfinite(high[left])) & (low[left] < MOST_S)]
+            if len(left) < _FEW_LEFT * len(starts_s):
+                left = left[high[left] > _MUCH_LONGER * low[left]]
+            growth = np.clip(below[left], 0.05, math.log(2.0))
+            share = np.clip((below[left] + 0.5 * _CLOSE) / (below[left] - above[left]), 0.15, 0.85)
+            if tries > _SECANTS:
+                share[:] = 0.5
+            between = np.isfinite(high[left])
+            growth[between] = share[between] * np.log(high[left][between] / low[left][between])
+            tried[left] = low[left] * np.exp(growth)
+        return np.asarray(np.minimum(high, MOST_S))
+
+    def estimated_s(self, starts_s: Array) -> Array:
+        """The shortest times to rest (N,) from ``starts_s`` if no joint had to stay on its path."""
+        first = np.minimum(np.rint(self._places(starts_s.astype(np.float32))), self._last).astype(np.intp)
+        found = np.full(len(starts_s), SHORTEST_S)
+        for rows, factor in self._joints:
+            speed, acceleration = (rows[order][0].take(first).astype(float) for order in (0, 1))
+            acceleration = np.where(speed < 0.0, -acceleration, acceleration)
+            # when the acceleration is 0, with the most of the jerk, 1
+            speed = np.abs(speed) + 0.5 * acceleration**2
+            phase = np.minimum(np.sqrt(speed), 1.0 / factor)
+            np.maximum(found, phase + speed / np.maximum(phase, SHORTEST_S) + acceleration, out=found)
+        return np.asarray(np.minimum(found, 0.5 * MOST_S))
+
+    def excess(self, starts_s: Array, length_s: Array, rates: Rates, shapes: Shapes, phases: int) -> Array:
+        """Largest ratio (N,) of acceleration or jerk to the most allowed in changes between ``rates``.
+
+        ``starts_s``, ``length_s``, ``shapes``: (N,); ``phases`` of each piece of a ramp.
+        """
+        table = _ramp(phases)
+        if len(shapes) and np.all(shapes == shapes[0]):
+            shapes = shapes[:1]
+        place, rise, slope, bend, way, whole = (part.take(shapes, axis=1)[:, None] for part in table)
+        begin, length = starts_s.astype(np.float32), length_s.astype(np.float32)
+        before, after = np.array(rates, np.float32).T[:, :, None]  # the axes: phases, rates, starts
+        least, change = np.minimum(before, after), after - before
+        size = np.abs(change)
+        rate = least + size * rise
+        passed = least * place + size * way
+        np.copyto(passed, least + size * whole - passed, where=change < 0.0)
+        share = self._places(begin + length * passed)
+        whole_places = np.floor(share)
+        share -= whole_places
+        first = whole_places.astype(np.intp)
+        rate1, rate2 = change * (slope / length), size * (bend / (length * length))
+        square = rate * rate
+        cube, thrice = square * rate, np.float32(3.0) * rate * rate1
+        worst = np.full(first.shape[1:], _LEAST_EXCESS, np.float32)
+        for rows, factor in self._joints:
+            # every number is inside; "wrap" is the quickest of numpy's modes
+            speed, acceleration, jerk = (
+                values.take(first, mode="wrap") + share * steps.take(first, mode="wrap")
+                for values, steps in rows
+            )
+            found = np.abs(acceleration * square + speed * rate1).max(axis=0)
+            np.maximum(worst, factor * found, out=worst)
+            found = np.abs(jerk * cube + acceleration * thrice + speed * rate2).max(axis=0)
+            np.maximum(worst, found, out=worst)
+        return np.asarray(worst.max(axis=0), dtype=float)
+
+
+def _essential(trajectory: Trajectory, limits: Array) -> tuple[list[JointSpline], list[Array]]:
+    """The joints that matter, with their limits (3,): of those that move in proportion, one for all."""
+    kept: list[JointSpline] = []
+    units: list[Array] = []
+    spans: list[float] = []
+    most: list[Array] = []
+    for spline, limit in zip(trajectory.joints, limits, strict=True):
+        way = spline.angle_points_deg - spline.angle_points_deg[0]
+        span = float(np.max(np.abs(way)))
+        if span == 0.0:
+            continue
+        unit = way / way[np.argmax(np.abs(way))]
+        for number, known in enumerate(units):
+            axis = kept[number].time_points_s
+            alike = known.shape == unit.shape and np.abs(unit - known).max() <= _ALIKE
+            if alike and (spline.time_points_s is axis or np.array_equal(spline.time_points_s, axis)):
+                most[number] = np.minimum(most[number], limit * spans[number] / span)
+                break
+        else:
+            kept.append(spline)
+            units.append(unit)
+            spans.append(span)
+            most.append(limit)
+    return kept, most
+
+
+def _edge_bits(times_s: Sequence[Array], loads: Sequence[Array], duration_s: float) -> int:
+    """So that the closer entries are where the ramps at the ends of a motion are, and its middle is quiet; or 0.
+
+    ``loads``: at the ``times_s`` of each joint, the larger ratio of its acceleration and jerk to its limits.
+    """
+    if not loads:
+        return 0
+    time_s, load = np.concatenate(times_s), np.concatenate(loads)
+    busy_s = time_s[load > _QUIET * load.max()]
+    edge_s = _AROUND * float(np.max(np.minimum(busy_s, duration_s - busy_s)))
+    bits = min(int(math.log2(duration_s / edge_s)), MOST_EDGE_BITS) if edge_s > 0.0 else 0
+    return bits if bits >= LEAST_EDGE_BITS else 0
+
+
+def _with_differences(rows: Sequence[Array]) -> list[tuple[Single, Single]]:
+    """Each row (T,), followed by zeros, with the differences between its values."""
+    found = np.zeros((len(rows), 2, len(rows[0]) + 2), np.float32)
+    found[:, 0, :-2] = rows
+    found[:, 1, :-3] = np.diff(found[:, 0, :-2])
+    return [(values, steps) for values, steps in found]
+
+
+@cache
+def _ramp(phases: int) -> tuple[Single, ...]:
+    """r, S, S', S'' and e (3 * phases, N) at the ends of each piece and in between, and e(1) (1, N), of all N shapes.
+
+    As in ``armtempo_board/stepgen/time_law.py``.
+    """
+    second, first = np.divmod(_SHAPES[:, None], 16)
+    first, second, whole = first / 16.0, second / 16.0, _WAYS[:, None] / 64.0
+    late = 3 * (1 - whole) - first - second
+    slopes = (0.0 * first, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0 * first)
+    at = np.linspace(0.0, 1.0, phases)
+    rise = way = start = 0.0 * first
+    pieces = []
+    for width, before, after in zip(
+        (first, second - first, 1 - second), slopes[:-1], slopes[1:], strict=True
+    ):
+        gain, bend = width * before, width * (after - before)
+        pieces.append(
+            (
+                start + width * at,
+                rise + at * (gain + at * bend / 2),
+                before + at * (after - before),
+                (after - before) / width + 0.0 * at,
+                way + width * at * (rise + at * (gain / 2 + at * bend / 6)),
+            )
+        )
+        start = start + width
+        rise, way = pieces[-1][1][:, -1:], pieces[-1][4][:, -1:]
+    parts = [np.concatenate(one, axis=1).T for one in zip(*pieces, strict=True)]
+    return tuple(np.ascontiguousarray(part, np.float32) for part in [*parts, whole.T])
