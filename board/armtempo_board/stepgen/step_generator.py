@@ -101,8 +101,8 @@ class StepGenerator:
 
     Steps go into ``queue`` (step_queue.py). ``direction`` (1 or -1) is that of the steps put in now. ``at_reversal``:
     the next step goes the other way, ``reverse`` lets it come. ``halted``: the motion's time will stand still, and the
-    next step comes in another ``follow`` law. ``ended``: no more steps are put in. Between motions ``subintervals`` is free
-    for the check of the next.
+    next step comes in another ``follow`` law. ``ended``: no more steps are put in. Between motions ``subintervals`` is
+    free for the check of the next.
     """
 
     def __init__(self, memory: Memory) -> None:
