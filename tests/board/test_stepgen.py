@@ -190,7 +190,7 @@ def walk(board: Modules, record: bytes, brake: tuple[int, int] = (0, 0)) -> Trie
             generator.prepare(NEVER_KITICKS)
             generator.queue[board.queue.STEPS] = 0
             generator.queue[board.queue.OUT] = generator.queue[board.queue.IN]
-            assert not generator.at_turn
+            assert not generator.at_reversal
     return tried
 
 
