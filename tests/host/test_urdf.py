@@ -347,6 +347,7 @@ def test_transmissions_that_couple_joints(
         (">50<", "> <"),
         (">50<", ">x<"),
         (">50<", ">nan<"),
+        ("Differential", "Planetary"),
     ],
 )
 def test_transmissions_that_cannot_be_used_are_told(tmp_path: Path, old: str, new: str) -> None:

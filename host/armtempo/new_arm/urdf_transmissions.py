@@ -2,7 +2,7 @@
 
 The classes of ROS (``transmission_interface``), with motor turns m, joint angles j, reductions n of the joints and a
 of the actuators: a differential has m1 = a1 (n1 j1 + n2 j2) and m2 = a2 (n1 j1 - n2 j2); a four-bar linkage, or a belt
-that the first joint carries along, has m1 = a1 n1 j1 and m2 = a2 (j1 + n2 j2). The actuators' reductions are gear ratios.
+that the first joint carries along, has m1 = a1 n1 j1 and m2 = a2 (j1 + n2 j2). Reductions of actuators are gear ratios.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 DIFFERENTIAL, FOUR_BAR = "DifferentialTransmission", "FourBarLinkageTransmission"
+_SIMPLE = "SimpleTransmission"
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ def of_file(path: Path, names: Sequence[str]) -> tuple[tuple[Coupling, ...], tup
     for element in ElementTree.parse(path).iter("transmission"):
         kind = _kind(element)
         joints = [joint.get("name", "") for joint in _in_order(element, "joint")]
-        if kind not in (DIFFERENTIAL, FOUR_BAR) or not set(joints) & set(names):
+        if kind == _SIMPLE or len(set(joints)) < 2 or not set(joints) & set(names):
             continue
         name = element.get("name", "")
         coupling = _coupling(element, name, kind, joints) if set(joints) <= set(names) else None
@@ -61,17 +62,15 @@ def _in_order(element: ElementTree.Element, what: str) -> list[ElementTree.Eleme
 
 
 def _coupling(element: ElementTree.Element, name: str, kind: str, joints: list[str]) -> Coupling | None:
-    """None if it has not two joints and two actuators, or a reduction that is none."""
-    actuators = _in_order(element, "actuator")
+    """None for another class, or one that has not two joints and two actuators, or a reduction that is none."""
+    if kind not in (DIFFERENTIAL, FOUR_BAR):
+        return None
     try:
         first, second = map(_reduction, _in_order(element, "joint"))
-        motor, other = map(_reduction, actuators)
+        motor, other = map(_reduction, _in_order(element, "actuator"))
     except ValueError:
         return None
-    if (
-        not all(0.0 < abs(ratio) < math.inf for ratio in (first, second, motor, other))
-        or len(set(joints)) < 2
-    ):
+    if not all(0.0 < abs(ratio) < math.inf for ratio in (first, second, motor, other)):
         return None
     rows = ((first, second), (first, -second)) if kind == DIFFERENTIAL else ((first, 0.0), (1.0, second))
     return Coupling(name, kind, (joints[0], joints[1]), rows, (motor, other))
