@@ -39,7 +39,7 @@ KIND_BYTES = 3
 SUFFIX = ".py"
 """After the name of a program in the messages of sequences, which are those of programs too."""
 MARK = "__at__"
-"""The marked source calls it with the number of a line before what the line does in the cell, and in each turn of a
+"""The marked source calls it with the number of a line before what the line does in the cell, and in each pass of a
 loop."""
 EACH = "__each__"
 """It calls this with the number of a line and what a loop goes through."""

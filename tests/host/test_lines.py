@@ -367,7 +367,7 @@ def test_what_a_file_may_not_say(tmp_path: Path, old: str, new: str, message: st
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.seeds(1)
 def test_a_wider_tolerance_of_an_arc_is_never_slower(seed: int) -> None:
     """The more segments a spline has, the more it bends as the fastest path does, or less: so several are tried."""
     rng = np.random.default_rng(seed)

@@ -90,7 +90,7 @@ def test_problem(problem: problems.Problem) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.seeds(*range(4))
+@pytest.mark.seeds(2)
 def test_random_jobs_keep_their_limits_or_say_why_not(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """200 jobs each; floors have their own test."""
     monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))

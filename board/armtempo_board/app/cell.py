@@ -16,10 +16,10 @@ if TYPE_CHECKING:
             """Raise Ended if the program was stopped, or a fault is pending."""
 
         def serve(self) -> None:
-            """One turn of the board's loop, then ``check``."""
+            """One pass of the board's loop, then ``check``."""
 
         def serve_if_due(self) -> None:
-            """The same, if the last turn is a millisecond ago."""
+            """The same, if the last pass is a millisecond ago."""
 
         def note_line(self, line: int) -> None:
             """The program is at this line."""

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 _PERCENT = const(100)
 _SLOWEST = const(10)
-_MOST_PASSES = const(16)
+_MOST_SKIPPED = const(16)
 _SAID_BYTES = const(240)
 _CHARACTERS = const(60)  # of four bytes, as many as fit
 _SAY_MS = const(500)  # longest wait until a host has taken the text before
@@ -48,10 +48,10 @@ class UserProgram(Sequencer):
         super().__init__(controller, counters, name + program.SUFFIX.encode(), rate)
         self._source = record.source()
         self._app: "Any" = None
-        self._turn: "Callable[[], None]" = self._nothing
+        self._run_once: "Callable[[], None]" = self._nothing
         self._since_ms: "Any" = 0
         self._served_ms: "Any" = 0
-        self._passed_ms = self._passes = 0
+        self._passed_ms = self._skipped = 0
 
     def begin(self) -> None:
         """Let the main loop execute it."""
@@ -64,10 +64,10 @@ class UserProgram(Sequencer):
     def tell(self, link: "Any") -> None:
         """It has no rows."""
 
-    def execute(self, app: "Any", turn: "Callable[[], None]") -> None:
-        """Execute it to its end. ``turn``: one turn of the main loop."""
+    def execute(self, app: "Any", run_once: "Callable[[], None]") -> None:
+        """Execute it to its end. ``run_once``: one pass of the main loop."""
         self._app = app
-        self._turn = turn
+        self._run_once = run_once
         self._since_ms = time.ticks_ms()
         board = self._controller.board
         try:
@@ -78,7 +78,7 @@ class UserProgram(Sequencer):
             self._fail(error)
         gc.collect()
         while board.engine.moving:
-            turn()
+            run_once()
         if board.fault():
             self._end(sequence.FAULTED, board.fault())
         else:
@@ -128,16 +128,16 @@ class UserProgram(Sequencer):
             raise Ended
 
     def serve(self) -> None:
-        """A turn of the loop."""
-        self._turn()
-        self._passes = 0
+        """A pass of the loop."""
+        self._run_once()
+        self._skipped = 0
         self._served_ms = time.ticks_ms()
         self.check()
 
     def serve_if_due(self) -> None:
-        """A turn, unless the last one was in this millisecond; but often enough if no time passes."""
-        self._passes += 1
-        if self._passes < _MOST_PASSES and time.ticks_ms() == self._served_ms:
+        """A pass, unless the last one was in this millisecond; but often enough if no time passes."""
+        self._skipped += 1
+        if self._skipped < _MOST_SKIPPED and time.ticks_ms() == self._served_ms:
             return
         self.serve()
 

@@ -87,7 +87,32 @@ def test_homing_names_and_shows_the_posture_of_home_first(
         page.press(words.HOMING)
         assert "joint 1 0°, joint 2 -60°, joint 3 40°" in page.texts()
         assert shown[0] == pytest.approx(np.array(operator.arm.home_deg))
-        assert operator.board.homes == 0  # type: ignore[attr-defined]
+        assert operator.board.homes == []  # type: ignore[attr-defined]
         page.answer(words.HOME)
         page.done()
-        assert operator.board.homes == 1  # type: ignore[attr-defined]
+        assert operator.board.homes == [None]  # type: ignore[attr-defined]
+
+
+def test_a_joint_is_homed_alone(operator: PanelBoard) -> None:
+    operator.live.state, operator.live.doubt = unhomed(), "it may be elsewhere"
+    with pages(operator) as page:
+        page.press(words.HOMING)
+        page.named(words.WHICH_JOINTS).set_value("joint 2")
+        assert "joint 2 -60°" in page.texts()
+        page.answer(words.HOME)
+        page.done()
+        assert operator.board.homes == ["joint 2"]  # type: ignore[attr-defined]
+        assert operator.live.doubt  # of the others
+
+
+def test_homing_by_switches_tells_each_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    operator = fakes.operator(fakes.Board(), tmp_path, Arm.of("ar4"))
+    with pages(operator) as page:
+        page.press(words.HOMING)
+        page.named(words.WHICH_JOINTS).set_value(operator.arm.driven[2].name)
+        page.press(words.HOME_BY_SWITCHES)
+        page.done()
+        assert any("switch seen" in line for line in operator.log.last)
+        assert operator.progress == 0.5
+    operator.close()
