@@ -75,6 +75,8 @@ SURE_BY_HAND = (
 )
 GUIDING, GUIDED = "Guide the arm. It is held again after:", "The current on"
 VIEW = "View"
+PATH_SPEED = "0 … {fastest:.0f} mm/s"
+LIMIT, IN_PLAN = "limit of {names}", "{name}, planned"
 SPEED_OF_MOTION = "Speed"
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
 HOMING = "Home…"
