@@ -191,7 +191,8 @@ class ArmScene:
             simple = len(shape.pieces) + len(shape.housings)
             self._links = [""] * simple + self._meshes() if shape.meshes else self._body(COLOUR, JOINT, 1.0)
             self._ghost = self._body(GHOST, GHOST, _GHOST_OPACITY)
-            self._workspace()
+        self._walls: list[Object3D] = []
+        self.draw_workspace()
         self._dots: list[tuple[Object3D, Object3D]] = []
         """A ball for each via point, and its name."""
         self.look("free")
@@ -220,13 +221,16 @@ class ArmScene:
             found.append(str(mesh.id))
         return found
 
-    def _workspace(self) -> None:
-        """The boxes to keep out of, and frames for the walls."""
-        for low, high in self._shape.workspace:
-            is_wall = not (high - low).all()
-            width, height, depth = (high - low).tolist()
-            box = self.scene.box(width, height, depth, wireframe=is_wall)
-            box.material(ROOM, _ROOM_OPACITY).move(*((low + high) / 2).tolist())
+    def draw_workspace(self) -> None:
+        """The boxes to keep out of, and frames for the walls, as the arm has them now."""
+        while self._walls:
+            self._walls.pop().delete()
+        with self.scene:
+            for low, high in self._shape.workspace:
+                is_wall = not (high - low).all()
+                width, height, depth = (high - low).tolist()
+                box = self.scene.box(width, height, depth, wireframe=is_wall)
+                self._walls.append(box.material(ROOM, _ROOM_OPACITY).move(*((low + high) / 2).tolist()))
 
     @property
     def parts(self) -> str:
