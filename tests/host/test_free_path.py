@@ -14,7 +14,9 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, planner
+from armtempo.optimise.kkt import BandedKkt, Factor
+from armtempo.planning import checks, collocation, motion_program, planner
+from armtempo.planning.collocation import Curve, Ratios
 from armtempo.planning.free import corridor
 from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
@@ -326,3 +328,38 @@ def test_where_the_spline_leaves_a_range_the_free_path_is_named_and_plans_it() -
     with pytest.raises(PlanError, match=r'its range is .* take path = "free"'):
         planner.plan(ARM, replace(job, path="through", optimiser="gradient"))
     assert planner.plan(ARM, job).total_s > 0.0
+
+
+def test_a_plan_takes_few_and_small_matrices() -> None:
+    """Counted, because seconds depend on the load: of six joints with 1378 variables on the final segments."""
+    counted: list[int] = []
+
+    class Counted(BandedKkt):
+        def factor(self, entries: np.ndarray) -> Factor:
+            counted.append(len(entries))
+            return super().factor(entries)
+
+    arm, job = problems.spread_out(0, 6, 7)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(motion_program, "BandedKkt", Counted)
+        planner.plan(arm, replace(job, starts=1))
+    assert len(counted) <= 50
+    assert sum(counted) <= 6_500_000
+
+
+def test_ratios_added_keep_their_places_and_peaks_lower_what_is_allowed_next_to_them() -> None:
+    curve = Curve(
+        np.array([[[0.0, 1.0, 0.0, 1.0]] * 2]),
+        np.array([[0.0, 1.0, 0.0, 0.0]] * 2),
+        np.array([[9.0, 9.0, 4.0]]),
+    )
+    at = Ratios.grid(2, 1, (1, 2, 4))
+    assert len(at.kind) == 3 + 5 + 9
+    peaks = collocation.peaks(curve, 4, 1.1)
+    assert set(peaks.kind.tolist()) == {2}
+    both = at + peaks
+    assert np.array_equal(both.points.u[: len(at.kind)], at.points.u)
+    assert np.array_equal((both + peaks).points.u, both.points.u)
+    lower = both.tightened(curve, peaks)
+    assert lower.share[both.kind < 2] == pytest.approx(1.0)
+    assert lower.share[both.kind == 2] == pytest.approx(4.0 / 6.0)
