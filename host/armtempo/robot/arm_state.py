@@ -35,7 +35,7 @@ _WORDS = {
     "dir_setup_ticks": "driver timing",
     "dir_hold_ticks": "driver timing",
     "link_timeout_ms": "link time-out",
-    "identity": "geometry, motors, encoders or switches",
+    "identity": "geometry, motors, coupling, encoders or switches",
 }
 _HALF_STEP = 0.5 + 1e-9
 _KEEPS = "which keeps the position, as only limits, outputs or inputs differ"
