@@ -40,7 +40,8 @@ $(VENV)/demo: pyproject.toml | $(BIN)/python
 	@touch $@
 
 $(VENV)/test: pyproject.toml | $(BIN)/python
-	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -e '.[plot,cluster,mpy,urdf,ros,panel,docs]' -r tests/requirements.txt
+	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check uv # which takes a tenth of pip's time for what follows
+	"$(BIN)/uv" pip install --quiet --python "$(BIN)/python" -e '.[plot,cluster,mpy,urdf,ros,panel,docs]' -r tests/requirements.txt
 	@touch $@ $(VENV)/demo
 
 .cache/typings: board/mypy.ini | $(VENV)/test

@@ -223,7 +223,7 @@ class Pipe:
         turns = _TURNS
         with _importable(self._later):
             while turns:
-                self.app.turn()
+                self.app.run_once()
                 turns = _TURNS if self.port.inbox or self.port.outbox else turns - 1
                 if self.port.outbox:
                     self._send(1, bytes(self.port.outbox))

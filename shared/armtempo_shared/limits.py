@@ -48,7 +48,7 @@ Measured on the emulated chip at 3 cycles an instruction, with one, two and thre
 MAX_STEP_RATE_SUM = 240_000
 """Highest sum of the step rates of all joints, steps/s. The same."""
 
-TURN_SLACK_TICKS = 8400
+REVERSAL_SLACK_TICKS = 8400
 """How late the board may change DIR, before and after the time at which it should: 100 us."""
 
 MAX_MOTION_BYTES = 16384

@@ -1,7 +1,7 @@
 """Free paths compared with an independent reference: direct collocation by casadi and ipopt, of the same jobs.
 
     pip install --group bench
-    python -m tests.benchmark.collocation [--jobs 5] [--pieces 40] [--vias 40] [--feeding]
+    python -m tests.benchmark.collocation [--jobs 5] [--pieces 40] [--vias 40] [--joints 6] [--feeding]
 
 The reference knows nothing of splines: joints are chains of integrators with piecewise constant jerk, ``--pieces``
 of equal time between any two via points, all joints at a via point together, speed, acceleration and jerk within their
@@ -33,6 +33,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=5)
     parser.add_argument("--pieces", type=int, default=40)
     parser.add_argument("--vias", type=int, help="via points of each random job; default: 4 to 8")
+    parser.add_argument("--joints", type=int, help="joints of each random job; default: 3 to 6")
     parser.add_argument("--feeding", action="store_true")
     options = parser.parse_args()
     print(
@@ -70,10 +71,9 @@ def _jobs(options: argparse.Namespace) -> list[tuple[str, Arm, Job]]:
         return found
     for seed in range(options.jobs):
         rng = np.random.default_rng(seed)
-        via = rng.uniform(-90, 90, (int(rng.integers(4, 9)) if options.vias is None else options.vias, 3))
-        limits = np.stack([rng.uniform(20, 80, 3), rng.uniform(20, 80, 3), rng.uniform(80, 300, 3)], axis=1)
-        job = Job(f"random-{seed}", tuple(map(tuple, via.tolist())), path="free", seed=seed)
-        found.append((f"random {seed}", problems.make_arm(limits.tolist()), job))
+        vias = int(rng.integers(4, 9)) if options.vias is None else options.vias
+        joints = int(rng.integers(3, 7)) if options.joints is None else options.joints
+        found.append((f"random {seed}", *problems.spread_out(seed, joints, vias)))
     return found
 
 
@@ -82,47 +82,58 @@ def least_s(via_deg: np.ndarray, limits: np.ndarray, pieces: int) -> float:
     size = np.maximum(np.ptp(via_deg, axis=0), 1e-9)
     via, (speed, acceleration, jerk) = via_deg / size, (limits / size[:, None]).T
     joints, stretches = via.shape[1], len(via) - 1
-    problem = casadi.Opti()
-    times = problem.variable(stretches)
-    guess = (
-        1.5
-        * np.max(
-            np.abs(np.diff(via, axis=0)) / speed + 2 * np.sqrt(np.abs(np.diff(via, axis=0)) / acceleration),
-            axis=1,
-        )
-        + 0.1
+    steps = stretches * pieces
+    times = casadi.SX.sym("t", stretches)
+    q, v, a = (casadi.SX.sym(name, joints, steps + 1) for name in "qva")
+    j = casadi.SX.sym("j", joints, steps)
+    step = casadi.vertcat(*[casadi.repmat(times[number] / pieces, pieces) for number in range(stretches)])
+    h = casadi.repmat(step.T, joints, 1)
+    q0, v0, a0 = (each[:, :-1] for each in (q, v, a))
+    chained = casadi.vertcat(
+        casadi.vec(q[:, 1:] - (q0 + h * v0 + h**2 / 2 * a0 + h**3 / 6 * j)),
+        casadi.vec(v[:, 1:] - (v0 + h * a0 + h**2 / 2 * j)),
+        casadi.vec(a[:, 1:] - (a0 + h * j)),
     )
-    problem.set_initial(times, guess)
-    problem.subject_to(times >= 1e-3)
-    q, v, a = (problem.variable(joints) for _ in range(3))
-    for state, value in ((q, via[0]), (v, 0.0), (a, 0.0)):
-        problem.subject_to(state == value)
-    for stretch in range(stretches):
-        step = times[stretch] / pieces
-        for piece in range(pieces):
-            j = problem.variable(joints)
-            problem.subject_to(problem.bounded(-jerk, j, jerk))
-            here = [problem.variable(joints) for _ in range(3)]
-            share = (piece + 1) / pieces
-            problem.set_initial(here[0], via[stretch] + share * (via[stretch + 1] - via[stretch]))
-            problem.set_initial(here[1], (via[stretch + 1] - via[stretch]) / guess[stretch])
-            problem.subject_to(here[0] == q + step * v + step**2 / 2 * a + step**3 / 6 * j)
-            problem.subject_to(here[1] == v + step * a + step**2 / 2 * j)
-            problem.subject_to(here[2] == a + step * j)
-            # Of a quadratic: all three Bernstein coefficients of the speed within its limit.
-            problem.subject_to(problem.bounded(-speed, v + step / 2 * a, speed))
-            problem.subject_to(problem.bounded(-speed, here[1], speed))
-            problem.subject_to(problem.bounded(-acceleration, here[2], acceleration))
-            q, v, a = here
-        problem.subject_to(q == via[stretch + 1])
-    problem.subject_to(v == 0)
-    problem.subject_to(a == 0)
-    problem.minimize(casadi.sum1(times))
-    problem.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 2000})
-    try:
-        return float(np.sum(problem.solve().value(times)))
-    except RuntimeError as error:
-        raise ValueError(f"no reference: {error}") from None
+    between = casadi.vec(v0 + h / 2 * a0)  # with the knots, all three Bernstein coefficients of a quadratic
+    most = {
+        name: np.repeat(limit[:, None], steps + 1, axis=1)
+        for name, limit in (("v", speed), ("a", acceleration))
+    }
+    most["v"][:, [0, -1]] = most["a"][:, [0, -1]] = 0.0
+    low = np.full((joints, steps + 1), -np.inf)
+    low[:, ::pieces] = via.T
+    high = np.where(np.isfinite(low), low, np.inf)
+    jerks = np.repeat(jerk[:, None], steps, axis=1)
+    distances = np.abs(np.diff(via, axis=0))
+    guess = 1.5 * np.max(distances / speed + 2 * np.sqrt(distances / acceleration), axis=1) + 0.1
+    place = np.linspace(0, stretches, steps + 1)
+    start = np.array([np.interp(place, np.arange(stretches + 1), column) for column in via.T])
+    slope = np.repeat(np.diff(via, axis=0) / guess[:, None], pieces, axis=0).T
+
+    def flat(first: np.ndarray, *rest: np.ndarray) -> np.ndarray:
+        return np.concatenate([first, *(each.ravel(order="F") for each in rest)])
+
+    solver = casadi.nlpsol(
+        "reference",
+        "ipopt",
+        {
+            "x": casadi.vertcat(times, *map(casadi.vec, (q, v, a, j))),
+            "f": casadi.sum1(times),
+            "g": casadi.vertcat(chained, between),
+        },
+        {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 2000}},
+    )
+    zeros, ends = np.zeros(3 * joints * steps), np.tile(speed, steps)
+    found = solver(
+        x0=flat(guess, start, np.pad(slope, ((0, 0), (0, 1))), np.zeros_like(start), 0.0 * jerks),
+        lbx=flat(np.full(stretches, 1e-3), low, -most["v"], -most["a"], -jerks),
+        ubx=flat(np.full(stretches, np.inf), high, most["v"], most["a"], jerks),
+        lbg=np.concatenate([zeros, -ends]),
+        ubg=np.concatenate([zeros, ends]),
+    )
+    if not solver.stats()["success"]:
+        raise ValueError(f"no reference: {solver.stats()['return_status']}")
+    return float(found["f"])
 
 
 if __name__ == "__main__":

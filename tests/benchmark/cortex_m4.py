@@ -153,8 +153,8 @@ class Count:
         end = head + 2 * steps
         self.longest = 0.0
         while head < end and (subject.waits() or not subject.ended):
-            if subject.at_turn and not subject.waits():
-                subject.turn()
+            if subject.at_reversal and not subject.waits():
+                subject.reverse()
             before = self._all()
             subject.prepare(1 << 28)
             self.longest = max(self.longest, self._all() - before)

@@ -135,8 +135,8 @@ def test_turning_and_stopping(machine: Machine, joints: int) -> None:
     timer2[ISR_AT["CNT"]] = 100
     hold("no turn", _cost(machine, "serve_compare", block, timer2, port), idle)
     block[ISR_AT["BLOCK_HEAD"] + ISR_AT["DIR_BIT"]] = 128
-    block[ISR_AT["BLOCK_HEAD"] + ISR_AT["TURN_TIMES"]] = 100
-    block[ISR_AT["BLOCK_HEAD"] + ISR_AT["TURNS_IN"]] = 1
+    block[ISR_AT["BLOCK_HEAD"] + ISR_AT["REVERSAL_TIMES"]] = 100
+    block[ISR_AT["BLOCK_HEAD"] + ISR_AT["REVERSALS_IN"]] = 1
     hold("turn", _cost(machine, "serve_compare", block, timer2, port), turn)
     assert port[ISR_AT["BSRR"]] == 128
 

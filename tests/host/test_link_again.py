@@ -191,7 +191,7 @@ def test_a_board_is_closed_between_the_commands_of_other_threads(tmp_path: Path)
     stack = ExitStack()
     stack.callback(closed.set)
     board = Board(client, "pipe", stack)
-    with client.session.turns:
+    with client.session.lock:
         closing = Thread(target=board.close)
         closing.start()
         assert not closed.wait(0.05)
@@ -205,10 +205,10 @@ def test_a_board_is_closed_between_the_commands_of_other_threads(tmp_path: Path)
 def test_who_waits_for_a_cable_does_not_open_a_port_that_was_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("armtempo.robot.board.TURN_S", 0.01)
+    monkeypatch.setattr("armtempo.robot.board.LOCK_S", 0.01)
     pipe = Pipe(tmp_path / "flash")
     client = connect(pipe)
-    with client.session.turns:
+    with client.session.lock:
         closing = Thread(target=Board(client, "pipe").close)
         closing.start()
         closing.join()

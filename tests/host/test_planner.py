@@ -15,7 +15,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
-from armtempo.model.tool_way import ToolWay
+from armtempo.model.tool_segment import ToolSegment
 from armtempo.planning import checks, lower_bounds, path_deviation, planner
 from armtempo.planning.fitness import Fitness, scale_of
 from armtempo.planning.lower_bounds import Floor
@@ -90,7 +90,7 @@ def test_problem(problem: problems.Problem) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.seeds(*range(4))
+@pytest.mark.seeds(2)
 def test_random_jobs_keep_their_limits_or_say_why_not(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """200 jobs each; floors have their own test."""
     monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))
@@ -422,7 +422,7 @@ def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan
 
 
 def test_each_job_has_a_planner_of_the_table() -> None:
-    led = replace(JOB, ways=(ToolWay(1, line=True),))
+    led = replace(JOB, tool_segments=(ToolSegment(1, line=True),))
     asked = {
         "through": replace(JOB, path="through"),
         "free": replace(JOB, path="free", stops=(Stop(1),)),

@@ -18,9 +18,9 @@ from typing import Any, cast
 import pytest
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, PortError
 from armtempo.link import Client, Opening
+from armtempo.link.board_lock import BoardLock
 from armtempo.link.board_messages import Levels
 from armtempo.link.refusal import refusal
-from armtempo.link.turns import Turns
 from armtempo.ports import caller, claim, claim_file
 from armtempo.ports.caller import Caller, Ownership, ownership
 from armtempo.ports.claim import PortClaim
@@ -246,7 +246,7 @@ def test_what_is_no_message_ends_that_connection_only(server: Server, line: byte
 
 def test_who_is_in_a_hurry_goes_first() -> None:
     """The holder takes its turn again and again without a pause, as a program that follows a run does."""
-    turns, order, ended = Turns(), [], threading.Event()
+    turns, order, ended = BoardLock(), [], threading.Event()
 
     def talk() -> None:
         while not ended.is_set():

@@ -71,7 +71,7 @@ class Slopes:
 
 @pytest.mark.parametrize("start", [(0.5, -0.5), (1.9, 0.1), (3.0, 3.0)], ids=["inside", "near", "outside"])
 def test_a_curved_boundary_is_met_also_from_outside(start: tuple[float, float]) -> None:
-    found = slack_method.minimise(Disc(), np.array(start), np.array([False, True]), TIGHT)
+    found = slack_method.minimise(Disc(), np.array(start), np.array([False, True]), TIGHT).x
     assert found == pytest.approx([-1.0, -np.sqrt(3.0)], abs=1e-6)
 
 
@@ -80,7 +80,7 @@ def test_linear_programs_end_at_their_vertex_and_never_outside(seed: int) -> Non
     rng = np.random.default_rng(seed)
     cost, rows = rng.normal(size=4), np.concatenate([rng.normal(size=(12, 4)), np.eye(4), -np.eye(4)])
     program = Halfplanes(cost, rows)
-    found = slack_method.minimise(program, np.zeros(4), np.ones(len(rows), dtype=bool), TIGHT)
+    found = slack_method.minimise(program, np.zeros(4), np.ones(len(rows), dtype=bool), TIGHT).x
     best = linprog(cost, rows, np.ones(len(rows)), np.ones((1, 4)), [0.1], bounds=[(None, None)] * 4)
     assert cost @ found == pytest.approx(best.fun, abs=1e-6), f"seed {seed}"
     assert np.all(rows @ found < 1.0), f"seed {seed}"
@@ -88,4 +88,4 @@ def test_linear_programs_end_at_their_vertex_and_never_outside(seed: int) -> Non
 
 def test_a_start_beyond_a_linear_inequality_is_returned() -> None:
     start = np.array([-2.0, 0.0])
-    assert slack_method.minimise(Disc(), start, np.array([False, True]), TIGHT) is start
+    assert slack_method.minimise(Disc(), start, np.array([False, True]), TIGHT).x is start

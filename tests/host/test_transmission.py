@@ -289,6 +289,9 @@ def test_its_file_names_each_finding() -> None:
         "joint 5 (its motor, which also moves joint 6)" in words and "400000 steps/s" in words
         for words in said
     )
+    blind = (*THOR.joints[:4], replace(THOR.joints[4], encoder=Encoder(1, 4000, on="motor")), THOR.joints[5])
+    said = [str(found) for found in check_arm(replace(THOR, joints=blind))]
+    assert any("joint 5" in words and "alone does not give its angle" in words for words in said)
     with pytest.raises(InputError, match=r"joint 5 \(its motor, which also moves joint 6\)"):
         encode.arm_record(replace(THOR, joints=fast))
 

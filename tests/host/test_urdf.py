@@ -293,6 +293,74 @@ def test_joints_of_the_main_chain_are_not_taken_for_fingers(
     assert said in result.output
 
 
+DIFFERENTIAL = """
+  <transmission name="wrist">
+    <type>transmission_interface/DifferentialTransmission</type>
+    <actuator name="a"><role>actuator1</role><mechanicalReduction>50</mechanicalReduction></actuator>
+    <actuator name="b"><role>actuator2</role><mechanicalReduction>-40</mechanicalReduction></actuator>
+    <joint name="j3"><role>joint2</role><mechanicalReduction>0.5</mechanicalReduction></joint>
+    <joint name="j2"><role>joint1</role><mechanicalReduction>2.0</mechanicalReduction></joint>
+  </transmission>
+"""
+FOUR_BAR = """
+  <ros2_control name="arm" type="system">
+    <transmission name="elbow">
+      <plugin>transmission_interface/FourBarLinkageTransmission</plugin>
+      <actuator name="a" role="actuator1"/>
+      <actuator name="b" role="actuator2"><mechanical_reduction>30</mechanical_reduction></actuator>
+      <joint name="j1" role="joint1"/>
+      <joint name="j2" role="joint2"><mechanical_reduction>-1.5</mechanical_reduction></joint>
+    </transmission>
+  </ros2_control>
+"""
+
+
+@pytest.mark.parametrize(
+    ("element", "coupling", "ratios"),
+    [
+        (DIFFERENTIAL, [[1, 0, 0], [0, 2, 0.5], [0, 2, -0.5]], ["= 50", "= -40"]),
+        (FOUR_BAR, [[1, 0, 0], [1, -1.5, 0], [0, 0, 1]], ["= 1\n", "= 30"]),
+        (DIFFERENTIAL.replace("Differential", "Simple"), [], []),
+        ("", [], []),
+    ],
+)
+def test_transmissions_that_couple_joints(
+    tmp_path: Path, element: str, coupling: list[list[float]], ratios: list[str]
+) -> None:
+    """By the formulas of transmission_interface, once the '#' of motors and coupling are taken off."""
+    urdf, out = tmp_path / "coupled.urdf", tmp_path / "arm.toml"
+    urdf.write_text((FOLDER / "three_planar.urdf").read_text().replace("</robot>", f"{element}</robot>"))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    assert ("[coupling]" in result.output) == bool(coupling)
+    text = out.read_text()
+    assert all(f"gear_ratio {ratio}" in text for ratio in ratios)
+    out.write_text(re.sub(r"^# (limits|motor|\[coupling\]|\"j\d\") ?", r"\1 ", text, flags=re.M))
+    np.testing.assert_array_equal(np.array(Arm.load(out).coupling), np.array(coupling))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('name="j3"><role', 'name="gripper"><role'),
+        (">50<", ">0<"),
+        (">50<", "> <"),
+        (">50<", ">x<"),
+        (">50<", ">nan<"),
+        ("Differential", "Planetary"),
+    ],
+)
+def test_transmissions_that_cannot_be_used_are_told(tmp_path: Path, old: str, new: str) -> None:
+    urdf = tmp_path / "coupled.urdf"
+    element = DIFFERENTIAL.replace(old, new)
+    assert element != DIFFERENTIAL
+    urdf.write_text((FOLDER / "three_planar.urdf").read_text().replace("</robot>", f"{element}</robot>"))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
+    assert result.exit_code == 0, result.output
+    assert "note: transmission 'wrist' couples 'j2' and " in result.output
+    assert "[coupling]" not in (tmp_path / "arm.toml").read_text()
+
+
 def test_limits_in_degrees_are_suspected_at_import_and_by_check(tmp_path: Path) -> None:
     text = (FOLDER / "three_planar.urdf").read_text()
     urdf, out = tmp_path / "degrees.urdf", tmp_path / "arm.toml"

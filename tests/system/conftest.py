@@ -8,20 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from tests import interpreters
+from tests import interpreters, scripted
 from tests.system import replays
 from tests.system.replays import Replay
 
 FASTEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 """For jobs other than the shipped one: each interpreter has shown there that it makes the same pulses."""
-EMULATED = "micropython-arm"
 BY_JOB = {
-    "shipped": [name for name in interpreters.AVAILABLE if name != EMULATED],
-    "half": list(dict.fromkeys(name for name in (FASTEST, EMULATED) if name in interpreters.AVAILABLE)),
+    "shipped": [name for name in interpreters.AVAILABLE if name != scripted.EMULATED],
     "refined": [FASTEST],
     "cubic": [FASTEST],
 }
-"""The interpreters that replay a job."""
+"""The interpreters that replay a job; the emulator, which takes long, makes the same edges in tests/board."""
 CASES = [(job, name) for job, names in BY_JOB.items() for name in names]
 SAME = [
     pytest.param(

@@ -26,9 +26,8 @@ JOBS: dict[str, dict[str, Any]] = {
     "shipped": {},
     "refined": {"timing": "shared", "iterations": 50},
     "cubic": {"degree": 3, "iterations": 50},
-    "half": {"via": Job.paper(Arm.paper()).via[:4], "iterations": 50},
 }
-"""What is changed in the shipped job; half of it is for the emulated interpreter, which is slow."""
+"""What is changed in the shipped job."""
 REFINE = 4
 """Time segments per path segment of "refined"; the planner's search for them takes too long for a test."""
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import armtempo
 import numpy as np
 import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
@@ -209,13 +211,20 @@ def unhomed(
 
 
 @pytest.mark.parametrize("angle", [-9.0, -12.0])
-def test_homing_run_finds_where_the_arm_stands(tmp_path: Path, angle: float) -> None:
+def test_homing_run_finds_where_the_arm_stands(
+    tmp_path: Path, angle: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
     found = switched_arm(tmp_path, angle)
     with unhomed(found) as (board, stop):
         arm_state.home(board, found, np.array([30.0, -60.0, 40.0]))  # wrong: it is at 0
-        homing.home_to_switches(board, found, stop)
+        told: list[tuple[str, int, int]] = []
+        homing.home_to_switches(board, found, stop, progress=lambda *one: told.append(one))
         stands_deg = arm_state.posture_deg(board, found)
     assert stands_deg == pytest.approx([0.0, -60.0, 40.0], abs=0.03)
+    assert [text for text, _, _ in told][::2] == ["joint 1: on the way to the switch", "joint 1: at home"]
+    assert re.fullmatch(r"joint 1: switch seen after \d+\.\d°; once more, slowly", told[1][0])
+    assert [done for _, *done in told] == [[0, 1], [0, 1], [1, 1]]
 
 
 HOMED_FROM = (-24, -141, 113, 100, -85, 185)
@@ -290,6 +299,26 @@ def test_switch_that_trips_in_a_motion_is_a_fault(tmp_path: Path) -> None:
         arm_state.home(board, found, np.array([20.0, -60.0, 40.0]))  # wrong by 20 degrees
         with pytest.raises(BoardError, match="limit switch"):
             goto.go_to(board, found, np.array([0.0, -60.0, 40.0]), stop)
+
+
+@pytest.mark.parametrize("by_switches", [True, False])
+def test_a_joint_alone_is_homed(tmp_path: Path, by_switches: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is said of the others, nor do they move."""
+    monkeypatch.setattr(homing, "FAST", 1.0)
+    found = switched_arm(tmp_path)
+    with launch(LaunchOptions(arm=found)) as virtual, armtempo.connect(virtual.port, found) as board:
+        if by_switches:
+            board.home_to_switches(found, joint="joint 1")
+            assert board.status().known == 0b001
+            with pytest.raises(InputError, match="joint 2 has no limit switch"):
+                board.home_to_switches(found, joint=2)
+        else:
+            board.home(found, joint=2)
+            assert board.status().known == 0b010
+            with pytest.raises(InputError, match="drives no joint 7"):
+                board.home(found, joint=7)
+            with pytest.raises(InputError, match="exclude each other"):
+                board.home(found, "home", joint=1)
 
 
 def test_arm_without_switches() -> None:

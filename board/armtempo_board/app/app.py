@@ -22,9 +22,9 @@ from armtempo_board.app.controller import Controller
 from armtempo_board.app.events import Events
 from armtempo_board.link.serial_link import SerialLink
 
-_EXTRA_SERVICES_PER_TURN = const(3)  # calls of the engine, during a motion
+_EXTRA_SERVICES_PER_PASS = const(3)  # calls of the engine, during a motion
 _SPARE_BYTES = const(512)  # reserved for reporting an exception: a traceback, and its end for the host
-_MOST_FAILURES = const(10)  # consecutive failing turns of the loop after which the program ends
+_MOST_FAILURES = const(10)  # consecutive failing passes of the loop after which the program ends
 
 
 class App:
@@ -38,7 +38,7 @@ class App:
         self.controller = Controller(Board(root, program_crc, fault))
         self.commands = Commands(self.controller, self.link)
         self.events = Events(self.controller, self.link)
-        self.turns = self._failed = 0  # number of turns, and number of the last one that failed
+        self.passes = self._failed = 0  # number of passes, and number of the last one that failed
         self._failures = 0
         self._spare: "bytearray | None" = bytearray(_SPARE_BYTES)
         self.controller.configure()
@@ -53,15 +53,15 @@ class App:
         """Whether a host has asked for the REPL, and the reply was sent."""
         return self.commands.leaving and self.link.idle()
 
-    def turn(self) -> None:
-        """One turn of the loop; an exception in it becomes a fault."""
-        self.turns = (self.turns + 1) & 0xFFFF
+    def run_once(self) -> None:
+        """One pass of the loop; an exception in it becomes a fault."""
+        self.passes = (self.passes + 1) & 0xFFFF
         try:
-            self._turn()
+            self._run_once()
         except Exception as error:
             self.fail(error)
 
-    def _turn(self) -> None:
+    def _run_once(self) -> None:
         controller = self.controller
         link = self.link
         if link.poll():
@@ -76,7 +76,7 @@ class App:
         link.flush()
         if link.escape:
             self._escape()
-        for _ in range(_EXTRA_SERVICES_PER_TURN):
+        for _ in range(_EXTRA_SERVICES_PER_PASS):
             if controller.moving():
                 board.engine.service()
 
@@ -88,9 +88,9 @@ class App:
 
     def fail(self, error: "BaseException") -> None:
         """Freeze and note the fault; raises the error again after too many consecutive failures."""
-        again = (self.turns - self._failed) & 0xFFFF <= 1
+        again = (self.passes - self._failed) & 0xFFFF <= 1
         self._failures = self._failures + 1 if again else 1
-        self._failed = self.turns
+        self._failed = self.passes
         self.controller.fail()
         self.events.note_fault(codes.INTERNAL)
         self._spare = None

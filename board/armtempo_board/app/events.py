@@ -34,7 +34,7 @@ class Events:
         self._notice = b""
 
     def note_fault(self, code: int) -> None:
-        """Called every turn with the pending fault (0: none), which is sent once."""
+        """Called every pass with the pending fault (0: none), which is sent once."""
         if code != self._noted:
             self._noted = code
             self._fault_waits = code != 0

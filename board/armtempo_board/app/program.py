@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 ROOT = "/flash/armtempo"
 _CTRL_C = const(3)
 _EXCEPTION_BUFFER = const(100)
-_EIGHTH_TURN = const(7)  # during a motion, LEDs, watchdog and button are served only in every eighth turn
+_EIGHTH_PASS = const(7)  # during a motion, LEDs, watchdog and button are served only in every eighth pass
 
 app: "Any" = None
 """The program's App; kept when the program is left for the REPL."""
@@ -71,7 +71,7 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     """Run the loop until a host asks for the REPL. Stops the motion however it ends."""
     try:
         while True:
-            app.turn()
+            app.run_once()
             try:
                 if app.leave_requested():
                     break
@@ -85,7 +85,7 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
 def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     """Serve LEDs, watchdog and button."""
     controller = app.controller
-    if controller.running and app.turns & _EIGHTH_TURN:
+    if controller.running and app.passes & _EIGHTH_PASS:
         return
     leds.show(controller.state())
     watchdog.feed()

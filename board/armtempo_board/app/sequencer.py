@@ -107,7 +107,7 @@ class Sequencer:
         self.tell = self._command.tell
 
     def begin(self) -> None:
-        """Begin with the next turn; raises Refused if the heap has no room for a motion."""
+        """Begin with the next pass; raises Refused if the heap has no room for a motion."""
         controller = self._controller
         controller.release_memory()
         free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES
@@ -215,7 +215,7 @@ class Sequencer:
         if then == sequence.STOP_THEN:
             self._end(sequence.TIMED_OUT)
         elif then == sequence.FAULT_THEN:
-            self._controller.board.pending = codes.INPUT_TIMEOUT  # the next turn ends it
+            self._controller.board.pending = codes.INPUT_TIMEOUT  # the next pass ends it
         return then == sequence.NEXT_THEN
 
     def _end(self, ending: int, code: int = 0) -> None:

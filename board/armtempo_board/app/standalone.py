@@ -77,12 +77,12 @@ def _follow(app: "App", controller: "Controller", watchdog: "Watchdog") -> None:
     byte = bytearray(1)
     presses = 0
     while controller.moving():
-        app.turn()
+        app.run_once()
         watchdog.feed()
         if port.readinto(byte) and byte[_ONLY] == _CTRL_C and controller.moving():
             controller.stop(presses)
             presses = 1
-    app.turn()
+    app.run_once()
 
 
 def _name(code: int) -> str:

@@ -58,8 +58,8 @@ HIGH_A = const(11)  # port A when frozen: a STEP pin that was high finishes its 
 PULSE_TICKS = const(12)  # STEP high time
 JOINTS = const(13)
 ENCODERS = const(14)
-TURN_LATE = const(15)  # a turn of DIR came too late
-TURN_SLACK_TICKS = const(16)  # how late it may come
+REVERSAL_LATE = const(15)  # a reversal of DIR came too late
+REVERSAL_SLACK_TICKS = const(16)  # how late it may come
 DIR_SETUP_TICKS = const(17)  # DIR stable before a rising edge
 HIGH_B = const(18)  # and port B
 TIM2_AT = const(19)  # its address: the low 30 bits, and in the next word the rest
@@ -68,15 +68,15 @@ BLOCK_HEAD = const(22)
 ALWAYS = const(1 << 16)  # in LINE_LEVELS and LINE_MASK, where no pin is: whatever DIR says
 # words of a joint in the block, after the head
 DIR_BIT = const(0)  # in the DIR port
-TURNS_IN = const(1)  # turns of DIR that were queued,
-TURNS_OUT = const(2)  # and made
+REVERSALS_IN = const(1)  # reversals of DIR that were queued,
+REVERSALS_OUT = const(2)  # and made
 CCR_AT = const(3)  # word of its compare register in the timer
 CCMR_AT = const(4)  # and of the register that has its mode,
 MODE_SHIFT = const(5)  # with the mode's place there
 ON_PORT_B = const(6)  # its STEP pin; else on port A
 PIN_BIT = const(7)
-TURN_TIMES = const(8)  # when the queued turns are due
-TURN_ROOM = const(8)  # this many
+REVERSAL_TIMES = const(8)  # when the queued reversals are due
+MOST_REVERSALS = const(8)  # this many
 RING = const(16)  # the state of its ring
 JOINT_WORDS = const(29)
 # words of a line after six joints: of an external interrupt, 8 to 15, or of the program itself
@@ -245,8 +245,8 @@ def arm_channel(block: ptr32, timer: ptr32, ring: ptr32, at: int) -> int:
     due = first - block[DIR_SETUP_TICKS]
     block = ptr32(int(block) + 4 * at)
     if (
-        block[TURNS_IN] != block[TURNS_OUT]
-        and ((due - block[TURN_TIMES + ((block[TURNS_IN] - 1) & (TURN_ROOM - 1))]) >> 31) & 1
+        block[REVERSALS_IN] != block[REVERSALS_OUT]
+        and ((due - block[REVERSAL_TIMES + ((block[REVERSALS_IN] - 1) & (MOST_REVERSALS - 1))]) >> 31) & 1
     ):
         return 1
     timer[block[CCR_AT]] = first
@@ -277,14 +277,14 @@ def park_compare(timer: ptr32, compare: int, state: ptr32) -> object:
 
 
 @micropython.viper
-def add_turn(block: ptr32, state: ptr32, at: int, delay: int) -> int:
-    """Queue a turn of DIR, ``delay`` ticks after the last entry; 0 when the queue is full."""
+def add_reversal(block: ptr32, state: ptr32, at: int, delay: int) -> int:
+    """Queue a reversal of DIR, ``delay`` ticks after the last entry; 0 when the queue is full."""
     block = ptr32(int(block) + 4 * at)
-    queued = block[TURNS_IN]
-    if ((queued - block[TURNS_OUT]) & 0xFF) >= TURN_ROOM:
+    queued = block[REVERSALS_IN]
+    if ((queued - block[REVERSALS_OUT]) & 0xFF) >= MOST_REVERSALS:
         return 0
-    block[TURN_TIMES + (queued & (TURN_ROOM - 1))] = state[LAST_TIME] + delay
-    block[TURNS_IN] = (queued + 1) & 0xFF
+    block[REVERSAL_TIMES + (queued & (MOST_REVERSALS - 1))] = state[LAST_TIME] + delay
+    block[REVERSALS_IN] = (queued + 1) & 0xFF
     return 1
 
 
@@ -301,27 +301,27 @@ def interrupt_soon(timer: ptr32) -> object:
 def serve_compare(block: ptr32, timer: ptr32, port: ptr32) -> int:
     """The compare interrupt: turn the DIR pins that are due; 1 when a sample is due, else arm for the next.
 
-    185 instructions and 24 a joint; a turn of DIR takes almost as much again.
+    185 instructions and 24 a joint; a reversal of DIR takes almost as much again.
     """
     head = block
     while True:
         now = timer[CNT]
         soonest = 1 << 29
-        turned = 0
+        reversed_pins = 0
         joints = block[JOINTS]
         block = ptr32(int(block) + 4 * BLOCK_HEAD)
         while joints:
             joints -= 1
-            if block[TURNS_OUT] != block[TURNS_IN] and not head[FROZEN]:
-                gap = block[TURN_TIMES + (block[TURNS_OUT] & (TURN_ROOM - 1))] - now
+            if block[REVERSALS_OUT] != block[REVERSALS_IN] and not head[FROZEN]:
+                gap = block[REVERSAL_TIMES + (block[REVERSALS_OUT] & (MOST_REVERSALS - 1))] - now
                 if ((gap - 1) >> 31) & 1:
                     bit = block[DIR_BIT]
                     if port[ODR] & bit:
                         bit <<= 16
-                    turned |= bit
-                    block[TURNS_OUT] = (block[TURNS_OUT] + 1) & 0xFF
-                    if ((gap + head[TURN_SLACK_TICKS]) >> 31) & 1:
-                        head[TURN_LATE] = 1
+                    reversed_pins |= bit
+                    block[REVERSALS_OUT] = (block[REVERSALS_OUT] + 1) & 0xFF
+                    if ((gap + head[REVERSAL_SLACK_TICKS]) >> 31) & 1:
+                        head[REVERSAL_LATE] = 1
                     soonest = 0
                 else:
                     gap &= 0x3FFFFFFF
@@ -329,8 +329,8 @@ def serve_compare(block: ptr32, timer: ptr32, port: ptr32) -> int:
                         soonest = gap
             block = ptr32(int(block) + 4 * JOINT_WORDS)
         block = head
-        if turned:
-            port[BSRR] = turned
+        if reversed_pins:
+            port[BSRR] = reversed_pins
         if not block[SAMPLES_DONE]:
             gap = block[NEXT_SAMPLE] - now
             if ((gap - 1) >> 31) & 1:

@@ -115,5 +115,5 @@ class Ring:
             isr.park_compare(self.timer, self._block[self._at + isr.CCR_AT], self.state)
 
     def set_last_to_now(self) -> None:
-        """Take the time of the last entry for now: the ring is empty, only turns of DIR are measured from it."""
+        """Take the time of the last entry for now: the ring is empty, only reversals of DIR are measured from it."""
         isr.copy_word(self.timer, isr.CNT, self.state, isr.LAST_TIME)

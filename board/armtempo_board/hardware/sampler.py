@@ -1,4 +1,4 @@
-"""The compare interrupt of TIM2 channel 4: samples at exact times of the motion, and turns of the DIR pins.
+"""The compare interrupt of TIM2 channel 4: samples at exact times of the motion, and reversals of the DIR pins.
 
 The interrupt stores raw samples; ``next_raw`` gives them to the main loop in their order.
 """
@@ -62,8 +62,8 @@ class Sampler:
         block = self.block
         for joint in range(block[isr.JOINTS]):
             at = self.joint_at(joint)
-            block[at + isr.TURNS_OUT] = block[at + isr.TURNS_IN]
-        for word in (isr.RAW_IN, isr.RAW_OUT, isr.RAW_LOST, isr.TURN_LATE):
+            block[at + isr.REVERSALS_OUT] = block[at + isr.REVERSALS_IN]
+        for word in (isr.RAW_IN, isr.RAW_OUT, isr.RAW_LOST, isr.REVERSAL_LATE):
             block[word] = 0
         block[isr.NEXT_SAMPLE] = 0
         self._regular = -(-duration_ticks // SAMPLE_TICKS)  # samples before the last
@@ -100,14 +100,14 @@ class Sampler:
         )
 
     def overdue(self, joint: int) -> bool:
-        """Whether a sample or a turn of the joint was due 0.5 ms ago: the interrupt comes no more."""
+        """Whether a sample or a reversal of the joint was due 0.5 ms ago: the interrupt comes no more."""
         block = self.block
         at = self.joint_at(joint)
-        out = block[at + isr.TURNS_OUT]
-        turn = at + isr.TURN_TIMES + (out & (isr.TURN_ROOM - 1))
+        out = block[at + isr.REVERSALS_OUT]
+        due = at + isr.REVERSAL_TIMES + (out & (isr.MOST_REVERSALS - 1))
         if (
-            out != block[at + isr.TURNS_IN]
-            and isr.kiticks_until(self._timer2, block, turn) < _OVERDUE_KITICKS
+            out != block[at + isr.REVERSALS_IN]
+            and isr.kiticks_until(self._timer2, block, due) < _OVERDUE_KITICKS
         ):
             return True
         return (

@@ -12,7 +12,7 @@ underrun               the same: the ring stops, no wrong step is made
 E-stop                 known, but unknown if the arm record releases the drivers
 following error        unknown for the joint that was lost
 wrong steps            unknown for the joint that made others than its record has
-DIR turned too late    unknown for all joints
+DIR reversed late      unknown for all joints
 exception in service   unknown for all joints
 =====================  =============================================================
 """
@@ -227,8 +227,8 @@ class Engine:
         elif self._background_task == _CHECK_FOLLOWING:
             self._check_following()
         elif self._sampler.overdue(self._watched_joint):
-            self.block[isr.TURN_LATE] = 1
-        if self.block[isr.TURN_LATE]:
+            self.block[isr.REVERSAL_LATE] = 1
+        if self.block[isr.REVERSAL_LATE]:
             self._fail(codes.INTERNAL, NO_JOINT)
         elif self._has_ended() and self.moving:  # not if an encoder has just ended it
             self._check_end()
@@ -389,7 +389,7 @@ class Engine:
             joint.settle()
         self._sampler.take_now()
         self._readings.convert()
-        if self.block[isr.TURN_LATE]:
+        if self.block[isr.REVERSAL_LATE]:
             self.known = 0
         self.inputs.watch(0)  # a bouncing switch is noted once
         self._note_trip()

@@ -8,7 +8,7 @@ from array import array
 
 import stm
 from armtempo_shared import codes
-from armtempo_shared.limits import TURN_SLACK_TICKS
+from armtempo_shared.limits import REVERSAL_SLACK_TICKS
 from micropython import const
 from pyb import Pin
 
@@ -32,7 +32,7 @@ _REFILL_KITICKS = const(512)  # at most 6 ms between two checks of a queue that 
 _NEVER_KITICKS = const(1 << 29)
 _NOT_FED = const(-(1 << 22))  # as in ring.py
 _LATEST_KITICKS = const(22)  # of the queue, as in step_queue.py
-_TURNS = const(8)
+_REVERSALS = const(8)
 
 
 class JointDrive:
@@ -59,18 +59,18 @@ class JointDrive:
         self.ring = Ring(row["channel"], block, self._words_at, ring_words)
         self.generator = StepGenerator(memory)
         self._inverted = row["dir_inverted"]
-        self._turn_delay = head["dir_hold_ticks"] + TURN_SLACK_TICKS
+        self._reversal_delay = head["dir_hold_ticks"] + REVERSAL_SLACK_TICKS
         self.gap_ticks = max(
-            head["pulse_ticks"] + self._turn_delay + TURN_SLACK_TICKS + head["dir_setup_ticks"],
+            head["pulse_ticks"] + self._reversal_delay + REVERSAL_SLACK_TICKS + head["dir_setup_ticks"],
             head["pulse_ticks"] + head["low_ticks"],
         )
         name = pins.DIR[row["channel"]]
         self._dir = Pin(name, Pin.OUT_PP, value=0)
         block[self._words_at + isr.DIR_BIT] = 1 << pins.line(name)
         block[isr.PULSE_TICKS] = head["pulse_ticks"]
-        block[isr.TURN_SLACK_TICKS] = TURN_SLACK_TICKS
+        block[isr.REVERSAL_SLACK_TICKS] = REVERSAL_SLACK_TICKS
         block[isr.DIR_SETUP_TICKS] = head["dir_setup_ticks"]
-        self._turn_steps = array("i", [0] * _TURNS)  # steps of the ring before each queued turn
+        self._reversal_steps = array("i", [0] * _REVERSALS)  # steps of the ring before each queued reversal
         self._direction = 1
         self._count_from(0)
         self.ended = True
@@ -81,7 +81,7 @@ class JointDrive:
         """Restart the count of the ring at a position."""
         self._base = position
         self._base_steps = 0
-        self._turns_in = self._turns_out = 0
+        self._reversals_in = self._reversals_out = 0
 
     def load(self, motion: "MotionHead", number: int) -> None:
         """Prepare for a motion; the clock is before 0."""
@@ -101,14 +101,14 @@ class JointDrive:
     def position(self, matches: int) -> int:
         """Commanded steps after ``matches`` matches of the ring; call it in the order of the matches."""
         steps = (matches + 1) >> 1
-        while self._turns_out != self._turns_in:
-            turned = self._turn_steps[self._turns_out & (_TURNS - 1)]
-            if turned > steps:
+        while self._reversals_out != self._reversals_in:
+            reversed_at = self._reversal_steps[self._reversals_out & (_REVERSALS - 1)]
+            if reversed_at > steps:
                 break
-            self._base += self._direction * (turned - self._base_steps)
-            self._base_steps = turned
+            self._base += self._direction * (reversed_at - self._base_steps)
+            self._base_steps = reversed_at
             self._direction = -self._direction
-            self._turns_out += 1
+            self._reversals_out += 1
         return self._base + self._direction * (steps - self._base_steps)
 
     def is_astray(self, at_rest: bool) -> bool:
@@ -132,7 +132,12 @@ class JointDrive:
         ahead_kiticks = self.ring.fed_kiticks()
         if ahead_kiticks == _NOT_FED:
             return self._restart(now_kiticks) if self._sampler.quiet() else 0
-        if generator.at_turn and not generator.waits() and ahead_kiticks > _GUARD_KITICKS and self._turn():
+        if (
+            generator.at_reversal
+            and not generator.waits()
+            and ahead_kiticks > _GUARD_KITICKS
+            and self._reverse()
+        ):
             self.can_queue_more = True
         elif not can_queue_more:  # the queue is full, or long enough
             wait_kiticks = generator.queue[_LATEST_KITICKS] - now_kiticks >> 3
@@ -141,15 +146,15 @@ class JointDrive:
             self._next_refill_kiticks = now_kiticks + wait_kiticks
         return codes.INTERNAL if ahead_kiticks < _OVERDUE_KITICKS else 0
 
-    def _turn(self) -> bool:
+    def _reverse(self) -> bool:
         """Queue the change of DIR at which the generator waits; returns False while the queue is full."""
-        if self._turns_in - self._turns_out >= _TURNS:
+        if self._reversals_in - self._reversals_out >= _REVERSALS:
             return False
-        if not isr.add_turn(self._sampler.block, self.ring.state, self._words_at, self._turn_delay):
+        if not isr.add_reversal(self._sampler.block, self.ring.state, self._words_at, self._reversal_delay):
             return False
-        self._turn_steps[self._turns_in & (_TURNS - 1)] = self.ring.written() >> 1
-        self._turns_in += 1
-        self.generator.turn()
+        self._reversal_steps[self._reversals_in & (_REVERSALS - 1)] = self.ring.written() >> 1
+        self._reversals_in += 1
+        self.generator.reverse()
         isr.interrupt_soon(stm.TIM2)
         return True
 
@@ -162,9 +167,9 @@ class JointDrive:
                 ring.release()
                 self.ended = True
                 self._next_refill_kiticks = _NEVER_KITICKS
-            elif generator.at_turn:
+            elif generator.at_reversal:
                 ring.set_last_to_now()
-                self._turn()
+                self._reverse()
             elif generator.halted:
                 ring.park_compare()
                 self._next_refill_kiticks = now_kiticks + _REFILL_KITICKS

@@ -115,7 +115,7 @@ class NextMotion:
             if (
                 self._is_fast
                 or joint.can_queue_more
-                or generator.at_turn
+                or generator.at_reversal
                 or generator.latest_kiticks() < now_kiticks + joint.lookahead_kiticks - _RESERVE_KITICKS
             ):
                 return False

@@ -99,10 +99,10 @@ _LARGEST = const(1 << 16)  # in 4096 ticks: longer than any subinterval and gap,
 class StepGenerator:
     """Goes through one joint's motion.
 
-    Steps go into ``queue`` (step_queue.py). ``direction`` (1 or -1) is that of the steps put in now. ``at_turn``: the
-    next step goes the other way, ``turn`` lets it come. ``halted``: the motion's time will stand still, and the next
-    step comes in another ``follow`` law. ``ended``: no more steps are put in. Between motions ``subintervals`` is free
-    for the check of the next.
+    Steps go into ``queue`` (step_queue.py). ``direction`` (1 or -1) is that of the steps put in now. ``at_reversal``:
+    the next step goes the other way, ``reverse`` lets it come. ``halted``: the motion's time will stand still, and the
+    next step comes in another ``follow`` law. ``ended``: no more steps are put in. Between motions ``subintervals`` is
+    free for the check of the next.
     """
 
     def __init__(self, memory: Memory) -> None:
@@ -113,7 +113,7 @@ class StepGenerator:
         self._law_words = memory.take_for_processor(_LAW_WORDS)
         self._law: "Any" = None  # JointLaw, while a motion is loaded
         self.direction = 1
-        self.at_turn = False
+        self.at_reversal = False
         self.ended = True
         self.halted = self._is_last_law = False
         # every attribute from the start, so that none is added while a motion runs
@@ -157,7 +157,7 @@ class StepGenerator:
         self._gap_ticks = gap_ticks
         self._position = position_steps + _BIAS
         self.direction = 1
-        self.at_turn = self.ended = self.halted = self._is_last_law = False
+        self.at_reversal = self.ended = self.halted = self._is_last_law = False
         self._pending = _NOTHING
         self._last_is_queued = False
         self._found = _NOT_YET
@@ -166,8 +166,8 @@ class StepGenerator:
         """Continue from the start towards the first step, for a limited time; False if it waits, or there is none."""
         if self.ended or self.waits():
             return False
-        if self.at_turn:
-            self.turn()
+        if self.at_reversal:
+            self.reverse()
         # A step that comes at 0 is the last one, too: a law that begins there takes it back
         self.prepare(_BEFORE)
         return True
@@ -181,11 +181,11 @@ class StepGenerator:
         """Put the next steps into the queue, unless it is full or continues beyond a time already.
 
         What comes after that time is not written to the ring, and waits. True if it could continue: each call takes a
-        limited time. At a turn it ends.
+        limited time. At a reversal it ends.
         """
         queue = self.queue
         for _ in range(_PARTS_PER_CALL):
-            if not has_room(queue, until_kiticks) or self.at_turn or self.halted or self.ended:
+            if not has_room(queue, until_kiticks) or self.at_reversal or self.halted or self.ended:
                 return False
             if self._pending & _FIRST:
                 self._queue_first()
@@ -221,10 +221,10 @@ class StepGenerator:
         queue = self.queue
         return queue[_STEPS] != 0 or queue[_IN] != queue[_OUT]
 
-    def turn(self) -> None:
+    def reverse(self) -> None:
         """Let the steps in the other direction come."""
         self.direction = -self.direction
-        self.at_turn = False
+        self.at_reversal = False
 
     def follow(
         self, law: "array[int]", is_last: bool, ring: "array[int] | memoryview[int]" = _NO_RING
@@ -372,7 +372,7 @@ class StepGenerator:
         elif not self._first_due:
             self._halt()
         elif is_opposite:
-            self.at_turn = True
+            self.at_reversal = True
         else:
             self._pending = _NOTHING
             if self.queue[_LAST_STEP] == 0 and self._is_slow():

@@ -216,7 +216,7 @@ def import_urdf(
         "worst_position_mm": float(fit.position_mm),
         "worst_rotation_deg": float(fit.rotation_deg),
         "radii_mm": [joint.radius_mm for joint in arm.joints],
-        "doubts": list(chain.doubts),
+        "doubts": [*chain.doubts, *chain.unclear],
     }
     lines = [
         f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}",
@@ -228,6 +228,11 @@ def import_urdf(
     lines += [
         f"note: {doubt} A URDF has radians; correct it, or range_deg in {out}" for doubt in chain.doubts
     ]
+    lines += [f"note: {unclear}" for unclear in chain.unclear]
+    if chain.couplings:
+        lines.append(
+            f"the URDF's transmissions couple joints: [coupling] in {out} is to be used with the motors"
+        )
     if meshes:
         lines.append(f"wrote {len(written)} meshes into {mesh_files.folder_of(out)}")
     if len(chain.joints) > MAX_JOINTS:

@@ -64,17 +64,22 @@ def goto(
 @click.command("home", cls=options.TakesNumbers)
 @click.argument("where", default=HOME, shell_complete=options.files)
 @click.option("--switches", is_flag=True, help="Find the position by moving to the limit switches.")
+@click.option("--joint", metavar="JOINT", help="Home this joint alone, by its number (from 1) or name.")
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
-def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions) -> None:
+def home(where: str, switches: bool, joint: str | None, job_path: Path | None, given: BoardOptions) -> None:
     """Declare the arm's position.
 
     WHERE: angles such as '0,-60,40', a posture of the arm file by its name, a via point of the job such as
     P0, or a trajectory file (its start). Default: the home posture of the arm file. Nothing moves; afterwards
     motions may start. With --switches the joints that have a switch of known angle move: to it, off it,
     slowly to it again, and to their home angle; in the order of 'homing' in the arm file, by default one
-    after the other.
+    after the other. With --joint only that joint, and those that are coupled with it, are homed or declared.
     """
+    if joint is not None and where != HOME:
+        raise InputError(
+            "WHERE and --joint exclude each other", "a joint alone is declared at its home angle"
+        )
     if switches and where != HOME:
         raise InputError(
             "WHERE and --switches exclude each other",
@@ -86,7 +91,10 @@ def home(where: str, switches: bool, job_path: Path | None, given: BoardOptions)
         angles_deg = wanted.angles_deg(arm, job_path)
         board.configure(arm, replace=given.replace_arm)
         if switches:
-            board.home_to_switches(arm)
+            say = results.progress_printer(given.as_json)
+            board.home_to_switches(arm, joint=joint, progress=lambda text, done, whole: say(text))
+        elif joint is not None:
+            board.home(arm, joint=joint)
         else:
             board.home(arm, angles_deg)
         print_position(board, given.as_json)

@@ -133,6 +133,10 @@ def _range(joint: DrivenJoint) -> list[Finding]:
 def encoder_findings(arm: Arm) -> list[Finding]:
     """Findings about the encoders: resolution, rate, following error."""
     found = [finding for joint in arm.driven if joint.encoder for finding in _encoder(joint)]
+    for joint, seen in zip(arm.driven, arm.transmission.measured, strict=True):
+        if joint.encoder and not seen:
+            text = "the encoder of its motor alone does not give its angle, as other motors turn it too"
+            found.append(note(joint.name, text, "fit encoders to all motors that turn it"))
     without = [joint.name for joint in arm.driven if joint.encoder is None]
     if without:
         text = f"no encoder: {', '.join(without)}; lost steps there are not seen"

@@ -18,9 +18,9 @@ from armtempo_shared import wire
 
 from armtempo.basics.errors import ArmtempoError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import board_messages
+from armtempo.link.board_lock import BoardLock
 from armtempo.link.refusal import refusal
 from armtempo.link.transport import Transport
-from armtempo.link.turns import Turns
 
 _CTRL_C = 3
 REPEAT_INTERVAL_S = 0.2
@@ -81,7 +81,7 @@ class Session:
     ) -> None:
         self.transport = transport
         self.clock = clock
-        self.turns = Turns()
+        self.lock = BoardLock()
         self.events: deque[board_messages.Event] = deque()
         self.recent = bytearray()
         self.repeats = 0
@@ -144,7 +144,7 @@ class Session:
         Raises BoardError if the board refuses, NoAnswerError after ``silence_timeout_s`` without a byte or
         ``answer_timeout_s`` without an answer, LinkError if the port breaks.
         """
-        with self.turns:
+        with self.lock:
             return self._command(
                 name, wire.encode(wire.COMMAND[name], values, tail), silence_timeout_s, answer_timeout_s
             )
@@ -180,7 +180,7 @@ class Session:
         deadline_s = self.clock() + timeout_s
         while not self.events:
             left_s = deadline_s - self.clock()
-            with self.turns:
+            with self.lock:
                 frame = self._frame(max(0.0, left_s))
                 if frame is not None:
                     self._keep_event(frame)
@@ -196,9 +196,9 @@ class Session:
 
     @contextmanager
     def in_a_hurry(self, timeout_s: float) -> Iterator[bool]:
-        """The next turn to talk to the board, for a request of another program; see ``Turns.in_a_hurry``."""
+        """The lock next, for a request of another program; see ``BoardLock.in_a_hurry``."""
         self.transport.wake()
-        with self.turns.in_a_hurry(timeout_s) as mine:
+        with self.lock.in_a_hurry(timeout_s) as mine:
             yield mine
 
     def _no_answer(self, name: str, waited_s: float) -> NoAnswerError:
@@ -258,7 +258,7 @@ class Session:
 
         Raises ``reason`` if that fails, OtherBoardError if another board answers.
         """
-        with self.turns:
+        with self.lock:
             self._check()
             if self._greet is None or self._reconnecting or not self._retry_s():
                 raise reason  # whoever reconnects repeats a command that fails meanwhile

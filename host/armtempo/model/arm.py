@@ -9,8 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
@@ -18,6 +16,7 @@ from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
 from armtempo.model import (
     boards,
+    coupled,
     drive_limits,
     outputs_file,
     parts_file,
@@ -62,7 +61,7 @@ class Arm:
     """The space in which it may move; not sent to the board."""
     loads: tuple[Load, ...] = field(default=(), metadata=json_codec.ADDED)
     """What its tool may hold; the board knows nothing of them."""
-    held: Load | None = field(default=None, metadata=json_codec.ADDED)
+    payload: Load | None = field(default=None, metadata={**json_codec.ADDED, json_codec.KEY: "held"})
     """What it holds; see ``holding``."""
     homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
     """Names of the joints in the order of homing, joints of an entry together; the other joints follow one by one."""
@@ -93,7 +92,7 @@ class Arm:
         """Raise InputError for a coupling that is none, or for what the board cannot do with coupled joints."""
         joints = self.table_joints
         names = [joint.name for joint in joints]
-        problem = transmission.coupling_problem(self.coupling, names) or _coupled_problem(
+        problem = transmission.coupling_problem(self.coupling, names) or coupled.board_problem(
             joints, self.homing, Transmission((1.0,) * len(joints), (), self.coupling)
         )
         if problem:
@@ -212,36 +211,8 @@ class Arm:
 
     @cached_property
     def motors(self) -> tuple[DrivenJoint, ...]:
-        """The driven joints, those that are coupled with range and limits of their motors behind the gears: what
-        they reach with each joint anywhere in its own."""
-        if not self.coupling:
-            return self.driven
-        gears = self.transmission
-        reached = (
-            np.array([joint.range_deg for joint in self.driven]).T[:, None, :] * gears.matrix
-        )  # (2, motors, joints)
-        ranges = np.stack([reached.min(axis=0).sum(axis=1), reached.max(axis=0).sum(axis=1)], axis=1).tolist()
-        limits = gears.largest_motors_deg(
-            np.array([joint.limits.values for joint in self.driven]).T
-        ).T.tolist()
-        return tuple(
-            replace(
-                joint,
-                name=self._motor_name(index),
-                range_deg=tuple(span),
-                limits=Limits(*most),
-                step_share=1.0,
-            )
-            for index, (joint, span, most) in enumerate(zip(self.driven, ranges, limits, strict=True))
-        )
-
-    def _motor_name(self, index: int) -> str:
-        names = [
-            joint.name for joint, factor in zip(self.driven, self.coupling[index], strict=True) if factor
-        ]
-        own = self.driven[index].name
-        names.remove(own)
-        return f"{own} (its motor, which also moves {' and '.join(names)})" if names else own
+        """The driven joints; those that are coupled have range and limits of their motors behind the gears."""
+        return coupled.motors(self.driven, self.transmission)
 
     @cached_property
     def transmission(self) -> Transmission:
@@ -273,8 +244,10 @@ class Arm:
         if not load:
             return self
         if load == NOTHING:
-            return replace(self, held=None)
-        return replace(self, held=self.loads[self._number("load", load, [each.name for each in self.loads])])
+            return replace(self, payload=None)
+        return replace(
+            self, payload=self.loads[self._number("load", load, [each.name for each in self.loads])]
+        )
 
     def _number(self, what: str, name: str, names: list[str]) -> int:
         if name in names:
@@ -354,40 +327,6 @@ def _driven(joint: Joint, limits: Limits) -> DrivenJoint:
         joint.switches,
         joint.model,
     )
-
-
-def _coupled_problem(
-    joints: tuple[Joint, ...], homing: tuple[tuple[str, ...], ...], gears: Transmission
-) -> tuple[str, str] | None:
-    """What the board cannot do with coupled joints, and what to do; None for nothing.
-
-    It knows motors only: it compares an encoder with its own motor, and sees by the direction of one motor whether a
-    joint moves towards its switch.
-    """
-    for number, joint in enumerate(joints):
-        if gears.is_alone(number):
-            continue
-        others = ", ".join(joints[other].name for other in gears.group(number) if other != number)
-        if joint.encoder is not None and joint.encoder.on == "joint":
-            return (
-                f"{joint.name} is coupled with {others}, so its encoder cannot be on the joint",
-                'mount it on the motor, with on = "motor"',
-            )
-        if isinstance(joint.switches.low, int) or isinstance(joint.switches.high, int):
-            return (
-                f"{joint.name} is coupled with {others}, so its switches can be used for homing only",
-                'connect them to free pins such as "PD0" instead of the inputs 1 to 3',
-            )
-    for group in gears.groups:
-        names = {joints[number].name for number in group}
-        together = next((entry for entry in homing if len(names.intersection(entry)) > 1), ())
-        if together:
-            listed = ", ".join(name for name in together if name in names)
-            return (
-                f"homing: {listed} are coupled, so they cannot be homed together",
-                "list them one after the other",
-            )
-    return None
 
 
 def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:

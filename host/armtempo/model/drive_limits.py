@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from armtempo_shared.limits import MAX_STEP_RATE, TICK_HZ, TURN_SLACK_TICKS
+from armtempo_shared.limits import MAX_STEP_RATE, REVERSAL_SLACK_TICKS, TICK_HZ
 
 from armtempo.model.parts import Driver, Encoder, Joint, Limits, Motor
 from armtempo.model.transmission import Matrix
@@ -15,7 +15,7 @@ MOST_COUNTS_S = 1e6
 """Largest rate of an encoder: fewer than 32 768 counts between two readings (board/docs/hardware.md)."""
 _REVERSAL_STEPS = 0.16 * 0.99
 """Largest acceleration times the square of the time between opposite steps, of which the board allows 0.16."""
-_SLACK_US = 1e6 * TURN_SLACK_TICKS / TICK_HZ
+_SLACK_US = 1e6 * REVERSAL_SLACK_TICKS / TICK_HZ
 
 
 class Bound(NamedTuple):

@@ -65,7 +65,29 @@ def arm_text(chain: Chain, fit: Fit, urdf: Path) -> str:
         _joint(row, chain, frame, number == 1, radii_mm.get(number))
         for number, (row, frame) in enumerate(zip(fit.rows, frames[1:], strict=True), 1)
     ]
-    return "\n".join([unread + head, *rows])
+    return "\n".join([unread + head, *rows, *_couplings(chain)])
+
+
+def _couplings(chain: Chain) -> list[str]:
+    """The table [coupling], to be used with the motors; no text without couplings."""
+    if not chain.couplings:
+        return []
+    lines = [
+        "# Motors that turn joints together, by the URDF's transmissions: take the '#' off with that of their motors.",
+        "# A negative gear_ratio means direction = -1.",
+        "# [coupling]",
+    ]
+    names = {joint.name: _joint_name(chain, number) for number, joint in enumerate(chain.joints)}
+    for coupling in chain.couplings:
+        keys = [_text(names[joint]) for joint in coupling.joints]
+        for key, row, ratio in zip(keys, coupling.rows, coupling.gear_ratios, strict=True):
+            entries = ", ".join(f"{of} = {factor!r}" for of, factor in zip(keys, row, strict=True) if factor)
+            lines.append(f"# {key} = {{ {entries} }}  # of {_text(coupling.name)}; gear_ratio = {ratio:g}")
+    return ["\n".join(lines) + "\n"]
+
+
+def _joint_name(chain: Chain, number: int) -> str:
+    return _one_line(chain.joints[number].name) or f"joint {number + 1}"
 
 
 def _joint(row: DhRow, chain: Chain, frame: Array, first: bool, radius_mm: float | None) -> str:
@@ -74,7 +96,7 @@ def _joint(row: DhRow, chain: Chain, frame: Array, first: bool, radius_mm: float
         name = "base" if first else "tool"
         return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves", radius_mm)
     joint = chain.joints[row.joint]
-    name = _one_line(joint.name) or f"joint {row.joint + 1}"
+    name = _joint_name(chain, row.joint)
     if joint.is_linked:
         note = "a linkage keeps its direction: it mimics the joint before"
         text = _row_text(name, row, (-_STILL_DEG, _STILL_DEG), note, radius_mm) + "parallel_linkage = true\n"

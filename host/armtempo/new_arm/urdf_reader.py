@@ -16,8 +16,9 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.model.parts_file import MAX_ANGLE_DEG
-from armtempo.new_arm import urdf_bodies
+from armtempo.new_arm import urdf_bodies, urdf_transmissions
 from armtempo.new_arm.urdf_bodies import Body
+from armtempo.new_arm.urdf_transmissions import Coupling
 
 MM = 1000.0
 """Millimetres in the URDF's unit, the metre."""
@@ -69,6 +70,10 @@ class Chain:
     """(4, 4): the tip link's frame in the base link's, all joints at 0; lengths in mm."""
     model: Any
     """The reader's own robot, for its forward kinematics."""
+    couplings: tuple[Coupling, ...] = ()
+    """Transmissions that turn two of its joints together."""
+    unclear: tuple[str, ...] = ()
+    """What is said of other such transmissions."""
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -129,7 +134,10 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     first, last = joints[0].parent, joints[-1].child
     model.update_cfg({joint.name: 0.0 for joint in moving if joint.mimic is None})
     turning = tuple(map(partial(_turning, model, first), moving, [*moving[1:], None]))
-    return Chain(model.robot.name, first, last, turning, _transform(model, last, first), model)
+    names = [joint.name for joint in moving if joint.mimic is None]
+    couplings, unclear = urdf_transmissions.of_file(path, names)
+    zero = _transform(model, last, first)
+    return Chain(model.robot.name, first, last, turning, zero, model, couplings, unclear)
 
 
 def _reader() -> Any:

@@ -36,17 +36,38 @@ def ask(page: PanelPage, _: Press) -> None:
     home_deg = np.array(arm.home_deg)
     page.show_ghost(home_deg)
 
+    def chosen() -> str | None:
+        return which.value or None
+
     def declare(press: Press) -> None:
-        page.do(press, words.HOME, operator.home, Needs.COMMAND)
+        joint = chosen()
+        page.do(press, words.HOME, lambda: operator.home(joint), Needs.COMMAND)
 
     def seek(press: Press) -> None:
+        joint = chosen()
         asked.dialog.close()
-        page.do(press, words.HOME_BY_SWITCHES, operator.home_to_switches, Needs.COMMAND)
+        page.do(press, words.HOME_BY_SWITCHES, lambda: operator.home_to_switches(joint), Needs.COMMAND)
+
+    def why_not() -> str:
+        joint = chosen()
+        fitted = joint is None or any(joint in group.split(", ") for group in groups)
+        return "" if fitted else words.NO_SWITCH.format(joint=joint)
+
+    def angles() -> str:
+        shown = [
+            f"{joint.name} {angle:g}°"
+            for joint, angle in zip(arm.driven, arm.home_deg, strict=True)
+            if chosen() in (None, joint.name)
+        ]
+        return words.plain(", ".join(shown))
 
     asked = page.ask(words.SURE, words.HOME, declare, lambda: page.show_ghost(None))
+    groups = switches(arm)
     with asked.place:
-        angles = [f"{joint.name} {angle:g}°" for joint, angle in zip(arm.driven, arm.home_deg, strict=True)]
-        ui.label(words.plain(", ".join(angles))).classes("text-weight-bold")
-        if groups := switches(arm):
+        names = {"": words.ALL_JOINTS, **{joint.name: words.plain(joint.name) for joint in arm.driven}}
+        which = ui.select(names, value="", label=words.WHICH_JOINTS).props("dense outlined")
+        label = ui.label(angles()).classes("text-weight-bold")
+        which.on_value_change(lambda: label.set_text(angles()))
+        if groups:
             ui.label(words.BY_SWITCHES.format(order=words.plain(" → ".join(groups))))
-            page.button(words.HOME_BY_SWITCHES, seek, Needs.COMMAND)
+            page.button(words.HOME_BY_SWITCHES, seek, Needs.COMMAND, why_not)

@@ -19,6 +19,7 @@ from armtempo.model import via_table
 from armtempo.model.job import DEGREES, PATHS, TIMINGS, Job
 from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
+from armtempo.panel.fields import Fields
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.job_editor import ANGLES, OPTIONS, POSE, WAY_KEYS, Via
 from armtempo.panel.panel_board import Needs
@@ -47,6 +48,9 @@ class JobTab:
         self._open: set[int] = set()
         """Via points whose keys are shown."""
         self._shown = self._jobs.version
+        self._cells, self._choices = Fields(), Fields()
+        self._built: object = None
+        """What the table and the options were built for."""
         page.scene.picked, page.scene.dragged = self._pick, self._drag
         self._file = FileRow(page, self._jobs, words.JOB_FILE)
         self._table()
@@ -65,12 +69,14 @@ class JobTab:
         ui.context.client.on_connect(self._connected)
 
     def _connected(self) -> None:
-        self._shown = -1
+        self._built, self._shown = None, -1
 
     # the table
 
     @ui.refreshable_method
     def _table(self) -> None:
+        self._cells.clear()
+        self._built = self._form()
         joints = self._operator.arm.driven
         columns = f"2.2rem 4.6rem repeat({len(joints)}, minmax(4rem, 6rem)) auto"
         with ui.element("div").classes("armtempo-grid").style(f"grid-template-columns: {columns}"):
@@ -85,20 +91,28 @@ class JobTab:
             ui.button(words.FROM_ARM, on_click=self._take_posture).props("outline no-caps")
             ui.button(words.PASTE, on_click=self._paste).props("outline no-caps")
 
+    def _form(self) -> object:
+        """What the fields are built for: their values may change without building them anew."""
+        jobs = self._jobs
+        given = {key: jobs.option(key) for key in _CHOICES}
+        others = [text for key, text in given.items() if text and text not in map(str, _CHOICES[key])]
+        forms = [(via.form, _shown_keys(via)) for via in jobs.vias]
+        return jobs.file, forms, sorted(self._open), others
+
+    def _of(self, number: int, text: Callable[[Via], str]) -> Callable[[], str]:
+        """A text of a via point, as it is when it is asked for."""
+        return lambda: text(self._jobs.vias[number])
+
     def _row(self, number: int, via: Via) -> None:
-        joints = self._operator.arm.driven
         ui.label(f"P{number}")
-        form = words.FORMS[via.form]
-        ways = [words.WAYS[key] for key in WAY_KEYS if key in via.values and key in words.WAYS]
-        ui.label(", ".join([form, *ways])).classes("armtempo-note").tooltip(
-            ", ".join(f"{key} = {via.text(key)}" for key in via.values if key != ANGLES) or form
-        )
-        for index, joint in enumerate(joints):
-            value = "" if via.angles_deg is None else f"{via.angles_deg[index]:g}"
-            if via.form == ANGLES and via.angles_deg is None:
-                value = _cell(via, index)
-            box = ui.input(value=value).props("dense outlined inputmode=decimal")
+        with ui.label(_kind(via)).classes("armtempo-note") as kind:
+            hint = ui.tooltip(_hint(via))
+        self._cells.add(kind.set_text, self._of(number, _kind))
+        self._cells.add(hint.set_text, self._of(number, _hint))
+        for index, joint in enumerate(self._operator.arm.driven):
+            box = ui.input(value=_cell(index, via)).props("dense outlined inputmode=decimal")
             named(box, f"P{number} {joint.name}")
+            self._cells.add(box.set_value, self._of(number, partial(_cell, index)))
             if via.form == ANGLES:
                 self._on_typed(box, self._jobs.set_angle, number, index)
             else:
@@ -124,14 +138,14 @@ class JobTab:
 
     def _keys(self, number: int, via: Via) -> None:
         """The keys of a via point: of its pose, and of the way to it."""
-        shown = [key for key in via.values if key not in (ANGLES, *WAY_KEYS)]
         with ui.row().classes("armtempo-keys"):
-            for key in (*shown, *WAY_KEYS):
-                text = via.text(key)
+            for key in (*_shown_keys(via), *WAY_KEYS):
+                text, value = via.text(key), self._of(number, partial(_text, key))
                 label = words.VIA_KEYS.get(key, key)
                 if key in _SWITCHES:
                     switch = ui.switch(label, value=text == "true")
                     named(switch, f"P{number}: {label}")
+                    self._cells.add(partial(_switch, switch), value)
                     switch.on_value_change(
                         lambda event, key=key: self._edit(
                             self._jobs.set_key, number, key, "true" if event.value else ""
@@ -140,6 +154,7 @@ class JobTab:
                     continue
                 box = ui.input(label, value=text).props("dense outlined").classes("armtempo-value")
                 named(box, f"P{number}: {label}")
+                self._cells.add(box.set_value, value)
                 self._on_typed(box, self._jobs.set_key, number, key)
 
     def _toggle(self, number: int) -> None:
@@ -151,13 +166,8 @@ class JobTab:
         box.on("change", lambda event: self._typed(event, call, *given))
 
     def _typed(self, event: Any, call: Callable[..., object], *given: Any) -> None:
-        """Take what was typed; the fields are not rebuilt, as the user may already type in the next one."""
-        others = self._jobs.version - self._shown
-        text = str(event.args or "").strip()
-        self._page.attempt(lambda: call(*given, text))
-        if all(via.form == ANGLES for via in self._jobs.vias) and call != self._jobs.set_key:
-            self._shown = self._jobs.version - others
-        self._draw_vias()
+        """Take what was typed."""
+        self._edit(call, *given, str(event.args or "").strip())
 
     def _edit(self, call: Callable[..., object], *arguments: Any) -> None:
         """Change the table by a button."""
@@ -237,6 +247,7 @@ class JobTab:
 
     @ui.refreshable_method
     def _options(self) -> None:
+        self._choices.clear()
         with ui.row().classes("armtempo-fields"):
             for key in OPTIONS:
                 self._option(key)
@@ -250,7 +261,8 @@ class JobTab:
             if not choices:
                 return
         if choices is None:
-            box = ui.input(label, value=value).props("dense outlined").classes("armtempo-value")
+            box = ui.input(label, value=value).props("dense outlined").classes("armtempo-wide")
+            self._choices.add(box.set_value, partial(self._jobs.option, key))
             self._on_typed(box, self._jobs.set_option, key)
             return
         texts = {"": words.DEFAULT, **{str(one): words.CHOICES.get(str(one), str(one)) for one in choices}}
@@ -258,6 +270,7 @@ class JobTab:
             texts[value] = value
         chosen = ui.select(texts, value=value, label=label).props("dense outlined").classes("armtempo-option")
         chosen.on_value_change(lambda event: self._edit(self._jobs.set_option, key, str(event.value or "")))
+        self._choices.add(chosen.set_value, partial(self._jobs.option, key))
 
     def _plan_row(self) -> None:
         page = self._page
@@ -343,8 +356,12 @@ class JobTab:
         jobs = self._jobs
         if jobs.version != self._shown:
             self._shown = jobs.version
-            self._table.refresh()
-            self._options.refresh()
+            if self._form() != self._built:
+                self._table.refresh()  # later
+                self._options.refresh()
+            else:
+                self._cells.look()
+                self._choices.look()
             self._draw_vias()
         self._file.look()
         self._result.set_text(self._describe_plan())
@@ -366,8 +383,36 @@ class JobTab:
         return words.MOTION_TIME.format(total=plan.total_s, bound=bound)
 
 
-def _cell(via: Via, index: int) -> str:
+def _shown_keys(via: Via) -> list[str]:
+    """The keys of its pose, which have fields besides those of the way to it."""
+    return [key for key in via.values if key not in (ANGLES, *WAY_KEYS)]
+
+
+def _text(key: str, via: Via) -> str:
+    return via.text(key)
+
+
+def _switch(switch: ui.switch, text: str) -> None:
+    switch.set_value(text == "true")
+
+
+def _kind(via: Via) -> str:
+    """How a via point is given, and what is required on the way to it."""
+    ways = [words.WAYS[key] for key in WAY_KEYS if key in via.values and key in words.WAYS]
+    return ", ".join([words.FORMS[via.form], *ways])
+
+
+def _hint(via: Via) -> str:
+    """Its keys."""
+    return (
+        ", ".join(f"{key} = {via.text(key)}" for key in via.values if key != ANGLES) or words.FORMS[via.form]
+    )
+
+
+def _cell(index: int, via: Via) -> str:
     """What is written in the place of an angle."""
+    if via.angles_deg is not None:
+        return f"{via.angles_deg[index]:g}" if index < len(via.angles_deg) else ""
     values = via.values.get(ANGLES)
     return str(values[index]) if isinstance(values, list) and index < len(values) else ""
 

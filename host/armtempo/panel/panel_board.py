@@ -128,7 +128,7 @@ class PanelBoard:
         return self._board is not None
 
     def arm_changed(self, arm: Arm) -> None:
-        """Take another version of the arm that differs in its postures alone."""
+        """Take another version of the arm that differs in its postures and its workspace alone."""
         self.arm = self.live.arm = self.jobs.arm = self.sequences.arm = arm
         if self._board is not None:
             self._board.arm = arm
@@ -268,15 +268,23 @@ class PanelBoard:
         brakes = brake_time.of_motion(trajectory, [joint.limits for joint in self.arm.driven])
         return HeldJog(self.board.client, self.arm, JogMotion(trajectory, brakes, ""))
 
-    def home(self, where: Where | None = None) -> None:
-        """Declare where the arm is; default: at home."""
-        self.board.home(self.arm, where)
-        self.live.doubt = ""
+    def home(self, joint: str | None = None) -> None:
+        """Declare that the arm is at home, or a joint of it alone."""
+        self.board.home(self.arm, joint=joint)
+        self._homed(joint)
 
-    def home_to_switches(self) -> None:
-        """Home the joints that have switches."""
-        self.board.home_to_switches(self.arm)
-        self.live.doubt = ""
+    def home_to_switches(self, joint: str | None = None) -> None:
+        """Home the joints that have switches, or one of them alone; each that is at home is told."""
+        self.board.home_to_switches(self.arm, joint=joint, progress=self._tell_homing)
+        self._homed(joint)
+
+    def _tell_homing(self, text: str, done: int, whole: int) -> None:
+        self.say(text)
+        self.part(done, whole)
+
+    def _homed(self, joint: str | None) -> None:
+        if joint is None:  # else the others may still be elsewhere
+            self.live.doubt = ""
 
     def _work(self, what: str, call: Callable[[], object]) -> None:
         try:

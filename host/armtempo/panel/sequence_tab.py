@@ -15,6 +15,7 @@ from armtempo import pipeline
 from armtempo.basics.errors import ArmtempoError
 from armtempo.model.steps import position, whole_cycles
 from armtempo.panel import words
+from armtempo.panel.fields import Fields
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
@@ -39,6 +40,9 @@ class SequenceTab:
         self._editor = page.operator.sequences
         self._shown = self._editor.version
         self._lit = 0
+        self._fields = Fields()
+        self._built: object = None
+        """What the table was built for."""
         self._rows: list[ui.row] = []
         self._times: list[ui.label] = []
         self._timed: SequencePlan | None = None
@@ -60,7 +64,11 @@ class SequenceTab:
 
     def _connected(self) -> None:
         """Show the steps again, as texts typed while the connection was broken have not arrived."""
-        self._shown = -1
+        self._built, self._shown = None, -1
+
+    def _form(self) -> object:
+        """What the fields are built for: their values may change without building them anew."""
+        return self._editor.file, [kind_of(step) for step in self._editor.steps], self._editor.depths
 
     def _why_not(self) -> str:
         return "" if self._editor.is_open else words.NO_SEQUENCE_OPEN
@@ -73,6 +81,8 @@ class SequenceTab:
     @ui.refreshable_method
     def _table(self) -> None:
         self._rows, self._times, self._timed = [], [], None
+        self._fields.clear()
+        self._built, self._lit = self._form(), 0
         steps = self._editor.steps
         jobs = self._operator.jobs.files()
         for index, (step, depth) in enumerate(zip(steps, self._editor.depths, strict=True)):
@@ -115,21 +125,22 @@ class SequenceTab:
         """A field for the value of a key, with what it can name as a list."""
         box = ui.input(label, value=value, autocomplete=self._editor.choices(key, jobs))
         named(box.props("dense outlined"), f"{words.STEP} {index + 1}: {key}")
+        self._fields.add(box.set_value, lambda: self._editor.steps[index].get(key, ""))
         box.on("change", lambda event: self._set(index, key, str(event.args or "").strip()))
         self._page.control(box.classes("armtempo-value"), Needs.CONTROL)
 
     def _set(self, index: int, key: str, text: str) -> None:
-        """Set a value; the table is not rebuilt, as the user may already type in the next field."""
-        others = self._editor.version - self._shown
+        """Set a value."""
         self._page.attempt(lambda: self._editor.set(index, key, text))
-        self._shown = self._editor.version - others
 
     def _look(self) -> None:
         self._file.look()
         if self._editor.version != self._shown:
             self._shown = self._editor.version
-            self._table.refresh()
-            self._lit = 0
+            if self._form() != self._built:
+                self._table.refresh()  # later
+            else:
+                self._fields.look()
         self._look_at_times()
         state = self._operator.live.sequence
         running = state is not None and state.ending == "running"

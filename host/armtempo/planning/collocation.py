@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import perm
 
 import numpy as np
@@ -34,6 +34,55 @@ class Points:
         same = (np.diff(segment) == 0) & (np.diff(u) < _APART)
         keep = np.concatenate([[True], ~same])
         return Points(segment[keep], u[keep])
+
+
+@dataclass(frozen=True, eq=False)
+class Ratios:
+    """Ratios of a joint's speed (``kind`` 0), acceleration (1) or jerk (2) to its limit at points, each (R,).
+
+    ``share``: the part of the limit that is allowed there.
+    """
+
+    points: Points
+    kind: Index
+    joint: Index
+    share: Array
+
+    @classmethod
+    def grid(cls, segments: int, joints: int, parts: tuple[int, int, int]) -> Ratios:
+        """Every joint's speed, acceleration and jerk at so many points of each segment."""
+        kinds = []
+        for kind, count in enumerate(parts):
+            points = grid(segments, count, ends=False)
+            each = Points(np.repeat(points.segment, joints), np.repeat(points.u, joints))
+            own = np.tile(np.arange(joints), len(points.u))
+            kinds.append(cls(each, np.full(len(own), kind), own, np.ones(len(own))))
+        return kinds[0] + kinds[1] + kinds[2]
+
+    def tightened(self, curve: Curve, peaks: Ratios) -> Ratios:
+        """With lower shares in each segment where peaks of the curve exceed the limit: by as much as they do."""
+        joints, segments = curve.angle.shape[:2]
+        heights = curve.own_ratios(peaks.joint, peaks.points.segment, peaks.points.u)
+        excess = np.ones((3 * joints, segments))
+        peak = peaks.kind * joints + peaks.joint, peaks.points.segment
+        np.maximum.at(excess, peak, heights[peaks.kind, np.arange(len(peaks.kind))])
+        row, segment = self.kind * joints + self.joint, self.points.segment
+        before = excess[row, np.where(self.points.u == 0.0, np.maximum(segment - 1, 0), segment)]
+        return replace(self, share=self.share / np.maximum(excess[row, segment], before))
+
+    def __add__(self, other: Ratios) -> Ratios:
+        """Both, these first, without those of ``other`` that are nearly equal to one of these."""
+        own = [self.kind, self.joint, self.points.segment, self.points.u, self.share]
+        more = [other.kind, other.joint, other.points.segment, other.points.u, other.share]
+        both = [np.concatenate(pair) for pair in zip(own, more, strict=True)]
+        order = np.lexsort((both[3], both[2], both[1], both[0]))
+        near = np.diff(both[3][order]) < _APART
+        for each in both[:3]:
+            near &= np.diff(each[order]) == 0
+        keep = np.ones(len(order), dtype=bool)
+        keep[np.maximum(order[1:], order[:-1])[near]] = False
+        kind, joint, segment, u, share = (each[keep] for each in both)
+        return Ratios(Points(segment, u), kind, joint, share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +130,8 @@ def grid(segments: int, parts: int, ends: bool = True) -> Points:
     return Points(points.segment[keep], points.u[keep])
 
 
-def peaks(curve: Curve, parts: int, least: float) -> Points:
-    """Local maxima of ratios of at least ``least``, found on ``parts`` points per segment."""
+def peaks(curve: Curve, parts: int, least: float) -> Ratios:
+    """Local maxima of ratios of at least ``least``, found on ``parts`` points per segment, in order of u."""
     segments = len(curve.time)
     points = grid(segments, parts)
     ratios = curve.ratios(points.segment, points.u).reshape(3 * len(curve.angle), -1)
@@ -93,16 +142,17 @@ def peaks(curve: Curve, parts: int, least: float) -> Points:
     ]  # the same point of the next segment
     high[:, parts + 1 :: parts + 1] |= high[:, parts :: parts + 1][:, :-1]
     which, point = np.nonzero(high)
-    if not len(point):
-        return Points(points.segment[:0], points.u[:0])
-    segment, u = points.segment[point], points.u[point]
-    return _zoomed(curve, which, segment, u, 1.0 / parts)
-
-
-def _zoomed(curve: Curve, which: Index, segment: Index, u: Array, step: float) -> Points:
-    """The peaks near these points, by parabolas on decreasing steps."""
-    column = np.arange(len(u))
     kind, joint = np.divmod(which, len(curve.angle))
+    segment, u = points.segment[point], points.u[point]
+    if len(point):
+        u = _zoomed(curve, kind, joint, segment, u, 1.0 / parts)
+    order = np.lexsort((u, segment))
+    return Ratios(Points(segment[order], u[order]), kind[order], joint[order], np.ones(len(order)))
+
+
+def _zoomed(curve: Curve, kind: Index, joint: Index, segment: Index, u: Array, step: float) -> Array:
+    """The u of the peaks near these points, by parabolas on decreasing steps."""
+    column = np.arange(len(u))
     for _ in range(_ZOOMS):
         middle = np.clip(u, step, 1.0 - step)
         left, here, right = (
@@ -112,8 +162,7 @@ def _zoomed(curve: Curve, which: Index, segment: Index, u: Array, step: float) -
         offset = np.divide(right - left, 2.0 * bend, out=np.sign(right - left), where=bend > 0)
         u = np.clip(middle + step * np.clip(offset, -1.0, 1.0), 0.0, 1.0)
         step *= 0.25
-    order = np.lexsort((u, segment))
-    return Points(segment[order], u[order])
+    return u
 
 
 def _derivatives(coefficients: Array, u: Array) -> list[Array]:

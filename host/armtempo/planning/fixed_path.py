@@ -123,7 +123,7 @@ class FixedPath:
                 best = here * scale
             if bound and self.duration_s(best) <= bound * (1.0 + gap):
                 break
-            points += collocation.peaks(curve, _PEAK_GRID_FACTOR * parts, _PEAK_THRESHOLD)
+            points += collocation.peaks(curve, _PEAK_GRID_FACTOR * parts, _PEAK_THRESHOLD).points
             here = here * scale
             settings = Schedule(_AGAIN, min(_AGAIN, 0.3 * gap))
         return Optimum(best, self.duration_s(best), min(bound, self.duration_s(best)))

@@ -1,16 +1,50 @@
-"""Inequalities of a motion program that bound short weighted sums of its variables."""
+"""Weighted sums of a few variables each, as inequalities of a motion program are, or have as derivatives."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.planning.variables import Index
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+_CHUNK = 8
+"""Rows of the same variables whose products are summed together."""
+
+
+class WindowRows:
+    """Rows ``weights`` (R, w) of the variables ``columns`` (R, w), with products summed for rows of the same group.
+
+    ``size``: number of variables; ``group``: (R,), rows of one group have the same variables.
+    """
+
+    def __init__(self, size: int, columns: Index, group: Index) -> None:
+        self._size, self._columns = size, columns
+        order = np.argsort(group, kind="stable")
+        starts = np.flatnonzero(np.diff(group[order], prepend=-1))
+        place = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
+        chunk = np.cumsum(place % _CHUNK == 0) - 1
+        count = int(chunk[-1]) + 1 if len(chunk) else 0
+        self._chunks = np.full((count, _CHUNK), len(order))
+        """Rows of each chunk; R stands for none."""
+        self._chunks[chunk, place % _CHUNK] = order
+        own, width = columns[self._chunks[:, 0]], columns.shape[1]
+        self.rows = np.repeat(own, width, axis=1).ravel()
+        self.columns = np.tile(own, (1, width)).ravel()
+
+    def forward(self, weights: Array, x: Array) -> Array:
+        """The sums: (R,)."""
+        return np.asarray(np.einsum("rw,rw->r", weights, x[self._columns]))
+
+    def backward(self, weights: Array, of_rows: Array) -> Array:
+        """The sum over all rows with factors (R,): (size,)."""
+        return sum_at(self._columns, weights * of_rows[:, None], self._size)
+
+    def hessian(self, weights: Array, of_rows: Array) -> Array:
+        """Sums of the rows' outer products with factors (R,), at ``rows`` and ``columns``."""
+        both = np.zeros((2, len(weights) + 1, weights.shape[1]))
+        both[0, :-1], both[1, :-1] = weights, weights * of_rows[:, None]
+        left, right = both[0][self._chunks], both[1][self._chunks]
+        return np.asarray((left.swapaxes(1, 2) @ right).ravel())
 
 
 class LinearRows:
@@ -22,14 +56,19 @@ class LinearRows:
     linear = True
 
     def __init__(self, size: int, columns: Index, weights: Array, low: Array, high: Array) -> None:
-        self._low, self._high = low, high
-        self._lower, self._upper = np.flatnonzero(np.isfinite(low)), np.flatnonzero(np.isfinite(high))
+        bounded = np.isfinite(low) | np.isfinite(high)
+        columns, self._weights = columns[bounded], weights[bounded]
+        self._low, self._high = low[bounded], high[bounded]
+        self._lower, self._upper = (
+            np.flatnonzero(np.isfinite(self._low)),
+            np.flatnonzero(np.isfinite(self._high)),
+        )
         self.count = len(self._lower) + len(self._upper)
+        self._size, self._window = size, columns
         width = columns.shape[1]
         self.rows = np.repeat(columns, width, axis=1).ravel()
         self.columns = np.tile(columns, (1, width)).ravel()
-        self._matrix = _matrix(columns, weights, size)
-        self._outer = (weights[:, :, None] * weights[:, None, :]).reshape(len(weights), -1)
+        self._outer = self._weights[:, :, None] * self._weights[:, None, :]
 
     def values(self, x: Array) -> Array:
         """How far each sum is above its low bound, then below its high bound."""
@@ -44,14 +83,14 @@ class LinearRows:
         return self._split(self._sums(step), 0.0, 0.0)
 
     def backward(self, weights: Array) -> Array:
-        return np.asarray(self._matrix.T @ self._per_row(weights, -1.0))
+        return sum_at(self._window, self._weights * self._per_row(weights, -1.0)[:, None], self._size)
 
     def hessian(self, weights: Array, _: Array, __: bool) -> Array:
         """See there; the entries are at ``rows`` and ``columns``."""
-        return np.asarray((self._per_row(weights, 1.0)[:, None] * self._outer).ravel())
+        return np.asarray((self._per_row(weights, 1.0)[:, None, None] * self._outer).ravel())
 
     def _sums(self, x: Array) -> Array:
-        return np.asarray(self._matrix @ x)
+        return np.asarray(np.einsum("rw,rw->r", self._weights, x[self._window]))
 
     def _split(self, sums: Array, low: Array | float, high: Array | float) -> Array:
         return np.concatenate([(sums - low)[self._lower], (high - sums)[self._upper]])
@@ -65,9 +104,6 @@ class LinearRows:
         return rows
 
 
-def _matrix(columns: Index, weights: Array, size: int) -> csr_array:
-    from scipy.sparse import csr_array  # here, because loading it takes longer than most commands
-
-    count, width = columns.shape
-    starts = np.arange(0, count * width + 1, width)
-    return csr_array((np.asarray(weights).ravel(), columns.ravel(), starts), shape=(count, size))
+def sum_at(columns: Index, values: Array, size: int) -> Array:
+    """The sums (size,) of the values at each column; both (R, w)."""
+    return np.bincount(columns.ravel(), values.ravel(), minlength=size).astype(float, copy=False)

@@ -37,13 +37,13 @@ _CELLS = 8
 """Cells of a leg; on each k is linear, l quadratic."""
 _TRIAL_TIMES = np.array([0.97, 1.0, 1.03])
 """Durations for which k and l at via points are optimised, relative to the expected ones."""
-_GRID_TIMES = np.array([0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.96, 1.0, 1.04, 1.09, 1.16, 1.28, 1.5, 2.0, 3.0])
+_GRID_TIMES = np.array([0.5, 0.75, 0.9, 1.0, 1.1, 1.3, 2.0, 3.0])
 """Durations at which E is evaluated first, relative to the expected ones."""
 _EXTENSION = 2.0
 """Factor from the largest duration to the next one."""
 _MOST_REFINEMENTS = 6
 """How often durations are added where E may be lower between two of them."""
-_FIRST_SMOOTHING, _LAST_SMOOTHING, _SMOOTHING_FACTOR = 0.1, 1e-5, 0.3
+_FIRST_SMOOTHING, _LAST_SMOOTHING, _SMOOTHING_FACTOR = 0.05, 3e-5, 0.3
 """Smoothing of absolute values relative to the mean duration of a leg: first, last, factor from one to the next."""
 _WARM_SMOOTHING = 1e-2
 """First smoothing if the multipliers of a similar duration are the start."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from armtempo_shared import armrecord, wire
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
@@ -35,7 +35,7 @@ _WORDS = {
     "dir_setup_ticks": "driver timing",
     "dir_hold_ticks": "driver timing",
     "link_timeout_ms": "link time-out",
-    "identity": "geometry, motors, encoders or switches",
+    "identity": "geometry, motors, coupling, encoders or switches",
 }
 _HALF_STEP = 0.5 + 1e-9
 _KEEPS = "which keeps the position, as only limits, outputs or inputs differ"
@@ -84,10 +84,20 @@ def home_unknown(client: Client, arm: Arm) -> None:
     known = known_joints(status, arm)
     if all(known):
         return
-    here = arm.transmission.angles_of_steps(status.positions.commanded_steps)
-    wanted = arm.transmission.whole_steps(np.where(known, here, arm.home_deg))
-    unknown_turned = (arm.transmission.matrix != 0.0) @ ~np.array(known)
-    client.home([steps if moved else None for steps, moved in zip(wanted, unknown_turned, strict=True)])
+    _declare_home(client, arm, ~np.array(known))
+
+
+def home_joint(client: Client, arm: Arm, joint: int) -> None:
+    """Declare that a joint, from 0, and those that are coupled with it are at home; the others stay as they are."""
+    _declare_home(client, arm, np.isin(np.arange(len(arm.driven)), arm.transmission.group(joint)))
+
+
+def _declare_home(client: Client, arm: Arm, chosen: NDArray[np.bool_]) -> None:
+    """Declare that joints, (J,), are at home, by all motors that turn them."""
+    here = arm.transmission.angles_of_steps(client.status().positions.commanded_steps)
+    wanted = arm.transmission.whole_steps(np.where(chosen, arm.home_deg, here))
+    turned = (arm.transmission.matrix != 0.0) @ chosen
+    client.home([steps if moved else None for steps, moved in zip(wanted, turned, strict=True)])
 
 
 def known_joints(status: Status, arm: Arm) -> list[bool]:

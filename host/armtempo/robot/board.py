@@ -28,7 +28,7 @@ from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.position import ArmPosition
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import BoardStore
-from armtempo.robot.stored_motion import TURN_S
+from armtempo.robot.stored_motion import LOCK_S
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -144,7 +144,7 @@ class Board:
 
         One that waits longer, for a cable that is out, finds that the board is closed.
         """
-        with self.client.session.in_a_hurry(TURN_S):
+        with self.client.session.in_a_hurry(LOCK_S):
             kept_position.keep(self.client, self.port)
             self.client.session.guard(self._closed)
             yield

@@ -10,7 +10,7 @@ motors are declared, and the joints move home, when the angles of all coupled jo
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,8 @@ from armtempo.robot import arm_state
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import put_once, raise_fault, replay
 
+HomingProgress = Callable[[str, int, int], object]
+"""Called with what happens now or was seen, by joint; how many joints are at home, and how many are homed."""
 FAST, SLOW = 0.2, 0.04
 """Fractions of the joint's limits in the first and in the second approach."""
 BACK_DEG = 3.0
@@ -56,22 +58,49 @@ class _Switch:
         return max(0.0, self.side * (self.trip_deg - self.edge_deg))
 
 
-def home_to_switches(client: Client, arm: Arm, stop: StopRequest) -> None:
+def silent(text: str, done: int, whole: int) -> None:
+    """Nobody is told."""
+
+
+def home_to_switches(
+    client: Client,
+    arm: Arm,
+    stop: StopRequest,
+    joint: int | None = None,
+    progress: HomingProgress = silent,
+) -> None:
     """Home every joint that has a switch of known angle, in the order of ``arm.homing``; the others do not move.
 
-    Ends at the home posture. Raises InputError if no joint has such a switch, LinkError if a switch does not
-    trip, BoardError if the board refuses or a fault ends it, Stopped after a stop request.
+    ``joint``: only this one, from 0, and those that are coupled with it. Ends at the home posture. Raises InputError
+    if no joint has such a switch, LinkError if a switch does not trip, BoardError if the board refuses or a fault
+    ends it, Stopped after a stop request.
     """
-    groups = _groups(arm)
+    wanted = range(len(arm.driven)) if joint is None else arm.transmission.group(joint)
+    groups = [{index: group[index] for index in group if index in wanted} for group in _groups(arm)]
+    groups = [group for group in groups if group]
     _check_coupled(arm, {index for group in groups for index in group})
     if not groups:
+        of = f"arm {arm.name!r}" if joint is None else arm.driven[joint].name
         raise InputError(
-            f"arm {arm.name!r} has no limit switch whose angle is known",
+            f"{of} has no limit switch whose angle is known",
             "give low_deg or high_deg in a joint's [switches], or home by hand",
         )
+    told = _Told(progress, sum(map(len, groups)))
     found_deg: dict[int, float] = {}
     for group in groups:
-        _GroupHoming(client, arm, stop, group, found_deg).run()
+        _GroupHoming(client, arm, stop, group, found_deg, told).run()
+
+
+class _Told:
+    """Counts the joints that are at home for the progress."""
+
+    def __init__(self, progress: HomingProgress, whole: int) -> None:
+        self._progress, self._whole, self._done = progress, whole, 0
+
+    def __call__(self, text: str, home: int = 0) -> None:
+        """What happens; ``home``: how many more joints are at home."""
+        self._done += home
+        self._progress(text, self._done, self._whole)
 
 
 def _check_coupled(arm: Arm, fitted: set[int]) -> None:
@@ -117,6 +146,7 @@ class _GroupHoming:
     switches: dict[int, _Switch]
     found_deg: dict[int, float]
     """Angles of joints that are found, but not declared: their motors turn other joints too."""
+    told: _Told
 
     def run(self) -> None:
         """Make both approaches, back off, declare the positions, and move the joints home."""
@@ -124,7 +154,10 @@ class _GroupHoming:
             index: abs(switch.far_deg - switch.edge_deg) + switch.outside_deg + MARGIN_DEG
             for index, switch in self.switches.items()
         }
-        self._approach(whole, FAST)
+        self.told(f"{self._names(whole)}: on the way to the switch")
+        gone_deg = self._approach(whole, FAST)
+        for index, way_deg in gone_deg.items():
+            self.told(f"{self._names([index])}: switch seen after {way_deg:.1f}°; once more, slowly")
         self._approach_again()
         away_deg = {index: BACK_DEG + switch.outside_deg for index, switch in self.switches.items()}
         self._leave(away_deg)
@@ -136,6 +169,7 @@ class _GroupHoming:
         if found:
             self._declare(found)
             self._go_home(found)
+            self.told(f"{self._names(found)}: at home", len(found))
 
     def _approach_again(self) -> None:
         """Back off and approach slowly; a joint whose switch trips at once started on it, and backs off further."""

@@ -1,6 +1,6 @@
 """The owner of a board's port answers other programs, stops the board for them, and publishes samples.
 
-Each request runs in its own thread; requests and this program's commands take turns (``Session.turns``), a stop first.
+Each request runs in its own thread; requests and this program's commands take turns (``Session.lock``), a stop first.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from armtempo.ports.server import Server
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.speed import change_speed
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import TURN_S, fault_name, request_stop
+from armtempo.robot.stored_motion import LOCK_S, fault_name, request_stop
 
 EVERY_S = 0.5
 """Interval of the published states."""
@@ -95,29 +95,29 @@ class Sharing:
 
     def _speed(self, request: Message) -> Message:
         rate = request["rate"]
-        with self._turn():
+        with self._locked():
             change_speed(self._client, rate)
         if self._server is not None:
             self._server.publish("event", {"event": "speed", "rate": rate})
         return {}
 
     def _output(self, request: Message) -> Message:
-        with self._turn():
+        with self._locked():
             self._client.set_output(request["number"], request["value"])
         return {}
 
     def _inputs(self, request: Message) -> Message:
-        with self._turn():
+        with self._locked():
             found = self._client.levels()
         return {"inputs": found.inputs, "outputs": list(found.outputs)}
 
     def _read(self) -> BoardState:
-        with self._turn():
+        with self._locked():
             return self._state()
 
     @contextmanager
-    def _turn(self) -> Iterator[None]:
-        with self._client.session.in_a_hurry(TURN_S) as mine:
+    def _locked(self) -> Iterator[None]:
+        with self._client.session.in_a_hurry(LOCK_S) as mine:
             if not mine:
                 raise NoAnswerError(
                     "the program that has the port is waiting for the board's answer", "try again"

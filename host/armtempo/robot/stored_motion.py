@@ -28,7 +28,7 @@ BRAKE_S = 5.0
 _LATER_S = 1.0
 FREEZE_S = 2.0
 """Longest time that freezing takes."""
-TURN_S = 1.0
+LOCK_S = 1.0
 """A request from another thread waits this long for its turn to talk to the board."""
 
 
@@ -208,7 +208,7 @@ def request_stop(client: Client, stops: Iterable[StopRequest], now: bool, by: st
     """
     for request in [*stops]:
         request.ask(by)
-    with client.session.in_a_hurry(TURN_S) as mine:
+    with client.session.in_a_hurry(LOCK_S) as mine:
         if not mine:
             raise NoAnswerError(
                 "the board does not answer the program that has its port",

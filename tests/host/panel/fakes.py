@@ -104,7 +104,8 @@ class Board:
         self.jog = Jog()
         self.stops: list[tuple[bool, str]] = []
         self.moves = True
-        self.homes = 0
+        self.homes: list[object] = []
+        """What was declared to be at home: None for all joints."""
 
     def _noted(self, *name: object) -> Any:
         return lambda *given, **more: self.calls.append((*name, *given))
@@ -129,8 +130,11 @@ class Board:
     def close(self) -> None:
         """Nothing is open."""
 
-    def home(self, arm: Arm, where: object) -> None:
-        self.homes += 1
+    def home(self, arm: Arm, joint: object = None) -> None:
+        self.homes.append(joint)
+
+    def home_to_switches(self, arm: Arm, joint: object, progress: Callable[[str, int, int], object]) -> None:
+        progress(f"{joint}: switch seen", 1, 2)
 
     def request_stop(self, now: bool, by: str) -> bool:
         self.stops.append((now, by))

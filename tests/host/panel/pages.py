@@ -45,6 +45,8 @@ class Page:
             before = set(background_tasks.running_tasks)
             with self.client:
                 call()
+            for _ in range(3):  # a table that is built anew begins a little later
+                await asyncio.sleep(0)
             await asyncio.wait_for(asyncio.gather(*(background_tasks.running_tasks - before)), 60)
 
         self.loop.run_until_complete(ended())

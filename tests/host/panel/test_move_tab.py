@@ -87,7 +87,55 @@ def test_homing_names_and_shows_the_posture_of_home_first(
         page.press(words.HOMING)
         assert "joint 1 0°, joint 2 -60°, joint 3 40°" in page.texts()
         assert shown[0] == pytest.approx(np.array(operator.arm.home_deg))
-        assert operator.board.homes == 0  # type: ignore[attr-defined]
+        assert operator.board.homes == []  # type: ignore[attr-defined]
         page.answer(words.HOME)
         page.done()
-        assert operator.board.homes == 1  # type: ignore[attr-defined]
+        assert operator.board.homes == [None]  # type: ignore[attr-defined]
+
+
+def test_a_joint_is_homed_alone(operator: PanelBoard) -> None:
+    operator.live.state, operator.live.doubt = unhomed(), "it may be elsewhere"
+    with pages(operator) as page:
+        page.press(words.HOMING)
+        page.named(words.WHICH_JOINTS).set_value("joint 2")
+        assert "joint 2 -60°" in page.texts()
+        page.answer(words.HOME)
+        page.done()
+        assert operator.board.homes == ["joint 2"]  # type: ignore[attr-defined]
+        assert operator.live.doubt  # of the others
+
+
+def test_homing_by_switches_tells_each_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    operator = fakes.operator(fakes.Board(), tmp_path, Arm.of("ar4"))
+    with pages(operator) as page:
+        page.press(words.HOMING)
+        page.named(words.WHICH_JOINTS).set_value(operator.arm.driven[2].name)
+        page.press(words.HOME_BY_SWITCHES)
+        page.done()
+        assert any("switch seen" in line for line in operator.log.last)
+        assert operator.progress == 0.5
+    operator.close()
+
+
+def test_the_table_is_asked_for_where_the_arm_file_names_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    text = "# mine\n" + shipped.arm_path().read_text()
+    (tmp_path / "arm.toml").write_text(text)
+    operator = fakes.operator(fakes.Board(), tmp_path, Arm.load(tmp_path / "arm.toml"))
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        assert words.NO_FLOOR in page.texts()
+        page.press(words.ASK_FLOOR)
+        page.named(words.FLOOR_HEIGHT).set_value(20.0)
+        page.answer(words.STORE)
+        page.look()
+        assert words.NO_FLOOR not in page.texts()
+        assert operator.arm.workspace is not None
+        assert operator.arm.workspace.low_mm[2] == 20.0
+        assert (tmp_path / "arm.toml").read_text().startswith(text.rstrip())
+        assert operator.live.arm is operator.jobs.arm is operator.arm  # jogs and plans keep to it
+    operator.close()

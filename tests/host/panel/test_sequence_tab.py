@@ -11,7 +11,7 @@ from armtempo.panel import words
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.sequence_editor import SequenceEditor
 
-from tests.host.panel.fakes import ARM
+from tests.host.panel.fakes import ARM, board_state
 from tests.host.panel.pages import pages
 
 SEQUENCE = """# all day
@@ -96,3 +96,20 @@ def test_cycles_are_counted_from_one(operator: PanelBoard, ending: str, cycle: i
     with pages(operator) as page:
         page.show(words.TAB_SEQUENCE)
         assert said in page.texts()
+
+
+def test_what_is_being_typed_into_a_step_stays_when_another_changes(
+    operator: PanelBoard, tmp_path: Path
+) -> None:
+    operator.live.state = board_state()
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    operator.sequences.open("day.toml")
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        typed = page.named("step 3: wait_s")
+        page.fire(typed, "update:value", "7")
+        operator.sequences.set(0, "repeat", "5")  # on another page
+        page.look()
+        assert page.named("step 1: repeat").value == "5"
+        assert page.named("step 3: wait_s") is typed
+        assert typed.value == "7"

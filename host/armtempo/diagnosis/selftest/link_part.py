@@ -31,7 +31,7 @@ def trips(client: Client) -> dict[str, Any]:
     commands = _SIMULATED_COMMANDS if client.info.virtual else _COMMANDS
     for number in range(commands):
         if number >= commands // 2:
-            with client.session.turns:
+            with client.session.lock:
                 client.session.transport.write(_damaged(random))
         begin_s = time.perf_counter()
         client.status()

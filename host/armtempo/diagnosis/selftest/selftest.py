@@ -131,7 +131,7 @@ def _check_rest(client: Client) -> None:
 def _leave(client: Client, found: SelfTest, work: Callable[[Prompt], None]) -> None:
     """Do ``work`` at the board's REPL, then wait for its program."""
     session = client.session
-    with session.turns:
+    with session.lock:
         client.leave()
         session.transport.close()
         try:

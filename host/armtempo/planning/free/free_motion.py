@@ -16,7 +16,7 @@ from armtempo.optimise import slack_method
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.optimise.slack_method import Goal
 from armtempo.planning import collocation
-from armtempo.planning.collocation import Curve, Points
+from armtempo.planning.collocation import Curve, Points, Ratios
 from armtempo.planning.free import angle_bounds
 from armtempo.planning.free.layout import DEGREE, DWELL_SEGMENTS, Layout, Vias
 from armtempo.planning.free.tool_rows import ToolRows, ToolTargets
@@ -26,13 +26,18 @@ from armtempo.planning.tool import Tool
 from armtempo.planning.variables import MotionVariables, time_points
 from armtempo.splines import bspline
 
-_PARTS = 4
-"""Collocation points per segment, besides peaks."""
+_PARTS, _COARSE_PARTS = (1, 2, 4), (4, 4, 4)
+"""Points per segment at which speed, acceleration and jerk are kept besides peaks: on many segments, and on few."""
+_FINE = 16
+"""Segments per via point that are many."""
 _CORRIDOR_PARTS = 4
 """Points per segment at which the tool's corridor is enforced."""
-_PEAK_GRID_FACTOR = 4
+_PEAK_PARTS = 16
+"""Points per segment on which peaks are looked for."""
 _PEAK_THRESHOLDS = 0.95, 0.999
 """Peaks that become points after the first solve, and after a later one."""
+_TIGHTENED = 2
+"""After so many solves peaks not only become points: next to them the limit is lowered too, until they keep it."""
 _AWAY, _LEAST_AWAY = 0.01, 1e-5
 """Fraction by which time is scaled before each solve, for a start within the limits: twice what the last one was
 scaled by, within these."""
@@ -41,14 +46,17 @@ _SMOOTHING, _SMOOTHED = 0.075, 0.1
 _LEAST_STEP = 1e-3
 """Least difference of time control points, as a fraction of their mean: rounding errors of angles are divided
 by its cube."""
-_FIRST, _AGAIN = Goal(gap=2e-3, violation=1e-3), Goal(gap=3e-4, violation=1e-4)
-"""Goals of the first solve, whose peaks are added to the points, and of the later ones."""
+_FIRST = Goal(gap=2e-3, violation=1e-3)
+_AGAIN = Goal(gap=3e-4, violation=1e-4, first_gap=1e-2, least_slack=2e-3)
+"""Goals of the first solve, whose peaks are added to the points, and of the later ones, which start from its result."""
 _TOOL_KEPT = 0.9995
 """Fraction of the tool's tolerances that a solve may use: it meets them to about half of the rest."""
 _ROUNDED = 1e-10
 """Relative excess over a bound that is only rounding."""
 _AT_END = 1e-6
 """A via point this close to the end of a range (fraction of the joint's motion) counts as at the end."""
+_NEARBY = 0.5
+"""Solves leave out the ends of ranges that are farther from the motion than this fraction of the joint's motion."""
 _NEAR = 1e-4
 """Solves end if the limits at their points are exceeded by at most this fraction."""
 
@@ -244,15 +252,22 @@ class Improver:
     def improved(self, motion: FreeMotion, rounds: int) -> FreeMotion:
         """The motion after ``rounds`` solves, each with the peaks of the previous one; never slower than
         ``motion``."""
-        points = collocation.grid(self.layout.segments, _PARTS, ends=False)
+        fine = self.layout.segments >= _FINE * (len(self.demand.via_deg) - 1)
+        parts = _PARTS if fine else _COARSE_PARTS
+        at = Ratios.grid(self.layout.segments, len(self._size), parts)
         best = here = motion.scaled(self.demand.limits)
-        scale = np.inf
+        scale, known = np.inf, np.empty((2, 0))
         for number in range(rounds):
-            here = self._inside(self._solve(here, points, scale), best)
+            known = np.concatenate([known, np.full((2, len(at.kind) - known.shape[1]), np.nan)], axis=1)
+            solved, known = self._solve(here, at, scale, known)
+            here = self._inside(solved, best)
             curve = here.curve(self.demand.limits)
             scale = curve.scale()
             least = _PEAK_THRESHOLDS[min(number, 1)]
-            points += collocation.peaks(curve, _PEAK_GRID_FACTOR * _PARTS, least)
+            peaks = collocation.peaks(curve, _PEAK_PARTS, least)
+            if number >= _TIGHTENED:
+                at = at.tightened(curve, peaks)
+            at += peaks
             here = here.slower(scale)
             best = min(best, here, key=lambda candidate: candidate.total_s)
             if scale < 1.0 + _NEAR:
@@ -296,14 +311,19 @@ class Improver:
         via = Vias(self.demand.via_deg / self._size, self.demand.turning, frozenset(self.demand.tolerances))
         return self.layout.equalities(self.variables, via, unit_s)
 
-    def angle_rows(self) -> Block:
-        """Inequalities of ranges and corridor, with angles in units of ``size_deg``."""
-        return angle_bounds.forms(self.variables, self._low / self._size, self._high / self._size).rows(
-            self.variables
-        )
+    def angle_rows(self, motion: FreeMotion) -> Block:
+        """Inequalities of ranges and corridor near the motion, with angles in units of ``size_deg``."""
+        at, near = angle_bounds.of_path(motion.angle_points_deg, DEGREE), _NEARBY * self._size
+        low = np.where(at - near < self._low, self._low, -np.inf)
+        high = np.where(at + near > self._high, self._high, np.inf)
+        return angle_bounds.forms(self.variables, low / self._size, high / self._size).rows(self.variables)
 
-    def _solve(self, motion: FreeMotion, points: Points, scale: float) -> FreeMotion:
-        """``scale``: how much the solve before exceeded the limits, as a factor on time; inf for the first."""
+    def _solve(self, motion: FreeMotion, at: Ratios, scale: float, known: Array) -> tuple[FreeMotion, Array]:
+        """The motion that keeps R ratios within their limits, and the multipliers of these, (2, R).
+
+        ``known``: multipliers of the solve before, NaN of new ratios; ``scale``: how much it exceeded the limits, as
+        a factor on time, inf for the first.
+        """
         unit_s = motion.total_s / self.layout.segments
         limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
         first, excess = scale == np.inf, scale - 1.0
@@ -311,18 +331,23 @@ class Improver:
         steps = motion.differences_s / unit_s * (1.0 + min(2.0 * excess + _LEAST_AWAY, _AWAY))
         least = min(_LEAST_STEP, 0.5 * float(steps.min()))
         start = self.variables.pack(motion.angle_points_deg / self._size, steps)
-        blocks: list[Block] = [LimitRows(self.variables, points, limits), self.angle_rows()]
+        blocks: list[Block] = [LimitRows(self.variables, at, limits), self.angle_rows(motion)]
         if (tool_rows := self._tool_rows(_TOOL_KEPT)) is not None:
             blocks.append(tool_rows)
         program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least)
-        x = slack_method.minimise(program, start, program.linear, _FIRST if first else _AGAIN)
+        multipliers = np.full(len(program.linear), np.nan)
+        multipliers[: known.size] = known.ravel()
+        x, multipliers = slack_method.minimise(
+            program, start, program.linear, _FIRST if first else _AGAIN, multipliers
+        )
         x = met(self.variables, program.equalities, x)
-        return replace(
+        solved = replace(
             motion,
             angle_points_deg=self.variables.angle_points(x) * self._size,
             # a dwell much shorter than the segments next to it may be missed; then it lasts longer
             differences_s=np.maximum(self.variables.time_differences(x), least) * unit_s,
         )
+        return solved, multipliers[: known.size].reshape(2, -1)
 
     def _smoothing(self) -> Array:
         """Weights of the steps between time differences; none where a dwell begins and ends."""

@@ -149,6 +149,8 @@ def _nearest(forms: Forms, margin: float, fixed: Equalities, wanted: Array) -> A
     """
     x, margin = wanted, min(_MARGIN * margin, _MOST_MARGIN)
     excess = _excess(forms, x) + margin
+    if excess < min(margin - _TOO_NEAR, 0.0):
+        return x
     for _ in range(_STEPS):
         if excess <= 0.5 * margin:
             break

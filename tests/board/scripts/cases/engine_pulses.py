@@ -162,7 +162,7 @@ def case_three_joints():  # not emulated
     assert rig.commanded() == [2 * steps.total() for steps in motion.joints]
 
 
-def case_highest_rate():
+def case_highest_rate():  # not emulated
     """Three joints at a third of a million steps a second each, on both timers."""
     rig = Rig([dict(joint, channel=channel) for joint, channel in zip(arm(3), (0, 3, 5))], pulse_ticks=100)
     motion = Motion(TICK_HZ // 100, *[Steps((1000 + 7 * n, 252, 3000, 1 - 2 * (n & 1))) for n in range(3)])
@@ -170,7 +170,7 @@ def case_highest_rate():
     check(rig, motion)
 
 
-def case_six_joints():
+def case_six_joints():  # not emulated
     """All channels at once."""
     motion = Motion(
         TICK_HZ // 10,

@@ -165,16 +165,16 @@ def case_due_or_not():
     for now in (0, 1000, 0x7FFFFFF0, 0xFFFFFFF0):
         block, timer, port, state = words(BLOCK), words(18), words(8), words(isr.STATE_WORDS)
         block[isr.JOINTS] = 2
-        block[isr.TURN_SLACK_TICKS] = 100
+        block[isr.REVERSAL_SLACK_TICKS] = 100
         timer[isr.CNT] = now
         for joint in range(2):
             block[isr.BLOCK_HEAD + joint * isr.JOINT_WORDS + isr.DIR_BIT] = 1 << (7 + joint)
         second = isr.BLOCK_HEAD + isr.JOINT_WORDS
         block[isr.NEXT_SAMPLE] = (now + 900) & 0xFFFFFFFF
         state[isr.LAST_TIME] = (now - 50) & 0xFFFFFFFF
-        assert isr.add_turn(block, state, isr.BLOCK_HEAD, 50)
-        assert isr.add_turn(block, state, second, 51)
-        assert isr.add_turn(block, state, second, 400)
+        assert isr.add_reversal(block, state, isr.BLOCK_HEAD, 50)
+        assert isr.add_reversal(block, state, second, 51)
+        assert isr.add_reversal(block, state, second, 400)
         assert isr.serve_compare(block, timer, port) == 0
         assert port[isr.BSRR] == 1 << 7
         port[isr.ODR] = 1 << 7
@@ -184,11 +184,11 @@ def case_due_or_not():
         assert port[isr.BSRR] == 1 << 8
         port[isr.ODR] = 3 << 7
         assert timer[isr.CCR4] == (now + 350) & 0xFFFFFFFF
-        assert block[isr.TURN_LATE] == 0
+        assert block[isr.REVERSAL_LATE] == 0
         timer[isr.CNT] = (now + 460) & 0xFFFFFFFF
         assert isr.serve_compare(block, timer, port) == 0
         assert port[isr.BSRR] == 1 << (8 + 16)
-        assert block[isr.TURN_LATE] == 1
+        assert block[isr.REVERSAL_LATE] == 1
         timer[isr.CNT] = (now + 900) & 0xFFFFFFFF
         assert isr.serve_compare(block, timer, port) == 1
 
@@ -196,12 +196,12 @@ def case_due_or_not():
 def case_turn_queue():
     """Eight turns fit; the ninth waits."""
     block, state = words(BLOCK), words(isr.STATE_WORDS)
-    for n in range(isr.TURN_ROOM):
+    for n in range(isr.MOST_REVERSALS):
         state[isr.LAST_TIME] = 1000 * n
-        assert isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
-    assert not isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
-    block[isr.BLOCK_HEAD + isr.TURNS_OUT] = 1
-    assert isr.add_turn(block, state, isr.BLOCK_HEAD, 5)
+        assert isr.add_reversal(block, state, isr.BLOCK_HEAD, 5)
+    assert not isr.add_reversal(block, state, isr.BLOCK_HEAD, 5)
+    block[isr.BLOCK_HEAD + isr.REVERSALS_OUT] = 1
+    assert isr.add_reversal(block, state, isr.BLOCK_HEAD, 5)
 
 
 def case_sample_times():
@@ -252,10 +252,10 @@ def case_late_first_step():
         (1000, 581, 1),
         (1000, 0xFFFFFFFF, 0),
     ):
-        block[at + isr.TURNS_IN] = block[at + isr.TURNS_OUT] = 0
+        block[at + isr.REVERSALS_IN] = block[at + isr.REVERSALS_OUT] = 0
         if turn is not None:
-            block[at + isr.TURN_TIMES] = turn
-            block[at + isr.TURNS_IN] = 1
+            block[at + isr.REVERSAL_TIMES] = turn
+            block[at + isr.REVERSALS_IN] = 1
         ring[0] = first & 0xFFFFFFFF
         timer[isr.CCMR1] = 4 << 4 | 4 << 12
         timer[isr.DIER] = 1 << 4

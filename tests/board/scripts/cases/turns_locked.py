@@ -115,7 +115,7 @@ frames.append(b"noise" + frames[0][:-1] + b"x")
 frames.append(command(200, "home", 0) + command(201, "list", 0))
 app.link.stream = port = Port(frames)
 app.controller.board.engine = Still()
-app.turn()
+app.run_once()
 stand_in.Pin.levels["D1"] = 1
 micropython.heap_lock()
 for turn in range(TURNS):
@@ -123,7 +123,7 @@ for turn in range(TURNS):
         port.open = True
     stand_in.Clock.now_ms += 1
     stand_in.Pin.levels["D1"] = turn // 100 % 2
-    app.turn()
+    app.run_once()
 micropython.heap_unlock()
 assert app.controller.board.fault() == 0, app.controller.board.fault()
 assert app.controller.board.samples.next > TURNS // 10 - 5

@@ -56,8 +56,8 @@ def walk(motion, joint, generator, out, pulse, gap, room, start, length, shape):
     lock, unlock = heap_lock, heap_unlock
     while generator.waits() or not generator.ended:
         lock()
-        if generator.at_turn and not generator.waits():
-            generator.turn()
+        if generator.at_reversal and not generator.waits():
+            generator.reverse()
         generator.prepare(NEVER if braked else start_kiticks)
         near = generator.next_kiticks()
         brake_now = not braked and near >= start_kiticks

@@ -63,7 +63,7 @@ class StepGenerator:
 
     def __init__(self, memory):
         self.ended = True
-        self.at_turn = False
+        self.at_reversal = False
         self.direction = 1
         self.queue = array("i", bytes(4 * step_queue.QUEUE_SIZE))
 
@@ -81,7 +81,7 @@ class StepGenerator:
         state[step_queue.PULSE] = pulse
         state[step_queue.STEPS] = state[step_queue.LATEST_KITICKS] = 0
         state[step_queue.OUT] = state[step_queue.IN]
-        self.at_turn = False
+        self.at_reversal = False
         first = self._steps.at(self._place)
         self.ended = first is None
         self.direction = 1 if first is None else first[1]
@@ -94,17 +94,17 @@ class StepGenerator:
         """Where the plan leads."""
         return self._end_steps
 
-    def turn(self):
+    def reverse(self):
         """Continue in the other direction."""
         self.direction = -self.direction
-        self.at_turn = False
+        self.at_reversal = False
 
     def prepare(self, until):
         """Queue steps as the evaluator's does: the first of a block by itself, the others as cubics."""
-        while step_queue.has_room(self.queue, until) and not self.ended and not self.at_turn:
+        while step_queue.has_room(self.queue, until) and not self.ended and not self.at_reversal:
             time, direction = self._steps.at(self._place)
             if direction != self.direction:
-                self.at_turn = True
+                self.at_reversal = True
                 break
             _, gap, count, _ = self._steps.blocks[self._place[0]]
             steps = 1

@@ -343,7 +343,7 @@ class Host:
         frames = []
         for _ in range(turns):
             Clock.now_ms += 1
-            self.app.turn()
+            self.app.run_once()
         self.parser.feed(bytes(self.port.outbox))
         self.port.outbox = bytearray()
         frame = self.parser.next()

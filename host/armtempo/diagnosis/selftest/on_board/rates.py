@@ -56,7 +56,7 @@ def measure(record, motion, rates, frames, idle_us, watch=()):
         begun_us = time.ticks_us()
         then = cycles()
         while app.controller.running:
-            app.turn()
+            app.run_once()
             if captures and time.ticks_diff(time.ticks_us(), begun_us) > watch[1]:
                 end(captures)
             if idle_us:
@@ -76,7 +76,7 @@ def measure(record, motion, rates, frames, idle_us, watch=()):
         raise ValueError("the E-stop was pressed")
     return {
         "fault": fault,
-        "turns": app.turns,
+        "turns": app.passes,
         "longest_turn_cycles": longest,
         "commands": host.sent,
         "steps": captures[0].window() if captures else {},

@@ -11,7 +11,7 @@ from typing import Self
 _YIELD_S = 0.0002
 
 
-class Turns:
+class BoardLock:
     """A re-entrant lock; as a context it lets waiting ``in_a_hurry`` callers go first."""
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class Turns:
 
     @contextmanager
     def in_a_hurry(self, timeout_s: float) -> Iterator[bool]:
-        """Take the next turn; yields False if it does not come within ``timeout_s``."""
+        """Take the lock next; yields False if it is not free within ``timeout_s``."""
         self._count(1)
         try:
             mine = self._lock.acquire(timeout=timeout_s)

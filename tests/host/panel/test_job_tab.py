@@ -1,0 +1,81 @@
+"""The job's table: what is typed is taken, and stays, whatever changes in other fields."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from armtempo.panel import words
+from armtempo.panel.panel_board import PanelBoard
+
+from tests.host.panel.fakes import board_state
+from tests.host.panel.pages import Page, pages
+
+POSES = """name = "poses"
+[[via]]
+position_mm = [300, 0, 200]
+
+[[via]]
+position_mm = [310, 0, 210]
+
+[[via]]
+angles_deg = [10, -60, 40]
+"""
+
+
+def opened(page: Page, text: str = POSES) -> None:
+    """The tab with a job of the folder."""
+    page.operator.live.state = board_state()
+    (page.operator.jobs.folder / "poses.toml").write_text(text)
+    page.operator.jobs.open("poses.toml")
+    page.show(words.TAB_JOB)
+    page.look()
+
+
+def type_into(page: Page, name: str, text: str, left: bool = True) -> Any:
+    """Type into a field, and leave it or not; the field."""
+    box = page.named(name)
+    page.fire(box, "update:value", text)
+    if left:
+        page.fire(box, "change", text)
+    return box
+
+
+@pytest.mark.parametrize("elsewhere", ["field", "option", "key", "other page"])
+def test_what_is_being_typed_stays_when_another_field_changes(operator: PanelBoard, elsewhere: str) -> None:
+    """The next field is typed into before the last one is taken."""
+    with pages(operator) as page:
+        opened(page)
+        page.fire(page.named(f"{words.MORE} P1"), "click", {})
+        typed = type_into(page, "P2 joint 1", "1", left=False)
+        if elsewhere == "field":
+            type_into(page, "P2 joint 2", "-61")
+        elif elsewhere == "option":
+            page.named(words.OPTIONS["path"]).set_value("through")
+        elif elsewhere == "key":
+            type_into(page, f"P1: {words.VIA_KEYS['dwell_s']}", "0.5")
+        else:
+            operator.jobs.set_key(1, "dwell_s", "0.5")
+        page.look()
+        assert page.named("P2 joint 1") is typed
+        assert typed.value == "1"
+        page.fire(typed, "change", "12")
+        wanted = (12.0, -61.0 if elsewhere == "field" else -60.0, 40.0)
+        assert operator.jobs.vias[2].angles_deg == pytest.approx(wanted)
+
+
+def test_fields_show_what_has_changed(operator: PanelBoard) -> None:
+    with pages(operator) as page:
+        opened(page)
+        page.fire(page.named(f"{words.MORE} P1"), "click", {})
+        before = page.named("P1 joint 2").value
+        operator.jobs.set_key(1, "position_mm", "[310, 0, 260]")
+        operator.jobs.set_key(1, "dwell_s", "0.5")
+        operator.jobs.set_option("path", "through")
+        page.look()
+        assert page.named("P1 joint 2").value != before  # the pose has other angles
+        assert page.named(f"P1: {words.VIA_KEYS['dwell_s']}").value == "0.5"
+        assert page.named(words.OPTIONS["path"]).value == "through"
+        operator.jobs.delete(2)
+        page.look()
+        assert not [one for one in page.elements() if one.props.get("aria-label") == "P2 joint 1"]
