@@ -73,12 +73,7 @@ def _jobs(options: argparse.Namespace) -> list[tuple[str, Arm, Job]]:
         rng = np.random.default_rng(seed)
         vias = int(rng.integers(4, 9)) if options.vias is None else options.vias
         joints = int(rng.integers(3, 7)) if options.joints is None else options.joints
-        via = rng.uniform(-90, 90, (vias, joints))
-        limits = np.stack(
-            [rng.uniform(20, 80, joints), rng.uniform(20, 80, joints), rng.uniform(80, 300, joints)]
-        )
-        job = Job(f"random-{seed}", tuple(map(tuple, via.tolist())), path="free", seed=seed)
-        found.append((f"random {seed}", problems.make_arm(limits.T.tolist()), job))
+        found.append((f"random {seed}", *problems.spread_out(seed, joints, vias)))
     return found
 
 

@@ -34,16 +34,19 @@ def main() -> None:
     planner.plan(arm, replace(paper, iterations=5, polish=True))  # so that everything is loaded
     planner.plan(arm, Job("first", paper.via, path="free", refine=4, starts=1))
     print(f"{'job':<34}{'time s':>10}{'floor s':>10}{'over %':>8}{'CPU s':>8}{'segments':>10}{'record':>8}")
-    job = Job("feed", paper.via)
+    spline = Job("feed", paper.via, path="through")
     _print("paper: per-joint, refine 1, acs", arm, paper)
-    _print("shared, refine 1", arm, replace(job, refine=1))
-    for refine in (8, 64):
-        _print(f"shared, refine {refine}", arm, replace(job, refine=refine))
-    _print("the defaults (shared, auto)", arm, job)
-    _print("the defaults, gradient", arm, replace(job, optimiser="gradient"))
-    _print("free", arm, replace(job, path="free"))
-    _print("free, 1 start", arm, replace(job, path="free", starts=1))
-    _print("free, per-joint", arm, replace(job, path="free", timing="per-joint"))
+    for refine in (1, 8, 64):
+        _print(f"through, refine {refine}", arm, replace(spline, refine=refine))
+    _print("through, refine auto", arm, spline)
+    _print("through, auto, gradient", arm, replace(spline, optimiser="gradient"))
+    free = Job("feed", paper.via)
+    _print("the defaults: free, 3 starts", arm, free)
+    _print("free, 1 start", arm, replace(free, starts=1))
+    _print("free, per-joint", arm, replace(free, timing="per-joint"))
+    for joints, vias in ((6, 7), (6, 12), (3, 50)):
+        arm_of, many = problems.spread_out(0, joints, vias)
+        _print(f"free, {joints} joints, {vias} via points", arm_of, many)
     equal = problems.make_arm([[50.0, 50.0, 150.0]] * 3)
     for vias, refine in ((10, 4), (30, 4), (100, 4), *(((300, 1), (500, 1)) if options.large else ())):
         via = np.random.default_rng(1).normal(0, 40, (vias, 3))
@@ -55,7 +58,7 @@ def main() -> None:
             starts=1,
             path="through",
         )
-        _print(f"{vias} via points, refine {refine}, gradient", equal, many)
+        _print(f"through, {vias} via points, refine {refine}", equal, many)
 
 
 def _print(label: str, arm: Arm, job: Job) -> None:

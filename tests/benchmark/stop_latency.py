@@ -28,7 +28,7 @@ OWNER = """
 import sys
 import armtempo
 arm = armtempo.Arm.paper()
-plan = armtempo.plan(arm, armtempo.Job("long", via_deg=[[0, -60, 40], [170, -10, -50]]))
+plan = armtempo.plan(arm, armtempo.Job("long", via_deg=[[0, -60, 40], [170, -10, -50]], path="through"))
 with armtempo.connect(sys.argv[1], arm) as board:
     board.upload(plan)
     while True:

@@ -111,6 +111,17 @@ def random_problem(seed: int) -> tuple[Arm, Job]:
     return make_arm(limits.tolist()), job
 
 
+def spread_out(seed: int, joints: int, vias: int) -> tuple[Arm, Job]:
+    """A free path through random via angles between -90 and 90 degrees."""
+    rng = np.random.default_rng(seed)
+    via = rng.uniform(-90, 90, (vias, joints))
+    limits = np.stack(
+        [rng.uniform(20, 80, joints), rng.uniform(20, 80, joints), rng.uniform(80, 300, joints)]
+    )
+    job = Job(f"random-{seed}", tuple(map(tuple, via.tolist())), path="free", seed=seed)
+    return make_arm(limits.T.tolist()), job
+
+
 def random_free_problem(seed: int) -> tuple[Arm, Job]:
     """The same with a free path: stops, dwells, corridors, fixed and automatic numbers of pieces."""
     arm, job = random_problem(seed)

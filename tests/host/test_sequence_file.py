@@ -12,6 +12,7 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.cli import sequences
 from armtempo.encoding import encoded_sequence
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import shipped
@@ -60,6 +61,19 @@ def words(plan: SequencePlan) -> list[str]:
 def ends(plan: SequencePlan) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
     """Where each motion begins and ends."""
     return [(tuple(leg(0.0)), tuple(leg(leg.duration_s))) for leg in plan.legs]
+
+
+def test_where_a_motion_swings_beyond_its_via_points_is_told(tmp_path: Path) -> None:
+    path = written(tmp_path, 'run = "job.toml"', "goto = [20, -60, 40]", 'run = "job.toml"')
+    swings = JOB.replace("[1, -60, 40], [2, -60, 41]", "[20, -60, 40], [21, -60, 40], [99, -60, 40]")
+    (tmp_path / "job.toml").write_text(swings)
+    plan = armtempo.plan_sequence(ARM, Sequence.load(path, ARM))
+    (note,) = plan.notes
+    assert note.startswith("j: between P0 and P1 joint 1 reaches ")
+    assert f"note: {note}" in sequences.lines(plan)
+    plan.save(tmp_path / "plan.json")
+    assert SequencePlan.load(tmp_path / "plan.json").notes == plan.notes
+    assert planned(tmp_path, 'goto = "a"', 'run = "job.toml"').notes == ()
 
 
 @pytest.mark.slow

@@ -67,6 +67,7 @@ def values(planned: SequencePlan) -> dict[str, Any]:
         "cycles": cycles,
         "total": None if planned.total is None else _share(planned.total),
         "pause_s": PAUSE_S,
+        "notes": list(planned.notes),
     }
 
 
@@ -96,6 +97,7 @@ def lines(planned: SequencePlan) -> list[str]:
         found.append(f"cycle (step {cycle.step}, {times}): {_made_of(cycle.share)}")
     if planned.total is not None:
         found.append(f"in all: {_made_of(planned.total)}")
+    found.extend(f"note: {note}" for note in planned.notes)
     found.extend(text_summary.torque_lines(planned.loaded_legs))
     found.append(f"pause between two motions: about {PAUSE_S:g} s; waits for inputs are not counted")
     return found

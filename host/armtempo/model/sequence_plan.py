@@ -87,6 +87,8 @@ class SequencePlan:
     versions: Mapping[str, str]
     loads: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
     """What the tool holds in each leg; "": nothing."""
+    notes: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
+    """On the motions that were planned, each with the motion's name."""
 
     def __repr__(self) -> str:
         return f"<SequencePlan {self.name!r} for {self.arm.name!r}: {len(self.rows)} rows, {len(self.legs)} motions>"

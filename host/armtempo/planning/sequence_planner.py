@@ -51,6 +51,7 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
         tuple(compiler.counters),
         planner.versions(),
         tuple(compiler.loads),
+        tuple(dict.fromkeys(compiler.notes)),
     )
 
 
@@ -78,6 +79,7 @@ class _Compiler:
     counters: list[str] = field(default_factory=list)
     loads: list[str] = field(default_factory=list)
     """The load in each leg."""
+    notes: list[str] = field(default_factory=list)
     _holds: str = ""
     """The present load."""
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
@@ -242,9 +244,11 @@ class _Compiler:
             workspace_check.check(arm, source.trajectory, source.job.start_touches)
             return source.trajectory
         job = replace(source, holds=source.holds or self._holds)
-        found = planner.plan(self.arm, job, self.progress).trajectory
-        checks.check_held(found, self.arm)
-        return found
+        planned = planner.plan(self.arm, job, self.progress)
+        checks.check_held(planned.trajectory, self.arm)
+        told = checks.hardware_notes(self.arm)
+        self.notes.extend(f"{job.name}: {note}" for note in planned.notes if note not in told)
+        return planned.trajectory
 
     def _straight(self, step: kinds.Goto, start: Angles, end: Angles) -> Trajectory:
         job = Job(
