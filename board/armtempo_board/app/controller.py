@@ -28,6 +28,7 @@ from armtempo_board.app import arm_setup
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
+from armtempo_board.storage.store import MOTION, SEQUENCE
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -46,7 +47,8 @@ class Controller:
 
     def __init__(self, board: "Board") -> None:
         self.board = board
-        self.sequence: "Any" = None  # the present run
+        self.sequence: "Any" = None  # the present run, or a program,
+        self.program: "Any" = None  # which is to be executed by the main loop
         self.free_flash = 0
         self.free_heap = 0
         self.run_number = 0
@@ -201,27 +203,39 @@ class Controller:
             self.forget_speed()
         if not name:  # no default is set
             raise Refused(codes.NOT_FOUND)
-        if features.SEQUENCES and name != ONCE_NAME and self._is_sequence(name):
-            self._new_sequence(name, crc, rate, flags)
-            self.sequence.begin()
-            return
+        if features.SEQUENCES and name != ONCE_NAME:
+            kind = self._kind(name)
+            if kind != MOTION:
+                self._new_sequence(kind, name, crc, rate, flags)
+                self.sequence.begin()
+                return
         self.begin_motion(name, crc, rate, flags, unknown)
 
     if features.SEQUENCES:
 
-        def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
-            self.board.once.release()
+        def _new_sequence(self, kind: int, name: str, crc: "int | None", rate: int, flags: int) -> None:
+            """Make the sequence or program ready."""
+            if flags:
+                raise Refused(codes.IS_SEQUENCE)
+            if kind == SEQUENCE:
+                self.board.once.release()  # a program makes its moves there
             self.release_memory()
             try:
-                from armtempo_board.app import sequence_start  # here, as only sequences need its memory
+                # here, as only these need the memory
+                if kind == SEQUENCE:
+                    from armtempo_board.app import sequence_start
 
-                self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
+                    self.sequence = sequence_start.sequencer(self, name, crc, rate)
+                else:
+                    from armtempo_board.app import program_start
+
+                    self.sequence = program_start.user_program(self, name, crc, rate)
             except MemoryError:
                 raise Refused(codes.NO_SEQUENCE_MEMORY)
 
-        def _is_sequence(self, name: str) -> bool:
+        def _kind(self, name: str) -> int:
             self.release_memory()
-            return bool(self.board.store().is_sequence(name))
+            return int(self.board.store().kind(name))
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a motion at ``rate`` thousandths of its speed, or refuse.
@@ -271,6 +285,10 @@ class Controller:
             self.sequence.stopping = True
             if not self.board.engine.moving:
                 return
+        self.brake(now)
+
+    def brake(self, now: int) -> None:
+        """As ``stop``, but a sequence goes on."""
         self._braking = True
         self._held = 0
         if now or not self._can_brake:

@@ -46,6 +46,10 @@ class Events:
         if not self._notice:
             self._notice = text
 
+    def can_note(self) -> bool:
+        """Whether the last text was sent."""
+        return not self._notice
+
     def push(self) -> bool:
         """Give pending events to the link, at most one sample; returns whether there was a sample."""
         if self._controller.sequence:

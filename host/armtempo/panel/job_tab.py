@@ -261,7 +261,7 @@ class JobTab:
             if not choices:
                 return
         if choices is None:
-            box = ui.input(label, value=value).props("dense outlined").classes("armtempo-value")
+            box = ui.input(label, value=value).props("dense outlined").classes("armtempo-wide")
             self._choices.add(box.set_value, partial(self._jobs.option, key))
             self._on_typed(box, self._jobs.set_option, key)
             return

@@ -82,6 +82,8 @@ class PanelPage:
     """Speed of jogs and of moves to a target, percent of the limits."""
     picture: Element = field(init=False)
     """The place of the scene."""
+    speeds: ui.label = field(init=False)
+    """What the colours of the planned path mean."""
 
     @cached_property
     def scene(self) -> ArmScene:

@@ -75,9 +75,17 @@ SURE_BY_HAND = (
 )
 GUIDING, GUIDED = "Guide the arm. It is held again after:", "The current on"
 VIEW = "View"
+PATH_SPEED = "0 … {fastest:.0f} mm/s"
+LIMIT, IN_PLAN = "limit of {names}", "{name}, planned"
 SPEED_OF_MOTION = "Speed"
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
 HOMING = "Home…"
+NO_FLOOR = "The arm file names no table: nothing keeps the arm from going below it."
+ASK_FLOOR, FLOOR_HEIGHT = "Table…", "Height of the table, z in mm"
+FLOOR_HINT = (
+    "No jog, target or plan goes below the table. Its height, in the base's frame, goes into the arm file."
+)
+NO_HEIGHT, GIVE_HEIGHT = "The table has no height", "type one"
 WHICH_JOINTS, ALL_JOINTS = "Home", "All joints"
 NO_SWITCH = "{joint} has no switch whose angle is known: say where it is instead."
 HOME_BY_SWITCHES = "Home by the switches"
