@@ -70,7 +70,7 @@ class Controller:
         board = self.board
         board.engine.service()
         self._collect()
-        if features.OUTPUTS and board.outputs:
+        if board.outputs:
             if board.fault():
                 board.outputs.safe()
             board.inputs.poll(time.ticks_ms())
@@ -80,13 +80,9 @@ class Controller:
             elif silent_ms > board.silence_ms and self._by_host and not self._braking:
                 board.pending = codes.LINK_LOST
                 self.stop(0)
-            elif (
-                features.JOG
-                and self._held
-                and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS
-            ):
+            elif self._held and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS:
                 self.stop(0)
-        if features.SEQUENCES and self.sequence:
+        if self.sequence:
             if board.engine.moving:
                 self.sequence.prepare()
             else:
@@ -105,7 +101,7 @@ class Controller:
     def _end(self) -> None:
         self._collect()
         self._withdraw_assumed()
-        if not features.SEQUENCES or not self.sequence:  # its next motion starts at once
+        if not self.sequence:  # its next motion starts at once
             heap.collect_often()
         self.running = False
         self._braking = False
@@ -116,7 +112,7 @@ class Controller:
         """After an exception: freeze, and set the fault INTERNAL."""
         board = self.board
         board.pending = codes.INTERNAL
-        if features.OUTPUTS and board.outputs:
+        if board.outputs:
             board.outputs.safe()
         if board.engine:
             board.engine.freeze()
@@ -124,10 +120,10 @@ class Controller:
 
     def halt(self) -> None:
         """Freeze a running motion, set outputs to their safe values; the position stays known."""
-        if features.SEQUENCES and self.sequence:
+        if self.sequence:
             self.sequence.stopping = True
         board = self.board
-        if features.OUTPUTS and board.outputs:
+        if board.outputs:
             board.outputs.safe()
         if board.engine and board.engine.moving:
             board.engine.freeze()
@@ -135,7 +131,7 @@ class Controller:
     def moving(self) -> bool:
         """Whether there may be more steps; True while a sequence waits."""
         engine = self.board.engine
-        return engine is not None and (engine.moving or (features.SEQUENCES and self.sequence is not None))
+        return engine is not None and (engine.moving or self.sequence is not None)
 
     # called by commands, button and prompt
 
@@ -285,7 +281,7 @@ class Controller:
 
     def stop(self, now: int) -> None:
         """Brake along the path (``now``, or without brake times: freeze); ends a sequence."""
-        if features.SEQUENCES and self.sequence:
+        if self.sequence:
             self.sequence.stopping = True
             if not self.board.engine.moving:
                 return

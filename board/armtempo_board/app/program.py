@@ -97,7 +97,7 @@ def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     leds.show(controller.state())
     watchdog.feed()
     pressed = button.pressed()  # a press during a motion is ignored, but it stops a sequence
-    if features.SEQUENCES and pressed and controller.sequence:
+    if pressed and controller.sequence:
         controller.stop(0)
     if controller.moving():
         return

@@ -80,7 +80,10 @@ class BoardTab:
         if state is not None:
             values = asdict(state)
             rows = [
-                {"key": words.STATE_KEYS.get(key, key.replace("_", " ")), "value": words.text(values[key])}
+                {
+                    "key": words.STATE_KEYS.get(key, key.replace("_", " ")),
+                    "value": words.plain(words.text(values[key])),
+                }
                 for key in _SHOWN
                 if values[key] != ""
             ]
@@ -131,7 +134,7 @@ class BoardTab:
             kind = f"{motion.duration_s:.3f} s"
             if motion.sequence or motion.program:
                 kind = words.A_SEQUENCE if motion.sequence else words.A_PROGRAM
-            ui.label(f"{name} · {kind}{words.BY_BUTTON if motion.default else ''}")
+            ui.label(words.plain(f"{name} · {kind}{words.BY_BUTTON if motion.default else ''}"))
             page.button(words.RUN, lambda press: page.do(press, name, run_it), look="outline dense")
             for text, call in (
                 (words.RENAME, lambda _: self._rename(name)),
@@ -143,7 +146,7 @@ class BoardTab:
         def remove(press: Press) -> None:
             self._change(press, words.REMOVE, lambda: self._operator.board.remove(name))
 
-        self._page.ask(words.SURE_REMOVE.format(name=name), words.REMOVE, remove)
+        self._page.ask(words.plain(words.SURE_REMOVE.format(name=name)), words.REMOVE, remove)
 
     def _rename(self, name: str) -> None:
         def rename(press: Press) -> None:
@@ -189,7 +192,7 @@ class _Shown:
         count = self._lines.count
         new = min(count - self._count, self.log.max_lines or 0)
         for line in list(self._lines.last)[-new:] if new else ():
-            self.log.push(line)
+            self.log.push(words.plain(line))
         self._count = count
 
 

@@ -257,7 +257,7 @@ def of_job(text: str) -> str:
 
 def of_text(text: str) -> str:
     """A text of the library in the words of the panel."""
-    return _COMMAND.sub(_button, text)
+    return plain(_COMMAND.sub(_button, text))
 
 
 def _button(command: re.Match[str]) -> str:
