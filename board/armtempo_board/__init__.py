@@ -17,6 +17,11 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from armtempo_board.app.cell import Cell
+
+    cell: Cell
+    """That of the user's program that runs."""
+
 
 def load_program() -> "Any":
     """Import the program, which takes most of the chip's heap; prints a traceback if that fails."""

@@ -61,7 +61,7 @@ __all__ = [
     "Stop",
     "StopRequest",
     "Stopped",
-    "ToolWay",
+    "ToolSegment",
     "Trajectory",
     "Wait",
     "WaitInput",
@@ -118,7 +118,7 @@ if TYPE_CHECKING:
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.model.steps import Count, Goto, Hold, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
     from armtempo.model.tool_pose import Pose
-    from armtempo.model.tool_way import ToolWay
+    from armtempo.model.tool_segment import ToolSegment
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.board_port import find_ports
     from armtempo.report.run import Run
@@ -173,7 +173,7 @@ _HOMES = {
     "armtempo.model.sequence": ("Sequence",),
     "armtempo.model.sequence_plan": ("SequencePlan",),
     "armtempo.model.tool_pose": ("Pose",),
-    "armtempo.model.tool_way": ("ToolWay",),
+    "armtempo.model.tool_segment": ("ToolSegment",),
     "armtempo.pipeline": ("compare", "connect", "plan", "plan_sequence", "summary"),
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.board_state": ("BoardState",),

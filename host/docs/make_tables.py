@@ -1,5 +1,6 @@
 """Writes the tables of the pages that follow from the code: ``python host/docs/make_tables.py``."""
 
+import inspect
 import math
 from collections.abc import Callable
 from dataclasses import MISSING
@@ -10,6 +11,7 @@ from armtempo import optimise
 from armtempo.basics import toml_section
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
 from armtempo.optimise.task import Number, Parameter
+from armtempo_board.app.cell import Cell
 
 FOLDER = Path(__file__).parent
 
@@ -72,6 +74,24 @@ def _value(value: Any) -> str:
     return f"{value:_.10g}".replace("_", " " if abs(value) >= 10_000 else "")
 
 
+def _cell() -> str:
+    """The calls of a user's program."""
+    lines = ["| call | what it does |", "|---|---|"]
+    for name, call in vars(Cell).items():
+        if name.startswith("_") or not inspect.isfunction(call) or name in ("at", "each"):
+            continue
+        given = [
+            f"{one.name}={one.default!r}"
+            if one.default is not inspect.Parameter.empty
+            else str(one).split(":")[0]
+            for one in [*inspect.signature(call).parameters.values()][1:]
+        ]
+        asked = "await " if inspect.iscoroutinefunction(call) else ""
+        said = " ".join((inspect.getdoc(call) or "").split())
+        lines.append(f"| `{asked}cell.{name}({', '.join(given)})` | {said} |")
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "optimisers.md": {"parameters": _parameters},
     "files.md": {
@@ -81,6 +101,7 @@ TABLES = {
         "keys of encoder": _keys(Encoder, "encoder"),
         "keys of load": _keys(Load, "[load.NAME]"),
     },
+    "programs.md": {"cell": _cell},
     "virtual-board.md": {"keys of model": _keys(JointModel, "model")},
 }
 

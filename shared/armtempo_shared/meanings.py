@@ -105,7 +105,7 @@ _ROWS = (
     ),
     (
         "no_sequence_memory",
-        "the board has no memory to run a sequence of motions for this arm; nothing has moved",
+        "the board has no memory to run a sequence or program for this arm; nothing has moved",
         "put the program into the firmware ('armtempo flash'), or let the host run the steps (board.run)",
     ),
     (
@@ -117,6 +117,11 @@ _ROWS = (
         "needs_firmware",
         "the program's core on stock MicroPython can only run single motions; nothing has moved",
         "put the program into the firmware: 'armtempo flash'",
+    ),
+    (
+        "needs_host",
+        "a program is started by a host only",
+        "start it with 'armtempo program' or 'armtempo run'",
     ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "'armtempo clear', then move the arm away from it"),
@@ -146,6 +151,11 @@ _ROWS = (
         "wrong_steps",
         "a joint's steps differ from the motion's record: an error in the board program",
         "'armtempo clear', then home; report it with the log",
+    ),
+    (
+        "program_failed",
+        "an exception ended the user's program",
+        "mend the line that its traceback names, then 'armtempo clear'",
     ),
     ("start_failed", "the timers did not start as set up", "power-cycle the board"),
 )
@@ -206,12 +216,13 @@ COMMANDS: "dict[str, str]" = {
     "back along a stored motion (`shared/armtempo_shared/backwards.py`). Offset 0 begins a new one. Answer: the next "
     "offset.",
     "list": "The stored trajectory number `index` (from 0, in order of names) of `count`; `not_found` after the "
-    "last. A damaged one has `crc`, `duration` and `joints` 0. `sequence` 1: it is a sequence, whose `duration` "
-    "and `joints` are 0. Tail of the answer: its name.",
+    "last. A damaged one has `crc`, `duration` and `joints` 0. `sequence` 1: it is a sequence, 2: a program, whose "
+    "`duration` and `joints` are 0. Tail of the answer: its name.",
     "sequence": "State of the running sequence, or of the last one. Unknown to a board on which none has been "
     "started. `ending`: 1 running, 2 finished, 3 stopped, 4 stopped by the time-out of an input, 5 a fault, 6 a "
     "motion was refused; `code`: of that fault or refusal. `step`: of the sequence file; `row`: of the "
-    "record; `cycle`: finished passes of its outermost repeats. Tail: its name.",
+    "record; `cycle`: finished passes of its outermost repeats. Tail: its name; that of a program ends with `.py`, and "
+    "`step` is the line of its source.",
     "counter": "Counter `index` (from 0) of the `count` that the sequence has, or that the last one had: its `value`, "
     "0 after the last. Each start sets them to 0. Unknown as `sequence` is. Tail: its name.",
     "remove": "Removes the trajectory of that name.",
@@ -224,7 +235,7 @@ COMMANDS: "dict[str, str]" = {
     "`flags` 1: a limit switch ends it without a fault; with bits from 4 on, one per joint, only a switch of these "
     "joints does, else one of any that moves; 2: it is held, and brakes without a fault when no `hold` "
     "arrives for 300 ms. Answer: number of the run and its length in ticks. Or starts a sequence, each of whose "
-    "motions is a run of its own; then the answer has the number of the last run and 0.",
+    "motions is a run of its own; then the answer has the number of the last run and 0. The same with a program.",
     "stop": "`now` 0: brake along the path (freeze if the motion has no brake times); 1: freeze.",
     "speed": "Sets the rate of the motion's own time in thousandths (10 to 1000), along the same path; 0: pause, "
     "65535: the rate before the pause. Refused with `fixed_speed`, or with `too_long` if the run would last longer "

@@ -92,6 +92,14 @@ def no_ramps() -> "tuple[tuple[int, ...], tuple[int, ...], int, int]":
     return (0,) * REST_ENTRIES, (0,) * OTHER_ENTRIES, MOST_RAMP_BITS, 0
 
 
+def pack_head(shape: "tuple[int, int, bool, int, int]", ramps: "Ramps", arm_crc: int) -> bytes:
+    """The first HEAD_SIZE bytes of a motion record; ``shape``: the arguments of ``size``."""
+    degree, joints, shared, segments, refine = shape
+    flags = (SHARED_AXIS if shared else 0) | ramps[3] << _EDGE_BIT
+    head = struct.pack(_HEAD, MAGIC, degree, joints, flags, ramps[2], segments, refine, arm_crc)
+    return head + struct.pack(_RAMPS, *ramps[0], *ramps[1])
+
+
 def pack(
     degree: int,
     angles: "list[list[int]]",
@@ -108,9 +116,7 @@ def pack(
     """
     segments = len(angles[0]) - degree
     shared = len(times) == 1 and len(angles) > 1
-    flags = (SHARED_AXIS if shared else 0) | ramps[3] << _EDGE_BIT
-    head = struct.pack(_HEAD, MAGIC, degree, len(angles), flags, ramps[2], segments, refine, arm_crc)
-    head += struct.pack(_RAMPS, *ramps[0], *ramps[1])
+    head = pack_head((degree, len(angles), shared, segments, refine), ramps, arm_crc)
     body: "list[int]" = []
     for joint, points in enumerate(angles):
         body.extend(points)

@@ -94,6 +94,40 @@ def ends_of_pieces(record: bytes, at: float) -> list[float]:
     ]
 
 
+@pytest.mark.parametrize(
+    ("place", "step"), [(12.0, 12), (12.49, 12), (12.5, 13), (-12.5, -12), (-12.51, -13)]
+)
+def test_a_joint_that_stands_is_judged_by_its_place(
+    interpreter: str, place: float, step: int, tmp_path: Path
+) -> None:
+    """As the ends of one that moves."""
+    times = [-0.1, 0.0, 0.1, 0.2, 0.3, 0.4]
+    stands, moves = straight(times, [place] * 6), straight(times, [place] * 5 + [place + 3.0])
+    for record in (stands, moves):
+        found = judge(interpreter, tmp_path, record, low=step, high=FAR)
+        assert found == [None]
+        assert judge(interpreter, tmp_path, record, low=step + 1) == [(codes.OUT_OF_RANGE, 0, step)]
+        assert judge(interpreter, tmp_path, record, high=step - 1) == [(codes.OUT_OF_RANGE, 0, step)]
+    back = straight([-0.1, 0.0, 0.1, 0.1, 0.3, 0.4], [place] * 6)
+    assert judge(interpreter, tmp_path, back)[0] == (codes.TIME_ORDER, 0, 3)
+
+
+def test_joints_that_stand_cost_no_subintervals() -> None:
+    """A jog of one of six joints is checked as quickly as if the arm had one."""
+    way = [round(angle * 2**limits.STEP_FRACTION_BITS) for angle in (0.0, 0.0, 0.0, 30.0, 40.0, 40.0)]
+    times = [round(0.1 * at * TICK_HZ * 2**limits.TICK_FRACTION_BITS) for at in range(-1, 5)]
+    record = motion.pack(3, [[0] * 6, way, *[[5] * 6] * 4], [times], 1, motion.no_ramps(), 0)
+    loaded = []
+    interval = SimpleNamespace(
+        load=lambda data, joint: loaded.append(joint), measure=lambda: 0, close=lambda: None
+    )
+    with inprocess.board_modules():
+        check = importlib.import_module("armtempo_board.motion.motion_check").check
+        row = {"min_steps": -FAR, "max_steps": FAR, "max_rate": 1000}
+        check(motion.Motion(record), [row] * 6, 1000, interval)
+    assert loaded == [1]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "cubic", "refined"])
 def test_rate(interpreter: str, name: str, tmp_path: Path) -> None:

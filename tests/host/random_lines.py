@@ -12,7 +12,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import APPROACH, WHOLE, Pose
-from armtempo.model.tool_way import ToolWay
+from armtempo.model.tool_segment import ToolSegment
 from scipy.spatial.transform import Rotation
 
 from tests.host.problems import sampled
@@ -144,7 +144,7 @@ def random_lines(seed: int) -> tuple[Arm, Job]:
             through = tuple(tool_poses(arm, between[None])[0, :3, 3].tolist())
         limited = rng.random() < 0.3
         ways.append(
-            ToolWay(
+            ToolSegment(
                 via, True, through,
                 tolerance_mm=float(10.0 ** rng.uniform(-1.5, 0.7)),
                 tolerance_deg=float(10.0 ** rng.uniform(-1.5, 0.7)),
@@ -152,18 +152,18 @@ def random_lines(seed: int) -> tuple[Arm, Job]:
                 acceleration_mm_s2=float(10.0 ** rng.uniform(1.5, 3.5)) if limited else None,
             )
         )  # fmt: skip
-    job = Job("lines", via=tuple(vias), ways=_with_cuts(ways, vias, arm, rng))
+    job = Job("lines", via=tuple(vias), tool_segments=_with_cuts(ways, vias, arm, rng))
     stops = tuple(
         Stop(via, float(10.0 ** rng.uniform(-2.0, 1.0)))
         for via in range(1, count)
-        if rng.random() < 0.3 and not any(way.blend_mm and way.via == via for way in job.ways)
+        if rng.random() < 0.3 and not any(way.blend_mm and way.via == via for way in job.tool_segments)
     )
     return arm, replace(job, stops=stops, path="free" if rng.random() < 0.3 else "through")
 
 
 def _with_cuts(
-    ways: list[ToolWay], vias: list[tuple[float, ...] | Pose], arm: Arm, rng: np.random.Generator
-) -> tuple[ToolWay, ...]:
+    ways: list[ToolSegment], vias: list[tuple[float, ...] | Pose], arm: Arm, rng: np.random.Generator
+) -> tuple[ToolSegment, ...]:
     led = {way.via for way in ways}
     found = []
     for way in ways:
@@ -185,7 +185,7 @@ def ways_of(plan: Plan) -> dict[int, Way]:
     """The lines of a plan's job by their via points, from where its postures bring the tool."""
     poses = tool_poses(plan.arm, plan.via_deg)
     found: dict[int, Way] = {}
-    for way in plan.job.ways:
+    for way in plan.job.tool_segments:
         if not way.line:
             continue
         via = plan.job.via[way.via]
@@ -209,8 +209,8 @@ def line_faults(plan: Plan) -> list[str]:
     arrivals = np.array(spline.via_segments)
     u, seconds = joints[0].u, joints[0].time_s
     ways = ways_of(plan)
-    cuts = {way.via: way.blend_mm for way in plan.job.ways}
-    for asked in plan.job.ways:
+    cuts = {way.via: way.blend_mm for way in plan.job.tool_segments}
+    for asked in plan.job.tool_segments:
         own = (u >= arrivals[asked.via - 1]) & (u <= arrivals[asked.via])
         points, rotation = poses[own, :3, 3], poses[own, :3, :3]
         found += _limit_faults(asked, points, seconds[own])
@@ -232,14 +232,14 @@ def line_faults(plan: Plan) -> list[str]:
     return found
 
 
-def _along_deg(way: Way, asked: ToolWay) -> float:
+def _along_deg(way: Way, asked: ToolSegment) -> float:
     """How far the orientation turns on a way as long as the tolerance."""
     length = np.linalg.norm(way.end[:3, 3] - way.start[:3, 3])
     whole = way.turned_deg(way.end[None, :3, :3], np.zeros(1))[0]
     return float(whole * min(1.0, asked.tolerance_mm / max(length, 1e-9)))
 
 
-def _limit_faults(asked: ToolWay, points: np.ndarray, seconds: np.ndarray) -> list[str]:
+def _limit_faults(asked: ToolSegment, points: np.ndarray, seconds: np.ndarray) -> list[str]:
     found = []
     speed = np.diff(points, axis=0) / np.diff(seconds)[:, None]
     if asked.speed_mm_s and np.linalg.norm(speed, axis=1).max() > asked.speed_mm_s * (1 + 1e-6):
@@ -257,7 +257,7 @@ def allowed(arm: Arm, job: Job) -> bool:
     """Whether a dense check follows all lines of a job within the ranges, in small steps from posture to posture."""
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     here = np.array(job.via[0], dtype=float)
-    led = {way.via: way for way in job.ways}
+    led = {way.via: way for way in job.tool_segments}
     for via in range(1, len(job.via)):
         target = job.via[via]
         if via not in led:

@@ -44,7 +44,7 @@ def random_workspace(seed: int) -> tuple[Arm, Trajectory]:
             figures = reach * rng.uniform(0.0, (0.05, 0.2))
             centre = tuple(map(float, 0.1 * reach * rng.uniform(-1.0, 1.0, 3)))
             load = Load("random", 0.0, *map(float, figures), "xyz"[rng.integers(3)], centre)
-        arm = replace(arm, joints=joints, workspace=Workspace(tuple(boxes)), held=load)
+        arm = replace(arm, joints=joints, workspace=Workspace(tuple(boxes)), payload=load)
         if not workspace_check.posture_touches(arm, start):
             return arm, point_to_point.straight("random", start, end, arm)
     raise AssertionError("no posture is free")
@@ -75,7 +75,7 @@ def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
         pose[:, :3, 1] = np.cos(alpha) * across + np.sin(alpha) * z
         pose[:, :3, 2] = np.cos(alpha) * z - np.sin(alpha) * across
         pose[:, :3, 3] = out[:, :, -1]
-    if load := arm.held:
+    if load := arm.payload:
         held = np.tile(np.array(load.centre_mm)[:, None], (1, _POINTS))
         held["xyz".index(load.along)] += load.length_mm * (part - 0.5)
         least = min(least, _least(arm, pose[:, :3, :3] @ held + pose[:, :3, 3:]) - load.radius_mm)

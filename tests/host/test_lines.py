@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
 from armtempo.model.pose import from_rpy
 from armtempo.model.tool_pose import Pose
-from armtempo.model.tool_way import ToolWay
+from armtempo.model.tool_segment import ToolSegment
 from armtempo.planning import planner
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import deviation, line_path, tool_path
@@ -42,7 +43,9 @@ HALF = tuple(np.array(moved(30, 10, -15).matrix)[:3, 3])
 FLIPPED = ((90.0, -100.0, 200.0, -90.0, 40.0, 180.0), (95.0, -100.0, 200.0, 90.0, -40.0, 0.0))
 """The wrist turned over on the way."""
 JOB = Job(
-    "lines", via=(START, moved(60, 20, -30), moved(-20, 30, 0)), ways=(ToolWay(1, True), ToolWay(2, True))
+    "lines",
+    via=(START, moved(60, 20, -30), moved(-20, 30, 0)),
+    tool_segments=(ToolSegment(1, True), ToolSegment(2, True)),
 )
 
 
@@ -51,7 +54,7 @@ JOB = Job(
 def test_random_lines_hold_when_looked_at_densely(seed: int) -> None:
     """A job that is refused is followed in small steps: where that reaches the end, it is refused wrongly."""
     arm, job = random_lines(seed)
-    if not job.ways:
+    if not job.tool_segments:
         return
     try:
         plan = planner.plan(arm, job)
@@ -66,10 +69,10 @@ def test_random_lines_hold_when_looked_at_densely(seed: int) -> None:
 @pytest.fixture(scope="module")
 def plan() -> Plan:
     ways = (
-        ToolWay(1, True, speed_mm_s=80.0, acceleration_mm_s2=700.0),
-        ToolWay(2, True, (40.0, 150.0, 440.0)),
+        ToolSegment(1, True, speed_mm_s=80.0, acceleration_mm_s2=700.0),
+        ToolSegment(2, True, (40.0, 150.0, 440.0)),
     )
-    return planner.plan(ARM, replace(JOB, ways=ways, refine=2))
+    return planner.plan(ARM, replace(JOB, tool_segments=ways, refine=2))
 
 
 def test_a_line_and_an_arc_keep_speed_tolerance_and_rests(plan: Plan, tmp_path: Path) -> None:
@@ -81,6 +84,9 @@ def test_a_line_and_an_arc_keep_speed_tolerance_and_rests(plan: Plan, tmp_path: 
     again = Plan.load(tmp_path / "plan.json")
     assert again.job == plan.job
     assert again.notes == plan.notes
+    assert len(json.loads((tmp_path / "plan.json").read_text())["plan"]["job"]["ways"]) == 2, (
+        "as in older files"
+    )
 
 
 @pytest.mark.slow
@@ -88,7 +94,8 @@ def test_a_wait_after_a_line_and_a_free_path_after_it() -> None:
     """The arm stands still for as long as asked; then it is faster than on the spline."""
     vias = ((80.0, -90.0, 200.0, 40.0, 60.0, 100.0), (60.0, -80.0, 180.0, 20.0, 20.0, 150.0))
     job = replace(
-        JOB, via=(*JOB.via[:2], *vias), ways=(ToolWay(1, True),), stops=(Stop(1, 1.5),), path="free", refine=6, starts=1
+        JOB, via=(*JOB.via[:2], *vias), tool_segments=(ToolSegment(1, True),),
+        stops=(Stop(1, 1.5),), path="free", refine=6, starts=1
     )  # fmt: skip
     plan = planner.plan(ARM, job)
     assert faults(plan) + line_faults(plan) == []
@@ -102,22 +109,24 @@ def test_a_wait_after_a_line_and_a_free_path_after_it() -> None:
 @pytest.mark.slow
 def test_faults_of_a_line_are_seen(plan: Plan) -> None:
     """The check itself: a plan checked against a line nearby, and against a lower speed."""
-    ways = (replace(plan.job.ways[0], speed_mm_s=79.0), plan.job.ways[1])
-    assert line_faults(replace(plan, job=replace(plan.job, ways=ways)))
-    ways = (replace(plan.job.ways[0], tolerance_mm=0.01), plan.job.ways[1])
-    assert line_faults(replace(plan, job=replace(plan.job, ways=ways)))
+    ways = (replace(plan.job.tool_segments[0], speed_mm_s=79.0), plan.job.tool_segments[1])
+    assert line_faults(replace(plan, job=replace(plan.job, tool_segments=ways)))
+    ways = (replace(plan.job.tool_segments[0], tolerance_mm=0.01), plan.job.tool_segments[1])
+    assert line_faults(replace(plan, job=replace(plan.job, tool_segments=ways)))
 
 
 def test_the_bound_holds_and_is_sharp() -> None:
     """Random splines next to a line: no sample of them is beyond the bound, and it is near to the largest."""
     seed = 31
     rng = np.random.default_rng(seed)
-    led = line_path.led_legs(ARM, replace(JOB, via=JOB.via[:2], ways=JOB.ways[:1]), _via(JOB)[:2])[0]
+    led = line_path.led_legs(
+        ARM, replace(JOB, via=JOB.via[:2], tool_segments=JOB.tool_segments[:1]), _via(JOB)[:2]
+    )[0]
     course, tool = led.followed.course, led.followed.tool
     for size in (0.03, 1.0, 5.0):
-        angles = bspline.fit(led.followed.at(led.ways(8)), 5)
+        angles = bspline.fit(led.followed.at(led.distances(8)), 5)
         angles = angles + size * rng.uniform(-1, 1, angles.shape)
-        ways = bspline.fit(led.ways(8), 5)
+        ways = bspline.fit(led.distances(8), 5)
         found = deviation.proven(
             of_path(angles, 5),
             of_path(ways[:, None], 5)[:, :, 0],
@@ -215,8 +224,8 @@ def test_ordinary_arcs_are_defined() -> None:
 @pytest.mark.slow
 def test_a_full_circle_comes_back(tmp_path: Path) -> None:
     points = tuple(tuple(np.array(moved(*by).matrix)[:3, 3]) for by in ((20, 20, 0), (40, 0, 0)))
-    ways = (ToolWay(1, True, circle_through_mm=points),)
-    plan = planner.plan(ARM, Job("circle", via=(START, moved(0, 0, 0)), ways=ways, refine=2))
+    ways = (ToolSegment(1, True, circle_through_mm=points),)
+    plan = planner.plan(ARM, Job("circle", via=(START, moved(0, 0, 0)), tool_segments=ways, refine=2))
     assert faults(plan) == []
     middle = HERE[:3, 3] + (20.0, 0.0, 0.0)
     poses = tool_poses(ARM, plan.trajectory(np.linspace(0.0, plan.trajectory.duration_s, 400)))
@@ -243,7 +252,9 @@ def test_a_line_that_turns_the_tool_by_half_a_turn_is_refused() -> None:
     arm = Arm.of("ar4")
     here = from_rpy((250.0, 0.0, 300.0), (180.0, 0.0, 0.0))
     there = from_rpy((290.0, 0.0, 300.0), (180.0, 0.0, 180.0))
-    job = Job("half", via=(Pose.of_matrix(here), Pose.of_matrix(there)), ways=(ToolWay(1, True),))
+    job = Job(
+        "half", via=(Pose.of_matrix(here), Pose.of_matrix(there)), tool_segments=(ToolSegment(1, True),)
+    )
     with pytest.raises(PlanError, match="turns by 180 degrees"):
         planner.plan(arm, job)
 
@@ -252,7 +263,7 @@ def test_a_line_that_does_not_end_at_its_pose_is_refused() -> None:
     """Of pitch alone nothing is kept on the way."""
     pose = Pose.of_angles(HERE[:3, 3] + (10.0, 0.0, 0.0), {"pitch": 70.0})
     with pytest.raises(PlanError, match=r"P1: the line ends .* deg from the pose"):
-        planner.plan(ARM, Job("pitch", via=(START, pose), ways=(ToolWay(1, True),)))
+        planner.plan(ARM, Job("pitch", via=(START, pose), tool_segments=(ToolSegment(1, True),)))
 
 
 @pytest.mark.slow
@@ -261,15 +272,15 @@ def test_a_line_that_does_not_end_at_its_pose_is_refused() -> None:
     [
         ({"via": (START, moved(400, 0, 0))}, "P0 to P1, at .* of 400.0 mm"),
         ({"via": (START, moved(0, 0, 0))}, "the tool is at this point already"),
-        ({"ways": (ToolWay(1, True, blend_mm=80.0), ToolWay(2, True))}, "more than half"),
+        ({"tool_segments": (ToolSegment(1, True, blend_mm=80.0), ToolSegment(2, True))}, "more than half"),
         ({"via": FLIPPED}, "joint 4 at -90 degrees, not 90"),
-        ({"ways": (ToolWay(1, True, HALF),)}, "one line"),
-        ({"ways": (ToolWay(1, True, circle_through_mm=(HALF, HALF)),)}, "ends where it began"),
+        ({"tool_segments": (ToolSegment(1, True, HALF),)}, "one line"),
+        ({"tool_segments": (ToolSegment(1, True, circle_through_mm=(HALF, HALF)),)}, "ends where it began"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_followed_says_where(change: dict[str, object], message: str) -> None:
     job = replace(JOB, **change)  # type: ignore[arg-type]
-    job = replace(job, ways=tuple(way for way in job.ways if way.via < len(job.via)))
+    job = replace(job, tool_segments=tuple(way for way in job.tool_segments if way.via < len(job.via)))
     with pytest.raises(PlanError, match=message):
         planner.plan(ARM, job)
 
@@ -294,8 +305,8 @@ def test_a_straight_wrist_on_the_way_is_named() -> None:
         ({"path": "free", "corridor_deg": 1.0}, "with a corridor"),
         ({"timing": "per-joint"}, 'need timing = "shared"'),
         ({"degree": 3}, "degree 5"),
-        ({"ways": (ToolWay(3, True),)}, "lead to via points"),
-        ({"ways": (ToolWay(1, True, blend_mm=5.0),)}, "needs a line on both sides"),
+        ({"tool_segments": (ToolSegment(3, True),)}, "lead to via points"),
+        ({"tool_segments": (ToolSegment(1, True, blend_mm=5.0),)}, "needs a line on both sides"),
     ],
 )
 def test_jobs_that_do_not_fit_are_refused(change: dict[str, object], message: str) -> None:
@@ -340,9 +351,9 @@ def test_a_job_file_says_all_of_it(tmp_path: Path) -> None:
     file = tmp_path / "glue.toml"
     file.write_text(FILE, encoding="utf-8")
     job = Job.load(file, ARM)
-    assert job.ways == (
-        ToolWay(1, True, tolerance_mm=0.2, blend_mm=5.0),
-        ToolWay(2, True, (20.0, 170.0, 440.0), speed_mm_s=20.0),
+    assert job.tool_segments == (
+        ToolSegment(1, True, tolerance_mm=0.2, blend_mm=5.0),
+        ToolSegment(2, True, (20.0, 170.0, 440.0), speed_mm_s=20.0),
     )
     assert job.speed_mm_s == 50.0
     assert isinstance(job.via[1], Pose)
@@ -378,6 +389,6 @@ def test_a_wider_tolerance_of_an_arc_is_never_slower(seed: int) -> None:
     through = tool_poses(paper, middle[None])[0, :3, 3]
     times = []
     for tolerance_mm in (1.3, 0.3, 0.03):
-        arc = ToolWay(1, line=True, arc_through_mm=tuple(through.tolist()), tolerance_mm=tolerance_mm)
-        times.append(planner.plan(paper, Job("arc", via_deg=[start, end], ways=(arc,))).total_s)
+        arc = ToolSegment(1, line=True, arc_through_mm=tuple(through.tolist()), tolerance_mm=tolerance_mm)
+        times.append(planner.plan(paper, Job("arc", via_deg=[start, end], tool_segments=(arc,))).total_s)
     assert times == sorted(times), f"seed {seed}: {times}"

@@ -13,6 +13,7 @@ from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.sequence import Sequence
+from armtempo.model.workspace import FAR_MM
 from armtempo.new_arm import folder as project_folder
 from armtempo.new_arm import joint_entry
 from click.testing import CliRunner, Result
@@ -118,14 +119,49 @@ def test_an_empty_folder_is_filled(tmp_path: Path) -> None:
 
 def test_questions_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("armtempo.cli.new._asked", lambda: True)
-    answers = ["own", "1", "", "turntable", "", "", "", "", "-180", "180", "", "", "5", "", "20", "sim:table"]
+    answers = [
+        "own",
+        "1",
+        "",
+        "turntable",
+        "",
+        "",
+        "",
+        "",
+        "-180",
+        "180",
+        "",
+        "",
+        "5",
+        "",
+        "20",
+        "-5",
+        "-300 400",
+        "none",
+        "sim:table",
+    ]
     done = new(str(tmp_path / "x"), text="\n".join(answers) + "\n")
     assert done.exit_code == 0, done.output
     arm = Arm.load(tmp_path / "x" / "arm.toml")
     assert arm.driven[0].name == "turntable"
     assert arm.driven[0].motor.gear_ratio == 5.0
     assert arm.driven[0].limits.speed_deg_s == 20.0
+    assert arm.workspace is not None
+    assert (arm.workspace.low_mm[0], arm.workspace.high_mm[0], arm.workspace.low_mm[2]) == (
+        -300.0,
+        400.0,
+        -5.0,
+    )
+    assert arm.workspace.high_mm[1] == FAR_MM
     assert 'port = "sim:table"' in (tmp_path / "x" / "armtempo.toml").read_text()
+
+
+def test_a_shipped_arm_gets_its_floor_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done = interview(tmp_path / "x", monkeypatch, ["ar4", "0", "", "", ""])
+    assert done.exit_code == 0, done.output
+    found = Arm.load(tmp_path / "x" / "arm.toml").workspace
+    assert found is not None
+    assert found.low_mm == (-FAR_MM, -FAR_MM, 0.0)
 
 
 def test_a_name_with_quotes_stays_one_line_and_control_characters_are_refused() -> None:
@@ -170,7 +206,28 @@ def test_each_answer_is_checked_where_it_is_given(tmp_path: Path, monkeypatch: p
             "",
         ),
     ]
-    answers += ["120", "-120", "<", "-120", "120", "200.5", "", "", "0", "2", "3", "", "1e9", "20", ""]
+    answers += [
+        "120",
+        "-120",
+        "<",
+        "-120",
+        "120",
+        "200.5",
+        "",
+        "",
+        "0",
+        "2",
+        "3",
+        "",
+        "1e9",
+        "20",
+        "table",
+        "0",
+        "400 -300",
+        "",
+        "",
+        "",
+    ]
     done = interview(tmp_path / "x", monkeypatch, answers)
     assert done.exit_code == 0, done.output
     for said in (
@@ -184,6 +241,8 @@ def test_each_answer_is_checked_where_it_is_given(tmp_path: Path, monkeypatch: p
         "a whole number from 4 to 10000",
         "it must be from 0.1 to 10000, such as 4.5",
         "a whole number from 4 to 10000000",
+        "'table': not a number; e.g. 0, or none",
+        "'400 -300': not two numbers, the smaller first; e.g. -300 400, or none",
     ):
         assert said in done.output, said
     (joint,) = Arm.load(tmp_path / "x" / "arm.toml").joints
@@ -197,7 +256,7 @@ def test_what_was_answered_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert left.exit_code == 130
     assert f"continue with: armtempo new {folder} --resume" in left.output
     assert not folder.exists()
-    done = interview(folder, monkeypatch, ["", "44", *[""] * 9, ""], "--resume")
+    done = interview(folder, monkeypatch, ["", "44", *[""] * 12, ""], "--resume")
     assert done.exit_code == 0, done.output
     (joint,) = Arm.load(folder / "arm.toml").joints
     assert (joint.name, joint.a_mm) == ("axis", 44.0)
@@ -229,7 +288,7 @@ def test_modified_rows_bring_the_tool_where_craigs_do() -> None:
 
 def test_a_parallel_linkage_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     joint = ["", "", "100", "", "", "", "", "", "", "", "4000", ""]
-    answers = ["own", "2", "", *joint, *joint[:5], "yes", *joint[5:], ""]
+    answers = ["own", "2", "", *joint, *joint[:5], "yes", *joint[5:], "", "", "", ""]
     done = interview(tmp_path / "x", monkeypatch, answers)
     assert done.exit_code == 0, done.output
     assert [found.parallel_linkage for found in Arm.load(tmp_path / "x" / "arm.toml").joints] == [False, True]

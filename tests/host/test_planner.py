@@ -15,7 +15,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
-from armtempo.model.tool_way import ToolWay
+from armtempo.model.tool_segment import ToolSegment
 from armtempo.planning import checks, lower_bounds, path_deviation, planner
 from armtempo.planning.fitness import Fitness, scale_of
 from armtempo.planning.lower_bounds import Floor
@@ -422,7 +422,7 @@ def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan
 
 
 def test_each_job_has_a_planner_of_the_table() -> None:
-    led = replace(JOB, ways=(ToolWay(1, line=True),))
+    led = replace(JOB, tool_segments=(ToolSegment(1, line=True),))
     asked = {
         "through": replace(JOB, path="through"),
         "free": replace(JOB, path="free", stops=(Stop(1),)),

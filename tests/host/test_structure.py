@@ -32,6 +32,7 @@ ORDER = (
     "diagnosis",  # what looks wrong about an arm, a job, this machine; a board measures itself
     "report",  # run folders, what the samples say; pages, plots, tables
     "robot",  # a board in use: home, go, run, stop
+    "testing",  # a user's program without a board
     "pipeline",  # plan, load, run, report
     "paper",  # its tables and figures, repeated
     "panel",  # the arm in a browser

@@ -6,6 +6,7 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -41,6 +42,15 @@ def random_coupling(rng: np.random.Generator, joints: int) -> np.ndarray:
         np.fill_diagonal(matrix, rng.choice([-1.0, 1.0], joints) * rng.uniform(0.5, 2.0, joints))
         if np.linalg.cond(matrix) < 20.0:
             return matrix
+
+
+class Known(NamedTuple):
+    """A status in which the positions of all motors are known."""
+
+    positions: SimpleNamespace
+
+    def joint_known(self, motor: int) -> bool:
+        return True
 
 
 def rows(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
@@ -127,6 +137,9 @@ def test_a_posture_at_the_ends_of_ranges_is_found_again_from_its_steps(seed: int
         assert np.all((low <= found) & (found <= high))
         assert np.max(np.abs(arm.transmission.steps(found) - steps)) <= 0.5 + 1e-6
         point_to_point.posture(found, arm)
+        client = SimpleNamespace(status=lambda positions=status.positions: Known(positions))
+        assert arm_state.is_at(client, arm, posture)  # type: ignore[arg-type]
+        assert not arm_state.is_at(client, arm, posture + 2.0 * arm.transmission.step_deg)  # type: ignore[arg-type]
     far = SimpleNamespace(positions=SimpleNamespace(commanded_steps=tuple(10 * step for step in steps)))
     np.testing.assert_allclose(  # far beyond the ranges: no posture is made up
         matrix @ arm_state.angles_deg(far, arm) * arm.transmission.steps_per_deg,  # type: ignore[arg-type]

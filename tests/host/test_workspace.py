@@ -16,7 +16,7 @@ from armtempo.model.job import Job, Stop
 from armtempo.model.parts import NOTHING, Load
 from armtempo.model.sequence import Sequence
 from armtempo.model.steps import Goto, Hold
-from armtempo.model.tool_way import ToolWay
+from armtempo.model.tool_segment import ToolSegment
 from armtempo.model.workspace import FAR_MM, KeepOut, Workspace, read
 from armtempo.planning import lower_bounds, planner, point_to_point, sequence_planner, workspace_check
 from armtempo.planning.capsules import box_distance, segment_distance
@@ -85,9 +85,9 @@ def test_free_paths_in_random_rooms_touch_nothing(seed: int) -> None:
     via = trajectory(np.array([0.0, trajectory.duration_s]))
     if not workspace_check.touch_of(arm, trajectory) or workspace_check.posture_touches(arm, via[1]):
         return
-    job = Job("free", via_deg=via.tolist(), path="free", holds=arm.held.name if arm.held else "")
+    job = Job("free", via_deg=via.tolist(), path="free", holds=arm.payload.name if arm.payload else "")
     try:
-        plan = planner.plan(replace(arm, loads=(arm.held,) * bool(arm.held)), job)
+        plan = planner.plan(replace(arm, loads=(arm.payload,) * bool(arm.payload)), job)
     except PlanError:
         return  # no path around is found
     assert dense_least(arm, plan.trajectory, 1500) > 0.0, f"seed {seed}"
@@ -154,7 +154,11 @@ def test_a_free_path_goes_around_what_is_between_its_via_points(monkeypatch: pyt
     assert len(spline.via_segments) == 3
     np.testing.assert_allclose(plan.trajectory(np.array(spline.via_times_s)), via, atol=1e-6)
     seam = replace(
-        job, via=(*job.via[:2], (165.0, -50.0, 30.0)), stops=(), ways=(ToolWay(2, line=True),), refine=3
+        job,
+        via=(*job.via[:2], (165.0, -50.0, 30.0)),
+        stops=(),
+        tool_segments=(ToolSegment(2, line=True),),
+        refine=3,
     )
     led = planner.plan(arm, seam)
     assert dense_least(arm, led.trajectory, 2000) > 0.0
@@ -278,7 +282,7 @@ def test_an_arm_file_has_radii_workspace_and_loads(tmp_path: Path) -> None:
     arm = Arm.load(file)
     assert arm.workspace == Workspace(low_mm=(-FAR_MM, -FAR_MM, -5.0))
     assert arm.joints[0].radius_mm == 12.0
-    assert arm.holding("cup").held == Load("cup", radius_mm=30.0, centre_mm=(0.0, 0.0, 40.0))
+    assert arm.holding("cup").payload == Load("cup", radius_mm=30.0, centre_mm=(0.0, 0.0, 40.0))
     file.write_text(file.read_text(encoding="utf-8") + "[room]\n", encoding="utf-8")
     with pytest.raises(InputError, match="room: unknown key"):
         Arm.load(file)

@@ -10,7 +10,6 @@ from armtempo_shared import armrecord, codes
 from armtempo_shared.messages import ARM_RECORD_NAME
 from pyb import Pin, Timer
 
-from armtempo_board import features
 from armtempo_board.app import memory_shares
 from armtempo_board.app.board import NEVER_MS
 from armtempo_board.buffers import COMMANDED
@@ -101,7 +100,7 @@ def _take(board: "Board", record: "Record") -> None:
     board.arm_crc = crc
     board.raw = array("i", [0] * (COMMANDED + 2 * board.joints))
     board.samples.configure(board.joints)
-    if features.OUTPUTS and (outputs or inputs):
+    if outputs or inputs:
         from armtempo_board.app import output_setup  # here, as few arms need its memory
 
         output_setup.attach(board, outputs, inputs)
@@ -117,7 +116,7 @@ def _drop_engine(board: "Board") -> None:
     """Drop the engine before another is made, so that the heap is as before the first."""
     if board.engine:
         board.engine.close()
-    if features.OUTPUTS and board.outputs:
+    if board.outputs:
         drop_outputs(board)
     board.engine = None
     board.joints = board.arm_crc = 0

@@ -28,6 +28,7 @@ from armtempo_board.app import arm_setup
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
+from armtempo_board.storage.store import MOTION, SEQUENCE
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -46,7 +47,8 @@ class Controller:
 
     def __init__(self, board: "Board") -> None:
         self.board = board
-        self.sequence: "Any" = None  # the present run
+        self.sequence: "Any" = None  # the present run, or a program,
+        self.program: "Any" = None  # which is to be executed by the main loop
         self.free_flash = 0
         self.free_heap = 0
         self.run_number = 0
@@ -68,7 +70,7 @@ class Controller:
         board = self.board
         board.engine.service()
         self._collect()
-        if features.OUTPUTS and board.outputs:
+        if board.outputs:
             if board.fault():
                 board.outputs.safe()
             board.inputs.poll(time.ticks_ms())
@@ -78,13 +80,9 @@ class Controller:
             elif silent_ms > board.silence_ms and self._by_host and not self._braking:
                 board.pending = codes.LINK_LOST
                 self.stop(0)
-            elif (
-                features.JOG
-                and self._held
-                and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS
-            ):
+            elif self._held and time.ticks_diff(time.ticks_ms(), self._hold_ms) > HOLD_TIMEOUT_MS:
                 self.stop(0)
-        if features.SEQUENCES and self.sequence:
+        if self.sequence:
             if board.engine.moving:
                 self.sequence.prepare()
             else:
@@ -103,7 +101,7 @@ class Controller:
     def _end(self) -> None:
         self._collect()
         self._withdraw_assumed()
-        if not features.SEQUENCES or not self.sequence:  # its next motion starts at once
+        if not self.sequence:  # its next motion starts at once
             heap.collect_often()
         self.running = False
         self._braking = False
@@ -114,7 +112,7 @@ class Controller:
         """After an exception: freeze, and set the fault INTERNAL."""
         board = self.board
         board.pending = codes.INTERNAL
-        if features.OUTPUTS and board.outputs:
+        if board.outputs:
             board.outputs.safe()
         if board.engine:
             board.engine.freeze()
@@ -122,10 +120,10 @@ class Controller:
 
     def halt(self) -> None:
         """Freeze a running motion, set outputs to their safe values; the position stays known."""
-        if features.SEQUENCES and self.sequence:
+        if self.sequence:
             self.sequence.stopping = True
         board = self.board
-        if features.OUTPUTS and board.outputs:
+        if board.outputs:
             board.outputs.safe()
         if board.engine and board.engine.moving:
             board.engine.freeze()
@@ -133,7 +131,7 @@ class Controller:
     def moving(self) -> bool:
         """Whether there may be more steps; True while a sequence waits."""
         engine = self.board.engine
-        return engine is not None and (engine.moving or (features.SEQUENCES and self.sequence is not None))
+        return engine is not None and (engine.moving or self.sequence is not None)
 
     # called by commands, button and prompt
 
@@ -205,27 +203,39 @@ class Controller:
             self.forget_speed()
         if not name:  # no default is set
             raise Refused(codes.NOT_FOUND)
-        if features.SEQUENCES and name != ONCE_NAME and self._is_sequence(name):
-            self._new_sequence(name, crc, rate, flags)
-            self.sequence.begin()
-            return
+        if features.SEQUENCES and name != ONCE_NAME:
+            kind = self._kind(name)
+            if kind != MOTION:
+                self._new_sequence(kind, name, crc, rate, flags)
+                self.sequence.begin()
+                return
         self.begin_motion(name, crc, rate, flags, unknown)
 
     if features.SEQUENCES:
 
-        def _new_sequence(self, name: str, crc: "int | None", rate: int, flags: int) -> None:
-            self.board.once.release()
+        def _new_sequence(self, kind: int, name: str, crc: "int | None", rate: int, flags: int) -> None:
+            """Make the sequence or program ready."""
+            if flags:
+                raise Refused(codes.IS_SEQUENCE)
+            if kind == SEQUENCE:
+                self.board.once.release()  # a program makes its moves there
             self.release_memory()
             try:
-                from armtempo_board.app import sequence_start  # here, as only sequences need its memory
+                # here, as only these need the memory
+                if kind == SEQUENCE:
+                    from armtempo_board.app import sequence_start
 
-                self.sequence = sequence_start.sequencer(self, name, crc, rate, flags)
+                    self.sequence = sequence_start.sequencer(self, name, crc, rate)
+                else:
+                    from armtempo_board.app import program_start
+
+                    self.sequence = program_start.user_program(self, name, crc, rate)
             except MemoryError:
                 raise Refused(codes.NO_SEQUENCE_MEMORY)
 
-        def _is_sequence(self, name: str) -> bool:
+        def _kind(self, name: str) -> int:
             self.release_memory()
-            return bool(self.board.store().is_sequence(name))
+            return int(self.board.store().kind(name))
 
     def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
         """Start a motion at ``rate`` thousandths of its speed, or refuse.
@@ -271,10 +281,14 @@ class Controller:
 
     def stop(self, now: int) -> None:
         """Brake along the path (``now``, or without brake times: freeze); ends a sequence."""
-        if features.SEQUENCES and self.sequence:
+        if self.sequence:
             self.sequence.stopping = True
             if not self.board.engine.moving:
                 return
+        self.brake(now)
+
+    def brake(self, now: int) -> None:
+        """As ``stop``, but a sequence goes on."""
         self._braking = True
         self._held = 0
         if now or not self._can_brake:

@@ -6,8 +6,6 @@ from armtempo_shared.messages import MAX_PAYLOAD
 from armtempo_shared.table import offset, rows
 from micropython import const
 
-from armtempo_board import features
-
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
@@ -48,9 +46,13 @@ class Events:
         if not self._notice:
             self._notice = text
 
+    def can_note(self) -> bool:
+        """Whether the last text was sent."""
+        return not self._notice
+
     def push(self) -> bool:
         """Give pending events to the link, at most one sample; returns whether there was a sample."""
-        if features.SEQUENCES and self._controller.sequence:
+        if self._controller.sequence:
             self._controller.sequence.tell(self._link)
         if self._push_sample():
             return True

@@ -69,15 +69,22 @@ def _build(port: "pyb.USB_VCP", root: str) -> App:
 
 def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     """Run the loop until a host asks for the REPL. Stops the motion however it ends."""
+
+    def run_once() -> None:
+        app.run_once()
+        try:
+            _serve_panel(leds, button, watchdog)
+        except Exception as error:
+            app.fail(error)
+
     try:
         while True:
-            app.run_once()
-            try:
-                if app.leave_requested():
-                    break
-                _serve_panel(leds, button, watchdog)
-            except Exception as error:
-                app.fail(error)
+            run_once()
+            if features.SEQUENCES and app.controller.program:
+                user_program, app.controller.program = app.controller.program, None
+                user_program.execute(app, run_once)
+            if app.leave_requested():
+                break
     finally:
         app.controller.halt()
 
@@ -90,7 +97,7 @@ def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     leds.show(controller.state())
     watchdog.feed()
     pressed = button.pressed()  # a press during a motion is ignored, but it stops a sequence
-    if features.SEQUENCES and pressed and controller.sequence:
+    if pressed and controller.sequence:
         controller.stop(0)
     if controller.moving():
         return

@@ -49,6 +49,15 @@ class SequenceCommand:
         for (name, number, fields, _, tail), (_, _, answer, _, _) in zip(rows("S"), rows("T")):
             commands[number] = (getattr(self, name), fields, answer, tail)
 
+    def named(self, name: bytes, most: int) -> int:
+        """Number of a counter, added if there are fewer than ``most``; else -1."""
+        if name not in self._counters:
+            if len(self._counters) == most:
+                return -1
+            self._counters.append(name)
+            self._counts.append(0)
+        return self._counters.index(name)
+
     def count(self, number: int) -> int:
         """Increment a counter; returns its value."""
         self._counts[number] = (self._counts[number] + 1) & _MOST

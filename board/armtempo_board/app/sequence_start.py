@@ -11,6 +11,7 @@ from armtempo_board.app.sequence_ahead import AheadSequencer
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
+from armtempo_board.storage.store import SEQUENCE
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -20,14 +21,12 @@ if TYPE_CHECKING:
 _NONE = -1
 
 
-def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int, flags: int) -> Sequencer:
+def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int) -> Sequencer:
     """The sequence ``name``, ready for its first row; raises Refused.
 
-    ``crc`` as for ``Controller.begin``; ``flags`` must be 0.
+    ``crc`` as for ``Controller.begin``.
     """
-    if flags:
-        raise Refused(codes.IS_SEQUENCE)
-    record = controller.board.store().sequence(name)
+    record = controller.board.store().opened(name, SEQUENCE)
     if crc is not None and record.crc != crc:
         raise Refused(codes.BAD_CHECKSUM)
     if record.arm_crc != controller.board.arm_crc:

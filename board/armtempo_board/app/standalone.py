@@ -2,14 +2,13 @@
 
 import micropython
 import pyb
-from armtempo_shared import codes
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
 from armtempo_board.app import program
 from armtempo_board.app.app import App
 from armtempo_board.app.watchdog import Watchdog
-from armtempo_board.errors import Refused
+from armtempo_board.errors import Refused, name_of
 from armtempo_board.motion import endpoints
 
 TYPE_CHECKING = False
@@ -46,12 +45,12 @@ def replay(name: str = "", root: str = program.ROOT) -> None:
         _begin(controller, name or board.store().default())
         _follow(app, controller, watchdog)
         fault = board.fault()
-        said = "fault: " + _name(fault) if fault else "done"
+        said = "fault: " + name_of(fault) if fault else "done"
         print(said, "at steps", [board.engine.commanded(joint) for joint in range(board.joints)])
     except Refused as refused:
         joint = refused.joint
         where = "" if joint == NO_JOINT else "joint %d" % (joint + 1)
-        print("refused:", _name(refused.code), where, refused.value or "")
+        print("refused:", name_of(refused.code), where, refused.value or "")
     finally:
         controller.halt()
         micropython.kbd_intr(_CTRL_C)
@@ -83,11 +82,3 @@ def _follow(app: "App", controller: "Controller", watchdog: "Watchdog") -> None:
             controller.stop(presses)
             presses = 1
     app.run_once()
-
-
-def _name(code: int) -> str:
-    """Name of a refusal or fault, from ``codes``."""
-    for name in dir(codes):
-        if getattr(codes, name) == code:
-            return name.lower()
-    return ""

@@ -12,6 +12,7 @@ from micropython import const
 from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
+from armtempo_board.storage.store import MOTION
 
 _NUMBER_BYTES = const(1)  # of the command, in front of the answer
 
@@ -70,18 +71,18 @@ def list(commands: "Caller", row: tuple, length: int) -> int:
     if index >= len(names):
         raise Refused(codes.NOT_FOUND)
     name = names[index]
-    crc = duration = joints = is_sequence = 0
+    crc = duration = joints = kind = 0
     try:
-        is_sequence = features.SEQUENCES and store.is_sequence(name)
-        if is_sequence:
-            crc = store.sequence(name).crc
+        kind = store.kind(name) if features.SEQUENCES else MOTION
+        if kind != MOTION:
+            crc = store.opened(name, kind).crc
         else:
             motion = store.motion(name)
             crc, duration, joints = motion.crc, endpoints.duration_ticks(motion), motion.joints
     except Refused:
         crc = 0
     default = name == store.default()
-    size = commands.reply(row, len(names), store.size_of(name), crc, duration, joints, default, is_sequence)
+    size = commands.reply(row, len(names), store.size_of(name), crc, duration, joints, default, kind)
     return commands.reply_tail(size, name.encode())
 
 

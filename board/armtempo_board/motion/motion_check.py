@@ -58,12 +58,19 @@ def check(
     point; too_long, ticks or steps of 2**28; out_of_range, the position in steps; too_fast, steps/s;
     too_abrupt, steps/s**2.
     """
+    moving = 0
     try:
         for joint in range(motion.joints):
-            _check_numbers(motion, joint)
-            interval.load(motion, joint)
-            _check_joint(interval, Judge(interval, joints[joint], gap_ticks), joint)
-        rate_check.check_sum(motion, joints, interval)
+            if joint == 0 or not motion.shared:
+                segments = motion.segments * motion.refine
+                _check_spline(motion, joint, motion.time_offset(joint), segments, True)
+            if _check_spline(motion, joint, motion.angle_offset(joint), motion.segments, False):
+                moving |= 1 << joint
+                interval.load(motion, joint)
+                _check_joint(interval, Judge(interval, joints[joint], gap_ticks), joint)
+            else:
+                _check_standing(motion, joints[joint], joint)
+        rate_check.check_sum(motion, joints, moving, interval)
     finally:
         interval.close()
 
@@ -79,25 +86,33 @@ def _check_joint(interval: "Subintervals", judge: "Judge", joint: int) -> None:
             interval.advance(subdivision.SKIP)
 
 
-def _check_numbers(motion: "MotionHead", joint: int) -> None:
-    """Check that time control points increase, and that all numbers are within the range of the step generator."""
-    _check_spline(motion, joint, motion.time_offset(joint), motion.segments * motion.refine, True)
-    _check_spline(motion, joint, motion.angle_offset(joint), motion.segments, False)
+def _check_standing(motion: "MotionHead", row: "dict[str, int]", joint: int) -> None:
+    """Check the range of a joint that stands, of which nothing else can be wrong."""
+    (point,) = motion.points(motion.angle_offset(joint), 1)
+    position = (point >> STEP_FRACTION_BITS - 1) + 1 >> 1
+    if not row["min_steps"] <= position <= row["max_steps"]:
+        raise Refused(codes.OUT_OF_RANGE, joint, position)
 
 
-def _check_spline(motion: "MotionHead", joint: int, offset: int, segments: int, is_time: bool) -> None:
+def _check_spline(motion: "MotionHead", joint: int, offset: int, segments: int, is_time: bool) -> bool:
+    """Check that all numbers are within the range of the step generator, and that those of time increase.
+
+    Returns whether they differ at all.
+    """
     stream = motion.stream(offset)
+    differ = False
     try:
         control = list(struct.unpack("<%dq" % motion.degree, stream.read(_POINT_BYTES * motion.degree)))
         for segment in range(segments):
             control.extend(struct.unpack("<q", stream.read(_POINT_BYTES)))
-            _check_segment(control, joint, segment, is_time)
+            differ = _check_segment(control, joint, segment, is_time) or differ
             control.pop(_OLDEST)
     finally:
         stream.close()
+    return differ
 
 
-def _check_segment(control: "list[int]", joint: int, segment: int, is_time: bool) -> None:
+def _check_segment(control: "list[int]", joint: int, segment: int, is_time: bool) -> bool:
     if is_time:
         for i in range(len(control) - 1):
             if control[i] >= control[i + 1]:
@@ -109,6 +124,7 @@ def _check_segment(control: "list[int]", joint: int, segment: int, is_time: bool
         raise Refused(codes.TOO_LONG, joint, most)
     if is_time and most >> TICK_FRACTION_BITS >= LONGEST_TICKS:
         raise Refused(codes.TOO_LONG, joint, most >> TICK_FRACTION_BITS)
+    return span > 0
 
 
 class Judge:

@@ -105,16 +105,20 @@ def _rate(interval: "Subintervals", steps: int, ticks: int) -> int:
     return min((steps * TICK_HZ << up) // (ticks << interval.angle_measures[SCALE]), TICK_HZ)
 
 
-def check_sum(motion: "MotionHead", joints: "list[dict[str, int]]", interval: "Subintervals") -> None:
-    """Raise Refused (too_fast, no joint, rate) if the sum of all rates may be too high in one of many spans
-    of time."""
+def check_sum(
+    motion: "MotionHead", joints: "list[dict[str, int]]", moving: int, interval: "Subintervals"
+) -> None:
+    """Raise Refused (too_fast, no joint, rate) if the sum of all rates may be too high in one of many spans of time.
+
+    ``moving``: one bit per joint that does not stand.
+    """
     limit = step_rates.together + step_rates.together // 100
     if sum([row["max_rate"] for row in joints]) <= limit:
         return
     longest = max([_end_high(motion, joint) for joint in range(motion.joints)])
     width = longest // _SPANS + 1
     sums = array("I", bytes(4 * (_SPANS + 1)))
-    for joint in range(motion.joints):
+    for joint in [joint for joint in range(motion.joints) if moving >> joint & 1]:
         _add(interval, motion, joint, width, sums)
     worst = max(sums)
     if worst > limit:

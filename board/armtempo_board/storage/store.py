@@ -36,9 +36,13 @@ _ST_SIZE = const(6)
 _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
-_SEQUENCE_MAGIC = (
-    b"ATS"  # of every version, as in armtempo_shared.sequence, which is loaded for sequences only
-)
+_KIND_BYTES = const(3)  # of a record's magic, of every version
+_SEQUENCE_MAGIC, _PROGRAM_MAGIC = (
+    b"ATS",
+    b"ATP",
+)  # as in modules of armtempo_shared that are loaded when needed
+MOTION, SEQUENCE, PROGRAM = const(0), const(1), const(2)
+"""Kinds of records; what is neither of the last two counts as a motion."""
 _BLOCK = const(512)
 _0, _9, _A, _Z = const(0x30), const(0x39), const(0x61), const(0x7A)  # letters, small
 _SMALL = const(0x20)
@@ -211,29 +215,28 @@ class Store:
 
     if features.SEQUENCES:
 
-        def is_sequence(self, name: str) -> bool:
-            """Whether the record of this name is a sequence; refuses with NOT_FOUND."""
+        def kind(self, name: str) -> int:
+            """The kind of the record of this name; refuses with NOT_FOUND."""
             if not name:
                 raise Refused(codes.NOT_FOUND)
-            return self._is_sequence(_motion_file(name))
+            return self._kind(_motion_file(name))
 
-        def sequence(self, name: str) -> "Any":
-            """A stored sequence (``SequenceFile``), with head and checksum checked."""
-            return self._sequence(_motion_file(name))
+        def opened(self, name: str, kind: int) -> "Any":
+            """A stored sequence or program, with head and checksum checked."""
+            return self._opened(_motion_file(name), kind)
 
-        def _sequence(self, file_name: str) -> "Any":
-            from armtempo_board.storage import sequence_file  # here, as only sequences need its memory
-
-            size = self._size_of(file_name)
+        def _opened(self, file_name: str, kind: int) -> "Any":
+            path, size = self._path(file_name), self._size_of(file_name)
             try:
-                return self._guard(sequence_file.SequenceFile, self._path(file_name), size)
-            except ValueError:  # SequenceError, or MotionError for its checksum
-                raise Refused(codes.BAD_RECORD)
+                # here, as only these need the memory
+                if kind == SEQUENCE:
+                    from armtempo_board.storage import sequence_file
 
-        def _check_sequence(self, file_name: str) -> None:
-            try:
-                self._sequence(file_name).check()
-            except ValueError:  # SequenceError
+                    return self._guard(sequence_file.SequenceFile, path, size)
+                from armtempo_board.storage import program_file
+
+                return self._guard(program_file.ProgramFile, path, size)
+            except ValueError:  # of the record, or MotionError for its checksum
                 raise Refused(codes.BAD_RECORD)
 
     def size_of(self, name: str) -> int:
@@ -381,19 +384,24 @@ class Store:
         self._check_kind(file_name)
 
     def _check_kind(self, file_name: str) -> None:
-        """Refuse a record that is neither a motion nor a sequence."""
-        if features.SEQUENCES and self._is_sequence(file_name):
-            self._check_sequence(file_name)
-        else:
+        """Refuse a record of no kind."""
+        kind = self._kind(file_name) if features.SEQUENCES else MOTION
+        if kind == MOTION:
             self._motion(file_name)
+            return
+        try:
+            self._opened(file_name, kind).check()
+        except ValueError:  # SequenceError, or of a program's table
+            raise Refused(codes.BAD_RECORD)
 
-    def _is_sequence(self, file_name: str) -> bool:
+    def _kind(self, file_name: str) -> int:
         self._size_of(file_name)
         file = self._guard(open, self._path(file_name), "rb")
         try:
-            return bool(self._guard(file.read, len(_SEQUENCE_MAGIC)) == _SEQUENCE_MAGIC)
+            magic = self._guard(file.read, _KIND_BYTES)
         finally:
             file.close()
+        return SEQUENCE if magic == _SEQUENCE_MAGIC else PROGRAM if magic == _PROGRAM_MAGIC else MOTION
 
     def _motion(
         self, file_name: str, kind: "Any" = motion_file.MotionFile, *arguments: object
@@ -402,7 +410,7 @@ class Store:
         try:
             return self._guard(kind, self._path(file_name), size, *arguments)  # type: ignore[no-any-return]
         except ValueError:  # MotionError
-            if not self._is_sequence(file_name):
+            if self._kind(file_name) == MOTION:
                 raise Refused(codes.BAD_RECORD)
             raise Refused(codes.IS_SEQUENCE if features.SEQUENCES else codes.NEEDS_FIRMWARE)
 

@@ -108,10 +108,16 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "run": Entry(
             "run:run",
-            "Replay a motion and record it, or run a sequence.",
+            "Replay a motion and record it, or run a sequence or program.",
             "run first.json",
             "run first.json --repeat 3 --speed 50",
             "run sequence_name",
+        ),
+        "program": Entry(
+            "programs:program",
+            "Check a program in MicroPython, store it on the board, run it, and show what it prints.",
+            "program pick.py",
+            "program pick.py --check",
         ),
         "speed": Entry(
             "speed:speed", "Change the speed of the running motion to PERCENT of the planned one.", "speed 50"

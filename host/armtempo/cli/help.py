@@ -19,6 +19,7 @@ TOPICS = {
     "kinematics": "host",
     "planning": "host",
     "sequences": "host",
+    "programs": "host",
     "sharing": "host",
     "virtual-board": "host",
     "recovery": "host",

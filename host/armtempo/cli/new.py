@@ -99,9 +99,11 @@ def _given_arm(
 
 def _arm_of(name: str, answers: dict[str, str]) -> ArmText:
     if answers["arm"] != "own":
-        return project_folder.from_shipped(answers["arm"])
-    modified = answers["convention"] == questions.MODIFIED
-    return project_folder.from_joints(name, questions.joints(answers), modified)
+        arm = project_folder.from_shipped(answers["arm"])
+    else:
+        modified = answers["convention"] == questions.MODIFIED
+        arm = project_folder.from_joints(name, questions.joints(answers), modified)
+    return project_folder.within(arm, questions.workspace(answers))
 
 
 def draft_path(folder: Path) -> Path:

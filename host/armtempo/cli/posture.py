@@ -21,7 +21,7 @@ from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
 from armtempo.model.sequence_plan import SequencePlan, is_sequence_plan
-from armtempo.planning import planner, point_to_point, via_points
+from armtempo.planning import point_to_point, via_points
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
 
@@ -183,6 +183,8 @@ def format_angles(angles_deg: Array, arm: Arm) -> str:
 
 def via_deg(text: str, arm: Arm, job: Job) -> Array:
     """The angles of a via point of a job, degrees (J,); raises InputError if the job has no such point."""
+    from armtempo.planning import planner  # here, because it loads everything that plans
+
     points_deg, _ = planner.via_angles(arm, job)
     index = int(text[1:])
     if index >= len(points_deg):

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from armtempo.basics.errors import InputError
-from armtempo.cli import options, resolve, results, sequences
+from armtempo.cli import options, programs, resolve, results, sequences
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.run_progress import RunProgress, repetition_line
 from armtempo.encoding.encoded_motion import EncodedMotion
@@ -26,9 +26,9 @@ from armtempo.robot.board import Board
 @options.out
 @options.board(options.arm_of_file, options.replace_arm, options.altered)
 def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, given: BoardOptions) -> None:
-    """Replay a motion and record it, or run a sequence.
+    """Replay a motion and record it, or run a sequence or program.
 
-    WHAT: a trajectory file, a planned sequence, or the name of a motion or sequence on the board. The samples
+    WHAT: a trajectory file, a planned sequence, or the name of what is on the board. The samples
     go into a new run folder. The arm must be homed ('armtempo home') and be at the start of the motion
     ('armtempo goto'); a virtual arm is moved there first. Between repetitions the arm returns along the same
     path. Ctrl-C, or 'armtempo stop' in another terminal, brakes; 'armtempo speed', 'pause' and 'resume' work
@@ -51,7 +51,12 @@ def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, g
         results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(arm)}")
         motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
-        if isinstance(motion, str) and _is_sequence(board, motion):
+        stored = board.client.find(motion) if isinstance(motion, str) else None
+        if isinstance(motion, str) and stored and stored.program:
+            _refuse_repeat(repeat)
+            programs.run_and_report(board, motion, given.as_json)
+            return
+        if isinstance(motion, str) and stored and stored.sequence:
             _refuse_repeat(repeat)
             sequences.run_and_report(board, motion, False, resolve.runs(out), given.as_json)
             return
@@ -59,14 +64,11 @@ def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, g
 
 
 def _refuse_repeat(repeat: int) -> None:
-    """Raise InputError for --repeat, which a sequence does not have."""
+    """Raise InputError for --repeat, which a sequence or program does not have."""
     if repeat != 1:
-        raise InputError("--repeat: not for a sequence", "leave it out; repeat is a step of the sequence")
-
-
-def _is_sequence(board: Board, name: str) -> bool:
-    found = board.client.find(name)
-    return found is not None and found.sequence
+        raise InputError(
+            "--repeat: not for a sequence or program", "leave it out; it has its own repeat or loops"
+        )
 
 
 def run_and_report(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import click
+from armtempo_shared.program import SUFFIX
 from armtempo_shared.sequence import ENDINGS, FINISHED
 
 from armtempo.basics.errors import InputError
@@ -84,16 +85,18 @@ def motion_lines(state: BoardState) -> list[str]:
         found.append(f"fault     {state.fault}; see 'armtempo clear'")
     found += [f"          {line}" for line in joint_lines(state)]
     if state.sequence:
-        found.append(f"sequence  {_sequence(state.sequence)}")
+        found.append(_sequence(state.sequence))
     found.append(f"link      {_link(state)}")
     return found
 
 
 def _sequence(stand: SequenceStand) -> str:
-    """Name, step, cycle and counters of a sequence."""
+    """Name, place and counters of a sequence or program."""
+    if stand.name.endswith(SUFFIX):
+        return f"program   {stand.name}: {stand.ending}, line {stand.step}{counted(stand.counters)}"
     is_whole = stand.ending == ENDINGS[FINISHED]
     where = whole_cycles(stand.cycle) if is_whole else position(stand.step, stand.cycle)
-    return f"{stand.name}: {stand.ending}, {where}{counted(stand.counters)}"
+    return f"sequence  {stand.name}: {stand.ending}, {where}{counted(stand.counters)}"
 
 
 def counted(counters: Mapping[str, int]) -> str:

@@ -79,6 +79,7 @@ def _listed(entry: StoredMotion) -> dict[str, Any]:
     return {
         "name": entry.name,
         "sequence": entry.sequence,
+        "program": entry.program,
         "size_bytes": entry.size,
         "crc": entry.crc,
         "joints": entry.joints,
@@ -105,6 +106,8 @@ def _row(entry: StoredMotion) -> str:
     name = entry.name + (" *" if entry.default else "")
     if entry.sequence:
         return f"{name:<26}{entry.size:>8}{'sequence':>18}  {entry.crc:08x}"
+    if entry.program:
+        return f"{name:<26}{entry.size:>8}{'program':>18}  {entry.crc:08x}"
     if not entry.joints:
         return f"{name:<26}{entry.size:>8}  damaged; upload it again or remove it"
     return f"{name:<26}{entry.size:>8}{entry.joints:>8}{entry.duration_s:>10.3f}  {entry.crc:08x}"

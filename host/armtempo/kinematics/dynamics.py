@@ -28,8 +28,8 @@ def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) ->
     Angles of a parallel linkage are relative to the link before the previous one; its rods have no mass.
     """
     bodies = [joint.dynamics or Dynamics(0.0) for joint in arm.joints]
-    if arm.held:
-        bodies[-1] = _with_load(bodies[-1], arm.held)
+    if arm.payload:
+        bodies[-1] = _with_load(bodies[-1], arm.payload)
     geometry = Geometry.of(arm)
     by_row = _row_torques(geometry, bodies, angles, rates, rate_changes)
     turns = np.array(geometry.turns(list(np.eye(len(bodies)))))

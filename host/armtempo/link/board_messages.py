@@ -127,6 +127,8 @@ class StoredMotion:
     """Whether the board's button starts it."""
     sequence: bool = False
     """Whether it is a sequence, without ``duration_ticks`` and ``joints``."""
+    program: bool = False
+    """Whether it is a user's program, without them too."""
 
     @property
     def duration_s(self) -> float:
@@ -143,11 +145,12 @@ class SequenceState:
     code: int
     """Code of the fault or refusal that ended it."""
     step: int
-    """Step of the sequence file, from 1."""
+    """Step of the sequence file, or line of the program, from 1."""
     row: int
     cycle: int
     """Finished passes of its outermost repeats."""
     name: str
+    """Of a program with the ending ``.py``."""
 
 
 @dataclass(frozen=True)

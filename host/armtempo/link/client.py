@@ -24,6 +24,8 @@ LARGEST_PIECE = MAX_COMMAND - 4
 PIECE_TIMEOUT_S = 0.5
 
 _CTRL_C = 3
+SEQUENCE, PROGRAM = 1, 2
+"""Kinds of stored records other than motions."""
 _GREETINGS = 8
 """Number of a session's first frames that can be ``hello``."""
 
@@ -183,7 +185,7 @@ class Client:
         found: list[board_messages.StoredMotion] = []
         while True:
             try:
-                (count, size, crc, duration, joints, default, is_sequence), name = self.session.command(
+                (count, size, crc, duration, joints, default, kind), name = self.session.command(
                     "list", (len(found),)
                 )
             except BoardError as error:
@@ -194,7 +196,7 @@ class Client:
                 return found
             found.append(
                 board_messages.StoredMotion(
-                    name, size, crc, duration, joints, bool(default), bool(is_sequence)
+                    name, size, crc, duration, joints, bool(default), kind == SEQUENCE, kind == PROGRAM
                 )
             )
             if len(found) >= count:

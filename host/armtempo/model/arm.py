@@ -61,7 +61,7 @@ class Arm:
     """The space in which it may move; not sent to the board."""
     loads: tuple[Load, ...] = field(default=(), metadata=json_codec.ADDED)
     """What its tool may hold; the board knows nothing of them."""
-    held: Load | None = field(default=None, metadata=json_codec.ADDED)
+    payload: Load | None = field(default=None, metadata={**json_codec.ADDED, json_codec.KEY: "held"})
     """What it holds; see ``holding``."""
     homing: tuple[tuple[str, ...], ...] = field(default=(), metadata=json_codec.ADDED)
     """Names of the joints in the order of homing, joints of an entry together; the other joints follow one by one."""
@@ -244,8 +244,10 @@ class Arm:
         if not load:
             return self
         if load == NOTHING:
-            return replace(self, held=None)
-        return replace(self, held=self.loads[self._number("load", load, [each.name for each in self.loads])])
+            return replace(self, payload=None)
+        return replace(
+            self, payload=self.loads[self._number("load", load, [each.name for each in self.loads])]
+        )
 
     def _number(self, what: str, name: str, names: list[str]) -> int:
         if name in names:

@@ -13,10 +13,10 @@ from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
-from armtempo.model import shipped, tool_way, via_table
+from armtempo.model import shipped, tool_segment, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, Pose, from_table
-from armtempo.model.tool_way import ToolWay
+from armtempo.model.tool_segment import ToolSegment
 from armtempo.optimise import ALGORITHMS
 
 GRADIENT = "gradient"
@@ -61,7 +61,9 @@ class Job:
     """Each entry: the driven joints' angles, degrees (J,), or a pose."""
     stops: tuple[Stop, ...] = field(default=(), metadata=json_codec.ADDED)
     """Via points between the ends at which the motion stops, in order."""
-    ways: tuple[ToolWay, ...] = field(default=(), metadata=json_codec.ADDED)
+    tool_segments: tuple[ToolSegment, ...] = field(
+        default=(), metadata={**json_codec.ADDED, json_codec.KEY: "ways"}
+    )
     """Requirements for the tool between via points (lines, arcs, speeds), in order."""
     speed_mm_s: float | None = field(default=None, metadata=json_codec.ADDED)
     acceleration_mm_s2: float | None = field(default=None, metadata=json_codec.ADDED)
@@ -154,14 +156,14 @@ class Job:
     def of_table(cls, top: Table, arm: Arm) -> Job:
         """The job described by the top table of a TOML file; errors as in ``load``."""
         parameters = top.table("parameters")
-        vias, stops, ways = _vias(top, arm)
+        vias, stops, segments = _vias(top, arm)
         job = cls(
             name=name_of(top),
             via=vias,
             stops=stops,
-            ways=ways,
-            speed_mm_s=tool_way.limit(top, "speed_mm_s"),
-            acceleration_mm_s2=tool_way.limit(top, "acceleration_mm_s2"),
+            tool_segments=segments,
+            speed_mm_s=tool_segment.limit(top, "speed_mm_s"),
+            acceleration_mm_s2=tool_segment.limit(top, "acceleration_mm_s2"),
             holds=held(top, arm),
             start_touches=top.boolean("start_touches", cls.start_touches),
             path=top.choice("path", PATHS, cls.path),
@@ -261,12 +263,12 @@ def is_name(name: str, longest: int = MAX_NAME) -> bool:
 
 def _vias(
     top: Table, arm: Arm
-) -> tuple[tuple[tuple[float, ...] | Pose, ...], tuple[Stop, ...], tuple[ToolWay, ...]]:
-    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose, stops and ways among them."""
+) -> tuple[tuple[tuple[float, ...] | Pose, ...], tuple[Stop, ...], tuple[ToolSegment, ...]]:
+    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose, stops and lines too."""
     if top.has("via_deg") == top.has("via"):
         raise top.fail("via_deg", "given, or else [[via]] tables, but not both")
     stops: list[Stop] = []
-    ways: list[ToolWay] = []
+    segments: list[ToolSegment] = []
     if top.has("via_deg"):
         rows = top.array("via_deg", "a list of at least 2 lists of angles")
         named = Table({f"via_deg P{n}": row for n, row in enumerate(rows)}, top.file)
@@ -276,17 +278,17 @@ def _vias(
     else:
         tables = top.tables("via", lambda n: f"via P{n}")
         stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
-        found = [tool_way.read(table, n) for n, table in enumerate(tables)]
+        found = [tool_segment.read(table, n) for n, table in enumerate(tables)]
         vias = [
             _via(table, f"{top.file}: via P{n}", arm, way)
             for n, (table, way) in enumerate(zip(tables, found, strict=True))
         ]
-        ways = [way for way in found if way]
+        segments = [each for each in found if each]
     if len(vias) < 2:
         raise InputError(f"{top.file}: {len(vias)} via point is not a motion", "at least 2 are needed")
     if len(vias) - 1 > MAX_SEGMENTS:
         raise InputError(f"{top.file}: {len(vias)} via points", f"the board holds at most {MAX_SEGMENTS + 1}")
-    return tuple(vias), tuple(stops), tuple(ways)
+    return tuple(vias), tuple(stops), tuple(segments)
 
 
 def _stops(table: Table) -> bool:
@@ -306,7 +308,7 @@ def _stop(table: Table, via: int, count: int) -> Stop:
     return Stop(via, dwell_s)
 
 
-def _via(table: Table, where: str, arm: Arm, way: ToolWay | None) -> tuple[float, ...] | Pose:
+def _via(table: Table, where: str, arm: Arm, way: ToolSegment | None) -> tuple[float, ...] | Pose:
     forms = [key for key in ("angles_deg", "matrix", "position_mm", "posture") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
@@ -329,7 +331,7 @@ def _via(table: Table, where: str, arm: Arm, way: ToolWay | None) -> tuple[float
     return replace(pose, posture_deg=posture)
 
 
-def _done(table: Table, way: ToolWay | None) -> None:
+def _done(table: Table, way: ToolSegment | None) -> None:
     if way and way.line:
         table.known("tolerance_mm", "tolerance_deg")
     table.done()

@@ -14,7 +14,7 @@ from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
-from armtempo.model import tool_way
+from armtempo.model import tool_segment
 from armtempo.model.arm import Arm, read_posture
 from armtempo.model.job import Job, held, is_name, name_of, read_angles
 from armtempo.model.plan import Plan
@@ -187,7 +187,7 @@ class _Reader:
         line = table.boolean("line", False)
         if table.has("speed_mm_s") and not line:
             raise table.fail("speed_mm_s", "given with line = true only")
-        speed = tool_way.limit(table, "speed_mm_s")
+        speed = tool_segment.limit(table, "speed_mm_s")
         return [Goto(target, line=line, speed_mm_s=speed, where=_place(table), step=step)]
 
     def posture(self, table: Table, key: str) -> ArmPosture:

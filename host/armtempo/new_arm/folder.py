@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -119,6 +119,14 @@ def from_joints(name: str, joints: Sequence[JointEntry], modified: bool = False)
         ]
     tables = [joint_entry.table(joint, number, len(joints)) for number, joint in enumerate(joints, 1)]
     return _checked("\n".join([f"name = {json.dumps(name, ensure_ascii=False)}\n", *base, *tables]))
+
+
+def within(arm: ArmText, workspace: Mapping[str, Sequence[float]]) -> ArmText:
+    """The arm in a workspace: the numbers of its keys, one or two each. Raises InputError as an arm file."""
+    if not workspace:
+        return arm
+    rows = [f"{key} = {values[0] if len(values) == 1 else list(values)}" for key, values in workspace.items()]
+    return _checked("\n".join([arm.text, "[workspace]", *rows, ""]))
 
 
 def _checked(text: str) -> ArmText:

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS, MAX_STEP_RATE
 
 from armtempo.basics.text import visible
 from armtempo.model import shipped
 from armtempo.model.parts_file import MAX_ANGLE_DEG, MAX_LENGTH_MM
+from armtempo.model.workspace import FAR_MM
 from armtempo.new_arm.joint_entry import INTEGERS, JointEntry
 
 STANDARD, MODIFIED = "standard", "modified"
+NO = "none"
+FLOOR, WALLS = "floor_mm", ("x_mm", "y_mm")
+"""Keys of the workspace in an arm file."""
 CONVENTIONS = """\
     standard (Denavit-Hartenberg)           modified (Craig)
 
@@ -86,6 +91,7 @@ def _all(answers: Mapping[str, str]) -> list[Question]:
     if answers.get("arm") == "own":
         found += _own(answers)
     if answers.get("arm") != "own" or ("count" in answers and f"{answers['count']}.speed_deg_s" in answers):
+        found += _workspace()
         found.append(
             Question(
                 *("port", "port of the board", "sim:board"),
@@ -95,6 +101,51 @@ def _all(answers: Mapping[str, str]) -> list[Question]:
             )
         )
     return found
+
+
+def workspace(answers: Mapping[str, str]) -> dict[str, list[float]]:
+    """Height of the floor, and the walls, [low, high], by key of the arm file; only those that there are."""
+    given = {key: _numbers(1 if key == FLOOR else 2)(answers.get(key, NO)) for key in (FLOOR, *WALLS)}
+    return {key: found for key, found in given.items() if found}
+
+
+def _workspace() -> list[Question]:
+    return [
+        Question(
+            *(FLOOR, f"height of the table or floor, z in mm ({NO}: there is none)", NO),
+            "In the frame of the base, whose first joint is at z = 0. Nothing moves the arm below it, by hand neither; "
+            "later it is floor_mm of [workspace] in the arm file.",
+            _numbers(1),
+        ),
+        *(
+            Question(
+                *(key, f"walls, {key[0]} in mm, as in -300 400 ({NO}: there are none)", NO),
+                f"Two numbers, the smaller first: the arm stays between them. Later they are {key} of [workspace].",
+                _numbers(2),
+            )
+            for key in WALLS
+        ),
+    ]
+
+
+def _numbers(count: int) -> Callable[[str], list[float]]:
+    """Reads so many numbers, ascending, or none."""
+    example = "0" if count == 1 else "-300 400"
+
+    def read(text: str) -> list[float]:
+        if text == NO:
+            return []
+        try:
+            found = [float(one) for one in text.replace(",", " ").split()]
+        except ValueError:
+            found = []
+        fits = len(found) == count and all(abs(one) < FAR_MM for one in found)
+        if not fits or any(low >= high for low, high in pairwise(found)):
+            what = "a number" if count == 1 else "two numbers, the smaller first"
+            raise WrongAnswerError(f"{visible(text)!r}: not {what}; e.g. {example}, or {NO}")
+        return found
+
+    return read
 
 
 def _own(answers: Mapping[str, str]) -> list[Question]:

@@ -22,11 +22,13 @@ from armtempo.model.arm import Arm
 from armtempo.model.workspace import FAR_MM
 from armtempo.planning.workspace_check import Bodies
 
-COLOUR, GHOST, PATH, RUN, VIA, ROOM = "#4477aa", "#999999", "#228833", "#ee6677", "#ccbb44", "#aa3377"
-WAY = "#66ccee"
+COLOUR, GHOST, RUN, VIA, ROOM = "#4477aa", "#999999", "#ee6677", "#ccbb44", "#aa3377"
+WAY, JOINT = "#66ccee", "#33557a"
 """Paul Tol's bright scheme, which is safe for colour-blind users."""
-_THICK = 0.03
-"""Default radius of a link, as a fraction of the arm's reach."""
+_THICK = (0.042, 0.016)
+"""Radii of the first and the last link of an arm whose file gives none, as fractions of its reach."""
+_HOUSING = (1.3, 1.2)
+"""Radius, and half the length, of a joint's housing, by the radius of its link."""
 _DOT = 0.022
 """Radius of a via point's ball."""
 _SHORT_MM = 1e-6
@@ -38,6 +40,10 @@ _SHOWN = 1.2
 _VIA_NAME = "via "
 FOLLOW = "follow"
 """The view that keeps the tool in the middle."""
+EYES = {"side": (0.0, -1.4, 0.25), "top": (0.0, -0.001, 1.6), "free": (0.7, -0.85, 0.6)}
+"""Where the views look from; from above x is to the right and y up."""
+_SLOW_TO_FAST = ((0.20, 0.35, 0.75), (0.13, 0.55, 0.35), (0.85, 0.65, 0.10), (0.85, 0.15, 0.25))
+"""Colours of a path, red, green and blue, seen on light and dark: blue where it is slow, red where it is fastest."""
 
 
 class ArmShape:
@@ -82,7 +88,7 @@ class ArmShape:
     @cached_property
     def pieces(self) -> list[tuple[int, float, float]]:
         """Index in the outline, length and radius of each link; without links of length 0."""
-        radii = [radius / self.reach_mm or _THICK for radius in Bodies(self.arm).radius_mm]
+        radii = self._radii
         points = self.outline(np.array(self.arm.home_deg))
         lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
         return [
@@ -90,6 +96,22 @@ class ArmShape:
             for index, length in enumerate(lengths)
             if length * self.reach_mm > _SHORT_MM
         ]
+
+    @cached_property
+    def _radii(self) -> list[float]:
+        """Of each segment of the outline, two for each row: the arm file's, else thinner from row to row."""
+        given = Bodies(self.arm).radius_mm / self.reach_mm
+        rows = np.minimum(np.arange(len(given)) // 2, len(self.arm.joints) - 1)
+        usual = np.interp(rows, (0, max(1, len(self.arm.joints) - 1)), _THICK)
+        found: list[float] = np.where(given > 0.0, given, usual).tolist()
+        return found
+
+    @cached_property
+    def housings(self) -> list[tuple[float, float]]:
+        """Radius and length of the cylinder about the axis of each driven joint."""
+        radius, half = _HOUSING
+        links = [self._radii[2 * joint] for joint in self.arm.driven_indices]
+        return [(radius * link, 2 * half * radius * link) for link in links]
 
     @property
     def workspace(self) -> list[tuple[Array, Array]]:
@@ -104,29 +126,48 @@ class ArmShape:
         return found
 
     def poses(self, angles_deg: Array) -> list[list[float]]:
-        """x, y, z and the quaternion x, y, z, w of each piece's middle, its y axis along it, then of each mesh."""
+        """x, y, z and the quaternion x, y, z, w of the middle of each piece, then of each housing, their y axes along
+        them, then of each mesh."""
+        frames = all_frames(
+            self._geometry, np.radians(all_angles_deg(self.arm, np.asarray(angles_deg))).tolist()
+        )
         points, first = self.outline(angles_deg), [index for index, *_ in self.pieces]
         begin, end = points[first], points[np.array(first) + 1]
         along = (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
-        zero = np.zeros(len(along))
-        # The shortest rotation from y
-        turns = np.column_stack((along[:, 2], zero, -along[:, 0], 1.0 + along[:, 1]))
-        turns[turns[:, 3] < _OPPOSITE] = (1.0, 0.0, 0.0, 0.0)
-        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-        found: list[list[float]] = np.hstack(((begin + end) / 2, turns)).round(5).tolist()
-        return found + self._mesh_poses(np.asarray(angles_deg))
+        axes = frames[list(self.arm.driven_indices)]
+        middles = np.vstack(((begin + end) / 2, axes[:, :3, 3] / self.reach_mm))
+        turns = _from_y(np.vstack((along, axes[:, :3, 2])))
+        found: list[list[float]] = np.hstack((middles, turns)).round(5).tolist()
+        return found + self._mesh_poses(frames)
 
-    def _mesh_poses(self, angles_deg: Array) -> list[list[float]]:
+    def _mesh_poses(self, frames: Array) -> list[list[float]]:
         """The same of each mesh."""
         if not self.meshes:
             return []
         from scipy.spatial.transform import Rotation  # here, as most arms have no meshes
 
-        frames = all_frames(self._geometry, np.radians(all_angles_deg(self.arm, angles_deg)).tolist())
         chosen = frames[list(self.meshes)]
         turns = Rotation.from_matrix(chosen[:, :3, :3]).as_quat()
         found: list[list[float]] = np.hstack((chosen[:, :3, 3] / self.reach_mm, turns)).round(5).tolist()
         return found
+
+
+def _from_y(along: Array) -> Array:
+    """Quaternions x, y, z, w, (K, 4), of the shortest rotations from y to unit vectors, (K, 3)."""
+    turns = np.column_stack((along[:, 2], np.zeros(len(along)), -along[:, 0], 1.0 + along[:, 1]))
+    turns[turns[:, 3] < _OPPOSITE] = (1.0, 0.0, 0.0, 0.0)
+    found: Array = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+    return found
+
+
+def colours_of_speed(points_mm: Array, times_s: Array) -> tuple[Array, float]:
+    """Colours, red, green and blue, (N, 3), of the points of a path, (N, 3), by its speed, and the highest, mm/s."""
+    speeds = np.linalg.norm(np.gradient(points_mm, times_s, axis=0), axis=1)
+    fastest = float(speeds.max())
+    parts = speeds / (fastest or 1.0) * (len(_SLOW_TO_FAST) - 1)
+    scale = np.array(_SLOW_TO_FAST)
+    columns = [np.interp(parts, np.arange(len(scale)), scale[:, one]) for one in range(3)]
+    return np.column_stack(columns), fastest
 
 
 class ArmScene:
@@ -146,18 +187,18 @@ class ArmScene:
             on_click=self._clicked,
             on_drag_end=lambda event: self._moved(event.object_name, [event.x, event.y, event.z]),
         ) as self.scene:
-            # as capsules, or as the meshes that the arm has, whose poses come after those of the capsules
-            self._links = (
-                [""] * len(shape.pieces) + self._meshes() if shape.meshes else self._capsules(COLOUR, 1.0)
-            )
-            self._ghost = self._capsules(GHOST, _GHOST_OPACITY)
-            self._workspace()
+            # as simple shapes, or as the meshes that the arm has, whose poses come after those of the shapes
+            simple = len(shape.pieces) + len(shape.housings)
+            self._links = [""] * simple + self._meshes() if shape.meshes else self._body(COLOUR, JOINT, 1.0)
+            self._ghost = self._body(GHOST, GHOST, _GHOST_OPACITY)
+        self._walls: list[Object3D] = []
+        self.draw_workspace()
         self._dots: list[tuple[Object3D, Object3D]] = []
         """A ball for each via point, and its name."""
         self.look("free")
 
-    def _capsules(self, colour: str, opacity: float) -> list[str]:
-        """A capsule for each piece; their numbers in the scene."""
+    def _body(self, colour: str, colour_of_joints: str, opacity: float) -> list[str]:
+        """A capsule for each piece, a cylinder for each joint; their numbers in the scene."""
         found = []
         for _, length, radius in self._shape.pieces:
             with self.scene.group() as capsule:
@@ -165,6 +206,10 @@ class ArmScene:
                 for end in (-length / 2, length / 2):
                     self.scene.sphere(radius, 16, 12).material(colour, opacity).move(0, end, 0)
             found.append(str(capsule.id))
+        for radius, length in self._shape.housings:
+            with self.scene.group() as housing:
+                self.scene.cylinder(radius, radius, length, 24).material(colour_of_joints, opacity)
+            found.append(str(housing.id))
         return found
 
     def _meshes(self) -> list[str]:
@@ -176,13 +221,16 @@ class ArmScene:
             found.append(str(mesh.id))
         return found
 
-    def _workspace(self) -> None:
-        """The boxes to keep out of, and frames for the walls."""
-        for low, high in self._shape.workspace:
-            is_wall = not (high - low).all()
-            width, height, depth = (high - low).tolist()
-            box = self.scene.box(width, height, depth, wireframe=is_wall)
-            box.material(ROOM, _ROOM_OPACITY).move(*((low + high) / 2).tolist())
+    def draw_workspace(self) -> None:
+        """The boxes to keep out of, and frames for the walls, as the arm has them now."""
+        while self._walls:
+            self._walls.pop().delete()
+        with self.scene:
+            for low, high in self._shape.workspace:
+                is_wall = not (high - low).all()
+                width, height, depth = (high - low).tolist()
+                box = self.scene.box(width, height, depth, wireframe=is_wall)
+                self._walls.append(box.material(ROOM, _ROOM_OPACITY).move(*((low + high) / 2).tolist()))
 
     @property
     def parts(self) -> str:
@@ -195,14 +243,17 @@ class ArmScene:
     def look(self, view: str) -> None:
         """Look from the side, from above, from in front and above, or follow the tool."""
         if view != FOLLOW:
-            eye = {"side": (0.01, -1.4, 0.25), "top": (0.01, -0.01, 1.6), "free": (0.7, -0.85, 0.6)}[view]
-            self.scene.move_camera(*eye, 0, 0, 0.15, duration=0.3)
+            self.scene.move_camera(*EYES[view], 0, 0, 0.15, duration=0.3)
         ui.run_javascript(f"armtempo.follow = {json.dumps(view == FOLLOW)}")
 
-    def draw(self, name: str, points_mm: Array, colour: str) -> None:
-        """Draw a line through points (N, 3), replacing the line of that name."""
+    def draw(self, name: str, points_mm: Array, colour: str | Array) -> None:
+        """Draw a line through points (N, 3), replacing the line of that name.
+
+        ``colour``: of the line, or of each point, (N, 3).
+        """
         points = (np.asarray(points_mm) / self._shape.reach_mm).round(4).tolist()
-        ui.run_javascript(f"armtempo.line({json.dumps(name)}, {json.dumps(points)}, {json.dumps(colour)})")
+        given = colour if isinstance(colour, str) else colour.round(3).ravel().tolist()
+        ui.run_javascript(f"armtempo.line({json.dumps(name)}, {json.dumps(points)}, {json.dumps(given)})")
 
     def dots(self, points_mm: Array) -> None:
         """Draw a ball at each via point, (N, 3), that can be clicked and dragged."""

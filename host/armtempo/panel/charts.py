@@ -13,6 +13,11 @@ COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
 """Paul Tol's bright scheme."""
 DASHES = ("solid", "dashed", "dotted")
 _GRID = {"lineStyle": {"color": "rgba(128, 128, 128, 0.3)"}}
+_GREY = "#888888"
+_PLACES = ("insideStart", "insideMiddle", "insideEnd")
+"""Where limits are named, beside each other where they are nearly the same."""
+_FAR = 4.0
+"""A limit that is this many times as high as the curves is left out: they would be flat."""
 ORDER_LIMIT = {1: "speed_deg_s", 2: "acceleration_deg_s2", 3: "jerk_deg_s3"}
 
 
@@ -47,6 +52,7 @@ class CurveChart:
         """A curve for each joint: times (N,), values (N, J); ``reference``, (N, J), is dotted."""
         joints = range(values.shape[1])
         series = [self._curve(number, times_s, values[:, number]) for number in joints]
+        self._show_limits(series, float(np.nanmax(np.abs(values), initial=0.0)))
         if reference is not None:
             series += [self._curve(number, times_s, reference[:, number], of_plan=True) for number in joints]
         self._place.set_visibility(True)
@@ -62,21 +68,45 @@ class CurveChart:
     def _curve(self, number: int, times_s: Array, values: Array, of_plan: bool = False) -> dict[str, object]:
         points = np.column_stack((times_s, values)).round(4).tolist()
         curve: dict[str, object] = {
-            "name": self._arm.driven[number].name,  # one entry of the legend for both
+            "name": words.plain(self._arm.driven[number].name),
             "type": "line",
             "showSymbol": False,
             "color": COLOURS[number % len(COLOURS)],
             "data": points,
         }
         if of_plan:
-            return {**curve, "lineStyle": {"type": "dotted", "width": 4, "opacity": 0.5}}
-        return {**curve, "lineStyle": {"type": DASHES[number // len(COLOURS)]}, **self._limit(number)}
+            name = words.IN_PLAN.format(name=curve["name"])
+            return {**curve, "name": name, "lineStyle": {"type": "dotted", "width": 4, "opacity": 0.5}}
+        return {**curve, "lineStyle": {"type": DASHES[number // len(COLOURS)]}}
 
-    def _limit(self, number: int) -> dict[str, object]:
-        """Lines at a joint's limit, both ways."""
-        if self._order not in ORDER_LIMIT:
-            return {}
-        limit = getattr(self._arm.driven[number].limits, ORDER_LIMIT[self._order])
-        style = {"type": "dotted", "color": COLOURS[number % len(COLOURS)], "opacity": 0.5}
-        lines = [{"yAxis": value, "lineStyle": style} for value in (limit, -limit)]
-        return {"markLine": {"silent": True, "symbol": "none", "label": {"show": False}, "data": lines}}
+    def _show_limits(self, series: list[dict[str, object]], most: float) -> None:
+        """Lines at the limits, both ways, with the names of the joints that have them; the axis has those near."""
+        named = self._limits() if self._order in ORDER_LIMIT else {}
+        for count, (limit, numbers) in enumerate(named.items()):
+            colour = COLOURS[numbers[0] % len(COLOURS)] if len(numbers) == 1 else _GREY
+            text = words.LIMIT.format(names=", ".join(str(series[number]["name"]) for number in numbers))
+            place = _PLACES[count % len(_PLACES)]
+            label = {"formatter": text, "position": f"{place}Top", "color": "inherit", "fontSize": 10}
+            style = {"type": "dotted", "color": colour}
+            series[numbers[0]]["markLine"] = {
+                "silent": True,
+                "symbol": "none",
+                "data": [
+                    {"yAxis": limit, "lineStyle": style, "label": label},
+                    {
+                        "yAxis": -limit,
+                        "lineStyle": style,
+                        "label": {**label, "position": f"{place}Bottom"},
+                    },
+                ],
+            }
+        seen = max((limit for limit in named if limit < _FAR * most), default=None)
+        end = None if seen is None else max(most, seen) * 1.08
+        self.chart.options["yAxis"].update(max=end, min=None if end is None else -end)
+
+    def _limits(self) -> dict[float, list[int]]:
+        """The joints that have each limit."""
+        found: dict[float, list[int]] = {}
+        for number, joint in enumerate(self._arm.driven):
+            found.setdefault(getattr(joint.limits, ORDER_LIMIT[self._order]), []).append(number)
+        return found

@@ -13,7 +13,7 @@ from tomlkit.items import Array
 from armtempo.basics import toml_table
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import tool_way
+from armtempo.model import tool_segment
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -39,7 +39,7 @@ OPTIONS = (
     "holds",
 )
 """Keys of the job that are edited as fields."""
-WAY_KEYS = (*tool_way.KEYS, "stop", "dwell_s")
+WAY_KEYS = (*tool_segment.KEYS, "stop", "dwell_s")
 """Keys of a via point that are edited as fields, besides where it is."""
 _PLACES = 4
 """Decimal places of an angle that is taken from the arm or the picture: 0.0001 deg is less than a step."""

@@ -261,7 +261,7 @@ class JobTab:
             if not choices:
                 return
         if choices is None:
-            box = ui.input(label, value=value).props("dense outlined").classes("armtempo-value")
+            box = ui.input(label, value=value).props("dense outlined").classes("armtempo-wide")
             self._choices.add(box.set_value, partial(self._jobs.option, key))
             self._on_typed(box, self._jobs.set_option, key)
             return
@@ -414,7 +414,9 @@ def _cell(index: int, via: Via) -> str:
     if via.angles_deg is not None:
         return f"{via.angles_deg[index]:g}" if index < len(via.angles_deg) else ""
     values = via.values.get(ANGLES)
-    return str(values[index]) if isinstance(values, list) and index < len(values) else ""
+    found = values[index] if isinstance(values, list) and index < len(values) else ""
+    # As above, as one of the others is what is no angle
+    return f"{found:g}" if isinstance(found, int | float) and not isinstance(found, bool) else str(found)
 
 
 def build(page: PanelPage) -> None:

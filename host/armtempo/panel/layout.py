@@ -99,6 +99,8 @@ def _views(page: PanelPage) -> None:
             words.VIEWS, value="free", on_change=lambda event: page.scene.look(str(event.value))
         )
         named(views.props("dense no-caps unelevated"), words.VIEW)
+    page.speeds = ui.label("").classes("armtempo-speed-scale")
+    page.speeds.set_visibility(False)
     ui.label(words.UNKNOWN).classes("armtempo-unknown")
 
 
@@ -160,7 +162,11 @@ class Paths:
         if (plan := operator.jobs.plan) is not None and plan is not self._plan:
             self._plan = plan
             times = np.linspace(0.0, plan.total_s, _POINTS)
-            scene.draw("plan", tool_path_mm(plan.arm, plan.trajectory, times), arm_scene.PATH)
+            path = tool_path_mm(plan.arm, plan.trajectory, times)
+            colours, fastest = arm_scene.colours_of_speed(path, times)
+            scene.draw("plan", path, colours)
+            self._page.speeds.set_text(words.PATH_SPEED.format(fastest=fastest))
+            self._page.speeds.set_visibility(True)
         path = operator.live.run_path_mm
         if path is not self._run:
             self._run = path
@@ -255,8 +261,8 @@ def position(operator: PanelBoard) -> str:
     where = "  ".join(f"{angle:.2f}°" for angle in angles)
     with suppress(InputError):
         pose = forward(operator.arm, angles)
-        x, y, z = pose[:3, 3]
-        roll, pitch, yaw = to_rpy_deg(pose)
+        x, y, z = pose[:3, 3].round(1) + 0.0  # no -0.0
+        roll, pitch, yaw = np.round(to_rpy_deg(pose), 1) + 0.0
         return f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  roll {roll:.1f}  pitch {pitch:.1f}  yaw {yaw:.1f}°  ·  {where}"
     return where
 

@@ -16,7 +16,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.pose import to_rpy_deg
-from armtempo.panel import arm_scene, homing, teaching, words
+from armtempo.panel import arm_scene, floor, homing, teaching, words
 from armtempo.panel.hold import SHOWN_S
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import PanelPage, named
@@ -47,6 +47,7 @@ class MoveTab:
         self._target_deg: Array | None = None
         """What the ghost shows."""
         self._jogs()
+        floor.build(page)
         self._targets()
         self._home_and_teach()
         _outputs(page)

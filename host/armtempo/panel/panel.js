@@ -145,7 +145,7 @@ window.armtempo = {
     });
   },
 
-  // a line through points, in the place of the one of that name; tried again until three.js is loaded
+  // a line through points, of a colour or with one for each point, in the place of the one of that name; tried again until three.js is loaded
   line(name, points, colour) {
     const scene = this.parts && getElement(this.parts.scene);
     if (!this.THREE || !scene || !scene.scene) return setTimeout(() => this.line(name, points, colour), 100);
@@ -158,7 +158,9 @@ window.armtempo = {
   polyline(points, colour) {
     const T = this.THREE;
     const shape = new T.BufferGeometry().setFromPoints(points.map((point) => new T.Vector3(...point)));
-    return new T.Line(shape, new T.LineBasicMaterial({ color: colour }));
+    if (!Array.isArray(colour)) return new T.Line(shape, new T.LineBasicMaterial({ color: colour }));
+    shape.setAttribute("color", new T.Float32BufferAttribute(colour, 3));
+    return new T.Line(shape, new T.LineBasicMaterial({ vertexColors: true }));
   },
 
   // an arc at each joint for its range, and a hand on it for its angle

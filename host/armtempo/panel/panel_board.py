@@ -128,7 +128,7 @@ class PanelBoard:
         return self._board is not None
 
     def arm_changed(self, arm: Arm) -> None:
-        """Take another version of the arm that differs in its postures alone."""
+        """Take another version of the arm that differs in its postures and its workspace alone."""
         self.arm = self.live.arm = self.jobs.arm = self.sequences.arm = arm
         if self._board is not None:
             self._board.arm = arm

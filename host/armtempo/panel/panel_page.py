@@ -47,7 +47,7 @@ class _Control:
         self.element.set_enabled(not reason)  # type: ignore[attr-defined]
         for hint in self.element.default_slot.children:
             if isinstance(hint, ui.tooltip):
-                hint.set_text(reason)
+                hint.set_text(words.plain(reason))
                 hint.set_visibility(bool(reason))
 
 
@@ -82,6 +82,8 @@ class PanelPage:
     """Speed of jogs and of moves to a target, percent of the limits."""
     picture: Element = field(init=False)
     """The place of the scene."""
+    speeds: ui.label = field(init=False)
+    """What the colours of the planned path mean."""
 
     @cached_property
     def scene(self) -> ArmScene:

@@ -59,7 +59,7 @@ def ask(page: PanelPage, changed: Callable[[], object]) -> None:
         wanted = str(name.value or "").strip()
         if any(posture.name == wanted for posture in operator.arm.postures) and not replace.value:
             raise InputError(words.HAS_POSTURE.format(name=wanted), words.REPLACE_HINT)
-        taught.save(_arm_file(operator.arm), operator.arm, wanted, angles, replace.value)
+        taught.save(arm_file(operator.arm), operator.arm, wanted, angles, replace.value)
         _read_again(page, changed)
         operator.say(words.TAUGHT.format(name=wanted))
 
@@ -97,7 +97,7 @@ def ask(page: PanelPage, changed: Callable[[], object]) -> None:
 
 def _change(page: PanelPage, name: str, new: str | None, changed: Callable[[], object]) -> None:
     """Remove a posture from the arm file, or give it another name; its other lines and comments stay."""
-    file = _arm_file(page.operator.arm)
+    file = arm_file(page.operator.arm)
     content = tomlkit.parse(file.read_text(encoding="utf-8"))
     postures: Any = content["posture"]
     found = postures[name]
@@ -114,11 +114,11 @@ def _change(page: PanelPage, name: str, new: str | None, changed: Callable[[], o
 
 def _read_again(page: PanelPage, changed: Callable[[], object]) -> None:
     """Take the arm with its new postures, which the board does not know."""
-    page.operator.arm_changed(Arm.read(_arm_file(page.operator.arm)))
+    page.operator.arm_changed(Arm.read(arm_file(page.operator.arm)))
     changed()
 
 
-def _arm_file(arm: Arm) -> Path:
+def arm_file(arm: Arm) -> Path:
     """The file of an arm; raises InputError for one that ships, which is no file of the project."""
     file = Path(arm.source)
     if not file.is_file() or not file.resolve().is_relative_to(Path().resolve()):

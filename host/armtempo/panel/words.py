@@ -75,9 +75,17 @@ SURE_BY_HAND = (
 )
 GUIDING, GUIDED = "Guide the arm. It is held again after:", "The current on"
 VIEW = "View"
+PATH_SPEED = "0 … {fastest:.0f} mm/s"
+LIMIT, IN_PLAN = "limit of {names}", "{name}, planned"
 SPEED_OF_MOTION = "Speed"
 HOME, GO, CLEAR, PAUSE, RESUME = "The arm is at home", "Go", "Clear the fault", "Pause", "Resume"
 HOMING = "Home…"
+NO_FLOOR = "The arm file names no table: nothing keeps the arm from going below it."
+ASK_FLOOR, FLOOR_HEIGHT = "Table…", "Height of the table, z in mm"
+FLOOR_HINT = (
+    "No jog, target or plan goes below the table. Its height, in the base's frame, goes into the arm file."
+)
+NO_HEIGHT, GIVE_HEIGHT = "The table has no height", "type one"
 WHICH_JOINTS, ALL_JOINTS = "Home", "All joints"
 NO_SWITCH = "{joint} has no switch whose angle is known: say where it is instead."
 HOME_BY_SWITCHES = "Home by the switches"
@@ -197,7 +205,7 @@ STATE_KEYS = {
 }
 STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
 RENAME, REMOVE, NEW_NAME = "Rename", "Remove", "New name"
-A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
+A_SEQUENCE, A_PROGRAM, BY_BUTTON = "sequence", "program", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
 SELFTEST, SURE_SELFTEST = (
     "Self-test",
@@ -249,7 +257,7 @@ def of_job(text: str) -> str:
 
 def of_text(text: str) -> str:
     """A text of the library in the words of the panel."""
-    return _COMMAND.sub(_button, text)
+    return plain(_COMMAND.sub(_button, text))
 
 
 def _button(command: re.Match[str]) -> str:

@@ -123,7 +123,7 @@ def check_job(arm: Arm, job: Job) -> None:
 
 def leads_tool(job: Job) -> bool:
     """Whether the job has lines or arcs of the tool, or limits its speed."""
-    return bool(job.ways) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
+    return bool(job.tool_segments) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
 
 
 def planner_of(job: Job) -> str:
@@ -145,20 +145,20 @@ def _check_ways(job: Job, where: str) -> None:
             f"{where}: lines and speeds of the tool do not go together with a corridor",
             "leave one of them out",
         )
-    vias = [way.via for way in job.ways]
+    vias = [way.via for way in job.tool_segments]
     if vias != sorted(set(vias)) or (vias and vias[-1] >= len(job.via)):
         raise InputError(
             f"{where}: its ways lead to via points {vias}", "give each via point one way, in order"
         )
-    led = {way.via for way in job.ways if way.line}
-    for way in job.ways:
+    led = {way.via for way in job.tool_segments if way.line}
+    for way in job.tool_segments:
         if way.blend_mm and way.via + 1 not in led:
             raise InputError(
                 f"{where}: blend_mm at P{way.via} needs a line on both sides of it",
                 "leave it out: the motion rests there; or give the next via point line = true",
             )
     for stop in job.stops:
-        if any(way.blend_mm and way.via == stop.via for way in job.ways):
+        if any(way.blend_mm and way.via == stop.via for way in job.tool_segments):
             raise InputError(
                 f"{where}: the motion cannot rest at P{stop.via} and cut its corner", "leave one out"
             )
@@ -251,7 +251,7 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
         raise InputError(
             f"job {job.name!r}: a via angle is not a finite number", "give every angle as a number of degrees"
         )
-    circles = any(way.circle_through_mm is not None for way in job.ways)
+    circles = any(way.circle_through_mm is not None for way in job.tool_segments)
     if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE) and not circles:
         raise PlanError(
             f"job {job.name!r}: all via points are the same, so nothing moves", "change at least one angle"

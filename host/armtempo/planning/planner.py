@@ -17,7 +17,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.model.tool_way import ToolWay
+from armtempo.model.tool_segment import ToolSegment
 from armtempo.planning import checks, path_deviation, through_plan, workspace_check
 from armtempo.planning.free import around
 from armtempo.planning.through_plan import Planned
@@ -67,7 +67,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
 
 def _swing_note(arm: Arm, job: Job, trajectory: Trajectory) -> list[str]:
     """A note if a joint leaves the angles between two via points by more than ``_SWING_DEG``."""
-    swing = path_deviation.widest_swing(trajectory, [way.via for way in job.ways if way.line])
+    swing = path_deviation.widest_swing(trajectory, [way.via for way in job.tool_segments if way.line])
     if swing.beyond_deg <= _SWING_DEG:
         return []
     helps = 'path = "free" helps' if job.path == "through" else "a via point or a stop = true there keeps it"
@@ -119,7 +119,7 @@ def straight_line(
     job = Job(
         "goto",
         via=(tuple(map(float, start_deg)), target),
-        ways=(ToolWay(1, line=True, speed_mm_s=speed_mm_s),),
+        tool_segments=(ToolSegment(1, line=True, speed_mm_s=speed_mm_s),),
         refine=_LINE_REFINE,
         holds=holds,
     )

@@ -73,7 +73,9 @@ def _parts(job: Job, via_deg: Array, cuts: Sequence[int]) -> list[Job]:
                 stops=tuple(
                     replace(stop, via=stop.via - first) for stop in job.stops if first < stop.via < last
                 ),
-                ways=tuple(replace(way, via=way.via - first) for way in job.ways if first < way.via <= last),
+                tool_segments=tuple(
+                    replace(way, via=way.via - first) for way in job.tool_segments if first < way.via <= last
+                ),
             )
         )
     return parts

@@ -19,7 +19,6 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.model.plan import Plan
-from armtempo.planning import planner
 from armtempo.splines.trajectory import Trajectory
 
 ENOUGH = 1.5
@@ -137,6 +136,10 @@ def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan
     ``dynamics`` or without the torque of a motor, PlanError if slower motions do not help; otherwise as
     ``planner.plan``.
     """
+    from armtempo.planning import (
+        planner,
+    )  # here, as a report needs torques only, and it loads everything that plans
+
     held = [held_nm(joint, 0.0) for joint in arm.driven]
     if np.any(np.isnan(held)) or not any(joint.dynamics for joint in arm.joints):
         raise InputError(

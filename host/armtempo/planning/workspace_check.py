@@ -74,18 +74,18 @@ class Bodies:
     def names(self) -> list[str]:
         """Of each segment, (S,)."""
         found = [f"the link of {joint.name}" for joint in self.arm.joints for _ in range(2)]
-        return [*found, *([f"the load {self.arm.held.name}"] if self.arm.held else [])]
+        return [*found, *([f"the load {self.arm.payload.name}"] if self.arm.payload else [])]
 
     @cached_property
     def radius_mm(self) -> Array:
         """Of each segment, (S,)."""
         found = np.repeat([joint.radius_mm for joint in self.arm.joints], 2)
-        return np.append(found, self.arm.held.radius_mm) if self.arm.held else found
+        return np.append(found, self.arm.payload.radius_mm) if self.arm.payload else found
 
     @cached_property
     def load_ends_mm(self) -> Array:
         """The ends of the load's segment in the tool's frame: (2, 3), or (0, 3)."""
-        if not (load := self.arm.held):
+        if not (load := self.arm.payload):
             return np.empty((0, 3))
         way = np.zeros(3)
         way["xyz".index(load.along)] = 0.5 * load.length_mm
@@ -96,7 +96,7 @@ class Bodies:
         angles = all_angles_deg(self.arm, driven_deg)
         points = np.moveaxis(outline_mm(self.arm, angles), 1, 0)
         starts, ends = points[:-1], points[1:]
-        if self.arm.held:
+        if self.arm.payload:
             tool = forward(Geometry.of(self.arm), np.radians(angles))
             load = tool[:, None, :3, 3] + self.load_ends_mm @ np.swapaxes(tool[:, :3, :3], 1, 2)
             starts, ends = (
@@ -182,7 +182,7 @@ class Bodies:
 
 def has_room(arm: Arm) -> bool:
     """Whether there is anything that the arm could touch."""
-    thick = sum(joint.radius_mm > 0.0 for joint in arm.joints) + bool(arm.held and arm.held.radius_mm)
+    thick = sum(joint.radius_mm > 0.0 for joint in arm.joints) + bool(arm.payload and arm.payload.radius_mm)
     return bool(arm.workspace and arm.workspace.obstacles) or thick > 1
 
 

@@ -110,6 +110,11 @@ def posture_deg(client: Client, arm: Arm) -> Array:
 
     Raises LinkError if a position is unknown.
     """
+    return angles_deg(_known_status(client, arm), arm)
+
+
+def _known_status(client: Client, arm: Arm) -> Status:
+    """The status; LinkError if a position is unknown."""
     status = client.status()
     known = known_joints(status, arm)
     unknown = [joint.name for joint, is_known in zip(arm.driven, known, strict=True) if not is_known]
@@ -118,7 +123,7 @@ def posture_deg(client: Client, arm: Arm) -> Array:
             f"the position of {', '.join(unknown)} is unknown",
             "move the arm to its home posture and run 'armtempo home'",
         )
-    return angles_deg(status, arm)
+    return status
 
 
 def angles_deg(status: Status, arm: Arm) -> Array:
@@ -135,7 +140,11 @@ def angles_deg(status: Status, arm: Arm) -> Array:
 
 def is_at(client: Client, arm: Arm, target_deg: Array) -> bool:
     """Whether every motor is within half a step of ``target_deg`` (J,); raises LinkError if a position is unknown."""
-    return bool(np.all(np.abs(arm.transmission.steps(posture_deg(client, arm) - target_deg)) <= 0.5))
+    status, gears = _known_status(client, arm), arm.transmission
+    if arm.coupling:  # several postures within the ranges may have the same whole steps
+        off_steps = gears.steps(target_deg) - status.positions.commanded_steps
+        return bool(np.all(np.abs(off_steps) <= _HALF_STEP))
+    return bool(np.all(np.abs(gears.steps(angles_deg(status, arm) - target_deg)) <= 0.5))
 
 
 def _coupled_angles_deg(steps: tuple[int, ...], arm: Arm) -> Array:

@@ -26,6 +26,7 @@ from armtempo.robot.connection import Connection
 from armtempo.robot.motions import Motions
 from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.position import ArmPosition
+from armtempo.robot.programs import Programs
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import BoardStore
 from armtempo.robot.stored_motion import LOCK_S
@@ -67,6 +68,8 @@ class Board:
         """Outputs and inputs."""
         self.motions = Motions(self._shared, self.store)
         """What moves the arm, and what it recorded."""
+        self.programs = Programs(self._shared)
+        """Users' programs."""
         self._stack = stack or ExitStack()
 
     configure = _of("_shared", Connection.configure)
@@ -89,6 +92,9 @@ class Board:
     by_hand = _of("motions", Motions.by_hand)
     run = _of("motions", Motions.run)
     run_sequence = _of("motions", Motions.run_sequence)
+    encode_program = _of("programs", Programs.encode)
+    upload_program = _of("programs", Programs.upload)
+    run_program = _of("programs", Programs.run)
     fetch = _of("motions", Motions.fetch)
     stop = _of("motions", Motions.stop)
     request_stop = _of("motions", Motions.request_stop)
@@ -117,7 +123,7 @@ class Board:
 
     @property
     def counters(self) -> dict[str, int]:
-        """Counters of the running or the last sequence, by name.
+        """Counters of the running or the last sequence or program, by name.
 
         A start of a sequence sets them to 0; a power cycle loses them.
         """

@@ -37,13 +37,14 @@ class JointState:
 
 @dataclass(frozen=True)
 class SequenceStand:
-    """State of the running sequence, or of the last one since the board's start."""
+    """State of the running sequence or program, or of the last one since the board's start."""
 
     name: str
+    """Of a program with the ending ``.py``."""
     ending: str
     """One of ``armtempo_shared.sequence.ENDINGS``."""
     step: int
-    """Step of the sequence file, from 1."""
+    """Step of the sequence file, or line of the program, from 1."""
     cycle: int
     """Finished passes of its outermost repeats."""
     counters: dict[str, int]

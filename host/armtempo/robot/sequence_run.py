@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 from armtempo_shared import sequence as record
 from armtempo_shared import wire
@@ -13,7 +14,7 @@ from armtempo.basics.progress import Progress
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link import Client
-from armtempo.link.board_messages import SequenceState, StoredMotion
+from armtempo.link.board_messages import Event, SequenceState, StoredMotion
 from armtempo.link.refusal import refusal
 from armtempo.model.steps import position
 from armtempo.robot import stored_motion
@@ -95,7 +96,7 @@ def run(
     """
     with stored_motion.Supervision(client, stop) as supervision:
         client.start(key.name, key.crc)
-        follow = _Following(client, key.name, supervision, watcher, recorder or Recorder())
+        follow = Following(client, key.name, supervision, watcher, recorder or Recorder())
         end = supervision.follow(follow.to_its_end)
     if end.ending == "fault":
         raise refusal(f"a fault ended the sequence {where(end)}", end.code, client.status().fault_joint)
@@ -104,8 +105,16 @@ def run(
     return end
 
 
-class _Following:
-    """Follows a running sequence; continues where it was after the link was lost."""
+class Takes(Protocol):
+    """What takes the events of a run, and its end."""
+
+    def take(self, event: Event) -> None: ...
+
+    def end(self, state: SequenceState) -> None: ...
+
+
+class Following:
+    """Follows a running sequence or program; continues where it was after the link was lost."""
 
     def __init__(
         self,
@@ -113,7 +122,7 @@ class _Following:
         name: str,
         supervision: stored_motion.Supervision,
         watcher: SequenceWatcher,
-        recorder: Recorder,
+        recorder: Takes,
     ) -> None:
         self._client = client
         self._name = name
@@ -137,7 +146,7 @@ class _Following:
         if state.name != self._name or state.ending == "none":
             last = f"; last known state: {where(self._before)}" if self._before else ""
             raise OtherBoardError(
-                f"the board has restarted during the sequence: positions are unknown{last}",
+                f"the board has restarted during the run: positions are unknown{last}",
                 "move the arm to its home posture and run 'armtempo home'",
             )
         if state != self._before:
@@ -146,7 +155,7 @@ class _Following:
         return state
 
 
-def _take_events(client: Client, recorder: Recorder) -> None:
+def _take_events(client: Client, recorder: Takes) -> None:
     """Pass on the board's events for LOOK_S; a stop request ends that early."""
     until_s = client.session.clock() + LOOK_S
     while (left_s := until_s - client.session.clock()) > 0:

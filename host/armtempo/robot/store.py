@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from armtempo_shared import program
 from armtempo_shared.sequence import KIND_BYTES, MAGIC
 
 from armtempo.basics.arguments import checked_as
@@ -79,6 +80,8 @@ class BoardStore:
         data = self._board.client.fetch(stored_name(name))
         if data.startswith(MAGIC[:KIND_BYTES]):
             raise InputError(f"{name!r} is a sequence, not a motion", f"run it with: armtempo run {name}")
+        if data.startswith(program.MAGIC[:KIND_BYTES]):
+            raise InputError(f"{name!r} is a program, not a motion", f"run it with: armtempo run {name}")
         return encoded_motion.of_record(name, data, self._board.known_arm() if arm is None else Arm.of(arm))
 
     def remove(self, name: str) -> None:

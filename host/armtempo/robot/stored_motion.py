@@ -44,7 +44,7 @@ def store(
     found = client.find(name)
     if found is not None and found.crc == key.crc:
         return key
-    if found is not None and (found.joints or found.sequence) and not replace:
+    if found is not None and (found.joints or found.sequence or found.program) and not replace:
         button = ", which its button starts" if found.default else ""
         raise LinkError(
             f"the board has another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",

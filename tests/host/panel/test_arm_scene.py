@@ -12,6 +12,7 @@ from armtempo.kinematics.chain import all_angles_deg
 from armtempo.model import mesh_files, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.workspace import FAR_MM, KeepOut, Workspace
+from armtempo.panel import arm_scene
 from armtempo.panel.arm_scene import ArmShape
 
 from tests.host.panel.fakes import ARM
@@ -42,8 +43,41 @@ def test_meshes_next_to_the_arm_file_are_shown_in_the_frames_of_their_rows(tmp_p
     mesh_files.write(file, {0: corners, 3: corners})
     shape = ArmShape(arm)
     angles = np.array([90.0, -60.0, 40.0])
-    base, third = shape.poses(angles)[len(shape.pieces) :]
+    base, third = shape.poses(angles)[len(shape.pieces) + len(shape.housings) :]
     assert base == [0, 0, 0, 0, 0, 0, 1]
     wanted = all_frames(Geometry.of(arm), np.radians(all_angles_deg(arm, angles)).tolist())[3, :3, 3]
     assert np.array(third[:3]) * shape.reach_mm == pytest.approx(wanted, abs=0.1)
     assert abs(np.linalg.norm(third[3:]) - 1.0) < 1e-4
+
+
+def test_links_get_thinner_and_joints_have_housings_about_their_axes() -> None:
+    """Of arms whose file gives no radii, as all that ship."""
+    for name in ("ar4", "parol6", "scara"):
+        shape = ArmShape(arm := Arm.of(name))
+        radii = [radius for _, _, radius in shape.pieces]
+        assert radii == sorted(radii, reverse=True)
+        assert radii[0] > 1.2 * radii[-1]
+        assert len(shape.housings) == len(arm.driven)
+        poses = np.array(shape.poses(np.array(arm.home_deg)))
+        assert len(poses) == len(shape.pieces) + len(shape.housings)
+        x, y, z, w = poses[len(shape.pieces)][3:]  # the first joint turns about z
+        along = [2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)]
+        assert along == pytest.approx([0, 0, 1], abs=1e-4)
+
+
+def test_the_view_from_above_is_aligned_with_the_axes() -> None:
+    x, y, z = arm_scene.EYES["top"]
+    assert x == 0.0
+    assert -0.01 < y < 0.0 < z
+
+
+def test_a_path_is_coloured_by_its_speed() -> None:
+    times = np.linspace(0.0, 1.0, 101)
+    points = np.column_stack((100.0 * times**2, 0.0 * times, 0.0 * times))  # from 0 to 200 mm/s
+    colours, fastest = arm_scene.colours_of_speed(points, times)
+    assert fastest == pytest.approx(200.0, rel=0.02)
+    assert colours[0][2] > colours[0][0]  # blue
+    assert colours[-1][0] > colours[-1][2]  # red
+    still, none = arm_scene.colours_of_speed(np.zeros((3, 3)), np.array([0.0, 1.0, 2.0]))
+    assert none == 0.0
+    assert np.isfinite(still).all()

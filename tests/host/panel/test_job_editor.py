@@ -110,7 +110,7 @@ def test_a_pose_stays_a_pose_and_is_kept_when_others_change(editor: JobEditor) -
         "tolerance_mm = 0.25\n", "tolerance_mm = 0.25\nspeed_mm_s = 20\n"
     )
     job = Job.load(file, ARM)
-    assert [way.speed_mm_s for way in job.ways] == [20]
+    assert [way.speed_mm_s for way in job.tool_segments] == [20]
     assert job.seed == 7
     assert job.parameters == {"Pa": 0.3}
 
@@ -163,7 +163,7 @@ def test_rows_become_tables_for_a_line(editor: JobEditor) -> None:
         {ANGLES: [0, -60, 40]},
         {ANGLES: [10, -60, 40], "line": True},
     ]
-    assert len(editor.job().ways) == 1
+    assert len(editor.job().tool_segments) == 1
     assert editor.save() == editor.folder / "fresh.toml"
 
 

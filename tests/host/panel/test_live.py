@@ -59,6 +59,11 @@ def test_a_pause_is_named_as_one(operator: PanelBoard) -> None:
     assert layout.state_line(operator).startswith("paused")
 
 
+def test_no_angle_is_minus_zero(operator: PanelBoard) -> None:
+    operator.live.angles_deg = np.array([180.0, -38.0, -52.0])
+    assert "-0.0" not in layout.position(operator)
+
+
 def test_outputs_and_inputs_are_those_of_the_board() -> None:
     text = (
         shipped.arm_path().read_text()

@@ -116,3 +116,26 @@ def test_homing_by_switches_tells_each_joint(tmp_path: Path, monkeypatch: pytest
         assert any("switch seen" in line for line in operator.log.last)
         assert operator.progress == 0.5
     operator.close()
+
+
+def test_the_table_is_asked_for_where_the_arm_file_names_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    text = "# mine\n" + shipped.arm_path().read_text()
+    (tmp_path / "arm.toml").write_text(text)
+    operator = fakes.operator(fakes.Board(), tmp_path, Arm.load(tmp_path / "arm.toml"))
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        assert words.NO_FLOOR in page.texts()
+        page.press(words.ASK_FLOOR)
+        page.named(words.FLOOR_HEIGHT).set_value(20.0)
+        page.answer(words.STORE)
+        page.look()
+        assert words.NO_FLOOR not in page.texts()
+        assert operator.arm.workspace is not None
+        assert operator.arm.workspace.low_mm[2] == 20.0
+        assert (tmp_path / "arm.toml").read_text().startswith(text.rstrip())
+        assert operator.live.arm is operator.jobs.arm is operator.arm  # jogs and plans keep to it
+    operator.close()

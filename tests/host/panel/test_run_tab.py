@@ -56,7 +56,7 @@ def planned(operator: PanelBoard) -> None:
 @pytest.fixture
 def run_page(operator: PanelBoard, monkeypatch: pytest.MonkeyPatch) -> Iterator[Page]:
     """A page on the tab, which draws no path of the plan."""
-    monkeypatch.setattr(layout, "tool_path_mm", lambda *_: np.empty((0, 3)))
+    monkeypatch.setattr(layout, "tool_path_mm", lambda *given: np.zeros((len(given[-1]), 3)))
     planned(operator)
     with pages(operator) as page:
         page.show(words.TAB_RUN)

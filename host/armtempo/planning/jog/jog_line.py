@@ -90,13 +90,13 @@ class ToolLine:
         unit = np.eye(3)["xyz".index(self.axis[-1])]
         return self.sign * np.asarray(self._pose[:3, :3] @ unit if self.axis.startswith("tool") else unit)
 
-    def pose(self, way: float) -> Array:
-        """The tool's pose after a way in mm or deg, (4, 4)."""
+    def pose(self, distance: float) -> Array:
+        """The tool's pose after a distance in mm or deg, (4, 4)."""
         pose = self._pose.copy()
         if self.about:
-            pose[:3, :3] = rotations(math.radians(way) * self.direction[None])[0] @ pose[:3, :3]
+            pose[:3, :3] = rotations(math.radians(distance) * self.direction[None])[0] @ pose[:3, :3]
         else:
-            pose[:3, 3] += way * self.direction
+            pose[:3, 3] += distance * self.direction
         return pose
 
     @cached_property
@@ -155,11 +155,11 @@ class ToolLine:
             angles = found
         return True
 
-    def _near(self, way: float, before: Array, fixed: tuple[str, ...], step: float) -> Array | str:
-        """All joint angles on the line after ``way``, rad (joints,), near the posture before; or the reason
+    def _near(self, distance: float, before: Array, fixed: tuple[str, ...], step: float) -> Array | str:
+        """All joint angles on the line after ``distance``, rad (joints,), near the posture before; or the reason
         why not."""
         target = Pose(
-            tuple(map(tuple, self.pose(way).tolist())),
+            tuple(map(tuple, self.pose(distance).tolist())),
             fixed=fixed,
             tolerance_mm=TOLERANCE_MM,
             tolerance_deg=TOLERANCE_DEG,
@@ -189,24 +189,24 @@ class ToolLine:
     def followed(self, length: float) -> FollowedLine:
         """The part of the line that the arm can follow, at most ``length``."""
         fixed = self.fixed
-        ways, postures = [0.0], [self._start]
+        distances, postures = [0.0], [self._start]
         ends = ""
         step = min(self.step, length / _STEPS_TO_JUDGE)
-        while not ends and ways[-1] < length:
-            here = min(step, length - ways[-1])
-            found = self._near(ways[-1] + here, postures[-1], fixed, here)
+        while not ends and distances[-1] < length:
+            here = min(step, length - distances[-1])
+            found = self._near(distances[-1] + here, postures[-1], fixed, here)
             for _ in range(_HALVINGS):
                 if not isinstance(found, str):
                     break
                 ends, here = found, here / 2.0
-                found = self._near(ways[-1] + here, postures[-1], fixed, here)
+                found = self._near(distances[-1] + here, postures[-1], fixed, here)
             if isinstance(found, str):
                 break
-            ways.append(ways[-1] + here)
+            distances.append(distances[-1] + here)
             postures.append(found)
-            if length - ways[-1] < 1e-9 * length:
+            if length - distances[-1] < 1e-9 * length:
                 break
-        return FollowedLine(self, np.array(ways), np.array(postures), ends)
+        return FollowedLine(self, np.array(distances), np.array(postures), ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,7 @@ class FollowedLine:
     """The part of a line that the arm can follow."""
 
     line: ToolLine
-    ways: Array
+    distances: Array
     """(K,), from 0, mm or deg."""
     angles_rad: Array
     """Angles of all joints there, (K, joints)."""
@@ -224,30 +224,30 @@ class FollowedLine:
     @property
     def length(self) -> float:
         """Its length, mm or deg."""
-        return float(self.ways[-1])
+        return float(self.distances[-1])
 
-    def at(self, ways: Array) -> Array:
-        """The driven joints at ways along the line, degrees (K, J); raises InputError if the tool cannot follow."""
+    def at(self, distances: Array) -> Array:
+        """The driven joints at distances along it, degrees (K, J); raises InputError if the tool cannot follow."""
         found = []
         line = self.line
-        for way in ways:
-            near = np.array([np.interp(way, self.ways, column) for column in self.angles_rad.T])
-            angles = line._near(float(way), near, line.fixed, max(line.step, 1e-3))
+        for distance in distances:
+            near = np.array([np.interp(distance, self.distances, column) for column in self.angles_rad.T])
+            angles = line._near(float(distance), near, line.fixed, max(line.step, 1e-3))
             if isinstance(angles, str):
                 raise InputError(f"the tool cannot follow the line: {angles}", "jog single joints")
             found.append(np.degrees(angles[list(line.arm.driven_indices)]))
         return np.array(found)
 
     def stray(self, angle_points_deg: Array, way_points: Array) -> LineDeviation:
-        """Bound of the tool's deviation for splines of the driven joints, (S + 5, J), and of the way, (S + 5,)."""
+        """Bound of the tool's deviation for splines of the driven joints, (S + 5, J), and of the distance, (S + 5,)."""
         line = self.line
         fixed = line.fixed if line.fixed in (WHOLE, (APPROACH,)) else ()
         turn = math.radians(1.0) * line.direction if line.about else np.zeros(3)
         direction = np.zeros(3) if line.about else line.direction
         piece = ToolPiece(line._pose, self.length, direction, np.zeros(3), turn)
         tool = Tool(line.arm, list(range(len(line.arm.driven))), line.start_deg)
-        angles, ways = of_path(angle_points_deg, DEGREE), of_path(way_points[:, None], DEGREE)[:, :, 0]
-        return proven(angles, ways, tool, ToolPath((piece,)), fixed, LineDeviation(STRAY_MM, STRAY_DEG))
+        angles, distances = of_path(angle_points_deg, DEGREE), of_path(way_points[:, None], DEGREE)[:, :, 0]
+        return proven(angles, distances, tool, ToolPath((piece,)), fixed, LineDeviation(STRAY_MM, STRAY_DEG))
 
 
 def _short(reason: str) -> str:

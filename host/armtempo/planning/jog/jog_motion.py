@@ -247,11 +247,14 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
 def _line_limits(followed: FollowedLine, length: float, speed: float) -> WayLimits:
     """Limits of the way along the line, from those of the joints."""
     arm = followed.line.arm
-    upto = followed.ways <= length * (1 + 1e-9)
+    upto = followed.distances <= length * (1 + 1e-9)
     angles = np.degrees(followed.angles_rad[upto][:, list(arm.driven_indices)])
-    ways = followed.ways[upto]
+    ways = followed.distances[upto]
     if len(ways) < 2:
-        angles, ways = np.degrees(followed.angles_rad[:2][:, list(arm.driven_indices)]), followed.ways[:2]
+        angles, ways = (
+            np.degrees(followed.angles_rad[:2][:, list(arm.driven_indices)]),
+            followed.distances[:2],
+        )
     gains = np.abs(np.diff(angles, axis=0) / np.diff(ways)[:, None]).max(axis=0) + 1e-12
     return move_law.of_joints([joint.limits for joint in arm.driven], gains.tolist(), speed)
 

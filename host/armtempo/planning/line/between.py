@@ -61,7 +61,7 @@ def _free(arm: Arm, job: Job, leg: Leg, via_deg: Array, progress: Progress) -> B
         via=(ends[0], *job.via[leg.first + 1 : leg.last], ends[1]),
         refine=job.refine if isinstance(job.refine, int) else REST_PIECES,
         stops=(),
-        ways=(),
+        tool_segments=(),
         speed_mm_s=None,
         acceleration_mm_s2=None,
     )

@@ -1,6 +1,6 @@
-"""The joints' angles along a way of the tool, each posture next to the one before.
+"""The joints' angles along a path of the tool, each posture next to the one before.
 
-The arm stays in its branch, or passes a singular posture where the tool's way leads through it; if the joints cannot
+The arm stays in its branch, or passes a singular posture where the tool's path leads through it; if the joints cannot
 follow, the error says at which place and why.
 """
 
@@ -22,14 +22,14 @@ from armtempo.planning.line.tool_path import ToolPath, rotation_vectors
 from armtempo.planning.tool import Tool
 
 STEPS = 32
-"""Least number of places along a way."""
+"""Least number of places along a path."""
 _MOST_STEP_DEG = 4.0
 """Largest turn of a joint between two postures."""
 _FINEST = 2.0**-14
-"""Smallest step, as a fraction of the way."""
+"""Smallest step, as a fraction of the path."""
 _NEWTON_STEPS = 12
 _ON_IT = 1e-9
-"""Tolerance of a posture on the way, as a fraction of the reach, or rad."""
+"""Tolerance of a posture on the path, as a fraction of the reach, or rad."""
 _DROPPED = 1e-9
 """Smaller singular values, relative to the largest, count as 0."""
 _SINGULAR = 0.02
@@ -40,7 +40,7 @@ _STRAIGHT = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A way of the tool for an arm, with the constrained part of the orientation: WHOLE, (APPROACH,) or ()."""
+    """A path of the tool for an arm, with the constrained part of the orientation: WHOLE, (APPROACH,) or ()."""
 
     arm: Arm
     path: ToolPath
@@ -48,9 +48,9 @@ class Course:
     name: str
     """Name in messages: "P1 to P2"."""
 
-    def place(self, way: float) -> str:
+    def place(self, distance: float) -> str:
         """Describe a place on it."""
-        return f"{self.name}, at {max(way, 0.0):.1f} of {self.path.length:.1f} mm"
+        return f"{self.name}, at {max(distance, 0.0):.1f} of {self.path.length:.1f} mm"
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class Followed:
 
     course: Course
     tool: Tool
-    ways: Array
+    distances: Array
     """(K,), from 0."""
     angles_deg: Array
     """(K, J)."""
@@ -69,17 +69,19 @@ class Followed:
         """End posture, (J,)."""
         return np.asarray(self.angles_deg[-1])
 
-    def at(self, ways: Array) -> Array:
-        """The postures at ways (N,), exactly on the course: (N, J)."""
-        near = np.stack([np.interp(ways, self.ways, column) for column in self.angles_deg.T], axis=1)
+    def at(self, distances: Array) -> Array:
+        """The postures at distances (N,), exactly on the course: (N, J)."""
+        near = np.stack(
+            [np.interp(distances, self.distances, column) for column in self.angles_deg.T], axis=1
+        )
         if _is_loose(self.course, self.tool):
             from scipy.interpolate import CubicSpline  # its import takes longer than most commands
 
-            near = CubicSpline(self.ways, self.angles_deg)(ways)
-        angles, missed = _corrected(self.course, self.tool, ways, near)
+            near = CubicSpline(self.distances, self.angles_deg)(distances)
+        angles, missed = _corrected(self.course, self.tool, distances, near)
         worst = int(np.argmax(missed))
         if not missed[worst] <= _ON_IT:
-            raise _stuck(self.course, self.tool, float(ways[worst]), near[worst])
+            raise _stuck(self.course, self.tool, float(distances[worst]), near[worst])
         return angles
 
 
@@ -96,13 +98,13 @@ def follow(course: Course, start_deg: Array, end_deg: Array | None = None) -> Fo
     while places[-1] < 1.0:
         step = min(step, 1.0 - places[-1])
         place = places[-1] + step if 1.0 - places[-1] - step > 1e-9 else 1.0
-        ways = np.array([place * length])
+        distances = np.array([place * length])
         near = _extrapolated(places, postures, place)
         if evenly and end_deg is not None:
             near = postures[0] + place * (end_deg - postures[0])
-        angles, missed = _corrected(course, tool, ways, near[None])
+        angles, missed = _corrected(course, tool, distances, near[None])
         if missed[0] <= _ON_IT and np.max(np.abs(angles[0] - postures[-1])) <= _MOST_STEP_DEG:
-            _check_range(course, float(ways[0]), angles[0])
+            _check_range(course, float(distances[0]), angles[0])
             places.append(place)
             postures.append(angles[0])
             step = min(2.0 * step, 1.0 / STEPS)
@@ -121,11 +123,11 @@ def _extrapolated(places: list[float], postures: list[Array], place: float) -> A
     return np.asarray(postures[-1] + min(part, 2.0) * (postures[-1] - postures[-2]))
 
 
-def _corrected(course: Course, tool: Tool, ways: Array, near_deg: Array) -> tuple[Array, Array]:
+def _corrected(course: Course, tool: Tool, distances: Array, near_deg: Array) -> tuple[Array, Array]:
     """Postures on the course near given ones (N, J), and their residuals, (N,)."""
-    position, rotation = course.path.poses(ways)
+    position, rotation = course.path.poses(distances)
     angles = near_deg.copy()
-    missed = np.full(len(ways), np.inf)
+    missed = np.full(len(distances), np.inf)
     for _ in range(_NEWTON_STEPS):
         gap, slope = _gap(course, tool, position, rotation, angles)
         missed = np.abs(gap).max(axis=1)
@@ -163,36 +165,36 @@ def _is_loose(course: Course, tool: Tool) -> bool:
     return bool(tool.turns.shape[1] > _rank(course.fixed))
 
 
-def singular_value(course: Course, tool: Tool, ways: Array, angles_deg: Array) -> Array:
+def singular_value(course: Course, tool: Tool, distances: Array, angles_deg: Array) -> Array:
     """Distance of postures (N, J) from singular ones: the least relevant singular value of the Jacobian, (N,)."""
-    position, rotation = course.path.poses(ways)
+    position, rotation = course.path.poses(distances)
     slope = np.degrees(_gap(course, tool, position, rotation, angles_deg)[1])
     values = np.linalg.svd(slope, compute_uv=False)
     return np.asarray(values[:, min(_rank(course.fixed), values.shape[1]) - 1])
 
 
-def _check_range(course: Course, way: float, angles_deg: Array) -> None:
+def _check_range(course: Course, distance: float, angles_deg: Array) -> None:
     for joint, angle in zip(course.arm.driven, angles_deg, strict=True):
         low, high = joint.range_deg
         if not low - 1e-6 <= angle <= high + 1e-6:
             end = low if angle < low else high
             raise PlanError(
-                f"{course.place(way)}: {joint.name} reaches the end of its range, {end:g} degrees, so the tool "
+                f"{course.place(distance)}: {joint.name} reaches the end of its range, {end:g} degrees, so the tool "
                 "cannot follow",
                 "move the line, or give posture_deg of another branch at its start",
             )
 
 
-def _stuck(course: Course, tool: Tool, way: float, angles_deg: Array) -> PlanError:
+def _stuck(course: Course, tool: Tool, distance: float, angles_deg: Array) -> PlanError:
     """The error: why the joints cannot follow from here on."""
-    place = course.place(way)
+    place = course.place(distance)
     if tool.turns.shape[1] < _rank(course.fixed):
         count = tool.turns.shape[1]
         return PlanError(
             f"{place}: {count} joints with a motor cannot keep the tool's orientation on the way as well",
             "ask for less of the orientation at its end: approach, or position_mm alone",
         )
-    least = float(singular_value(course, tool, np.array([way]), angles_deg[None])[0])
+    least = float(singular_value(course, tool, np.array([distance]), angles_deg[None])[0])
     if least < _SINGULAR:
         return PlanError(
             f"{place}: the arm comes to a singular posture{_which(course.arm, angles_deg)}, where its joints cannot "
@@ -209,21 +211,21 @@ def passed(found: Followed) -> list[str]:
     if not refusals(geometry):
         postures = np.radians(all_angles_deg(course.arm, found.angles_deg))
         before = branch_of(geometry, postures[0])
-        for way, posture in zip(found.ways[1:], postures[1:], strict=True):
+        for distance, posture in zip(found.distances[1:], postures[1:], strict=True):
             here = branch_of(geometry, posture).after(before)
             if parts := before.differs(here):
                 words.append(
-                    f"{course.place(float(way))}: the arm changes its branch ({', '.join(parts)}), from {before} to "
-                    f"{here}, through a singular posture"
+                    f"{course.place(float(distance))}: the arm changes its branch ({', '.join(parts)}), from "
+                    f"{before} to {here}, through a singular posture"
                 )
             before = here
     if not _is_loose(course, found.tool):
-        values = singular_value(course, found.tool, found.ways, found.angles_deg)
+        values = singular_value(course, found.tool, found.distances, found.angles_deg)
         least = int(np.argmin(values))
         if values[least] < _SINGULAR and not words:
             posture = found.angles_deg[least]
             words.append(
-                f"{course.place(float(found.ways[least]))}: the arm comes near to a singular posture"
+                f"{course.place(float(found.distances[least]))}: the arm comes near to a singular posture"
                 f"{_which(course.arm, posture)}, so its joints turn far there"
             )
     return words

@@ -8,11 +8,11 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
-from armtempo.model import tool_way
+from armtempo.model import tool_segment
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.tool_pose import APPROACH, WHOLE, Pose
-from armtempo.model.tool_way import ToolWay
+from armtempo.model.tool_segment import ToolSegment
 from armtempo.planning.line import tool_path
 from armtempo.planning.line.deviation import LineDeviation
 from armtempo.planning.line.follow import Course, follow
@@ -25,11 +25,11 @@ _CUT = 0.5
 
 @dataclass(frozen=True)
 class Leg:
-    """Via points ``first`` to ``last``, with rests at both; ``ways``: the lines and arcs of the tool, if any."""
+    """Via points ``first`` to ``last``, with rests at both; ``tool_segments``: its lines and arcs of the tool."""
 
     first: int
     last: int
-    ways: tuple[ToolWay, ...] = ()
+    tool_segments: tuple[ToolSegment, ...] = ()
 
     @property
     def name(self) -> str:
@@ -40,25 +40,26 @@ class Leg:
     def enough(self) -> LineDeviation:
         """Allowed deviation of the tool."""
         return LineDeviation(
-            min(way.tolerance_mm for way in self.ways), min(way.tolerance_deg for way in self.ways)
+            min(segment.tolerance_mm for segment in self.tool_segments),
+            min(segment.tolerance_deg for segment in self.tool_segments),
         )
 
 
 def of_job(job: Job) -> list[Leg]:
     """The legs of a job in order."""
-    led = {way.via: way for way in job.ways if way.line}
+    led = {segment.via: segment for segment in job.tool_segments if segment.line}
     stops = {stop.via for stop in job.stops}
     legs: list[Leg] = []
-    first, ways = 0, []
+    first, segments = 0, []
     for via in range(1, len(job.via)):
         if via in led:
-            ways.append(led[via])
+            segments.append(led[via])
             goes_on = led[via].blend_mm > 0.0
         else:
             goes_on = via + 1 not in led and via not in stops
         if via == len(job.via) - 1 or not goes_on:
-            legs.append(Leg(first, via, tuple(ways)))
-            first, ways = via, []
+            legs.append(Leg(first, via, tuple(segments)))
+            first, segments = via, []
     return legs
 
 
@@ -74,9 +75,9 @@ def kept(arm: Arm, end: tuple[float, ...] | Pose) -> tuple[str, ...]:
 
 
 def course(arm: Arm, job: Job, leg: Leg, first_deg: Array) -> Course:
-    """The way of the tool in a leg that begins at angles ``first_deg``, (J,).
+    """The path of the tool in a leg that begins at angles ``first_deg``, (J,).
 
-    Raises PlanError for an invalid way.
+    Raises PlanError for an invalid path.
     """
     tool = Tool(arm, list(range(len(arm.driven))), first_deg)
     fixed = kept(arm, job.via[leg.last])
@@ -89,15 +90,15 @@ def course(arm: Arm, job: Job, leg: Leg, first_deg: Array) -> Course:
             )
     here = pose_at(tool, first_deg)
     pieces: list[ToolPiece] = []
-    for way in leg.ways:
-        target = job.via[way.via]
+    for segment in leg.tool_segments:
+        target = job.via[segment.via]
         end = np.array(target.matrix) if isinstance(target, Pose) else pose_at(tool, np.array(target))
-        pieces.append(_piece(way, here, end, fixed))
+        pieces.append(_piece(segment, here, end, fixed))
         last = pieces[-1]
         length = np.array([last.length])
         here = end.copy()
         here[:3, :3] = last.turned(length)[0] @ last.start[:3, :3]
-    cuts = tuple(way.blend_mm for way in leg.ways[:-1])
+    cuts = tuple(segment.blend_mm for segment in leg.tool_segments[:-1])
     path = ToolPath(tuple(pieces), cuts)
     _check_cuts(leg, path)
     return Course(arm, path, fixed, leg.name)
@@ -111,23 +112,23 @@ def pose_at(tool: Tool, angles_deg: Array) -> Array:
     return pose
 
 
-def _piece(way: ToolWay, start: Array, end: Array, fixed: tuple[str, ...]) -> ToolPiece:
-    where = f"P{way.via - 1} to P{way.via}"
+def _piece(segment: ToolSegment, start: Array, end: Array, fixed: tuple[str, ...]) -> ToolPiece:
+    where = f"P{segment.via - 1} to P{segment.via}"
     turn = np.zeros(3)
     if fixed == WHOLE:
         turn = tool_path.turn_between(start[:3, :3], end[:3, :3], where)
     elif fixed == (APPROACH,):
         turn = tool_path.turn_of_axis(start[:3, 2], end[:3, 2], where)
-    if way.arc_through_mm is not None:
-        return tool_path.arc(start, way.arc_through_mm, end, turn, where, way.tolerance_mm)
-    if way.circle_through_mm is not None:
-        return tool_path.full_circle(start, way.circle_through_mm, end, turn, where, way.tolerance_mm)
+    if segment.arc_through_mm is not None:
+        return tool_path.arc(start, segment.arc_through_mm, end, turn, where, segment.tolerance_mm)
+    if segment.circle_through_mm is not None:
+        return tool_path.full_circle(start, segment.circle_through_mm, end, turn, where, segment.tolerance_mm)
     return tool_path.line(start, end, turn, where)
 
 
 def _check_cuts(leg: Leg, path: ToolPath) -> None:
     """Raise PlanError if corners are cut over more than half of a line."""
-    ways = [0.0, *path.cuts, 0.0]
+    cuts = [0.0, *path.cuts, 0.0]
     for number, piece in enumerate(path.pieces):
         name = f"P{leg.first + number} to P{leg.first + number + 1}"
         if path.cuts and not np.any(piece.direction):
@@ -135,7 +136,7 @@ def _check_cuts(leg: Leg, path: ToolPath) -> None:
                 f"{name}: the tool only turns, so no corner is cut there",
                 "leave blend_mm out at both",
             )
-        for cut in ways[number : number + 2]:
+        for cut in cuts[number : number + 2]:
             if cut > _CUT * piece.length:
                 raise PlanError(
                     f"{name}: blend_mm = {cut:g} is more than half of its {piece.length:.4g} mm",
@@ -145,6 +146,6 @@ def _check_cuts(leg: Leg, path: ToolPath) -> None:
 
 def end_deg(arm: Arm, job: Job, via: int, before_deg: Array) -> Array:
     """Angles (J,) at the end of the line to a via point, starting at the posture ``before_deg`` (J,)."""
-    way = tool_way.at(job.ways, via)
-    assert way is not None
-    return follow(course(arm, job, Leg(via - 1, via, (way,)), before_deg), before_deg).end_deg
+    segment = tool_segment.at(job.tool_segments, via)
+    assert segment is not None
+    return follow(course(arm, job, Leg(via - 1, via, (segment,)), before_deg), before_deg).end_deg

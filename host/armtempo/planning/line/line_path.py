@@ -48,7 +48,7 @@ class Led:
     places: Array
     """Fractions of the way at equal steps of u, (_TABLE + 1,), for its knots."""
 
-    def ways(self, count: int) -> Array:
+    def distances(self, count: int) -> Array:
         """Ways at the knots of ``count`` segments: (count + 1,)."""
         steps = np.linspace(0.0, 1.0, count + 1)
         parts = np.interp(steps, np.linspace(0.0, 1.0, _TABLE + 1), self.places)
@@ -87,7 +87,7 @@ def led_legs(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
     speeds = np.array([limit.speed_deg_s for limit in checks.limits_of(arm)])
     found = {}
     for number, leg in enumerate(cut.of_job(job)):
-        if leg.ways:
+        if leg.tool_segments:
             followed = _followed(arm, job, leg, via_deg)
             found[number] = Led(leg, followed, _places(followed, speeds))
     return found
@@ -110,7 +110,7 @@ def _followed(arm: Arm, job: Job, leg: Leg, via_deg: Array) -> Followed:
 def _places(found: Followed, speeds: Array) -> Array:
     """Places on the way at equal steps of u: dense at both ends, and where the joints turn far."""
     u = np.linspace(0.0, 1.0, _TABLE + 1)
-    places = found.ways / found.ways[-1]
+    places = found.distances / found.distances[-1]
     taken = np.abs(np.diff(found.angles_deg, axis=0) / speeds).max(axis=1) / np.diff(places)
     slow = np.interp(u, 0.5 * (places[1:] + places[:-1]), taken)
     slow = np.maximum(slow, _FLOOR * slow.mean())
@@ -146,7 +146,7 @@ def proven_paths(
     led = {number: one for number, one in parts.items() if isinstance(one, Led)}
     most = _most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
     pieces = [
-        one.segments if isinstance(one, Between) else _LINE_PIECES * len(leg.ways)
+        one.segments if isinstance(one, Between) else _LINE_PIECES * len(leg.tool_segments)
         for leg, (_, one) in zip(legs, sorted(parts.items()), strict=True)
     ]
     if sum(pieces) > most:
@@ -162,7 +162,7 @@ def proven_paths(
         wide = [number for number, one in led.items() if not one.keeps(away[number])]
         if not wide:
             found.append(Proven(path, away))
-        short = [number for number in led if 2 * pieces[number] <= finest * len(legs[number].ways)]
+        short = [number for number in led if 2 * pieces[number] <= finest * len(legs[number].tool_segments)]
         before, pieces = (
             pieces,
             [2 * count if number in (wide or short) else count for number, count in enumerate(pieces)],
@@ -196,7 +196,7 @@ def _path(
     for number, (leg, count) in enumerate(zip(legs, pieces, strict=True)):
         one = parts[number]
         if isinstance(one, Led):
-            ways = one.ways(count)
+            ways = one.distances(count)
             angles = one.followed.at(ways)
             passed = _passed(one, ways)
         else:

@@ -11,7 +11,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress, part, stage
-from armtempo.model import tool_way
+from armtempo.model import tool_segment
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, Job
 from armtempo.model.parts import Limits
@@ -53,7 +53,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     others = {
         number: between(arm, job, leg, via_deg, progress)
         for number, leg in enumerate(cut.of_job(job))
-        if not leg.ways
+        if not leg.tool_segments
     }
     finest = _FINEST if job.refine == AUTO else 0
     paths = proven_paths(arm, job, via_deg, {**led, **others}, finest)
@@ -75,7 +75,7 @@ def _fastest(arm: Arm, job: Job, paths: Sequence[Proven], progress: Progress) ->
         moving = _moving(path)
         tool = Tool(arm, list(range(len(limits))), path.angle_points_deg[0])
         finest = max(
-            ((path.knots[led + 1] - path.knots[led]) // len(legs[led].ways) for led in proven.away),
+            ((path.knots[led + 1] - path.knots[led]) // len(legs[led].tool_segments) for led in proven.away),
             default=1,
         )
         most = time_parameterization.most_refine(job, path.knots[-1] + dwells, len(limits))
@@ -209,7 +209,7 @@ def _floor(
 
 def _asked(job: Job, via: int) -> tuple[float, float]:
     """Limits of the tool's speed and acceleration on the way to a via point; infinite without a limit."""
-    way = tool_way.at(job.ways, via)
+    way = tool_segment.at(job.tool_segments, via)
     both = []
     for key in ("speed_mm_s", "acceleration_mm_s2"):
         own = getattr(way, key) if way else None

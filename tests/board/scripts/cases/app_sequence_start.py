@@ -133,7 +133,7 @@ def case_a_sequence_is_stored_whole_or_not_at_all():
         assert host.upload("seq", bad)[-1][:2] == ("error", "bad_record")
     assert host.ask("get", (0, 200), "seq")[2] == kept
     again = App(host.port, flash())
-    assert again.controller.board.store().is_sequence("seq")
+    assert again.controller.board.store().kind("seq") == 1
 
 
 def case_one_of_an_older_version_is_named():

@@ -23,8 +23,8 @@ KEYS = ("line", "arc_through_mm", "circle_through_mm", "blend_mm", "speed_mm_s",
 
 @checked_fields
 @dataclass(frozen=True)
-class ToolWay:
-    """The way from the previous via point to via point ``via`` (from 0)."""
+class ToolSegment:
+    """The path of the tool from the previous via point to via point ``via`` (from 0)."""
 
     via: int
     line: bool = False
@@ -74,7 +74,7 @@ class ToolWay:
                 raise InputError(f"{where}: {key} {value:g} is not allowed", f"give {LEAST:g} to {MOST:g}")
 
 
-def read(table: Table, via: int) -> ToolWay | None:
+def read(table: Table, via: int) -> ToolSegment | None:
     """The requirements in a via point's table, None without any; raises InputError for invalid ones."""
     if not any(table.has(key) for key in KEYS):
         table.known(*KEYS)
@@ -91,7 +91,7 @@ def read(table: Table, via: int) -> ToolWay | None:
         raise table.fail("circle_through_mm", "left out with arc_through_mm")
     if table.has("blend_mm") and not line:
         raise table.fail("blend_mm", "given with line = true only")
-    return ToolWay(
+    return ToolSegment(
         via,
         line,
         arc,
@@ -125,6 +125,6 @@ def limit(table: Table, key: str) -> float | None:
     return table.number(key, least=LEAST, most=MOST) if table.has(key) else None
 
 
-def at(ways: Sequence[ToolWay], via: int) -> ToolWay | None:
+def at(segments: Sequence[ToolSegment], via: int) -> ToolSegment | None:
     """The requirements for the way to this via point, None without any."""
-    return next((way for way in ways if way.via == via), None)
+    return next((segment for segment in segments if segment.via == via), None)

@@ -1,0 +1,251 @@
+"""The interface of a user's program: ``from armtempo_board import cell``.
+
+Names are those of the arm file. What the calls do is done by a ``Work``: the board (``user_program.py``), or a test's
+(``armtempo.testing``).
+"""
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from typing import Any, Protocol
+
+    class Work(Protocol):
+        """What a cell does its work with."""
+
+        def check(self) -> None:
+            """Raise Ended if the program was stopped, or a fault is pending."""
+
+        def serve(self) -> None:
+            """One pass of the board's loop, then ``check``."""
+
+        def serve_if_due(self) -> None:
+            """The same, if the last pass is a millisecond ago."""
+
+        def note_line(self, line: int) -> None:
+            """The program is at this line."""
+
+        def ticks_ms(self) -> int:
+            """A time that increases, ms."""
+
+        def moving(self) -> bool:
+            """Whether a motion runs."""
+
+        def begin_motion(self, name: str, percent: int) -> None:
+            """Start a stored motion; raises CellError."""
+
+        def begin_move(self, target: "Sequence[int]", percent: int) -> None:
+            """Start a move to a position in steps; raises CellError."""
+
+        def brake(self) -> None:
+            """Brake the motion."""
+
+        def steps(self) -> "list[int]":
+            """Position of the joints."""
+
+        def set_output(self, number: int, value: int) -> None:
+            """Set an output, 0 to 65535."""
+
+        def level(self, number: int) -> int:
+            """Whether an input is active."""
+
+        def count(self, name: str) -> int:
+            """Increment a counter; returns its value."""
+
+        def say(self, text: str) -> None:
+            """Show a text to the host."""
+
+
+_FULL = 65535  # value of an output at the upper end of its range
+_LONGEST_S = 3600.0
+_LEAST_PERCENT = 1
+_PERCENT = 100
+
+
+class CellError(Exception):
+    """What a program asked for is not possible; nothing was done."""
+
+
+class Ended(BaseException):
+    """The program was stopped, or a fault is pending: it ends."""
+
+
+class Cell:
+    """The cell of a program; ``table``: that of its record (``armtempo_shared.program``)."""
+
+    Error = CellError
+
+    def __init__(self, table: "dict[str, Any]", work: "Work") -> None:
+        self._table = table
+        self._work = work
+
+    # moving
+
+    def goto(self, posture: "str | Sequence[float]", speed: float = 1.0, wait: bool = True) -> None:
+        """Move to a posture, a name or the joints' angles in degrees, all joints together; ``speed``: 0.01 to 1.
+
+        ``wait`` False: return at once, while the arm moves.
+        """
+        target = self._target(posture)
+        percent = _percent(speed)
+        self._begin()
+        if list(target) != self._work.steps():
+            self._work.begin_move(target, percent)
+        if wait:
+            self._rest()
+
+    def run(self, motion: str, speed: float = 1.0) -> None:
+        """Run a stored motion to its end; the arm must be at its start."""
+        self.start(motion, speed)
+        self._rest()
+
+    def start(self, motion: str, speed: float = 1.0) -> None:
+        """Start a stored motion; ``wait()`` waits for its end."""
+        percent = _percent(speed)
+        self._begin()
+        self._work.begin_motion(motion, percent)
+
+    def moving(self) -> bool:
+        """Whether the arm moves."""
+        self._work.serve()
+        return self._work.moving()
+
+    def brake(self) -> None:
+        """Brake the motion along its path; ``wait()`` waits for rest, and ``goto`` moves on from there."""
+        self._work.check()
+        if self._work.moving():
+            self._work.brake()
+
+    def posture(self) -> "list[float]":
+        """The joints' angles in degrees, as commanded."""
+        return [steps / per_deg for steps, per_deg in zip(self._work.steps(), self._table["per_deg"])]
+
+    # outputs and inputs
+
+    def set(self, output: str, value: "str | float", wait_s: float = 0.0) -> None:
+        """Set an output to a state of the arm file, or a number in its unit, and wait so long."""
+        number, low, high, states = self._found("outputs", "output", output)
+        if isinstance(value, str):
+            if value not in states:
+                raise CellError("output %r has no state %r; it has %s" % (output, value, _names(states)))
+            raw = states[value]
+        else:
+            if not low <= value <= high:
+                raise CellError("output %r: %r is not within %r to %r" % (output, value, low, high))
+            raw = int((value - low) / (high - low) * _FULL + 0.5)
+        self._work.check()
+        self._work.set_output(number, raw)
+        if wait_s:
+            self.sleep(wait_s)
+
+    def active(self, input: str) -> bool:
+        """Whether an input is active, debounced."""
+        number = self._found("inputs", "input", input)
+        self._work.serve()
+        return bool(self._work.level(number))
+
+    def wait(self, input: str = "", active: bool = True, timeout_s: float = 0.0) -> bool:
+        """Wait until an input is active (or not), without a name until the arm is at rest.
+
+        Returns False if that takes longer than ``timeout_s``; 0: no limit.
+        """
+        work = self._work
+        number = self._found("inputs", "input", input) if input else -1
+        limit_ms = _ms(timeout_s)
+        begin_ms = work.ticks_ms()
+        while True:
+            work.serve()
+            if not work.moving() if number < 0 else bool(work.level(number)) == bool(active):
+                return True
+            if limit_ms and work.ticks_ms() - begin_ms >= limit_ms:
+                return False
+
+    # the rest
+
+    def sleep(self, time_s: float) -> None:
+        """Wait; the arm may move meanwhile."""
+        work = self._work
+        limit_ms = _ms(time_s)
+        begin_ms = work.ticks_ms()
+        work.serve()
+        while work.ticks_ms() - begin_ms < limit_ms:
+            work.serve()
+
+    def count(self, name: str) -> int:
+        """Increment a counter, which 'armtempo status' shows; returns its value."""
+        self._work.check()
+        return self._work.count(name)
+
+    def say(self, *values: object) -> None:
+        """Show values to the host, as ``print`` does in a program."""
+        self._work.serve()
+        self._work.say(" ".join([str(value) for value in values]))
+
+    async def serve(self) -> None:
+        """A task for a program with ``asyncio``: the board's work between the other tasks."""
+        import asyncio
+
+        while True:
+            self._work.serve()
+            await asyncio.sleep(0)
+
+    # what the marked source calls, see armtempo_shared.program
+
+    def at(self, line: int, value: "Any" = None) -> "Any":
+        """The program is at this line: in a call of ``value``, the cell, which is returned; or at a loop's head."""
+        self._work.note_line(line)
+        if value is None:
+            self._work.serve_if_due()
+            return True
+        return value
+
+    def each(self, line: int, values: "Iterable[Any]") -> "Iterable[Any]":
+        """The values, one by one: the program is at this line before each."""
+        for value in values:
+            self.at(line)
+            yield value
+
+    def _begin(self) -> None:
+        """Wait for the end of a motion before the next one."""
+        self._rest()
+        self._work.check()
+
+    def _rest(self) -> None:
+        self._work.serve()
+        while self._work.moving():
+            self._work.serve()
+
+    def _target(self, posture: "str | Sequence[float]") -> "list[int]":
+        if isinstance(posture, str):
+            found: "list[int]" = self._found("postures", "posture", posture)
+            return found
+        per_deg = self._table["per_deg"]
+        if len(posture) != len(per_deg):
+            raise CellError("a posture has %d angles, not %d" % (len(per_deg), len(posture)))
+        return [_rounded(angle * scale) for angle, scale in zip(posture, per_deg)]
+
+    def _found(self, kind: str, word: str, name: str) -> "Any":
+        found = self._table[kind]
+        if name not in found:
+            raise CellError("the arm has no %s %r; it has %s" % (word, name, _names(found)))
+        return found[name]
+
+
+def _names(found: "Iterable[str]") -> str:
+    return ", ".join(sorted(found)) or "none"
+
+
+def _rounded(value: float) -> int:
+    return int(value + 0.5) if value >= 0 else -int(0.5 - value)
+
+
+def _percent(speed: float) -> int:
+    percent = int(speed * _PERCENT + 0.5)
+    if not _LEAST_PERCENT <= percent <= _PERCENT:
+        raise CellError("speed = %r is not within 0.01 to 1" % (speed,))
+    return percent
+
+
+def _ms(time_s: float) -> int:
+    if not 0 <= time_s <= _LONGEST_S:
+        raise CellError("%r s is not within 0 to %d" % (time_s, _LONGEST_S))
+    return int(time_s * 1000 + 0.5)

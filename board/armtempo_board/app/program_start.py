@@ -1,0 +1,36 @@
+"""Checks before the start of a user's program: it is for this arm, and there is heap for it."""
+
+import gc
+
+from armtempo_shared import codes, program
+
+from armtempo_board.app.user_program import UserProgram
+from armtempo_board.errors import Refused
+from armtempo_board.storage.store import PROGRAM
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+
+def user_program(controller: "Any", name: str, crc: "int | None", rate: int) -> UserProgram:
+    """The program ``name``, which the main loop executes; raises Refused.
+
+    ``crc`` as for ``Controller.begin``; None is refused: without a host nothing starts it.
+    """
+    record = controller.board.store().opened(name, PROGRAM)
+    if crc is None:
+        raise Refused(codes.NEEDS_HOST)
+    if record.crc != crc:
+        raise Refused(codes.BAD_CHECKSUM)
+    if record.arm_crc != controller.board.arm_crc:
+        raise Refused(codes.ARM_MISMATCH)
+    if hasattr(gc, "mem_free"):
+        gc.collect()
+        missing = program.needed_bytes(record.source_bytes) - gc.mem_free()
+        if missing > 0:
+            raise Refused(codes.NO_SEQUENCE_MEMORY, value=missing)
+    try:
+        return UserProgram(controller, record, name.encode(), rate)
+    except ValueError:
+        raise Refused(codes.BAD_RECORD)

@@ -1,0 +1,261 @@
+"""Runs a user's program: it is executed by the main loop, which goes on from within its calls (``cell.py``).
+
+It has the place of a sequence in the controller: the same commands stop it, change its speed and ask for its state;
+nothing else is started while it runs.
+"""
+
+import gc
+import io
+import sys
+import time
+
+from armtempo_shared import codes, messages, program, sequence
+from armtempo_shared.limits import MAX_NAME
+from armtempo_shared.rest_to_rest import Move, TooLongError
+from armtempo_shared.sequence import MAX_COUNTERS
+from micropython import const
+
+import armtempo_board
+from armtempo_board import step_rates
+from armtempo_board.app.cell import Cell, CellError, Ended
+from armtempo_board.app.sequence_command import STEP, VALUE
+from armtempo_board.app.sequencer import Sequencer
+from armtempo_board.errors import Refused, name_of
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from typing import Any
+
+    from armtempo_board.app.sequencer import Runner
+    from armtempo_board.storage.program_file import ProgramFile
+
+_PERCENT = const(100)
+_SLOWEST = const(10)
+_MOST_SKIPPED = const(16)
+_SAID_BYTES = const(240)
+_CHARACTERS = const(60)  # of four bytes, as many as fit
+_SAY_MS = const(500)  # longest wait until a host has taken the text before
+_MOST_MS = const(1 << 29)
+
+
+class UserProgram(Sequencer):
+    """See ``Sequencer``; ``record``: the program's."""
+
+    def __init__(self, controller: "Runner", record: "ProgramFile", name: bytes, rate: int) -> None:
+        self.table = record.table()
+        counters: "Any" = _Counters(self.table["counters"])
+        super().__init__(controller, counters, name + program.SUFFIX.encode(), rate)
+        self._source = record.source()
+        self._app: "Any" = None
+        self._run_once: "Callable[[], None]" = self._nothing
+        self._since_ms: "Any" = 0
+        self._served_ms: "Any" = 0
+        self._passed_ms = self._skipped = 0
+
+    def begin(self) -> None:
+        """Let the main loop execute it."""
+        super().begin()
+        self._controller.program = self
+
+    _nothing = Sequencer.prepare
+    advance = Sequencer.prepare  # it goes on by itself
+
+    def tell(self, link: "Any") -> None:
+        """It has no rows."""
+
+    def execute(self, app: "Any", run_once: "Callable[[], None]") -> None:
+        """Execute it to its end. ``run_once``: one pass of the main loop."""
+        self._app = app
+        self._run_once = run_once
+        self._since_ms = time.ticks_ms()
+        board = self._controller.board
+        try:
+            self._execute()
+        except (Ended, SystemExit):
+            pass
+        except BaseException as error:
+            self._fail(error)
+        gc.collect()
+        while board.engine.moving:
+            run_once()
+        if board.fault():
+            self._end(sequence.FAULTED, board.fault())
+        else:
+            self._end(sequence.STOPPED if self.stopping else sequence.FINISHED)
+
+    def _execute(self) -> None:
+        cell = Cell(self.table, self)
+        armtempo_board.cell = cell
+        names = {
+            "__name__": "__main__",
+            "print": self._print,
+            program.MARK: cell.at,
+            program.EACH: cell.each,
+        }
+        source, self._source = self._source, ""
+        code = compile(source, self.table["file"], "exec")
+        del source
+        gc.collect()
+        try:
+            exec(code, names)
+        finally:
+            del armtempo_board.cell
+
+    def _fail(self, error: "BaseException") -> None:
+        """Brake, set a fault, and tell the traceback of the program's own lines."""
+        controller = self._controller
+        if not controller.board.fault():
+            controller.board.pending = codes.PROGRAM_FAILED
+        if controller.board.engine.moving:
+            controller.stop(0)
+        try:
+            text, line = _traceback(error, self.table["file"])
+            self.status[STEP] = line or self.status[STEP]
+        except MemoryError:
+            text = "MemoryError in line %d" % self.status[STEP]
+        self._app.events.note(text)
+
+    def _print(self, *values: object, sep: str = " ", end: str = "\n", file: object = None) -> None:
+        self.serve()
+        self.say(sep.join([str(value) for value in values]))
+
+    # what the cell works with, see ``cell.Work``
+
+    def check(self) -> None:
+        """Raise Ended after a stop or a fault."""
+        if self.stopping or self._controller.board.fault():
+            raise Ended
+
+    def serve(self) -> None:
+        """A pass of the loop."""
+        self._run_once()
+        self._skipped = 0
+        self._served_ms = time.ticks_ms()
+        self.check()
+
+    def serve_if_due(self) -> None:
+        """A pass, unless the last one was in this millisecond; but often enough if no time passes."""
+        self._skipped += 1
+        if self._skipped < _MOST_SKIPPED and time.ticks_ms() == self._served_ms:
+            return
+        self.serve()
+
+    def note_line(self, line: int) -> None:
+        """For 'status'."""
+        self.status[STEP] = line
+
+    def ticks_ms(self) -> int:
+        """Since its start; after days it begins again."""
+        now_ms = time.ticks_ms()
+        self._passed_ms = (self._passed_ms + time.ticks_diff(now_ms, self._since_ms)) & _MOST_MS - 1
+        self._since_ms = now_ms
+        return self._passed_ms
+
+    def moving(self) -> bool:
+        """Whether a motion runs."""
+        return bool(self._controller.board.engine.moving)
+
+    def begin_motion(self, name: str, percent: int) -> None:
+        """Start a stored motion."""
+        self._begin(name, self.table["motions"].get(name), percent, "run(%r)" % name)
+
+    def begin_move(self, target: "Sequence[int]", percent: int) -> None:
+        """Start a move that the board makes."""
+        board = self._controller.board
+        for joint, steps in enumerate(target):
+            row = board.engine.limits[joint]
+            if not row["min_steps"] <= steps <= row["max_steps"]:
+                raise CellError("goto: joint %d would leave its range" % (joint + 1))
+        limits = [
+            (min(speed, step_rates.one), acceleration, jerk)
+            for speed, acceleration, jerk in self.table["limits"]
+        ]
+        try:
+            move = Move(self.steps(), target, limits, step_rates.together, percent)
+        except TooLongError:
+            raise CellError("goto: it would take longer than the board can make a move") from None
+        at = 0
+        for piece in move.pieces(board.arm_crc):
+            at = board.once.put(at, move.size, piece)
+        del move
+        self._begin(messages.ONCE_NAME, None, _PERCENT, "goto")
+
+    def _begin(self, name: str, crc: "int | None", percent: int, what: str) -> None:
+        try:
+            rate = max(self._rate * percent // _PERCENT, _SLOWEST)
+            self._controller.begin_motion(name, crc, rate)
+        except Refused as refused:
+            raise CellError("%s is refused: %s" % (what, _reason(refused))) from None
+
+    def brake(self) -> None:
+        """Brake the motion."""
+        self._controller.brake(0)
+
+    def steps(self) -> "list[int]":
+        """The joints' commanded steps."""
+        board = self._controller.board
+        return [board.engine.commanded(joint) for joint in range(board.joints)]
+
+    def set_output(self, number: int, value: int) -> None:
+        """Set an output."""
+        self._controller.board.outputs.set(number, value)
+
+    def level(self, number: int) -> int:
+        """Of an input."""
+        return int(self._controller.board.inputs.level(number))
+
+    def count(self, name: str) -> int:
+        """Increment a counter."""
+        number = self._command.named(name.encode()[:MAX_NAME], MAX_COUNTERS)
+        if number < 0:
+            raise CellError("more than %d counters" % MAX_COUNTERS)
+        self.status[VALUE] = self._command.count(number)
+        return int(self.status[VALUE])
+
+    def say(self, text: str) -> None:
+        """Each line as a notice; waits until the one before was sent, if a host is there."""
+        for line in text.split("\n"):
+            length = _SAID_BYTES if len(line.encode()) == len(line) else _CHARACTERS
+            for at in range(0, len(line) or 1, length):
+                begin_ms = time.ticks_ms()
+                while not self._app.events.can_note() and self._app.commands.greeted:
+                    if time.ticks_diff(time.ticks_ms(), begin_ms) > _SAY_MS:
+                        return
+                    self.serve()
+                self._app.events.note(line[at : at + length])
+
+
+class _Counters:
+    """The counters of a program as those of a sequence's record."""
+
+    def __init__(self, names: "list[str]") -> None:
+        self.counters = len(names)
+        self._names = names
+
+    def counter(self, number: int) -> bytes:
+        """Name of a counter."""
+        return self._names[number].encode()
+
+
+def _reason(refused: Refused) -> str:
+    """Name of the code, joint and value."""
+    joint = "" if refused.joint == messages.NO_JOINT else ", joint %d" % (refused.joint + 1)
+    return name_of(refused.code) + joint + (", %d" % refused.value if refused.value else "")
+
+
+def _traceback(error: "BaseException", file: str) -> "tuple[str, int]":
+    """The lines of a traceback that are in the program's file, and the error; the last line's number, or 0."""
+    text = io.StringIO()
+    sys.print_exception(error, text)
+    place = '  File "%s", line ' % file
+    found = []
+    line = 0
+    for row in text.getvalue().split("\n"):
+        if row.startswith(place):
+            number = row[len(place) :].split(",")[0]
+            line = int(number)
+        elif row.startswith((" ", "Traceback")) or not row:
+            continue
+        found.append(row)
+    return "\n".join(found), line

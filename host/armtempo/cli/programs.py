@@ -1,0 +1,135 @@
+"""``armtempo program``: a user's program, checked, stored and run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from armtempo.basics.errors import LinkError, MissingPackageError
+from armtempo.cli import options, resolve, results
+from armtempo.cli.options import BoardOptions
+from armtempo.cli.results import ProgressBar
+from armtempo.cli.state import counted
+from armtempo.deploy import program_files
+from armtempo.encoding import encoded_motion, encoded_program
+from armtempo.encoding.encoded_program import EncodedProgram
+from armtempo.link.board_messages import SequenceState
+from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.model.user_program import UserProgram
+from armtempo.robot.board import Board
+from armtempo.robot.stop_request import Stopped
+
+
+@click.command("program")
+@click.argument("file", type=options.PATH)
+@click.option("--check", is_flag=True, help="Only check the program; no board is needed.")
+@options.force("something else of its name, or of its motions' names, on the board")
+@options.board(options.arm, options.replace_arm)
+def program(file: Path, check: bool, force: bool, given: BoardOptions) -> None:
+    """Check a program in MicroPython, store it on the board, run it, and show what it prints.
+
+    FILE: a Python file with 'from armtempo_board import cell'; 'armtempo help programs' explains it. Motions that
+    it names are planned files NAME.json beside it, or on the board. The arm must be homed ('armtempo home').
+    Ctrl-C, or 'armtempo stop' in another terminal, brakes and ends it; 'armtempo status' shows its line.
+    """
+    arm = resolve.load_arm(given.arm_path)
+    found = UserProgram.load(file, arm)
+    _check_syntax(found)
+    if check:
+        _show_check(_without_board(found, arm), given.as_json)
+        return
+    say = results.progress_printer(given.as_json)
+    with resolve.board(given, arm) as board:
+        board.configure(arm, replace=given.replace_arm)
+        encoded = board.encode_program(found, arm)
+        _warn(encoded)
+        with ProgressBar("uploading") as progress:
+            board.upload_program(encoded, progress, force)
+        say(f"{found.name}: {len(encoded.data)} bytes stored, {encoded.heap_bytes} bytes of heap")
+        run_and_report(board, encoded, given.as_json)
+
+
+def _check_syntax(found: UserProgram) -> None:
+    """Compile it as MicroPython does, which knows less syntax than Python."""
+    try:
+        program_files.check_syntax(found.path, found.source)
+    except MissingPackageError as error:
+        results.remark(f"its syntax is not checked for MicroPython: {error}")
+
+
+def _without_board(found: UserProgram, arm: Arm) -> EncodedProgram:
+    """With the motions whose files are beside it."""
+    files = {name: found.path.parent / f"{name}.json" for name in found.motions}
+    motions = [
+        encoded_motion.of_plan(Plan.load(path), name) for name, path in files.items() if path.is_file()
+    ]
+    return encoded_program.of_program(found, arm, tuple(motions))
+
+
+def _warn(encoded: EncodedProgram) -> list[str]:
+    problems = encoded_program.moves_that_touch(encoded)
+    for problem in problems:
+        results.remark(f"a straight move {problem}; the board does not check that")
+    return problems
+
+
+def _show_check(encoded: EncodedProgram, as_json: bool) -> None:
+    found = encoded.program
+    with_it = {motion.name for motion in encoded.motions}
+    values: dict[str, Any] = {
+        "name": found.name,
+        "size_bytes": len(encoded.data),
+        "heap_bytes": encoded.heap_bytes,
+        "postures": [*found.postures],
+        "motions": [*found.motions],
+        "not_beside_it": [name for name in found.motions if name not in with_it],
+        "counters": [*found.counters],
+        "touches": _warn(encoded),
+    }
+    lines = [f"{found.file}: {len(encoded.data)} bytes, {encoded.heap_bytes} bytes of heap on the board"]
+    lines += [f"must be on the board: {name}" for name in values["not_beside_it"]]
+    results.show(as_json, values, lines)
+
+
+class _Shown:
+    """Shows the line of a running program on a terminal."""
+
+    def __init__(self) -> None:
+        self.is_terminal = sys.stderr.isatty()
+
+    def __call__(self, state: SequenceState) -> None:
+        if self.is_terminal and state.ending == "running":
+            click.echo(f"\r\x1b[Kline {state.step}", nl=False, err=True)
+
+    def clear(self) -> None:
+        """Remove the line, for another text."""
+        if self.is_terminal:
+            click.echo("\r\x1b[K", nl=False, err=True)
+
+
+def run_and_report(board: Board, what: EncodedProgram | str, as_json: bool = False) -> SequenceState:
+    """Run a program, or the stored program of that name; print what it prints, and its end."""
+    say = results.progress_printer(as_json)
+    shown = _Shown()
+
+    def listen(text: str) -> None:
+        shown.clear()
+        say(text)
+
+    try:
+        end = board.run_program(what, listen, shown)
+    except Stopped:
+        shown.clear()
+        say(f"stopped in line {board.client.sequence().step}{counted(board.counters)}")
+        raise
+    except LinkError:
+        shown.clear()
+        raise
+    shown.clear()
+    values = {"name": end.name, "ending": end.ending, "line": end.step, "counters": board.counters}
+    results.show(as_json, values, [f"{end.ending}{counted(board.counters)}"])
+    return end

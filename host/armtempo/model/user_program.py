@@ -1,0 +1,231 @@
+"""A user's program for the board (``cell``): read, checked against an arm, and marked with its lines.
+
+The board has no way to ask where a program is. So its source gets marks before it is sent: in each call of the cell and
+in the head of each loop, by which the board also does its own work in a loop that calls nothing. Lines stay as they
+are.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from armtempo_board.app.cell import Cell
+from armtempo_shared.program import EACH, MARK
+from armtempo_shared.sequence import MAX_COUNTERS
+
+from armtempo.basics.errors import InputError
+from armtempo.basics.text import did_you_mean
+from armtempo.model.arm import Arm
+from armtempo.model.job import NAME_RULE, is_name
+
+_PACKAGE, _CELL = "armtempo_board", "cell"
+_SLEEPS = ("sleep", "sleep_ms")
+_CALLS = {name: value for name, value in vars(Cell).items() if not name.startswith("_")}
+_INTERNAL = ("at", "each")
+
+
+@dataclass(frozen=True)
+class UserProgram:
+    """A program; ``postures``, ``motions``, ``counters``: those that it names in its text, with the first line."""
+
+    name: str
+    """Name on the board."""
+    path: Path
+    source: str
+    marked: str
+    postures: dict[str, int]
+    motions: dict[str, int]
+    counters: dict[str, int]
+
+    @property
+    def file(self) -> str:
+        """Name of its file, as tracebacks show it."""
+        return self.path.name
+
+    @classmethod
+    def load(cls, path: Path | str, arm: Arm) -> UserProgram:
+        """The program of a file, for this arm.
+
+        Raises InputError, with file and line, for wrong syntax, a call that the cell does not have, or a name that the
+        arm does not have.
+        """
+        path = Path(path)
+        if not is_name(path.stem):
+            raise InputError(f"{path}: its name is not valid on the board", f"give {NAME_RULE}, and .py")
+        try:
+            source = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            raise InputError(f"{path} is not text in UTF-8", "save it as that") from None
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror}", "give the file of a program") from None
+        try:
+            tree = ast.parse(source)
+        except (SyntaxError, ValueError) as error:
+            line = getattr(error, "lineno", None) or 1
+            problem = getattr(error, "msg", str(error))
+            raise InputError(f"{path}, line {line}: {problem}", "correct the line") from None
+        reader = _Reader(path, arm, _cell_name(tree, path))
+        reader.read(tree)
+        marked = _Marks(source, reader.cell).marked(tree)
+        return cls(path.stem, path, source, marked, reader.postures, reader.motions, reader.counters)
+
+
+def _cell_name(tree: ast.Module, path: Path) -> str:
+    """The name under which the program imports the cell."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == _PACKAGE:
+            for alias in node.names:
+                if alias.name == _CELL:
+                    return alias.asname or alias.name
+    raise InputError(f"{path} does not import the cell", f"write: from {_PACKAGE} import {_CELL}")
+
+
+@dataclass
+class _Reader:
+    """Checks the calls of a program."""
+
+    path: Path
+    arm: Arm
+    cell: str
+    postures: dict[str, int] = field(default_factory=dict)
+    motions: dict[str, int] = field(default_factory=dict)
+    counters: dict[str, int] = field(default_factory=dict)
+
+    def read(self, tree: ast.Module) -> None:
+        """Check all calls."""
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and _is_name(node.value, self.cell):
+                self._known(node)
+            if isinstance(node, ast.Call):
+                if isinstance(node.func, ast.Attribute) and _is_name(node.func.value, self.cell):
+                    self._known(node.func)
+                    self._check(node, node.func.attr)
+                self._check_sleep(node)
+        if len(self.counters) > MAX_COUNTERS:
+            raise InputError(f"{self.path}: {len(self.counters)} counters", f"use at most {MAX_COUNTERS}")
+
+    def _place(self, node: ast.AST) -> str:
+        return f"{self.path}, line {getattr(node, 'lineno', 1)}: "
+
+    def _known(self, node: ast.Attribute) -> None:
+        if node.attr not in _CALLS or node.attr in _INTERNAL:
+            names = [name for name in _CALLS if name not in _INTERNAL]
+            raise InputError(
+                f"{self._place(node)}the cell has no {node.attr!r}{did_you_mean(node.attr, names)}",
+                f"it has {', '.join(names)}",
+            )
+
+    def _check(self, node: ast.Call, name: str) -> None:
+        given = self._arguments(node, name)
+        first = next(iter(given.values()), None)
+        text = first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else ""
+        try:
+            if not text:
+                return
+            if name == "goto":
+                self.arm.posture(text)
+                self.postures.setdefault(text, node.lineno)
+            elif name in ("run", "start"):
+                self.motions.setdefault(_valid(text), node.lineno)
+            elif name == "count":
+                self.counters.setdefault(_valid(text), node.lineno)
+            elif name in ("wait", "active"):
+                self.arm.input(text)
+            elif name == "set":
+                self._check_output(text, given.get("value"))
+        except InputError as error:
+            raise InputError(f"{self._place(node)}{error.problem}", error.hint) from None
+
+    def _check_output(self, name: str, value: ast.expr | None) -> None:
+        output = self.arm.outputs[self.arm.output(name)]
+        if isinstance(value, ast.Constant) and isinstance(value.value, str | int | float):
+            output.raw(value.value)
+
+    def _arguments(self, node: ast.Call, name: str) -> dict[str, ast.expr]:
+        """The arguments of a call by the names of parameters; empty if stars hide them."""
+        if name == "Error" or any(isinstance(one, ast.Starred) for one in node.args):
+            return {}
+        if any(one.arg is None for one in node.keywords):
+            return {}
+        named = {str(one.arg): one.value for one in node.keywords}
+        try:
+            bound = inspect.signature(_CALLS[name]).bind(None, *node.args, **named)
+        except TypeError as error:
+            raise InputError(
+                f"{self._place(node)}{self.cell}.{name}: {error}",
+                f"its arguments are {_parameters(name)}",
+            ) from None
+        found: dict[str, Any] = dict(bound.arguments)
+        found.pop("self")
+        return found
+
+    def _check_sleep(self, node: ast.Call) -> None:
+        """The board does nothing else while MicroPython's sleep lasts: not even the steps of a motion."""
+        if (
+            isinstance(node.func, ast.Attribute)
+            and node.func.attr in _SLEEPS
+            and (_is_name(node.func.value, "time") or _is_name(node.func.value, "utime"))
+        ):
+            raise InputError(
+                f"{self._place(node)}time.{node.func.attr} keeps the board from its work",
+                f"write {self.cell}.sleep(seconds)",
+            )
+
+
+def _valid(name: str) -> str:
+    if not is_name(name):
+        raise InputError(f"{name!r} is not a valid name on the board", f"give {NAME_RULE}")
+    return name
+
+
+def _parameters(name: str) -> str:
+    parameters = list(inspect.signature(_CALLS[name]).parameters.values())[1:]
+    return ", ".join(str(one).replace("'", "") for one in parameters) or "none"
+
+
+def _is_name(node: ast.expr, name: str) -> bool:
+    return isinstance(node, ast.Name) and node.id == name
+
+
+class _Marks:
+    """Puts marks into a source."""
+
+    def __init__(self, source: str, cell: str) -> None:
+        self._lines = source.encode().splitlines(keepends=True)
+        self._cell = cell
+        self._texts: list[tuple[int, int, int, bytes]] = []  # line, byte, order, text
+
+    def marked(self, tree: ast.Module) -> str:
+        """The source with its marks."""
+        for node in _visible(tree):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                if _is_name(node.func.value, self._cell):
+                    self._around(node.func.value, f"{MARK}({node.lineno}, ", ")")
+            elif isinstance(node, ast.While):
+                self._around(node.test, f"{MARK}({node.lineno}) and (", ")")
+            elif isinstance(node, ast.For):
+                self._around(node.iter, f"{EACH}({node.lineno}, (", "))")
+        for line, at, _, text in sorted(self._texts, reverse=True):
+            row = self._lines[line - 1]
+            self._lines[line - 1] = row[:at] + text + row[at:]
+        return b"".join(self._lines).decode()
+
+    def _around(self, node: ast.expr, before: str, after: str) -> None:
+        """Put texts around a node; the marks of an outer one, which is visited first, go around those of an inner."""
+        order = len(self._texts) + 1
+        end = node.end_lineno or 0, node.end_col_offset or 0  # None in trees that no parser made
+        self._texts.append((node.lineno, node.col_offset, order, before.encode()))
+        self._texts.append((*end, -order, after.encode()))
+
+
+def _visible(tree: ast.AST) -> Iterator[ast.AST]:
+    """All nodes, outer ones first, but what is in f-strings: Python 3.11 does not say where that is."""
+    yield tree
+    for child in ast.iter_child_nodes(tree):
+        if not isinstance(child, ast.JoinedStr):
+            yield from _visible(child)

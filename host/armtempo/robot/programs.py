@@ -1,0 +1,93 @@
+"""Users' programs on a board."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armtempo.basics.arguments import checked_as
+from armtempo.basics.errors import InputError
+from armtempo.basics.progress import Progress
+from armtempo.encoding import encoded_motion, encoded_program
+from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_program import EncodedProgram
+from armtempo.link.board_messages import SequenceState
+from armtempo.model.arm import Arm
+from armtempo.model.job import is_name
+from armtempo.model.plan import Plan
+from armtempo.model.user_program import UserProgram
+from armtempo.robot import program_run
+from armtempo.robot.connection import Connection
+from armtempo.robot.program_run import Listener
+from armtempo.robot.sequence_run import SequenceWatcher
+from armtempo.robot.stop_request import StopRequest
+
+
+@checked_as("Board")
+class Programs:
+    """``Board.programs``: users' programs, stored and run."""
+
+    def __init__(self, board: Connection) -> None:
+        self._board = board
+
+    def encode(self, program: UserProgram | Path | str, arm: Arm | Path | str) -> EncodedProgram:
+        """The program of a file for this board, with the motions that it names: NAME.json beside it, or stored ones.
+
+        Raises InputError for one that is neither, and as ``UserProgram.load``.
+        """
+        arm = Arm.of(arm)
+        found = program if isinstance(program, UserProgram) else UserProgram.load(program, arm)
+        motions, stored = [], []
+        for name, line in found.motions.items():
+            file = found.path.parent / f"{name}.json"
+            kept = None if file.is_file() else self._board.client.find(name)
+            if file.is_file():
+                motions.append(encoded_motion.of_plan(Plan.load(file), name))
+            elif kept is not None and kept.joints:
+                stored.append(MotionKey(name, kept.crc))
+            else:
+                raise InputError(
+                    f"{found.path}, line {line}: no motion {name!r}",
+                    f"plan it as {file}, or store it with 'armtempo upload FILE --name {name}'",
+                )
+        return encoded_program.of_program(found, arm, tuple(motions), tuple(stored))
+
+    def upload(
+        self,
+        program: EncodedProgram | UserProgram | Path | str,
+        progress: Progress | None = None,
+        replace: bool = False,
+    ) -> MotionKey:
+        """Store a program with the motions that it names; a program of this name is replaced.
+
+        ``replace``: replace something else of one of the names too. Raises InputError for what is wrong in it,
+        LinkError if the board has too little memory, or something else under one of the names.
+        """
+        if not isinstance(program, EncodedProgram):
+            program = self.encode(program, self._board.known_arm())
+        self._board.configure(program.arm)
+        return program_run.store(self._board.client, program, progress, replace)
+
+    def run(
+        self,
+        program: EncodedProgram | UserProgram | Path | str,
+        listener: Listener = lambda _: None,
+        watcher: SequenceWatcher = lambda _: None,
+        stop: StopRequest | None = None,
+        replace: bool = False,
+    ) -> SequenceState:
+        """Run a program, or the stored program of that name; returns its last state.
+
+        ``listener`` is called with each line that it prints, ``watcher`` with each new state. The arm must be homed.
+        Raises as ``upload``, and BoardError if a fault ends it; its traceback went to ``listener``.
+        """
+        with self._board.stoppable(stop) as wanted:
+            if isinstance(program, str) and is_name(program):
+                found = self._board.client.find(program)
+                if found is None or not found.program:
+                    raise InputError(f"the board has no program {program!r}", "see 'armtempo list'")
+                key = MotionKey(found.name, found.crc)
+            else:
+                key = self.upload(program, replace=replace)
+            if self._board.arm is not None:
+                self._board.start.home_virtual_arm(self._board.arm)
+            return program_run.run(self._board.client, key, wanted, listener, watcher)

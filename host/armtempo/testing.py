@@ -1,0 +1,226 @@
+"""Tests of programs for the board without a board: a cell whose motions take no time.
+
+::
+
+    from armtempo import testing
+
+    def test_places_what_comes():
+        run = testing.run("pick.py", "my_arm.toml", inputs={"part": True}, moves=10)
+        assert run.counters["parts"] == 2
+        assert ("set", "gripper", "closed") in run.calls
+
+Names, ranges and values are checked by the code that checks them on the board (``armtempo_board.app.cell``).
+"""
+
+from __future__ import annotations
+
+import builtins
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import armtempo_board
+import numpy as np
+from armtempo_board.app.cell import Cell, CellError, Ended
+from armtempo_shared.program import EACH, MARK
+
+from armtempo.basics.errors import InputError
+from armtempo.encoding import encode, encoded_program
+from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.model.user_program import UserProgram
+
+LONGEST_S = 3600.0
+"""A program is stopped after this time of its own."""
+_AT_START_STEPS = 1
+
+Level = bool | Callable[["ProgramRun"], bool]
+"""Of an input: always, or at each look."""
+
+
+@dataclass
+class ProgramRun:
+    """What a program did."""
+
+    calls: list[tuple[Any, ...]] = field(default_factory=list)
+    """("goto", name or angles), ("run", motion), ("set", output, value), in order; ``start`` counts as "run"."""
+    said: list[str] = field(default_factory=list)
+    """What it printed."""
+    counters: dict[str, int] = field(default_factory=dict)
+    outputs: dict[str, float] = field(default_factory=dict)
+    """The last values, in the unit of each; at first the safe ones."""
+    posture_deg: tuple[float, ...] = ()
+    """Where the arm is."""
+    time_s: float = 0.0
+    """What its waits and motions took."""
+    stopped: bool = False
+    """Whether it was stopped, by ``moves`` or ``longest_s``; else it came to its end."""
+
+    @property
+    def moves(self) -> int:
+        """Number of motions and moves."""
+        return sum(call[0] in ("goto", "run") for call in self.calls)
+
+
+def run(
+    program: Path | str,
+    arm: Arm | Path | str,
+    inputs: Mapping[str, Level] | None = None,
+    *,
+    moves: int = 0,
+    motion_s: float = 0.0,
+    longest_s: float = LONGEST_S,
+) -> ProgramRun:
+    """ProgramRun a program from the home posture, and return what it did; what it raises passes through.
+
+    ``inputs``: levels by name, False for others. ``moves``: stop it instead of one more motion; 0: never.
+    ``motion_s``: time that each motion takes. A motion that it runs is a planned file NAME.json beside it. Raises
+    InputError as ``UserProgram.load``, and for an input that the arm does not have.
+    """
+    arm = Arm.of(arm)
+    found = UserProgram.load(program, arm)
+    for name in inputs or {}:
+        arm.input(name)
+    table = encoded_program.table(arm)
+    work = _Work(found, arm, inputs or {}, _Ends(moves, motion_s, longest_s))
+    cell = _Recorded(table, work)
+    names = {
+        "__name__": "__main__",
+        "__file__": str(found.path),
+        "print": work.print,
+        MARK: cell.at,
+        EACH: cell.each,
+    }
+    before = vars(armtempo_board).get("cell")
+    armtempo_board.cell = cell
+    try:
+        exec(compile(found.marked, str(found.path), "exec"), names)
+    except Ended:
+        work.run.stopped = True
+    except SystemExit:
+        pass
+    finally:
+        armtempo_board.cell = before  # type: ignore[assignment]
+    return work.run
+
+
+@dataclass(frozen=True)
+class _Ends:
+    moves: int
+    motion_s: float
+    longest_s: float
+
+
+class _Recorded(Cell):
+    """Notes what is called."""
+
+    def __init__(self, table: dict[str, Any], work: _Work) -> None:
+        super().__init__(table, work)
+        self._run = work.run
+
+    def goto(self, posture: str | Sequence[float], speed: float = 1.0, wait: bool = True) -> None:
+        super().goto(posture, speed, wait)
+        self._run.calls.append(("goto", posture if isinstance(posture, str) else tuple(posture)))
+
+    def start(self, motion: str, speed: float = 1.0) -> None:
+        super().start(motion, speed)
+        self._run.calls.append(("run", motion))
+
+    def set(self, output: str, value: str | float, wait_s: float = 0.0) -> None:
+        super().set(output, value, wait_s)
+        self._run.calls.append(("set", output, value))
+
+
+class _Work:
+    """Does what a cell asks for; see ``armtempo_board.app.cell.Work``."""
+
+    def __init__(self, program: UserProgram, arm: Arm, inputs: Mapping[str, Level], ends: _Ends) -> None:
+        self.run = ProgramRun(outputs={output.name: output.safe for output in arm.outputs})
+        self._program = program
+        self._arm = arm
+        self._inputs = [inputs.get(entry.name, False) for entry in arm.inputs]
+        self._ends = ends
+        self._now_ms = 0
+        self._rests_ms = 0
+        self._steps = self._in_steps(arm.home_deg)
+        self._limits = [(row["min_steps"], row["max_steps"]) for row in encode.motor_rows(arm)]
+        self.run.posture_deg = tuple(float(angle) for angle in arm.home_deg)
+
+    def _in_steps(self, angles_deg: Sequence[float]) -> list[int]:
+        return [
+            round(float(angle) * joint.steps_per_deg)
+            for angle, joint in zip(angles_deg, self._arm.driven, strict=True)
+        ]
+
+    def check(self) -> None:
+        if self.run.time_s > self._ends.longest_s:
+            raise Ended
+
+    def serve(self) -> None:
+        self._now_ms += 1
+        self.run.time_s = self._now_ms / 1000
+        self.check()
+
+    serve_if_due = serve
+
+    def note_line(self, line: int) -> None:
+        """Nothing to do."""
+
+    def ticks_ms(self) -> int:
+        return self._now_ms
+
+    def moving(self) -> bool:
+        return self._now_ms < self._rests_ms
+
+    def begin_motion(self, name: str, percent: int) -> None:
+        file = self._program.path.parent / f"{name}.json"
+        if not file.is_file():
+            raise InputError(f"no motion {name!r}: {file} does not exist", "plan it")
+        motion = Plan.load(file).trajectory
+        start = self._in_steps(motion(0.0).tolist())
+        off = np.abs(np.subtract(start, self._steps))
+        if off.max() > _AT_START_STEPS:
+            raise CellError(f"run({name!r}) is refused: wrong_start, joint {off.argmax() + 1}")
+        self._move(self._in_steps(motion(motion.duration_s).tolist()), percent)
+
+    def begin_move(self, target: Sequence[int], percent: int) -> None:
+        for joint, (steps, (low, high)) in enumerate(zip(target, self._limits, strict=True), 1):
+            if not low <= steps <= high:
+                raise CellError(f"goto: joint {joint} would leave its range")
+        self._move(list(target), percent)
+
+    def _move(self, target: list[int], percent: int) -> None:
+        if self._ends.moves and self.run.moves >= self._ends.moves:
+            raise Ended
+        self._steps = target
+        self._rests_ms = self._now_ms + round(1000 * self._ends.motion_s * 100 / percent)
+        self.run.posture_deg = tuple(
+            steps / joint.steps_per_deg for steps, joint in zip(target, self._arm.driven, strict=True)
+        )
+
+    def brake(self) -> None:
+        self._rests_ms = self._now_ms
+
+    def steps(self) -> list[int]:
+        return list(self._steps)
+
+    def set_output(self, number: int, value: int) -> None:
+        output = self._arm.outputs[number]
+        self.run.outputs[output.name] = output.value(value)
+
+    def level(self, number: int) -> int:
+        level = self._inputs[number]
+        return int(level(self.run) if callable(level) else level)
+
+    def count(self, name: str) -> int:
+        self.run.counters[name] = self.run.counters.get(name, 0) + 1
+        return self.run.counters[name]
+
+    def say(self, text: str) -> None:
+        self.run.said.append(text)
+
+    def print(self, *values: object, sep: str = " ", end: str = "\n", file: object = None) -> None:
+        """As on the board; also where pytest shows it."""
+        self.say(sep.join(map(str, values)))
+        builtins.print(*values, sep=sep, end=end)

@@ -1,0 +1,115 @@
+"""The program record: a user's program, and the arm's names in the board's numbers.
+
+Little endian::
+
+    offset  type   field
+    0       4s     magic  b"ATP1"
+    4       I      crc32 of the arm record it was made for
+    8       H      bytes T of the table
+    10      H      bytes S of the source
+    12      T      the table, in JSON (below)
+    ...     S      the source, in UTF-8; the host has put its marks into it (``MARK``)
+    end     I      crc32 over all before it
+
+The table has
+
+- ``file``: name of the source file, as tracebacks show it;
+- ``limits``: of each joint [speed, acceleration, jerk] for moves that the board makes, in steps;
+- ``per_deg``: steps per degree of each joint;
+- ``postures``: {name: [steps of each joint]};
+- ``motions``: {name: crc32} of the motions that were uploaded with it;
+- ``outputs``: {name: [number, value at 0, value at 65535, {state: 0 to 65535}]};
+- ``inputs``: {name: number};
+- ``counters``: [names] that the source counts.
+"""
+
+import json
+import struct
+from binascii import crc32
+
+from armtempo_shared.limits import MAX_MOTION_BYTES
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+MAGIC = b"ATP1"
+KIND_BYTES = 3
+"""Bytes of the magic that are the same in all versions."""
+SUFFIX = ".py"
+"""After the name of a program in the messages of sequences, which are those of programs too."""
+MARK = "__at__"
+"""The marked source calls it with the number of a line before what the line does in the cell, and in each pass of a
+loop."""
+EACH = "__each__"
+"""It calls this with the number of a line and what a loop goes through."""
+HEAP_BYTES = 26_000
+"""Heap that a program needs besides its own: its interface, and the start of a motion,"""
+HEAP_PER_BYTE = 8
+"""and for each byte of the source, most of it while it is compiled (host/docs/measurements.md)."""
+_HEAD = "<4sIHH"
+HEAD_BYTES = struct.calcsize(_HEAD)
+_CRC_BYTES = 4
+
+
+class ProgramError(ValueError):
+    """The record is damaged or of an unknown kind; or the program is too large."""
+
+
+def needed_bytes(source_bytes: int) -> int:
+    """Heap that a program with a source of this size needs."""
+    return HEAP_BYTES + HEAP_PER_BYTE * source_bytes
+
+
+def pack(arm_crc: int, table: "dict[str, Any]", source: str) -> bytes:
+    """A program record; raises ProgramError if it is too large."""
+    names, text = json.dumps(table).encode(), source.encode()
+    if HEAD_BYTES + len(names) + len(text) + _CRC_BYTES > MAX_MOTION_BYTES:
+        raise ProgramError("too large")
+    data = struct.pack(_HEAD, MAGIC, arm_crc, len(names), len(text)) + names + text
+    return data + struct.pack("<I", crc32(data))
+
+
+class ProgramRecord:
+    """A record of ``length`` bytes; a subclass provides the bytes by ``part``, and checks the checksum.
+
+    Raises ProgramError if the record is incomplete or of an unknown kind.
+    """
+
+    def __init__(self, length: int) -> None:
+        if length < HEAD_BYTES + _CRC_BYTES:
+            raise ProgramError("too short")
+        magic, self.arm_crc, self._table_bytes, self.source_bytes = struct.unpack(
+            _HEAD, self.part(0, HEAD_BYTES)
+        )
+        if magic != MAGIC:
+            raise ProgramError("no program record of this version")
+        if length != HEAD_BYTES + self._table_bytes + self.source_bytes + _CRC_BYTES:
+            raise ProgramError("length does not fit the header")
+
+    def part(self, offset: int, size: int) -> bytes:
+        """``size`` bytes of the record from ``offset`` on."""
+        raise NotImplementedError
+
+    def table(self) -> "dict[str, Any]":
+        """Its table; raises ValueError if it is none."""
+        found: "dict[str, Any]" = json.loads(self.part(HEAD_BYTES, self._table_bytes).decode())
+        return found
+
+    def source(self) -> str:
+        """The marked source."""
+        return self.part(HEAD_BYTES + self._table_bytes, self.source_bytes).decode()
+
+
+class ProgramData(ProgramRecord):
+    """A checked view of a record in memory."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        super().__init__(len(data))
+        if crc32(memoryview(data)[:-_CRC_BYTES]) != struct.unpack_from("<I", data, len(data) - _CRC_BYTES)[0]:
+            raise ProgramError("checksum")
+
+    def part(self, offset: int, size: int) -> bytes:
+        """See ``ProgramRecord``."""
+        return self._data[offset : offset + size]

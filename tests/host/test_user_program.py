@@ -1,0 +1,204 @@
+"""Users' programs on the host: refusals with their lines, marks, the record; the page's examples without a board."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from armtempo import testing
+from armtempo.basics.errors import InputError
+from armtempo.deploy import program_files
+from armtempo.encoding import encoded_motion, encoded_program
+from armtempo.model import shipped
+from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.model.user_program import UserProgram
+from armtempo_board.app.cell import CellError
+from armtempo_shared.program import ProgramData, ProgramError
+
+from tests.interpreters import ROOT
+from tests.system.commandline import run as run_command
+from tests.system.commandline import small_plan
+
+PAGE = (ROOT / "host" / "docs" / "programs.md").read_text()
+ARM_FILE = shipped.arm_path().parent / "pick_and_place" / "arm.toml"
+ARM = Arm.load(ARM_FILE)
+HEAD = "from armtempo_board import cell\n"
+
+
+def example(name: str, folder: Path) -> Path:
+    """A program of the page as a file."""
+    (found,) = re.findall(rf"^```py\n# {name}\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+    (folder / name).write_text(found)
+    return folder / name
+
+
+def written(text: str, folder: Path, name: str = "pick.py") -> Path:
+    (folder / name).write_text(HEAD + text)
+    return folder / name
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "problem"),
+    [
+        ("x = = 1\n", 2, "invalid syntax"),
+        ("\ncell.goto('hom')\n", 3, "no posture 'hom'"),
+        ("cell.move('home')\n", 2, "the cell has no 'move'"),
+        ("cell.at(3)\n", 2, "the cell has no 'at'"),
+        ("cell.goto()\n", 2, "missing a required argument"),
+        ("cell.goto('home', pace=1)\n", 2, "unexpected keyword argument 'pace'"),
+        ("cell.set('grip', 'open')\n", 2, "no output 'grip'"),
+        ("cell.set('gripper', 'ajar')\n", 2, "no state 'ajar'"),
+        ("cell.set('gripper', value=200.0)\n", 2, "its range is"),
+        ("cell.wait('parts')\n", 2, "no input 'parts'"),
+        ("cell.count('a b')\n", 2, "not a valid name"),
+        ("cell.run('my motion')\n", 2, "not a valid name"),
+        ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(text: str, line: int, problem: str, tmp_path: Path) -> None:
+    path = written(text, tmp_path)
+    with pytest.raises(InputError, match=problem) as raised:
+        UserProgram.load(path, ARM)
+    assert f"pick.py, line {line}: " in str(raised.value)
+
+
+def test_other_refusals(tmp_path: Path) -> None:
+    for name, text in (("my pick.py", HEAD), ("pick.py", "print(1)\n")):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InputError):
+            UserProgram.load(tmp_path / name, ARM)
+    with pytest.raises(InputError, match="give the file"):
+        UserProgram.load(tmp_path / "none.py", ARM)
+    path = written("match 3:\n    case 3:\n        pass\n", tmp_path)
+    with pytest.raises(InputError, match=r"pick.py, line 2: SyntaxError"):
+        program_files.check_syntax(path, path.read_text())
+    counts = "".join(f"cell.count('n{number}')\n" for number in range(9))
+    with pytest.raises(InputError, match="9 counters"):
+        UserProgram.load(written(counts, tmp_path), ARM)
+
+
+def test_marks_keep_the_lines_and_the_meaning(tmp_path: Path) -> None:
+    text = (
+        "from armtempo_board import cell as arm\n"
+        "n = 0\n"
+        "while arm.active('part') or n < 3:\n"
+        "    for á, b in (1, 2), (3, 4):\n"
+        "        n += á; arm.say(f'{arm.active(\"part\")}', arm.active(\n            'part'))\n"
+        "while (x := n + 1) < 4: n = x\n"
+        "print([arm.active('part') for _ in range(3)], n)\n"
+    )
+    (tmp_path / "pick.py").write_text(text)
+    found = UserProgram.load(tmp_path / "pick.py", ARM)
+    lines = [
+        [node.lineno for node in ast.walk(ast.parse(each)) if isinstance(node, ast.stmt)]
+        for each in (text, found.marked)
+    ]
+    assert lines[0] == lines[1]
+    assert "__at__(3) and (__at__(3, arm).active('part') or n < 3)" in found.marked
+    assert "in __each__(4, ((1, 2), (3, 4))):" in found.marked
+    run = testing.run(tmp_path / "pick.py", ARM)
+    assert run.said == ["False False"] * 2 + ["[False, False, False] 4"]
+
+
+def test_the_record_has_the_arms_names(tmp_path: Path) -> None:
+    found = UserProgram.load(written("cell.goto('home')\ncell.count('n')\ncell.run('m')\n", tmp_path), ARM)
+    assert (found.postures, found.counters, found.motions) == ({"home": 2}, {"n": 3}, {"m": 4})
+    motion = encoded_motion.of_plan(Plan.load(small_plan(tmp_path / "m.json")), "m")
+    encoded = encoded_program.of_program(found, ARM, (motion,))
+    record = ProgramData(encoded.data)
+    table = record.table()
+    assert record.source() == found.marked
+    assert table["motions"] == {"m": motion.key.crc}
+    assert table["counters"] == ["n"]
+    assert table["outputs"]["gripper"][0] == 0
+    assert set(table["outputs"]["gripper"][3]) == {"open", "closed"}
+    assert table["inputs"] == {"part": 0}
+    assert len(table["postures"]["home"]) == len(ARM.driven)
+    with pytest.raises(ProgramError):
+        ProgramData(encoded.data[:-9] + b"x" + encoded.data[-8:])
+    long = UserProgram.load(written("# " + 17_000 * "x" + "\n", tmp_path), ARM)
+    with pytest.raises(InputError, match="16384 bytes"):
+        encoded_program.of_program(long, ARM)
+
+
+def test_check_needs_no_board(tmp_path: Path) -> None:
+    path = written("cell.goto('home')\ncell.run('m')\n", tmp_path)
+    done = run_command("program", path, "--check", "--arm", ARM_FILE, folder=tmp_path, ARMTEMPO_PORT="none")
+    assert done.exit_code == 0, done.errors
+    assert "bytes of heap on the board" in done.output
+    assert "must be on the board: m" in done.output
+    path.write_text(HEAD + "cell.goto('hom')\n")
+    done = run_command("program", path, "--check", "--arm", ARM_FILE, folder=tmp_path, ARMTEMPO_PORT="none")
+    assert done.exit_code == 2
+    done.said("pick.py, line 2", "hom")
+
+
+# armtempo.testing
+
+
+def test_pick_and_place_and_its_own_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page's test of the page's example."""
+    example("pick_place.py", tmp_path)
+    (tmp_path / "arm.toml").write_text(ARM_FILE.read_text())
+    (code,) = re.findall(r"^```py\n(from armtempo import testing.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(code, names)
+    (test,) = (value for name, value in names.items() if name.startswith("test_"))
+    assert callable(test)
+    test()
+
+
+def test_a_pallet(tmp_path: Path) -> None:
+    run = testing.run(example("pallet.py", tmp_path), ARM)
+    places = [call[1] for call in run.calls if call[0] == "goto" and call[1] not in ("home", (0, -50, 30))]
+    assert len(set(places)) == 6
+    assert places[0] == (30, -55, 35)
+    assert places[-1] == (38, -52, 31)
+    assert run.counters == {"parts": 6}
+    assert not run.stopped
+    assert testing.run(example("pallet.py", tmp_path), ARM, moves=4).moves == 4
+
+
+def test_polling_a_sensor_while_moving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    class Bus:
+        def __init__(self, number: int, freq: int) -> None:
+            assert (number, freq) == (2, 400_000)
+
+        def readfrom_mem(self, address: int, register: int, size: int) -> bytes:
+            seen.append(address)
+            return max(0, 60 - len(seen)).to_bytes(size, "big")
+
+    machine = ModuleType("machine")
+    machine.I2C = Bus  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "machine", machine)
+    run = testing.run(example("polling.py", tmp_path), ARM, motion_s=0.5)
+    assert 30 < len(seen) < 40
+    assert run.said[0].startswith("at [")
+
+
+def test_what_a_program_raises_passes_and_endless_ones_end(tmp_path: Path) -> None:
+    with pytest.raises(CellError, match="joint 2 would leave its range"):
+        testing.run(written("cell.goto([0, 300, 0])\n", tmp_path), ARM)
+    with pytest.raises(InputError, match="does not exist"):
+        testing.run(written("cell.run('none')\n", tmp_path), ARM)
+    with pytest.raises(InputError, match="no input"):
+        testing.run(written("pass\n", tmp_path), ARM, {"parts": True})
+    run = testing.run(written("while True:\n    pass\n", tmp_path), ARM, longest_s=1.0)
+    assert run.stopped
+    assert run.time_s == pytest.approx(1.0, abs=0.01)
+    run = testing.run(written("cell.set('gripper', 'closed')\ncell.sleep(2)\n", tmp_path), ARM)
+    assert run.outputs["gripper"] == pytest.approx(95.0, abs=0.01)
+    assert run.time_s >= 2.0
+    source = (
+        "import asyncio\nasync def main():\n    task = asyncio.create_task(cell.serve())\n"
+        "    await asyncio.sleep(0)\n    print('in a task')\n    task.cancel()\nasyncio.run(main())\n"
+    )
+    assert testing.run(written(source, tmp_path), ARM).said == ["in a task"]
