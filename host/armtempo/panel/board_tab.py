@@ -123,13 +123,17 @@ class BoardTab:
         operator, page, name = self._operator, self._page, motion.name
 
         def run_it() -> None:
-            if motion.sequence:
+            if motion.program:
+                operator.board.run_program(name, operator.say)
+            elif motion.sequence:
                 operator.board.run_sequence(name, operator.live.take_sequence, out=operator.runs)
             else:
                 operator.board.run(name, 1, operator.runs, operator.part)
 
         with ui.row():
-            kind = words.A_SEQUENCE if motion.sequence else f"{motion.duration_s:.3f} s"
+            kind = f"{motion.duration_s:.3f} s"
+            if motion.sequence or motion.program:
+                kind = words.A_SEQUENCE if motion.sequence else words.A_PROGRAM
             ui.label(words.plain(f"{name} · {kind}{words.BY_BUTTON if motion.default else ''}"))
             page.button(words.RUN, lambda press: page.do(press, name, run_it), look="outline dense")
             for text, call in (

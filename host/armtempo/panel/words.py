@@ -205,7 +205,7 @@ STATE_KEYS = {
 }
 STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
 RENAME, REMOVE, NEW_NAME = "Rename", "Remove", "New name"
-A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
+A_SEQUENCE, A_PROGRAM, BY_BUTTON = "sequence", "program", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
 SELFTEST, SURE_SELFTEST = (
     "Self-test",
