@@ -239,8 +239,8 @@ def test_the_short_message_table_says_the_same() -> None:
 def test_tracebacks_say_classes(folder: str) -> None:
     """From a firmware, from sources in the flash, and from compiled files, whose names are all that they say."""
     chain = {
-        "App.turn": "armtempo_board/app/app.py",
-        "App._turn": "armtempo_board/app/app.py",
+        "App.run_once": "armtempo_board/app/app.py",
+        "App._run_once": "armtempo_board/app/app.py",
         "Engine.service": "armtempo_board/motion/engine.py",
         "Engine._service": "armtempo_board/motion/engine.py",
         "Engine._stopped": "armtempo_board/motion/engine.py",
