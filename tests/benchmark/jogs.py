@@ -2,18 +2,24 @@
 
 For every shipped arm, joint and percent of the speed: the way of a held jog after 0.1 to 2 s over that of ruckig's
 velocity interface; the duration of steps of 0.1 to 100 degrees over ruckig's; and the time to rest after a release at
-these times over the shortest, of the same limits too. It needs ruckig. ``--table``: the ways in the tests instead.
+these times over the shortest, of the same limits too. It needs ruckig. ``--table``: the ways in the tests instead;
+``--lines``: instead, jogs of AR4's tool at full speed over the fastest motion that the planner finds on the same line,
+within the same limits (half a minute).
 """
 
 from __future__ import annotations
 
 import argparse
+import time
+from dataclasses import replace
 
 import numpy as np
 import ruckig
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
-from armtempo.planning import brake_time, move_law
+from armtempo.planning import brake_time, move_law, planner
+from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.planning.move_law import WayLimits
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
@@ -21,13 +27,20 @@ TIMES_S = (0.1, 0.2, 0.5, 1.0, 2.0)
 PERCENTS = (1, 2, 5, 10, 25, 50, 75, 100)
 STEPS_DEG = (0.1, 1.0, 10.0, 100.0)
 LONG_DEG = 400.0
+ELBOW_DEG = (20.0, 10.0, -20.0, 15.0, 40.0, 30.0)
+LINES_MM = (1.0, 10.0, -50.0)
 
 
 def main() -> None:
     """Print the ratios, or the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--table", action="store_true")
-    table = parser.parse_args().table
+    parser.add_argument("--lines", action="store_true")
+    options = parser.parse_args()
+    if options.lines:
+        lines(Arm.load("ar4"))
+        return
+    table = options.table
     for name in shipped.files():
         arm = Arm.load(name)
         if table:
@@ -57,9 +70,9 @@ def compare(name: str, arm: Arm) -> None:
             spline = JointSpline(move_law.DEGREE, 1, law.way, law.time_s)
             ways.append(spline(np.array(TIMES_S)) / held_deg(limits))
             brakes = brake_time.of_motion(Trajectory(name, (spline,), True), [driven.limits])
-            for time in TIMES_S:
-                shortest_s = rest_s(limits, float(spline(time, 1)), float(spline(time, 2)))
-                rests.append(float(brakes.rest_s(time)) / shortest_s)
+            for time_s in TIMES_S:
+                shortest_s = rest_s(limits, float(spline(time_s, 1)), float(spline(time_s, 2)))
+                rests.append(float(brakes.rest_s(time_s)) / shortest_s)
             for step in STEPS_DEG:
                 found = move_law.law(step, move_law.of_joints([driven.limits], [1.0], percent / 100))
                 last_s = JointSpline(move_law.DEGREE, 1, found.way, found.time_s).duration_s
@@ -70,6 +83,36 @@ def compare(name: str, arm: Arm) -> None:
     print(
         f"rest: median {np.median(rest):.2f}, nine in ten {np.quantile(rest, 0.9):.2f}, most {rest.max():.2f}"
     )
+
+
+def lines(arm: Arm) -> None:
+    """Print the ratio of each line, and the processor time of both plans."""
+    joints = [
+        replace(
+            joint,
+            limits=replace(
+                joint.limits,
+                acceleration_deg_s2=move_law.ACCELERATION * joint.limits.acceleration_deg_s2,
+                jerk_deg_s3=move_law.JERK * joint.limits.jerk_deg_s3,
+            ),
+        )
+        for joint in arm.joints
+    ]
+    limited = replace(arm, joints=tuple(joints))
+    steps = np.array([joint.steps_per_deg for joint in arm.driven])
+    here_deg = (np.rint(ELBOW_DEG * steps) / steps).tolist()
+    for axis in ("x", "y", "tool-z"):
+        for by in LINES_MM:
+            begin_s = time.process_time()
+            jog = jog_motion.plan("jog", arm, here_deg, JogMove(by, axis=axis), 1.0)
+            middle_s = time.process_time()
+            fastest = planner.straight_line(limited, here_deg, jog.end_deg.tolist())
+            duration_s = jog.trajectory.duration_s
+            print(
+                f"{axis} {by:g} mm: {duration_s:.3f} s, {duration_s / fastest.duration_s:.3f} of the "
+                f"fastest; planned in {middle_s - begin_s:.2f} and {time.process_time() - middle_s:.2f} s",
+                flush=True,
+            )
 
 
 def limits_of(arm: Arm, joint: int, speed: float) -> WayLimits:
@@ -104,7 +147,7 @@ def held_deg(limits: WayLimits) -> np.ndarray:
     given.control_interface = ruckig.ControlInterface.Velocity
     given.target_velocity = [limits.speed]
     found = _solved(given)
-    return np.array([found.at_time(time)[0][0] for time in TIMES_S])
+    return np.array([found.at_time(time_s)[0][0] for time_s in TIMES_S])
 
 
 def rest_s(limits: WayLimits, speed: float, acceleration: float) -> float:

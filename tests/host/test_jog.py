@@ -135,16 +135,8 @@ OPTIMUM_DEG = {
             100: (0.021, 0.168, 2.4184, 13.347, 62.204),
         },
     ),
-    "thor": (
-        0,
-        {
-            1: (0.0081172, 0.028048, 0.088048, 0.18805, 0.38805),
-            5: (0.0093333, 0.069209, 0.36637, 0.86637, 1.8664),
-            25: (0.0093333, 0.074667, 1.0133, 3.5045, 8.5045),
-            100: (0.0093333, 0.074667, 1.0748, 5.932, 24.643),
-        },
-    ),
 }
+OPTIMUM_DEG["thor"] = OPTIMUM_DEG["moveo"]  # the same limits
 """Of the joint with the most of speed * jerk / acceleration² of each arm: by percent of its speed, the way after
 TIMES_S at the limits of a jog, by ruckig's velocity interface (``python -m tests.benchmark.jogs --table``)."""
 

@@ -83,7 +83,24 @@ class Backwards(MotionFile):
         return _Stream(super().stream(0), begin + _POINT_BYTES * points - (offset - begin), origin)
 
 
-class _Stream:
+class Reader:
+    """What reads into memory, as a file that reads too."""
+
+    def read(self, count: int) -> bytearray:
+        """As of a file."""
+        target = bytearray(count)
+        self.readinto(target)
+        return target
+
+    def readinto(self, target: "Any") -> int:
+        """As of a file."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """As of a file."""
+
+
+class _Stream(Reader):
     """Reads ``file`` backwards from ``end`` on, point by point; ``origin``: of a time axis."""
 
     def __init__(self, file: "Any", end: int, origin: bytes) -> None:
@@ -101,12 +118,6 @@ class _Stream:
         if self._origin:
             _subtract(target, size // _POINT_BYTES, self._origin)
         return size
-
-    def read(self, count: int) -> bytearray:
-        """As of a file."""
-        target = bytearray(count)
-        self.readinto(target)
-        return target
 
     def close(self) -> None:
         """As of a file."""

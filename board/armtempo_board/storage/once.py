@@ -11,7 +11,7 @@ from armtempo_shared.motion import Motion
 
 from armtempo_board.buffers import copy, pack_offsets
 from armtempo_board.errors import Refused
-from armtempo_board.storage.backwards import Backwards
+from armtempo_board.storage.backwards import Backwards, Reader
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class _InMemory(Motion):
         return _Stream(self.data, offset)
 
 
-class _Stream:
+class _Stream(Reader):
     """Reads ``data`` from ``at`` on."""
 
     def __init__(self, data: "bytes | memoryview", at: int) -> None:
@@ -93,12 +93,3 @@ class _Stream:
         copy(target, self._data, pack_offsets(0, self._at), count)
         self._at += count
         return count
-
-    def read(self, count: int) -> bytearray:
-        """As of a file."""
-        target = bytearray(count)
-        self.readinto(target)
-        return target
-
-    def close(self) -> None:
-        """As of a file."""

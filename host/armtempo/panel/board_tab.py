@@ -80,7 +80,10 @@ class BoardTab:
         if state is not None:
             values = asdict(state)
             rows = [
-                {"key": words.STATE_KEYS.get(key, key.replace("_", " ")), "value": words.text(values[key])}
+                {
+                    "key": words.STATE_KEYS.get(key, key.replace("_", " ")),
+                    "value": words.plain(words.text(values[key])),
+                }
                 for key in _SHOWN
                 if values[key] != ""
             ]
@@ -120,14 +123,18 @@ class BoardTab:
         operator, page, name = self._operator, self._page, motion.name
 
         def run_it() -> None:
-            if motion.sequence:
+            if motion.program:
+                operator.board.run_program(name, operator.say)
+            elif motion.sequence:
                 operator.board.run_sequence(name, operator.live.take_sequence, out=operator.runs)
             else:
                 operator.board.run(name, 1, operator.runs, operator.part)
 
         with ui.row():
-            kind = words.A_SEQUENCE if motion.sequence else f"{motion.duration_s:.3f} s"
-            ui.label(f"{name} · {kind}{words.BY_BUTTON if motion.default else ''}")
+            kind = f"{motion.duration_s:.3f} s"
+            if motion.sequence or motion.program:
+                kind = words.A_SEQUENCE if motion.sequence else words.A_PROGRAM
+            ui.label(words.plain(f"{name} · {kind}{words.BY_BUTTON if motion.default else ''}"))
             page.button(words.RUN, lambda press: page.do(press, name, run_it), look="outline dense")
             for text, call in (
                 (words.RENAME, lambda _: self._rename(name)),
@@ -139,7 +146,7 @@ class BoardTab:
         def remove(press: Press) -> None:
             self._change(press, words.REMOVE, lambda: self._operator.board.remove(name))
 
-        self._page.ask(words.SURE_REMOVE.format(name=name), words.REMOVE, remove)
+        self._page.ask(words.plain(words.SURE_REMOVE.format(name=name)), words.REMOVE, remove)
 
     def _rename(self, name: str) -> None:
         def rename(press: Press) -> None:
@@ -185,7 +192,7 @@ class _Shown:
         count = self._lines.count
         new = min(count - self._count, self.log.max_lines or 0)
         for line in list(self._lines.last)[-new:] if new else ():
-            self.log.push(line)
+            self.log.push(words.plain(line))
         self._count = count
 
 

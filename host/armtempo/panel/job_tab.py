@@ -414,7 +414,9 @@ def _cell(index: int, via: Via) -> str:
     if via.angles_deg is not None:
         return f"{via.angles_deg[index]:g}" if index < len(via.angles_deg) else ""
     values = via.values.get(ANGLES)
-    return str(values[index]) if isinstance(values, list) and index < len(values) else ""
+    found = values[index] if isinstance(values, list) and index < len(values) else ""
+    # As above, as one of the others is what is no angle
+    return f"{found:g}" if isinstance(found, int | float) and not isinstance(found, bool) else str(found)
 
 
 def build(page: PanelPage) -> None:

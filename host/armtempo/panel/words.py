@@ -205,7 +205,7 @@ STATE_KEYS = {
 }
 STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
 RENAME, REMOVE, NEW_NAME = "Rename", "Remove", "New name"
-A_SEQUENCE, BY_BUTTON = "sequence", " · started by the board's button"
+A_SEQUENCE, A_PROGRAM, BY_BUTTON = "sequence", "program", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
 SELFTEST, SURE_SELFTEST = (
     "Self-test",
@@ -257,7 +257,7 @@ def of_job(text: str) -> str:
 
 def of_text(text: str) -> str:
     """A text of the library in the words of the panel."""
-    return _COMMAND.sub(_button, text)
+    return plain(_COMMAND.sub(_button, text))
 
 
 def _button(command: re.Match[str]) -> str:

@@ -64,6 +64,17 @@ def test_what_is_being_typed_stays_when_another_field_changes(operator: PanelBoa
         assert operator.jobs.vias[2].angles_deg == pytest.approx(wanted)
 
 
+def test_what_is_being_typed_stays_when_a_wrong_text_beside_it_is_put_right(operator: PanelBoard) -> None:
+    with pages(operator) as page:
+        opened(page, 'name = "poses"\nvia_deg = [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]]\n')
+        type_into(page, "P0 joint 1", "no angle")
+        page.look()
+        typed = type_into(page, "P0 joint 2", "-6", left=False)
+        type_into(page, "P0 joint 1", "5")
+        page.look()
+        assert typed.value == "-6"
+
+
 def test_fields_show_what_has_changed(operator: PanelBoard) -> None:
     with pages(operator) as page:
         opened(page)

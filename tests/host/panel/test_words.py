@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from armtempo.panel import layout, words
+
+from tests.host.panel import fakes
+from tests.host.panel.pages import pages
 
 
 @pytest.mark.parametrize(
@@ -53,3 +57,38 @@ def test_texts_are_no_properties() -> None:
             for part in ast.walk(call):
                 if isinstance(part, ast.FormattedValue) and not isinstance(part.value, ast.IfExp):
                     assert ast.unparse(part.value) in allowed, f"{path.name}: {ast.unparse(part)}"
+
+
+def _texts(value: object) -> Iterator[str]:
+    """All texts in a value of any depth."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from (text for one in value.values() for text in _texts(one))
+    elif isinstance(value, list | tuple):
+        yield from (text for one in value for text in _texts(one))
+
+
+def test_names_from_files_and_boards_turn_no_line_on_any_tab(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+    name = 'j"\u202e<b>\x1b'  # an arm file with such a name is refused
+    operator = fakes.operator(fakes.Board(), tmp_path)
+    operator.live.state = fakes.board_state(arm=name, fault=name, port=name)
+    operator.log.add([name])
+    (operator.runs / name).mkdir(parents=True)
+    (operator.runs / name / "run.json").write_text("{}")
+    with pages(operator) as page:
+        for tab in (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD):
+            page.show(tab)
+            page.look()
+        page.press(words.CLEAR)
+        page.done()
+        shown = [*map(str, layout.message(operator, page.of.shape)["texts"].values())]
+        for element in page.elements():
+            found = [str(getattr(element, "text", "")), *_texts(element.props)]
+            assert not any("\u202e" in one or "\x1b" in one for one in found), (element, found)
+            shown += found
+        assert any('j"□<b>□' in text for text in shown)
+    operator.close()

@@ -15,7 +15,17 @@ from armtempo_board.stepgen.control_points import WINDOW_WORDS, ControlPoints
 from armtempo_board.storage import store
 from armtempo_board.storage.backwards import Backwards
 from armtempo_board.storage.motion_file import MotionFile
-from armtempo_shared import backwards, engine_memory, messages, motion, way_back, wire
+from armtempo_shared import (
+    armrecord,
+    backwards,
+    codes,
+    engine_memory,
+    limits,
+    messages,
+    motion,
+    way_back,
+    wire,
+)
 
 SEED = 20261127
 RAMPS = ((5,) * motion.REST_ENTRIES, (7,) * motion.OTHER_ENTRIES, 15, 0)
@@ -55,6 +65,83 @@ def case_a_record_in_memory_is_run_and_no_file_is_written():
 
 def refused(path, mode="r"):
     raise AssertionError("%s is opened (%s)" % (path, mode))
+
+
+def by_both(session, flags=0):
+    """What ``session`` yields of a board that runs a stored motion, and of one that runs it from memory: the same."""
+    found = []
+    for once in (False, True):
+        app, host = connected(flags)
+        put(host, host.record)
+        crc = wire.record_crc(host.record)
+
+        def begin(start_flags=0, host=host, crc=crc, name=messages.ONCE_NAME if once else "feed"):
+            return host.ask("start", (start_flags, crc), name)
+
+        said = list(session(app, host, begin))
+        found.append((said, app.controller.board.engine.calls, ends_of(host)))
+    assert found[0] == found[1], found
+    return found[0]
+
+
+def case_stop_pause_and_speed_are_those_of_a_stored_motion():
+    def session(app, host, begin):
+        yield host.ask("speed", (600,))  # of the next start
+        yield begin()
+        for rate in (250, 0, messages.RESUME, 1000):
+            yield host.ask("speed", (rate,))
+            yield app.controller.board.engine.rates.wanted
+        yield host.ask("stop", (0,))
+        yield state(host)
+        yield host.ask("speed", (500,))
+        app.controller.board.engine.finish()
+        yield state(host)
+        yield begin()
+        yield host.ask("stop", (1,))
+        yield state(host)
+        yield host.ask("stop", (0,))
+        yield host.ask("status")
+
+    said, calls, _ = by_both(session)
+    assert calls.count("rate") == 5
+    assert said[3:11:2] == [250, 0, messages.RESUME, 1000]
+    assert calls.count("brake") == 1
+    assert calls.count("freeze") >= 1
+    assert said[-2][:2] == ("error", "not_moving")
+
+
+def case_it_is_held_and_brakes_in_silence_as_a_stored_motion():
+    def session(app, host, begin):
+        yield begin(messages.START_HELD)
+        for _ in range(5):
+            host.turn(limits.HOLD_TIMEOUT_MS - 5)
+            yield host.ask("hold")
+        host.turn(limits.HOLD_TIMEOUT_MS + 5)
+        yield state(host)
+        app.controller.board.engine.finish()
+        yield state(host)
+        yield host.ask("hold")
+
+    said, calls, ends = by_both(session)
+    assert calls.count("brake") == 1
+    assert said[-3:-1] == ["braking", "idle"]
+    assert ends[-1][0] == "done"
+
+
+def case_a_lost_host_stops_it_as_a_stored_motion():
+    """The arm file says so; where the arm is stays known."""
+
+    def session(app, host, begin):
+        yield begin()
+        host.turn(5000)
+        yield app.controller.board.fault()
+        app.controller.board.engine.finish()
+        yield app.controller.board.known()
+
+    said, calls, _ = by_both(session, armrecord.FLAG_STOP_ON_LINK_LOSS)
+    assert said[1] == codes.LINK_LOST
+    assert calls.count("brake") == 1
+    assert said[-1] == 3
 
 
 def case_what_is_not_whole_or_not_meant_is_refused():

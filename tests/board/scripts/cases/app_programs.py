@@ -240,6 +240,22 @@ def case_marks_serve_a_loop_without_calls_and_tell_its_line():
     assert lines == [3, 5] and world.turns == 120, lines
 
 
+def case_the_hosts_speed_is_that_of_its_motions():
+    rates = []
+
+    def script(world):
+        engine = world.board.engine
+        if world.turns == 3:
+            assert world.host.ask("speed", (500,))[0] == "ok"
+        if engine.moving:
+            rates.append(engine.rates.wanted)
+            engine.finish()
+
+    world = World("cell.sleep(0.01)\ncell.run('there')\ncell.run('on', speed=0.5)\n", script)
+    assert world.run()[0] == "finished"
+    assert rates == [500, 250], rates
+
+
 def case_a_fault_of_the_board_ends_it():
     def script(world):
         if world.turns == 10:
