@@ -15,7 +15,7 @@ from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.optimise.kkt import BandedKkt, Factor
-from armtempo.planning import checks, collocation, motion_program, planner
+from armtempo.planning import checks, collocation, motion_program, planner, rest_to_rest
 from armtempo.planning.collocation import Curve, Ratios
 from armtempo.planning.free import corridor
 from armtempo.planning.tool import Tool
@@ -363,3 +363,13 @@ def test_ratios_added_keep_their_places_and_peaks_lower_what_is_allowed_next_to_
     lower = both.tightened(curve, peaks)
     assert lower.share[both.kind < 2] == pytest.approx(1.0)
     assert lower.share[both.kind == 2] == pytest.approx(4.0 / 6.0)
+
+
+@pytest.mark.slow
+def test_a_solve_that_ends_far_beyond_the_limits_is_not_the_last() -> None:
+    """A joint of three turns far; at few points the fastest path looks feasible, but is not between them."""
+    via = [[110.19, -81.1, -28.18], [121.99, -83.18, -105.21], [123.35, -80.61, -108.5]]
+    plan = planner.plan(ARM, Job("uneven", via_deg=via))
+    stopping_s = rest_to_rest.stopping_s(np.array(via), [joint.limits for joint in ARM.driven])
+    assert plan.total_s < 0.9 * stopping_s
+    assert faults(plan) == []

@@ -18,8 +18,9 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.steps import Goto, Hold
 from armtempo.model.tool_segment import ToolSegment
 from armtempo.model.workspace import FAR_MM, KeepOut, Workspace, read
-from armtempo.planning import planner, point_to_point, sequence_planner, workspace_check
+from armtempo.planning import lower_bounds, planner, point_to_point, sequence_planner, workspace_check
 from armtempo.planning.capsules import box_distance, segment_distance
+from armtempo.planning.free import free_path
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.robot import goto
@@ -131,14 +132,22 @@ def test_a_plan_names_link_obstacle_depth_time_and_via_points() -> None:
 
 
 @pytest.mark.slow
-def test_a_free_path_goes_around_what_is_between_its_via_points() -> None:
+def test_a_free_path_goes_around_what_is_between_its_via_points(monkeypatch: pytest.MonkeyPatch) -> None:
     """Over a box, as seen by dense samples; if walls leave no way, it is refused as before."""
+    calls: list[str] = []
+    for module, name in ((lower_bounds, "of_vias"), (free_path, "_starts")):
+        own = getattr(module, name)
+        monkeypatch.setattr(
+            module, name, lambda *given, own=own, name=name: calls.append(name) or own(*given)
+        )
     via = [[20, -60, 40], [160, -60, 40], [100, -90, 20]]
     job = Job("over", via_deg=via, stops=(Stop(1, 0.5),), path="free", refine=5, starts=1)
     arm = thick(PAPER, 20.0, Workspace((replace(FEEDER, high_mm=(50.0, 400.0, 250.0)),)))
     plan = planner.plan(arm, job)
     assert "the path goes around feeder" in plan.notes
     assert dense_least(arm, plan.trajectory, 2000) > 0.0
+    assert calls.count("of_vias") == 2, "of the first motion and of the last"
+    assert calls.count("_starts") <= 4, "the tool may pass nearby: no plan from new starts"
     assert plan.searches[0].floor_s <= plan.total_s < 10.0
     spline = plan.trajectory.joints[0]
     assert spline.via_segments is not None

@@ -80,15 +80,7 @@ def turns(angle_points_deg: Array, degree: int) -> Array:
     pieces = bspline.polynomials(angle_points_deg, degree)
     angles = np.concatenate([_stationary(piece) for piece in pieces] + [[pieces[-1].sum()]])
     wiggle = _WIGGLE * float(np.ptp(angles))
-    kept = [float(angles[0])]
-    for angle in angles[1:]:
-        if abs(angle - kept[-1]) <= wiggle:
-            continue
-        if len(kept) > 1 and (angle - kept[-1]) * (kept[-1] - kept[-2]) > 0:
-            kept[-1] = float(angle)
-        else:
-            kept.append(float(angle))
-    return np.array(kept)
+    return np.array(_turning(angles, wiggle))
 
 
 def _stationary(piece: Array) -> Array:
@@ -122,7 +114,7 @@ def of_vias(
         exact = [via for via in range(first, end + 1) if via not in loose]
         rests = end not in loose
         alone = max(
-            rest_to_rest.floor_s(_turning(via_deg[exact, joint], rests), limit, to_rest=rests)
+            rest_to_rest.floor_s(_stood_at(via_deg[exact, joint], rests), limit, to_rest=rests)
             for joint, limit in enumerate(limits)
         )
         together = 0.0
@@ -138,17 +130,20 @@ def of_vias(
     return Floor(total, kind)
 
 
-def _turning(angles: Array, rests: bool) -> Array:
-    """The first and last angle, and those at which the direction changes.
-
-    Without the last if the joint does not rest there.
-    """
+def _turning(angles: Array, wiggle: float = 0.0) -> list[float]:
+    """The first and last angle, and those at which the direction changes by more than ``wiggle``."""
     kept = [float(angles[0])]
     for angle in angles[1:]:
-        if angle == kept[-1]:
+        if abs(angle - kept[-1]) <= wiggle:
             continue
         if len(kept) > 1 and (angle - kept[-1]) * (kept[-1] - kept[-2]) > 0:
             kept[-1] = float(angle)
         else:
             kept.append(float(angle))
+    return kept
+
+
+def _stood_at(angles: Array, rests: bool) -> Array:
+    """As ``_turning``, without the last if the joint does not rest there."""
+    kept = _turning(angles)
     return np.array(kept if rests or len(kept) == 1 else kept[:-1])

@@ -181,9 +181,10 @@ def _free_s(plan: Plan) -> float:
         return math.inf
     job = replace(plan.job, path="free", degree=5, refine=AUTO, starts=1)
     try:
-        return free_plan.motion(plan.arm, job, plan.via_deg, lambda _done, _whole: None).trajectory.duration_s
+        found = free_plan.motion(plan.arm, job, plan.via_deg, lambda _done, _whole: None, trial=True)
     except ArmtempoError:
         return math.inf
+    return found.trajectory.duration_s
 
 
 def _separation(plan: Plan) -> list[str]:

@@ -73,7 +73,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
         helped = _helped(job, ways)
         angles = np.concatenate([ways[0], *(way[1:] for way in ways[1:])])
         try:
-            planned = free_plan.motion(arm, helped, angles, progress)
+            planned = free_plan.motion(arm, helped, angles, progress, trial=True)
         except PlanError:
             break
         if not (touch := _touch(arm, job, planned)):
@@ -103,7 +103,8 @@ def _loosened(
             for number, (each, pose) in enumerate(zip(helped.via, poses, strict=True))
         ]
         try:
-            found = free_plan.motion(arm, replace(helped, via=tuple(via)), angles, progress)
+            loose = replace(helped, via=tuple(via))
+            found = free_plan.motion(arm, loose, angles, progress, trial=True, known=planned)
         except PlanError:
             continue
         faster = found.trajectory.duration_s < planned.trajectory.duration_s

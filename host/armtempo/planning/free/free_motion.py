@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
-from armtempo.optimise import slack_method
+from armtempo.optimise import interior_point, slack_method
+from armtempo.optimise.interior_point import Schedule
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.optimise.slack_method import Goal
 from armtempo.planning import collocation
@@ -53,8 +54,13 @@ _TOOL_KEPT = 0.9995
 """Fraction of the tool's tolerances that a solve may use: it meets them to about half of the rest."""
 _ROUNDED = 1e-10
 """Relative excess over a bound that is only rounding."""
+_PART_OUT = 0.9
+"""How far a motion beyond a bound is moved towards the bound, as seen from one within: a solve starts inside."""
 _AT_END = 1e-6
 """A via point this close to the end of a range (fraction of the joint's motion) counts as at the end."""
+_WORSE = 1.1
+"""After a solve with so many times the time of the best motion, the limits are kept by all iterates from there on."""
+_CAREFUL = Schedule(first_barrier=0.1, last_barrier=1e-3, iterations=40, curvature=False)
 _NEARBY = 0.5
 """Solves leave out the ends of ranges that are farther from the motion than this fraction of the joint's motion."""
 _NEAR = 1e-4
@@ -257,9 +263,10 @@ class Improver:
         at = Ratios.grid(self.layout.segments, len(self._size), parts)
         best = here = motion.scaled(self.demand.limits)
         scale, known = np.inf, np.empty((2, 0))
-        for number in range(rounds):
+        number, careful = 0, False
+        for _ in range(rounds + 1):
             known = np.concatenate([known, np.full((2, len(at.kind) - known.shape[1]), np.nan)], axis=1)
-            solved, known = self._solve(here, at, scale, known)
+            solved, known = self._solve(here, at, scale, known, careful)
             here = self._inside(solved, best)
             curve = here.curve(self.demand.limits)
             scale = curve.scale()
@@ -269,8 +276,12 @@ class Improver:
                 at = at.tightened(curve, peaks)
             at += peaks
             here = here.slower(scale)
+            if here.total_s > _WORSE * best.total_s and not careful:  # it ended far beyond the limits
+                here, scale, known, careful = best, np.inf, np.full_like(known, np.nan), True
+                continue
             best = min(best, here, key=lambda candidate: candidate.total_s)
-            if scale < 1.0 + _NEAR:
+            number += 1
+            if scale < 1.0 + _NEAR or number == rounds:
                 break
         return best
 
@@ -285,7 +296,9 @@ class Improver:
         part = float(np.min((_ROUNDED - safe[out]) / (found[out] - safe[out])))
         if self._targets is not None or not part > 0.0:
             return within
-        points = within.angle_points_deg + part * (motion.angle_points_deg - within.angle_points_deg)
+        points = within.angle_points_deg + _PART_OUT * part * (
+            motion.angle_points_deg - within.angle_points_deg
+        )
         return replace(motion, angle_points_deg=points)
 
     def _strays(self, motion: FreeMotion) -> bool:
@@ -318,11 +331,13 @@ class Improver:
         high = np.where(at + near > self._high, self._high, np.inf)
         return angle_bounds.forms(self.variables, low / self._size, high / self._size).rows(self.variables)
 
-    def _solve(self, motion: FreeMotion, at: Ratios, scale: float, known: Array) -> tuple[FreeMotion, Array]:
+    def _solve(
+        self, motion: FreeMotion, at: Ratios, scale: float, known: Array, careful: bool
+    ) -> tuple[FreeMotion, Array]:
         """The motion that keeps R ratios within their limits, and the multipliers of these, (2, R).
 
         ``known``: multipliers of the solve before, NaN of new ratios; ``scale``: how much it exceeded the limits, as
-        a factor on time, inf for the first.
+        a factor on time, inf for the first; ``careful``: all iterates keep the limits, if the start does.
         """
         unit_s = motion.total_s / self.layout.segments
         limits = self.demand.limits * unit_s ** np.arange(1, 4) / self._size[:, None]
@@ -337,9 +352,12 @@ class Improver:
         program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least)
         multipliers = np.full(len(program.linear), np.nan)
         multipliers[: known.size] = known.ravel()
-        x, multipliers = slack_method.minimise(
-            program, start, program.linear, _FIRST if first else _AGAIN, multipliers
-        )
+        if careful:
+            x = interior_point.minimise(program, start, _CAREFUL).x
+        else:
+            x, multipliers = slack_method.minimise(
+                program, start, program.linear, _FIRST if first else _AGAIN, multipliers
+            )
         x = met(self.variables, program.equalities, x)
         solved = replace(
             motion,

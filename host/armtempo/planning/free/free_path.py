@@ -11,6 +11,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 from armtempo.basics.progress import Progress, alive, stage
+from armtempo.model.parts import Limits
 from armtempo.planning import rest_to_rest
 from armtempo.planning.free import angle_bounds, corridor, free_start, layout
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Improver, through
@@ -44,6 +45,8 @@ class Effort:
     rng: np.random.Generator
     along_s: Array | None = None
     """Differences of a time axis of the spline through the via points: if given, the only start in a corridor."""
+    known: Shortest | None = None
+    """A motion without some of the tolerances, from which one with them starts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +61,11 @@ class Shortest:
 def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     """The fastest motion that meets the demand, from several starts.
 
-    With tolerances, it starts from the motion that passes the via points exactly, so it is never slower.
+    With tolerances, it starts from a known motion, or that which passes the via points exactly, so it is never slower.
     Raises PlanError if no start keeps ranges and corridor.
     """
     if demand.tolerances:
-        exact = shortest(replace(demand, tolerances={}), effort, progress)
+        exact = effort.known or shortest(replace(demand, tolerances={}), effort, progress)
         looser = Improver(_tightened(demand), exact.motion.layout).improved(exact.motion, _ROUNDS)
         return replace(exact, motion=_within_corridor(demand, looser))
     even = effort.pieces is not None or _in_corridor(demand)
@@ -85,9 +88,25 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     if best is None:
         raise problem or PlanError("a free path needs at least one start", "set starts to 1 or more")
     stage("improving the best")
-    final = _finished(demand, best, effort, even)
+    final = _faster_than_stopping(demand, _finished(demand, best, effort, even), effort, progress)
     progress(whole, whole)
     return Shortest(final, np.array(times))
+
+
+def _faster_than_stopping(
+    demand: Demand, motion: FreeMotion, effort: Effort, progress: Progress
+) -> FreeMotion:
+    """The motion, or if stopping at every via point is faster, one that is improved from there."""
+    every = {via: demand.stops.get(via, 0.0) for via in range(1, len(demand.via_deg) - 1)}
+    limits = [Limits(*values) for values in demand.limits]
+    stopping_s = rest_to_rest.stopping_s(demand.via_deg, limits, True) + sum(demand.stops.values())
+    if motion.total_s <= stopping_s or every.keys() == demand.stops.keys() or _in_corridor(demand):
+        return motion
+    stage("starting from stops")
+    stopping = shortest(replace(demand, stops=every), effort, progress).motion
+    start = replace(stopping, layout=Layout(stopping.layout.pieces, demand.stops))
+    found = Improver(demand, start.layout).improved(start, _ROUNDS)
+    return min(motion, found, key=lambda each: each.total_s)
 
 
 def automatic_pieces(legs: int, most: int) -> int:

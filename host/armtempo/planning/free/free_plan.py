@@ -22,7 +22,7 @@ from armtempo.planning.free import corridor, free_path
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Tolerance, through
 from armtempo.planning.free.free_path import Effort, Shortest
-from armtempo.planning.free.layout import DEGREE, LEAST_PIECES, uniform
+from armtempo.planning.free.layout import DEGREE, DWELL_SEGMENTS, LEAST_PIECES, Layout, uniform
 from armtempo.planning.lower_bounds import Floor
 from armtempo.planning.through_plan import Planned
 from armtempo.planning.time_parameterization import MIN_DURATION_S
@@ -49,10 +49,14 @@ _WIDER = 0.5 * checks.TOLERANCE
 """Relative widening of ranges, so that a via point at their end is inside."""
 
 
-def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
+def motion(
+    arm: Arm, job: Job, via_deg: Array, progress: Progress, trial: bool = False, known: Planned | None = None
+) -> Planned:
     """The motion through via angles (n + 1, J), or near them at poses with a tolerance.
 
-    Raises InputError for a job that the board cannot hold, PlanError if no path stays within the ranges.
+    ``trial``: without its lower bound, which takes time; it is 0 then. ``known``: a motion of the job with shared
+    timing, without some of the tolerances; it is not planned again. Raises InputError for a job that the board cannot
+    hold, PlanError if no path stays within the ranges.
     """
     most = _most_segments(arm, job, len(via_deg))
     spline = None
@@ -68,6 +72,8 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
         if pieces is None and len(groups) > 1:
             pieces = free_path.automatic_pieces(len(via_deg) - 1, most)
         effort = Effort(pieces, most, job.starts, np.random.default_rng([job.seed, joints[0]]))
+        if known is not None:
+            effort = replace(effort, known=_shortest(known, demand))
         if spline is not None:
             pieces = pieces or free_path.automatic_pieces(len(via_deg) - 1, most)
             effort = replace(effort, along_s=_axis_s(demand, spline, pieces))
@@ -82,9 +88,21 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     points = np.stack([joint.angle_points_deg for joint in trajectory.joints], axis=1)
     checks.check_ranges(arm, points, DEGREE)
     searches = tuple(
-        _search(arm, job, via_deg, joints, one) for joints, one in zip(groups, found, strict=True)
+        _search(arm, job, via_deg, joints, one, trial) for joints, one in zip(groups, found, strict=True)
     )
     return Planned(trajectory, searches, _notes(arm, job, via_deg, groups, found))
+
+
+def _shortest(planned: Planned, demand: Demand) -> Shortest:
+    """What a motion with shared timing was made of."""
+    (search,) = planned.searches
+    joints = planned.trajectory.joints
+    assert joints[0].via_segments is not None  # a free path has these
+    waits = [demand.stops.get(via, 0.0) > 0.0 for via in range(len(demand.via_deg) - 1)]
+    pieces = np.diff(joints[0].via_segments) - DWELL_SEGMENTS * np.array(waits)
+    points = np.stack([joints[joint].angle_points_deg for joint in search.joints], axis=1)
+    motion = FreeMotion(Layout(pieces, demand.stops), points, np.diff(joints[0].time_points_s))
+    return Shortest(motion, search.starts_s)
 
 
 def _in_corridor(job: Job) -> bool:
@@ -225,8 +243,8 @@ def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
     return JointSpline(DEGREE, 1, angle_points_deg, times, tuple(map(int, motion.layout.arrivals)))
 
 
-def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shortest) -> Search:
-    floor = floor_of(arm, job, via_deg, joints, found.motion.via_times_s)
+def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shortest, trial: bool) -> Search:
+    floor = Floor(0.0, "vias") if trial else floor_of(arm, job, via_deg, joints, found.motion.via_times_s)
     return Search(
         joints=tuple(joints),
         intervals_s=found.motion.differences_s,
