@@ -2,6 +2,7 @@
 
 # all cases: slow on CPython
 
+import asyncio  # before the stand-in of time: its loop has a clock of its own
 import sys
 
 import cases
@@ -238,6 +239,33 @@ def case_marks_serve_a_loop_without_calls_and_tell_its_line():
     )
     assert world.run()[0] == "stopped"
     assert lines == [3, 5] and world.turns == 120, lines
+
+
+def case_tasks_of_asyncio_run_while_the_arm_moves():
+    def script(world):
+        engine = world.board.engine
+        if engine.moving and world.said():
+            engine.steps = world.target()
+            engine.finish()
+
+    world = World(
+        "import asyncio\n"
+        "async def main():\n"
+        "    task = asyncio.create_task(cell.serve())\n"
+        "    cell.goto('there', wait=False)\n"
+        "    for number in range(3):\n"
+        "        await asyncio.sleep(0.002)\n"
+        "    print('looked', number)\n"
+        "    while cell.moving():\n"
+        "        await asyncio.sleep(0)\n"
+        "    task.cancel()\n"
+        "asyncio.run(main())\n"
+        "print('at', cell.posture())\n",
+        script,
+    )
+    assert world.run()[0] == "finished"
+    assert world.said() == ["looked 2", "at [1.0, 0.5]"], world.said()
+    assert asyncio is sys.modules["asyncio"]
 
 
 def case_the_hosts_speed_is_that_of_its_motions():
