@@ -1,6 +1,5 @@
-"""The exception by which a command is refused, and the names of its codes."""
+"""The exception by which a command is refused."""
 
-from armtempo_shared import codes
 from armtempo_shared.messages import NO_JOINT
 
 
@@ -12,11 +11,3 @@ class Refused(Exception):
         self.code = code
         self.joint = joint
         self.value = value
-
-
-def name_of(code: int) -> str:
-    """Name of a refusal or fault, from ``codes``."""
-    for name in dir(codes):
-        if getattr(codes, name) == code:
-            return name.lower()
-    return ""

@@ -48,7 +48,8 @@ class Controller:
     def __init__(self, board: "Board") -> None:
         self.board = board
         self.sequence: "Any" = None  # the present run, or a program,
-        self.program: "Any" = None  # which is to be executed by the main loop
+        if features.SEQUENCES:
+            self.program: "Any" = None  # which is to be executed by the main loop
         self.free_flash = 0
         self.free_heap = 0
         self.run_number = 0

@@ -29,7 +29,7 @@ class Events:
         self._notice_number, _ = found["notice"]
         self._noted = 0  # the last noted fault
         self._fault_waits = False
-        self._notice = b""
+        self.notice = b""  # a text that is still to be sent
 
     def note_fault(self, code: int) -> None:
         """Called every pass with the pending fault (0: none), which is sent once."""
@@ -43,12 +43,8 @@ class Events:
 
     def note_bytes(self, text: bytes) -> None:
         """As ``note``, for at most MAX_PAYLOAD bytes; allocates nothing."""
-        if not self._notice:
-            self._notice = text
-
-    def can_note(self) -> bool:
-        """Whether the last text was sent."""
-        return not self._notice
+        if not self.notice:
+            self.notice = text
 
     def push(self) -> bool:
         """Give pending events to the link, at most one sample; returns whether there was a sample."""
@@ -103,8 +99,8 @@ class Events:
 
     def _push_notice(self) -> None:
         link = self._link
-        if self._notice and link.room(len(self._notice)):
+        if self.notice and link.room(len(self.notice)):
             at = link.payload()
-            link.out[at : at + len(self._notice)] = self._notice
-            link.event(self._notice_number, len(self._notice))
-            self._notice = b""
+            link.out[at : at + len(self.notice)] = self.notice
+            link.event(self._notice_number, len(self.notice))
+            self.notice = b""

@@ -8,7 +8,8 @@ from micropython import const
 from armtempo_board.app import program
 from armtempo_board.app.app import App
 from armtempo_board.app.watchdog import Watchdog
-from armtempo_board.errors import Refused, name_of
+from armtempo_board.code_names import name_of
+from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
 
 TYPE_CHECKING = False

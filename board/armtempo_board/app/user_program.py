@@ -20,7 +20,8 @@ from armtempo_board import step_rates
 from armtempo_board.app.cell import Cell, CellError, Ended
 from armtempo_board.app.sequence_command import STEP, VALUE
 from armtempo_board.app.sequencer import Sequencer
-from armtempo_board.errors import Refused, name_of
+from armtempo_board.code_names import name_of
+from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -219,7 +220,7 @@ class UserProgram(Sequencer):
             length = _SAID_BYTES if len(line.encode()) == len(line) else _CHARACTERS
             for at in range(0, len(line) or 1, length):
                 begin_ms = time.ticks_ms()
-                while not self._app.events.can_note() and self._app.commands.greeted:
+                while self._app.events.notice and self._app.commands.greeted:
                     if time.ticks_diff(time.ticks_ms(), begin_ms) > _SAY_MS:
                         return
                     self.serve()

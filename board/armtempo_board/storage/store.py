@@ -37,11 +37,9 @@ _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
 _KIND_BYTES = const(3)  # of a record's magic, of every version
-_SEQUENCE_MAGIC, _PROGRAM_MAGIC = (
-    b"ATS",
-    b"ATP",
-)  # as in modules of armtempo_shared that are loaded when needed
-MOTION, SEQUENCE, PROGRAM = const(0), const(1), const(2)
+MOTION = const(0)
+SEQUENCE = const(1)
+PROGRAM = const(2)
 """Kinds of records; what is neither of the last two counts as a motion."""
 _BLOCK = const(512)
 _0, _9, _A, _Z = const(0x30), const(0x39), const(0x61), const(0x7A)  # letters, small
@@ -401,7 +399,8 @@ class Store:
             magic = self._guard(file.read, _KIND_BYTES)
         finally:
             file.close()
-        return SEQUENCE if magic == _SEQUENCE_MAGIC else PROGRAM if magic == _PROGRAM_MAGIC else MOTION
+        # as in armtempo_shared.sequence and .program, which are loaded when needed
+        return SEQUENCE if magic == b"ATS" else PROGRAM if magic == b"ATP" else MOTION
 
     def _motion(
         self, file_name: str, kind: "Any" = motion_file.MotionFile, *arguments: object

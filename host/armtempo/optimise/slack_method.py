@@ -61,7 +61,7 @@ class Goal:
     iterations: int = 60
 
 
-class Found(NamedTuple):
+class LocalOptimum(NamedTuple):
     """Variables (n,) and multipliers of the inequalities (M,)."""
 
     x: Array
@@ -74,6 +74,14 @@ class _Step(NamedTuple):
     x: Array
     slack: Array
     multipliers: Array
+
+
+class _Corrected(NamedTuple):
+    """A step, and the parts of it that the slacks and the multipliers allow."""
+
+    step: _Step
+    of_slacks: float
+    of_multipliers: float
 
 
 class _Newton:
@@ -108,8 +116,8 @@ class _Newton:
         bent = one * other * step.slack * step.multipliers
         return target, np.clip(bent, -_CORRECTED * mean, _CORRECTED * mean)
 
-    def corrected(self, target: float, bent: Array) -> tuple[_Step, float, float]:
-        """The step towards products of ``target``, and the parts of it that slacks and multipliers allow."""
+    def corrected(self, target: float, bent: Array) -> _Corrected:
+        """The step towards products of ``target``."""
         products = target - bent
         step = self.step(products)
         one, other = self.lengths(step)
@@ -126,12 +134,12 @@ class _Newton:
             if large or sum(lengths) < one + other + _WORTHWHILE:
                 break
             step, products, (one, other) = longer, tried, lengths
-        return step, one, other
+        return _Corrected(step, one, other)
 
 
 def minimise(
     program: Program, x: Array, linear: NDArray[np.bool_], goal: Goal, multipliers: Array | None = None
-) -> Found:
+) -> LocalOptimum:
     """The variables near the local optimum near ``x`` (n,); ``linear``: whether each inequality is, (M,).
 
     Inequalities that are not linear are met to about ``goal.violation``. ``multipliers``: (M,) of a similar program
@@ -143,7 +151,7 @@ def minimise(
     least = goal.gap / count
     known = np.full(count, np.nan) if multipliers is None else multipliers
     if not np.all(slack > 0.0):
-        return Found(x, known)
+        return LocalOptimum(x, known)
     first = goal.first_gap / count
     slack = np.where(linear | np.isnan(known), slack, np.maximum(g, np.minimum(first / known, slack)))
     centre = first / slack
@@ -174,7 +182,7 @@ def minimise(
         multipliers = multipliers + min(1.0, _TO_BOUNDARY * other) * step.multipliers
         if mean <= 2.0 * least and (violation < goal.violation or violation > _STALLED * before):
             break
-    return Found(x, multipliers)
+    return LocalOptimum(x, multipliers)
 
 
 def _most(values: Array, change: Array) -> float:

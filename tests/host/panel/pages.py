@@ -31,8 +31,8 @@ class Page:
 
     def show(self, tab: str) -> None:
         """Go to a tab."""
-        with self.client:
-            next(one for one in self.elements(ui.tab_panels)).set_value(tab)
+        panels = next(one for one in self.elements(ui.tab_panels))
+        self._call(lambda: panels.set_value(tab))
 
     def look(self) -> None:
         """What the page does every quarter of a second."""

@@ -6,11 +6,13 @@ import asyncio
 import ipaddress
 import re
 import socket
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
+from armtempo.cli.panel import _way_in
 from armtempo.panel.access import COOKIE, MOST_BYTES, Access, Policy
-from armtempo.panel.server import listen, reachable
+from armtempo.panel.server import listen, reachable, url
 
 
 async def _inner(scope: Any, receive: Any, send: Any) -> None:
@@ -159,3 +161,15 @@ def test_the_printed_addresses_work(host: str, loopback: bool) -> None:
                 pass
     assert ipaddress.ip_address(addresses[-1]).is_loopback  # for this machine's browser
     assert ipaddress.ip_address(addresses[0]).is_loopback == (loopback or len(addresses) == 1)
+
+
+def test_the_page_that_is_opened_brings_the_token_and_nobody_else_reads_it() -> None:
+    """Arguments of a browser are read by every user of the machine: it gets the name of a file."""
+    address = url("::1", 8088, "secret")
+    with ExitStack() as stack:
+        page = _way_in(stack, address)
+        assert page.parent.stat().st_mode & 0o077 == 0
+        assert f"url={address}" in page.read_text()
+        assert "secret" not in str(page)
+        assert address == "http://[::1]:8088/?token=secret"
+    assert not page.exists()
