@@ -17,7 +17,8 @@ from armtempo.model.tool_pose import Pose
 from armtempo.optimise.kkt import BandedKkt, Factor
 from armtempo.planning import checks, collocation, motion_program, planner, rest_to_rest
 from armtempo.planning.collocation import Curve, Ratios
-from armtempo.planning.free import corridor
+from armtempo.planning.free import corridor, free_path
+from armtempo.planning.free.free_motion import Demand, FreeMotion
 from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
@@ -372,4 +373,20 @@ def test_a_solve_that_ends_far_beyond_the_limits_is_not_the_last() -> None:
     plan = planner.plan(ARM, Job("uneven", via_deg=via))
     stopping_s = rest_to_rest.stopping_s(np.array(via), [joint.limits for joint in ARM.driven])
     assert plan.total_s < 0.9 * stopping_s
+    assert faults(plan) == []
+
+
+def test_what_ends_slower_than_stopping_starts_from_the_stops_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    finished = free_path._finished
+    slow = iter([5.0])
+
+    def slower(demand: Demand, motion: FreeMotion, effort: free_path.Effort, even: bool) -> FreeMotion:
+        """The first result takes five times as long."""
+        return finished(demand, motion, effort, even).slower(next(slow, 1.0))
+
+    monkeypatch.setattr(free_path, "_finished", slower)
+    via = [[0.0, 0.0], [40.0, 30.0], [45.0, 60.0]]
+    arm = problems.make_arm([[50.0, 50.0, 150.0]] * 2)
+    plan = planner.plan(arm, Job("slow", via_deg=via, refine=4, starts=1))
+    assert plan.total_s < rest_to_rest.stopping_s(np.array(via), [joint.limits for joint in arm.driven])
     assert faults(plan) == []

@@ -20,6 +20,7 @@ READ_BY_PROGRAMS = {
     "help.py": 1,  # a page
     "jog_screen.py": 4,  # fits its line to the terminal itself
     "panel.py": 1,  # an address
+    "programs.py": 2,  # a line that is written again and again
     "results.py": 3,
     "sequences.py": 2,  # a line that is written again and again
     "teach.py": 2,  # TOML, and a line that is written again and again

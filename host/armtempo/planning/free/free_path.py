@@ -23,7 +23,7 @@ _PIECES, _LEAST = 32, 96
 """Segments of an automatic layout: per leg between via points, and least total."""
 _EVEN_PIECES = 24
 """Segments per leg if all have the same number."""
-_ROUNDS = 6
+_ROUNDS = 8
 """Solves on the final segments, each with the peaks of the one before; fewer if the limits hold between points."""
 _SPREAD = 0.5
 """Standard deviation of the logarithm of the random factors on the legs' times."""
