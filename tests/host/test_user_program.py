@@ -10,13 +10,16 @@ from types import ModuleType
 
 import pytest
 from armtempo import testing
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.deploy import program_files
 from armtempo.encoding import encoded_motion, encoded_program
+from armtempo.link import Client
+from armtempo.link.board_messages import Hello
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
+from armtempo.robot import program_run
 from armtempo_board.app.cell import CellError
 from armtempo_shared.program import ProgramData, ProgramError
 
@@ -136,6 +139,33 @@ def test_check_needs_no_board(tmp_path: Path) -> None:
     done = run_command("program", path, "--check", "--arm", ARM_FILE, folder=tmp_path, ARMTEMPO_PORT="none")
     assert done.exit_code == 2
     done.said("pick.py, line 2", "hom")
+
+
+class Small:
+    """A client of a board with little heap, or without sequences; nothing else may be asked of it."""
+
+    def __init__(self, free_heap: int, features: int = 15) -> None:
+        fields = dict.fromkeys(Hello.__dataclass_fields__, 0)
+        self.info = Hello(**{**fields, "free_heap": free_heap, "features": features})  # type: ignore[arg-type]
+
+    def hello(self) -> Hello:
+        return self.info
+
+    def need(self, feature: str, what: str) -> None:
+        Client.need(self, feature, what)  # type: ignore[arg-type]
+
+
+def test_a_board_without_the_memory_for_it_gets_nothing(tmp_path: Path) -> None:
+    found = UserProgram.load(written("cell.goto('home')\n", tmp_path), ARM)
+    encoded = encoded_program.of_program(found, ARM)
+    with pytest.raises(LinkError, match=f"needs {encoded.heap_bytes} bytes") as raised:
+        program_run.store(Small(encoded.heap_bytes - 1), encoded)  # type: ignore[arg-type]
+    assert "armtempo flash" in raised.value.hint
+    with pytest.raises(LinkError) as raised:
+        program_run.store(Small(100_000, features=0), encoded)  # type: ignore[arg-type]
+    assert "armtempo flash" in raised.value.hint
+    with pytest.raises(AttributeError, match="find"):
+        program_run.store(Small(encoded.heap_bytes), encoded)  # type: ignore[arg-type]
 
 
 # armtempo.testing
