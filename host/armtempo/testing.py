@@ -72,7 +72,7 @@ def run(
     motion_s: float = 0.0,
     longest_s: float = LONGEST_S,
 ) -> ProgramRun:
-    """ProgramRun a program from the home posture, and return what it did; what it raises passes through.
+    """Run a program from the home posture, and return what it did; what it raises passes through.
 
     ``inputs``: levels by name, False for others. ``moves``: stop it instead of one more motion; 0: never.
     ``motion_s``: time that each motion takes. A motion that it runs is a planned file NAME.json beside it. Raises

@@ -100,7 +100,7 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
 ) -> None:
     records, expected = shared
     for room in (14, 512, 1016):
-        steps = oracle.walk(QUICK, tmp_path, records, workspace=room)[1]
+        steps = oracle.walk(QUICK, tmp_path, records, room=room)[1]
         for mine, other in zip(steps, expected, strict=True):
             edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
             np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
@@ -134,7 +134,7 @@ def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
     brake = _brake(start_s, length_s)
     records = [motions.feeding()] + [motions.cruise(90_000)] * (start_s < CRUISE_S)
     one_by_one, *others = (
-        oracle.walk(QUICK, tmp_path, records, workspace=room, brake=brake)[1] for room in (2, 14, 1016)
+        oracle.walk(QUICK, tmp_path, records, room=room, brake=brake)[1] for room in (2, 14, 1016)
     )
     for steps in others:
         for mine, other in zip(steps, one_by_one, strict=True):

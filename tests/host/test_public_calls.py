@@ -100,6 +100,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "plan": plan,
         "new": "y",
         "path": "/no/such/file",
+        "program": "/no/such/file.py",
         "port": NOWHERE,
         "folders": [NOWHERE],
         "pose": np.eye(4),

@@ -214,12 +214,19 @@ def panels(folder: Path, cables: tuple[Cable, Cable] | None = None, arm: str = "
         yield made
 
 
-def opened(window: Any, address: str) -> Any:
-    """The panel's page in a window (a Playwright context), in control of the board."""
+_NOT_DRAWN = """{const get = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+  return kind.startsWith("webgl") ? null : get.call(this, kind, ...more);
+};}"""
+"""As in a browser without WebGL; the picture takes a processor most of its time."""
+
+
+def opened(window: Any, address: str, drawn: bool = True) -> Any:
+    """The panel's page in a window (a Playwright context), in control of the board; not ``drawn``: without the picture."""
     page = window.new_page()
     page.set_default_timeout(WAIT_S * 1000)
     page.on("console", lambda message: print(message.text))  # why it was loaded again, say
-    page.add_init_script(_SELDOM)
+    page.add_init_script(_SELDOM if drawn else _NOT_DRAWN)
     page.goto(address)
     return in_control(page)
 

@@ -92,7 +92,15 @@ def page(window: Any, panel: Panel) -> Any:
         if one.url == panel.address:
             return panels.in_control(one)
         one.close()
-    return panels.opened(window, panel.address)
+    return panels.opened(window, panel.address, drawn=False)
+
+
+@pytest.fixture
+def picture(window: Any, panel: Panel) -> Iterator[Any]:
+    """A page with the picture of the arm, which the others are without."""
+    page = panels.opened(window, panel.address)
+    yield page
+    page.close()
 
 
 def show(page: Any, tab: str) -> None:
@@ -159,7 +167,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     wait_for(page, "idle")  # a report is of a whole run
     for run, text in (("feed-002", "joint 1"), (_MARKUP, "of another arm")):
         with page.expect_popup() as popup:
-            page.get_by_role("button", name=f"Report: {run}").click()
+            page.get_by_role("link", name=f"Report: {run}").click()
         popup.value.wait_for_selector(f"text={text}")
         assert popup.value.title() != "hurt"
         popup.value.close()  # a page that is hidden is not drawn
@@ -167,7 +175,7 @@ def test_the_whole_way(page: Any, panel: Panel) -> None:
     for run in ("feed-001", "feed-002"):
         page.get_by_role("checkbox", name=f"Compare: {run}").click()
     with page.expect_popup() as popup:
-        page.get_by_role("button", name="Compare", exact=True).click()
+        page.get_by_role("link", name="Compare", exact=True).click()
     popup.value.wait_for_selector("text=feed-001")
     popup.value.close()
     show(page, "Board")
@@ -188,7 +196,8 @@ _PLACE = f"""name => {{
 }}"""
 
 
-def test_a_via_point_is_clicked_and_dragged_in_the_picture(page: Any) -> None:
+def test_a_via_point_is_clicked_and_dragged_in_the_picture(picture: Any) -> None:
+    page = picture
     show(page, "Job")
     page.wait_for_function(f"{_BALL}('via 3')")
     cell = page.get_by_label("P3 joint 1")
@@ -389,7 +398,7 @@ def test_names_from_files_are_text(chromium: Any, tmp_path: Path) -> None:
     text.write_text(tomlkit.dumps(content))
     with panels.panels(tmp_path, arm=str(text)) as running:
         window = chromium.new_context(viewport=panels.SMALL)
-        page = panels.opened(window, running().address)
+        page = panels.opened(window, running().address, drawn=False)
         home(page)
         for name in names:
             assert page.get_by_label(f"{name} +", exact=True).inner_text().strip() == "+"
@@ -565,7 +574,7 @@ def test_nothing_moves_that_nobody_means_any_more(
 ) -> None:
     if how == "reorders" and command == "posture":
         pytest.skip("a click has no release that could overtake it")
-    page = panels.opened(window, network.address)
+    page = panels.opened(window, network.address, drawn=False)
     home(page)
     where = page.inner_text("#armtempo-where")
     button = (

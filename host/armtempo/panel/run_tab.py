@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 import numpy as np
 from nicegui import ui
 
-from armtempo import pipeline
 from armtempo.basics.errors import InputError
 from armtempo.panel import past_runs, words
 from armtempo.panel.charts import CurveChart
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
 from armtempo.panel.past_runs import REPORT_PAGE, PastRun
+from armtempo.report.comparison import PAGE as COMPARISON
 from armtempo.robot.motions import MOST_REPETITIONS
 
 if TYPE_CHECKING:
@@ -121,7 +120,8 @@ class RunTab:
 
     @ui.refreshable_method
     def _past(self) -> None:
-        chosen: list[Path] = []
+        chosen: list[str] = []
+        compare: list[ui.button] = []
         if not self._known:
             ui.label(words.NO_RUNS).classes("armtempo-note")
             return
@@ -130,33 +130,36 @@ class RunTab:
                 ui.label(text).classes("text-caption")
             for run in self._known:
                 box = ui.checkbox(
-                    on_change=lambda event, run=run: _choose(chosen, run.folder, bool(event.value))
+                    on_change=lambda event, name=run.folder.name: _choose(chosen, name, event.value, compare)
                 )
                 named(box.props("dense"), f"{words.COMPARE}: {run.folder.name}")
                 for text in (run.folder.name, run.date, run.duration, run.ending):
                     ui.label(words.plain(text))
-                report = ui.button(words.REPORT, on_click=partial(self._report, run.folder))
+                report = _link(ui.button(words.REPORT), f"{_ADDRESS}/{quote(run.folder.name)}/{REPORT_PAGE}")
                 named(report.props("flat dense no-caps"), f"{words.REPORT}: {run.folder.name}")
         if len(self._known) > 1:
-            ui.button(words.COMPARE, on_click=lambda: self._compare(chosen)).props("outline no-caps")
-
-    async def _report(self, folder: Path) -> None:
-        """Open the report of a run, which is made if there is none yet."""
-        file = folder / REPORT_PAGE
-        made = file if file.is_file() else await self._page.threaded(lambda: past_runs.report(folder))
-        if made is not None:
-            ui.navigate.to(f"{_ADDRESS}/{quote(folder.name)}/{REPORT_PAGE}", new_tab=True)
-
-    async def _compare(self, folders: list[Path]) -> None:
-        if page := await self._page.threaded(lambda: pipeline.compare(sorted(folders))):
-            ui.navigate.to(f"{_ADDRESS}/{quote(page.name)}", new_tab=True)
+            compare.append(_link(ui.button(words.COMPARE), _comparison([])).props("outline no-caps"))
 
 
-def _choose(chosen: list[Path], folder: Path, wanted: bool) -> None:
+def _link(button: ui.button, address: str) -> ui.button:
+    """Open a page of the server in a new tab: the browser does, which keeps a server from it if that takes long."""
+    button.props["href"] = address
+    return button.props("target=_blank")
+
+
+def _comparison(names: Sequence[str]) -> str:
+    return f"{_ADDRESS}/{COMPARISON}?{urlencode({'run': sorted(names)}, doseq=True)}"
+
+
+def _choose(chosen: list[str], name: str, wanted: bool, compare: list[ui.button]) -> None:
+    """Note whether a run is to be compared, in the address of the comparison."""
     if wanted:
-        chosen.append(folder)
-    elif folder in chosen:
-        chosen.remove(folder)
+        chosen.append(name)
+    elif name in chosen:
+        chosen.remove(name)
+    for button in compare:
+        button.props["href"] = _comparison(chosen)
+        button.update()
 
 
 def build(page: PanelPage) -> None:
