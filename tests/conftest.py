@@ -33,7 +33,8 @@ DEPRECATIONS = ("DeprecationWarning", "PendingDeprecationWarning", "FutureWarnin
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Random tests with other cases than every day's."""
+    """Random tests with other cases than every day's, and what only a release needs."""
+    parser.addoption("--long", action="store_true", help="the tests marked long, too")
     parser.addoption("--cases", type=int, metavar="N", help="N random cases for each test that has seeds")
     parser.addoption("--first", type=int, default=0, metavar="SEED", help="the first of them, default 0")
 
@@ -95,6 +96,10 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """All of ``system/`` is slow. Several workers begin with what takes long, so that they end together."""
+    if not config.getoption("long"):
+        left_out = [item for item in items if item.get_closest_marker("long")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in set(left_out)]
     for item in items:
         if item.path.is_relative_to(interpreters.ROOT / "tests" / "system"):
             item.add_marker(pytest.mark.slow)

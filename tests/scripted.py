@@ -19,6 +19,11 @@ from tests import interpreters
 HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
 NOT_ON = {"micropython-arm": "not emulated", "cpython": "not on CPython"}
 EMULATED = "micropython-arm"
+_LONG = {
+    *("app_faults", "app_programs", "app_runs", "app_sequence_start", "app_sequences", "app_start"),
+    *("encoders", "engine_faults", "engine_override", "faults", "prompt", "sequences", "standalone"),
+}
+"""Scripts on what does not depend on the width of words, as far as is known."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +76,18 @@ def cases(*scripts: Path, on: Iterable[str] = interpreters.AVAILABLE) -> list[Ca
 
 
 def each(found: Iterable[Case]) -> pytest.MarkDecorator:
-    """A test for each case, as its argument ``case``; in the emulator and if a comment says so it is slow."""
+    """A test for each case, as its argument ``case``; in the emulator and if a comment says so it is slow.
+
+    In the emulator the scripts of ``_LONG`` are long, too.
+    """
     return pytest.mark.parametrize(
-        "case",
-        [pytest.param(case, id=str(case), marks=[pytest.mark.slow] * _is_slow(case)) for case in found],
+        "case", [pytest.param(case, id=str(case), marks=_marks(case)) for case in found]
     )
+
+
+def _marks(case: Case) -> list[pytest.MarkDecorator]:
+    is_long = case.interpreter == EMULATED and case.script.stem in _LONG
+    return [pytest.mark.slow] * _is_slow(case) + [pytest.mark.long] * is_long
 
 
 def _is_slow(case: Case) -> bool:

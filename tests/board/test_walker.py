@@ -61,6 +61,7 @@ def chance_records(count: int) -> list[bytes]:
     return [motions.chance(rng) for _ in range(count)]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_random_motions(tmp_path: Path) -> None:
     records = [record for record in chance_records(30) if oracle.peak_rate(record) < 330_000]

@@ -121,6 +121,7 @@ def test_refined_shared_timing(refine: int | str, most_s: float) -> None:
     assert 7.15 <= floor <= total
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_more_refinement_is_never_slower() -> None:
     """Also if it is no multiple of what came before."""
@@ -139,6 +140,7 @@ def test_automatic_refinement_stays_within_the_record() -> None:
     assert 119 * refine <= 2048
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["feeding", "feeding-shared"])
 def test_gradients_from_several_starts_find_the_best_known(name: str) -> None:
@@ -204,6 +206,7 @@ def test_gradients_start_within_bounds_and_are_not_held_by_them() -> None:
     assert plan.total_s == pytest.approx(planner.plan(arm, job).total_s, rel=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("vias", "joints", "timing", "room"),

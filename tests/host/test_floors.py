@@ -178,6 +178,7 @@ def test_no_plan_is_below_its_floor(seed: int) -> None:
     assert 0.0 < search.floor_s <= plan.total_s, f"seed {seed}"
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_many_via_points_and_jerk_that_hardly_matters() -> None:
     """Where a floor without an error bound was 8 % above the plan."""

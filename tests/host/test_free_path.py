@@ -134,6 +134,7 @@ def test_a_corridor_of_the_tool_holds_everywhere() -> None:
     assert plan.total_s < planner.plan(ARM, replace(FEED, path="through")).total_s
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_wider_corridors_are_never_slower_and_none_is_the_spline() -> None:
     """Those of degrees hold everywhere."""
@@ -167,6 +168,7 @@ def random_corridors(seed: int) -> tuple[Arm, Job, list[float]]:
     )
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.seeds(1)
 def test_a_corridor_is_never_slower_than_the_spline_nor_than_a_narrower_one(seed: int) -> None:

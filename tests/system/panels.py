@@ -222,7 +222,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
 
 
 def opened(window: Any, address: str, drawn: bool = True) -> Any:
-    """The panel's page in a window (a Playwright context), in control of the board; not ``drawn``: without the picture."""
+    """The panel's page in a window (a Playwright context), in control; without the picture if not ``drawn``."""
     page = window.new_page()
     page.set_default_timeout(WAIT_S * 1000)
     page.on("console", lambda message: print(message.text))  # why it was loaded again, say

@@ -47,6 +47,7 @@ def steps_of_a_run(folder: Path, deployed: bool) -> dict[str, list[int]]:
     return {pin: edges[pin][0].tolist() for pin in ("A15", "A1", "B10")}
 
 
+@pytest.mark.long
 def test_the_compiled_program_makes_the_same_pulses(tmp_path: Path) -> None:
     steps = [steps_of_a_run(tmp_path / str(deployed), deployed) for deployed in (False, True)]
     assert all(len(times) > 100 for times in steps[0].values())
@@ -59,6 +60,7 @@ def mpremote(port: str, *arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_sources_on_an_empty_board_and_back(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     flash.mkdir()

@@ -131,6 +131,7 @@ SPEED_DEG_S = 3.0
 FASTEST = interpreters.starter(interpreters.AVAILABLE[min(1, len(interpreters.AVAILABLE) - 1)])
 
 
+@pytest.mark.long
 def test_samples_wait_for_a_host_that_does_not_read() -> None:
     """In virtual time a motion of a minute would be over long before the host is back."""
     shipped = Arm.paper()

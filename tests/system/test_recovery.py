@@ -237,6 +237,7 @@ STATES: dict[str, dict[str, Callable[[Bench], None]]] = {
 """By section and name: what is done to a board with the program before it is powered, or with it."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("section", "state"),
     [(section, state) for section in SECTIONS for state in STATES.get(section.title, {"missing": None})],

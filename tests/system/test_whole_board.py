@@ -43,6 +43,13 @@ ON_SOURCES = [
 ]
 """What MicroPython runs with the sources themselves: what reaches into the program by the names in them or needs what
 compiled files are without, and what CPython runs too; with the core, which is deployed, it runs all others."""
+
+
+def is_again(case: scripted.Case) -> bool:
+    """Whether it is run with the core, too."""
+    return case.interpreter != QUICKEST and not is_for(case, "not compiled")
+
+
 CORE = [case for case in ALL if case.interpreter == QUICKEST and not is_for(case, "not compiled")]
 
 
@@ -118,7 +125,13 @@ def play(case: scripted.Case, flashes: Path, tmp_path: Path, program: str = PROG
     case.run(str(copied), program, home, str(FEWER[case.interpreter]))
 
 
-@scripted.each(ON_SOURCES)
+@pytest.mark.long
+@scripted.each(case for case in ON_SOURCES if is_again(case))
+def test_case_again(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
+    play(case, flashes, tmp_path)
+
+
+@scripted.each(case for case in ON_SOURCES if not is_again(case))
 def test_case(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
     play(case, flashes, tmp_path)
 
@@ -128,6 +141,7 @@ def test_case_with_the_core(case: scripted.Case, flashes: Path, core: str, tmp_p
     play(case, flashes, tmp_path, core)
 
 
+@pytest.mark.long
 def test_every_motion_of_a_soak_makes_the_steps_of_its_record(tmp_path: Path) -> None:
     sequences.make_flash(tmp_path / "flash", sequences.AWAY[:2])
     print(sequences.soak(QUICKEST, tmp_path / "flash", 10, seed=20268))

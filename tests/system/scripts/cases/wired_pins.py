@@ -81,14 +81,14 @@ class Board:
     """In the place of the controller."""
 
     def __init__(self):
-        self.rows = {}
+        self.extra_commands = {}
 
 
 def case_what_is_closed_can_be_made_anew():
     board = Board()
     output_setup.attach(board, [GRIPPER, HAND], [])
     arm_setup.drop_outputs(board)
-    assert (board.outputs, board.inputs, board.rows) == (None, None, {})
+    assert (board.outputs, board.inputs, board.extra_commands) == (None, None, {})
     assert pulses("B8") == pulses("B15") == (0, 0)
     assert line("B8").mode() == 0
     outputs_of([dict(GRIPPER, prescaler=51, period=32307)])
