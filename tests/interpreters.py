@@ -19,8 +19,8 @@ _STARTERS = {
 }
 AVAILABLE = [name for name, starter in _STARTERS.items() if starter.exists()]
 MISSING = [name for name in _STARTERS if name not in AVAILABLE]
-EACH = [pytest.param(name, marks=[pytest.mark.slow] * (name == "micropython-arm")) for name in AVAILABLE]
-"""For a test of each interpreter; the emulator takes long."""
+EACH = [pytest.param(name, marks=[pytest.mark.long] * (name == "micropython-arm")) for name in AVAILABLE]
+"""For a test of each interpreter; long in the emulator."""
 _BOARD_PATH = [ROOT / "shared", ROOT / "board", VIRTUAL / "hardware"]
 _RIGS = [ROOT / "tests" / folder for folder in ("rigs", "board/scripts/rigs", "system/scripts/rigs")]
 

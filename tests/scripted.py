@@ -19,11 +19,8 @@ from tests import interpreters
 HEAP = {"cpython": "", "micropython": "16M", "micropython-arm": "6M"}
 NOT_ON = {"micropython-arm": "not emulated", "cpython": "not on CPython"}
 EMULATED = "micropython-arm"
-_LONG = {
-    *("app_faults", "app_programs", "app_runs", "app_sequence_start", "app_sequences", "app_start"),
-    *("encoders", "engine_faults", "engine_override", "faults", "prompt", "sequences", "standalone"),
-}
-"""Scripts on what does not depend on the width of words, as far as is known."""
+_SHORT = {"memory", "rings"}
+"""Scripts on what depends on the width of words first of all; the others are long in the emulator."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +75,7 @@ def cases(*scripts: Path, on: Iterable[str] = interpreters.AVAILABLE) -> list[Ca
 def each(found: Iterable[Case]) -> pytest.MarkDecorator:
     """A test for each case, as its argument ``case``; in the emulator and if a comment says so it is slow.
 
-    In the emulator the scripts of ``_LONG`` are long, too.
+    Long is what takes long in the emulator, and what is slow everywhere.
     """
     return pytest.mark.parametrize(
         "case", [pytest.param(case, id=str(case), marks=_marks(case)) for case in found]
@@ -86,14 +83,11 @@ def each(found: Iterable[Case]) -> pytest.MarkDecorator:
 
 
 def _marks(case: Case) -> list[pytest.MarkDecorator]:
-    is_long = case.interpreter == EMULATED and case.script.stem in _LONG
-    return [pytest.mark.slow] * _is_slow(case) + [pytest.mark.long] * is_long
-
-
-def _is_slow(case: Case) -> bool:
     said = set().union(*(tags(case.script)[name] for name in case.name.split()))
+    is_long = "slow" in said or (case.interpreter == EMULATED and case.script.stem not in _SHORT)
     on_cpython = case.interpreter == "cpython" and "slow on CPython" in said
-    return case.interpreter == EMULATED or "slow" in said or on_cpython
+    is_slow = case.interpreter == EMULATED or on_cpython
+    return [pytest.mark.long] if is_long else [pytest.mark.slow] * is_slow
 
 
 def together(found: Iterable[Case]) -> list[Case]:

@@ -62,7 +62,7 @@ def test_a_million_steps_a_second_leave_time_to_spare(figures: dict[str, dict[st
     assert 999_000 * figures["cruise"]["all"] * 1.3 < 0.9 * 168e6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_machine_code_computes_what_cpython_does() -> None:
     assert interpreters.run("cpython", BENCHMARK, "--verify") == "the same\n"
 
@@ -346,7 +346,7 @@ def frozen(machine: Machine, chip: Chip, edge: float, cycles: float) -> array[in
     return block
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("cycles", "latency"), [(1.0, 3), (1.3, 40), (2.5, 10)])
 def test_at_every_tick_of_a_step(cycles: float, latency: int) -> None:
     """No pulse is cut or lasts on, no step comes after the stop, and the count is that of the pins."""

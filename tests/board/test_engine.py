@@ -22,7 +22,7 @@ def test_case(case: scripted.Case) -> None:
     case.run(*["short"] * (case.interpreter != QUICKEST))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(
     "micropython" not in interpreters.AVAILABLE,
     reason="no MicroPython here: CI ends at the start, and the summary says so",

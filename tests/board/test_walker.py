@@ -36,7 +36,7 @@ TIME_UNITS = 4.0
 SLOPE_PART = 2.0**-22
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", motions.NAMED)
 def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
     record = motions.NAMED[name]()
@@ -113,7 +113,7 @@ def _brake(start_s: float, length_s: float) -> tuple[int, int]:
     return round(start_s * oracle.TICK_HZ), round(length_s * oracle.TICK_HZ / whole) * whole
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("start_s", "length_s"), BRAKES)
 def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: float, tmp_path: Path) -> None:
     start, length = _brake(start_s, length_s)

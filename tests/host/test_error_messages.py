@@ -281,7 +281,7 @@ def test_a_speed_is_1_to_100_percent() -> None:
             speed.permille(fraction)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_words_that_users_read_name_no_file_of_the_checkout() -> None:
     """A wheel has no folder ``host/docs``: messages name a topic of ``armtempo help``."""
     package = Path(str(files("armtempo")))

@@ -46,7 +46,7 @@ def test_derivatives_of_the_ratios_are_theirs(seed: int) -> None:
                 assert slope == pytest.approx(bent, rel=1e-6, abs=1e-6 * np.abs(slopes).max())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["feeding", "feeding-shared", "feeding-cubic"])
 def test_polished_plan_is_the_best_known_to_1e_6(name: str) -> None:
     """From a short search on purpose, so that the solver has work to do."""
@@ -111,7 +111,7 @@ def test_refined_joints_come_near_their_floor(joint: int, most_s: float) -> None
     assert total <= 1.006 * floor
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("refine", "most_s"), [(1, 8.19), (4, 7.2975), (8, 7.254), (64, 7.2272), ("auto", 7.228)]
 )

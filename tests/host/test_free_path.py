@@ -114,7 +114,7 @@ def _away_deg(plan: Plan) -> float:
     return away
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_corridor_of_the_tool_holds_everywhere() -> None:
     plan = planner.plan(ARM, replace(FEED, corridor_mm=2.0))
     assert faults(plan) == []
@@ -186,7 +186,7 @@ def test_a_corridor_is_never_slower_than_the_spline_nor_than_a_narrower_one(seed
         least = min(least, total)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

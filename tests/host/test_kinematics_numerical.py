@@ -56,7 +56,7 @@ def checked(found: NumericalSolutions) -> np.ndarray:
     return angles
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("arm", "fixed"), FITTING, ids=lambda value: getattr(value, "name", None))
 def test_every_arm_finds_the_posture_that_made_the_pose(arm: Arm, fixed: tuple[str, ...]) -> None:
     rng = np.random.default_rng(31)

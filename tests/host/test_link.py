@@ -264,7 +264,7 @@ def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:
     assert (end.fault, end.lost) == (0, ())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("kind", FAULTS)
 def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     pipe = Pipe(tmp_path / "flash")

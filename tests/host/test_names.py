@@ -158,7 +158,7 @@ def test_a_plan_tells_of_coarse_steps(made: Plan, monkeypatch: pytest.MonkeyPatc
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_plan_on_the_spline_tells_what_is_faster_if_it_loses_much_to_it() -> None:
     """Short approaches, as of a pick, between which the spline swings."""
     via = [[0, -60, 40], [0, -60, 42], [90, -70, 42], [90, -70, 40]]

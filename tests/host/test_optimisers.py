@@ -274,7 +274,7 @@ def fitness_of(joint: int) -> Fitness:
     return Fitness(points[:, [joint]], 5, [limits])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("joint", range(3))
 def test_is_near_the_best_known_with_every_seed(joint: int) -> None:
     """A part of host/docs/measurements.md: median within 0.05 %, worst within 0.3 %, at most 2 N 500 evaluations."""

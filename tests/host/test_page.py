@@ -91,7 +91,7 @@ def figure(name: str) -> str:
     return drawing.inline_svg(drawn[name](), name, "what it shows")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["motion", "tracking", "errors", "overlay", "convergence", "postures", "searches"]
 )

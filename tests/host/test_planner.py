@@ -170,7 +170,7 @@ def test_a_tiny_motion_takes_a_hundredth_of_a_second(refine: int, polish: bool) 
     assert plan.trajectory.duration_s == pytest.approx(0.01, rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("refine", [1, 2])
 @pytest.mark.parametrize("polish", [False, True])
 def test_progress_grows_to_the_whole(refine: int, polish: bool) -> None:
@@ -182,7 +182,7 @@ def test_progress_grows_to_the_whole(refine: int, polish: bool) -> None:
     assert seen[-1] == pytest.approx(1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "changes",
     [{}, {"path": "free", "refine": 4, "starts": 1}, {"path": "free", "corridor_mm": 0.01, "refine": 4}],

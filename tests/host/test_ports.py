@@ -173,7 +173,7 @@ print("\\n".join(failed))
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_module_is_imported_without_what_only_posix_has() -> None:
     done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

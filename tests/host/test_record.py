@@ -503,7 +503,7 @@ def test_a_joint_without_an_encoder_is_not_measured() -> None:
     assert found[0][0].verdict in (peaks.KEPT, peaks.WITHIN)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_stated_uncertainty_is_that_of_repeated_measurements() -> None:
     """Seed 7: the same noise in 40 runs; their peaks at one place scatter by the stated sigma."""
     rng = np.random.default_rng(7)

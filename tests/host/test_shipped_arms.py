@@ -192,7 +192,7 @@ def test_ar4_encoders_count_as_its_driver_says() -> None:
     assert [joint.encoder.direction for joint in joints if joint.encoder] == [-1, 1, 1, 1]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_each_says_where_its_figures_are_from_and_can_be_planned_for(name: str) -> None:
     path = shipped.files()[name]

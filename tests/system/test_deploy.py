@@ -157,6 +157,7 @@ def test_sectors_that_hold_something_else_are_left_alone(tmp_path: Path) -> None
     assert sectors.read_bytes() == bytes(1 << 18)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cut", [5, 30], ids=["files", "sectors"])
 def test_cut_off_deployment_is_completed_by_the_next(
     cut: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

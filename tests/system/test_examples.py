@@ -190,10 +190,13 @@ SHORTER = (
     ("PARTS = 2", "PARTS = 1"),
 )
 """What takes time and shows nothing new here."""
+EVERY_DAY = ("feeding.py", "pick_and_place.py")
 ARGUMENTS = {"sweep.py": ["--jobs", "6"], "compare_searches.py": FEW}
 
 
-@pytest.mark.parametrize("name", LEAVES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] * (name not in EVERY_DAY)) for name in LEAVES]
+)
 def test_example(name: str, tmp_path: Path) -> None:
     script = EXAMPLES / name
     if script.suffix == ".ipynb":
@@ -212,6 +215,7 @@ def test_example(name: str, tmp_path: Path) -> None:
     assert (tmp_path / LEAVES[name]).stat().st_size > 0
 
 
+@pytest.mark.long
 def test_searches_on_a_cluster_give_the_same(tmp_path: Path) -> None:
     import distributed  # takes long, and every process that collects the tests would do it
 

@@ -117,6 +117,7 @@ def put(text: str, folder: Path) -> None:
     (folder / name).write_text(added + rest)
 
 
+@pytest.mark.long
 def test_its_commands_one_after_the_other(tmp_path: Path) -> None:
     folder = tmp_path
     outputs: dict[str, str] = {}
@@ -242,6 +243,7 @@ def test_its_trajectory_file_runs_again(demo: tuple[Ended, Path]) -> None:
     assert first.commanded_steps[-1].tolist() == second.commanded_steps[-1].tolist()
 
 
+@pytest.mark.long
 def test_without_matplotlib_it_says_what_is_missing_and_keeps_the_run(tmp_path: Path) -> None:
     blocked = tmp_path / "blocked"
     (blocked / "matplotlib").mkdir(parents=True)

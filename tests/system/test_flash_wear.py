@@ -64,6 +64,7 @@ def day(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 @scripted.each(scripted.cases(CASES / "flash_day.py"))
 def test_a_day(case: scripted.Case, day: Path) -> None:
     case.run(str(day), PROGRAM, ",".join(map(str, HOME_STEPS)), FEWER)
@@ -71,6 +72,7 @@ def test_a_day(case: scripted.Case, day: Path) -> None:
     assert set(counted) <= {"1", "2", "3", "4"}
 
 
+@pytest.mark.long
 def test_status_shows_erasures_and_moves_add_none(tmp_path: Path) -> None:
     port = f"sim:{tmp_path / 'board'}"
     with connect(port) as board:

@@ -80,6 +80,7 @@ def test_steps_by_the_command_line() -> None:
         assert "needs a terminal" in jogged(port, code=2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_held_jogs_rest_within_the_stated_time_and_the_range(tmp_path: Path, kind: str) -> None:
     print("seed", SEED)
@@ -289,6 +290,7 @@ def test_a_terminal_that_vanishes_ends_it_with_the_arm_at_rest(tmp_path: Path) -
         np.testing.assert_allclose(where(port), [0, -60, 40], atol=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals")
 def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
     with homed() as port:

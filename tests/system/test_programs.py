@@ -81,6 +81,7 @@ ENDINGS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in INTERPRETERS if name != "cpython"])
 def test_how_programs_end_on_micropython(name: str, tmp_path: Path) -> None:
     """An exception, a full heap, a call that lasts: the arm stops on its way, its position is known."""

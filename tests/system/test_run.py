@@ -35,6 +35,7 @@ ENDS_WITHIN_S = 60.0
 """Far more than braking and freezing may take, for loaded machines."""
 
 
+@pytest.mark.long
 def test_board_on_a_port(tmp_path: Path) -> None:
     file = small_plan(tmp_path / "small.json")
     with launch(LaunchOptions(tmp_path / "flash")) as board:
@@ -155,6 +156,7 @@ def samples_in(folder: Path) -> int:
     return sum(path.read_text().count("\n") for path in folder.glob("*-001/samples-01.csv"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run(tmp_path: Path, number: signal.Signals) -> None:
     file = small_plan(tmp_path / "small.json", (90.0, -75.0, 50.0))
@@ -319,6 +321,7 @@ def test_little_is_imported_before_an_interrupt_is_minded(whole: Watched) -> Non
     assert {"click", "numpy", "armtempo.planning.planner"} <= set(whole.imported)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", range(MOMENTS))
 @START
 def test_an_interrupt_during_the_imports_ends_it_quietly(number: int, whole: Watched, tmp_path: Path) -> None:
@@ -331,6 +334,7 @@ def test_an_interrupt_during_the_imports_ends_it_quietly(number: int, whole: Wat
     assert not list(tmp_path.iterdir()), what
 
 
+@pytest.mark.long
 @START
 def test_in_the_background_ctrl_c_stays_ignored(whole: Watched, tmp_path: Path) -> None:
     for after in (len(whole.imported) // 10, len(whole.imported) // 2):

@@ -243,6 +243,7 @@ def test_a_part_leaves_nothing_at_the_prompt(
     assert interpreters.run(interpreter, script).split() == ["1", "0", "True"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("broken", BROKEN)
 def test_what_is_wrong_is_named(tmp_path: Path, broken: str, monkeypatch: pytest.MonkeyPatch) -> None:
     faults, *wrong = BROKEN[broken]
@@ -278,6 +279,7 @@ def test_motors_that_turn_in_spite_of_enable_stop_it(tmp_path: Path) -> None:
     assert all(rises(tmp_path, pin) < 40 for pin in STEPS)
 
 
+@pytest.mark.long
 def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C, then a kill, while the board hangs in a part; then a host that waits. The watchdog brings the program
     back each time, and the board itself knows where it hung: nobody told the last one of the kill."""

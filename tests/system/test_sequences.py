@@ -27,6 +27,7 @@ CYCLES = 5
 LEGS = 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name != "micropython-arm"])
 def test_cycles_lead_back_to_the_step(name: str, tmp_path: Path) -> None:
     plan = small(tmp_path, CYCLES)
@@ -69,6 +70,7 @@ def status_lines(board: armtempo.Board) -> list[str]:
     return [line[10:] for line in state.lines(board.state())]
 
 
+@pytest.mark.long
 def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None:
     """E-stop in a motion, no part, a stop; after each one the next sequence starts where the arm is."""
     plan = small(tmp_path, 20, "fault")
@@ -101,6 +103,7 @@ def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None
         assert board.status().state == "idle"
 
 
+@pytest.mark.long
 def test_from_the_command_line(tmp_path: Path) -> None:
     """Plan, store, list, run by file and by name; a changed one replaces it and takes its old motions along."""
 
@@ -199,6 +202,7 @@ def test_every_row_and_sample_is_recorded(tmp_path: Path) -> None:
     assert "goto pick" in page
 
 
+@pytest.mark.long
 def test_an_error_of_the_caller_stops_it(tmp_path: Path) -> None:
     """Nobody follows it any more; a cable that is out is no such error."""
     plan = small(tmp_path, "for ever")
@@ -215,6 +219,7 @@ def test_an_error_of_the_caller_stops_it(tmp_path: Path) -> None:
         assert board.run_sequence(small(tmp_path, 1), replace=True).ending == "finished"
 
 
+@pytest.mark.long
 def test_after_a_power_failure_the_folder_says_where_it_stood(tmp_path: Path) -> None:
     """The board forgets it: its flash is not written while a sequence runs."""
     plan = small(tmp_path, "for ever")
@@ -246,6 +251,7 @@ def test_after_a_power_failure_the_folder_says_where_it_stood(tmp_path: Path) ->
     assert armtempo.SequenceRun.load(found.path).rows == found.rows
 
 
+@pytest.mark.long
 def test_recorded_from_the_command_line(tmp_path: Path) -> None:
     plan = small(tmp_path, 2)
     plan.save(tmp_path / "small.json")

@@ -39,6 +39,7 @@ def check_on_path(run: Run, plan: armtempo.Plan) -> None:
     assert samples["path_s"][-1] >= plan.total_s - 1e-6
 
 
+@pytest.mark.long
 def test_half_the_speed_takes_twice_the_time_on_the_same_path(plan: armtempo.Plan, tmp_path: Path) -> None:
     with armtempo.connect("sim", plan.arm) as board:
         board.speed(0.5)
@@ -73,6 +74,7 @@ class Changing(Watcher):
             self._board.speed(at)
 
 
+@pytest.mark.long
 def test_changes_and_a_pause_while_it_runs(plan: armtempo.Plan, tmp_path: Path) -> None:
     with armtempo.connect("sim", plan.arm) as board:
         board.speed(0.3)
@@ -121,6 +123,7 @@ def test_another_program_changes_the_speed(plan: armtempo.Plan, tmp_path: Path) 
         assert "complete" in output
 
 
+@pytest.mark.long
 def test_changes_keep_the_brake_times_limits() -> None:
     """Numerically, on the stretched path itself: any two rates, anywhere, acceleration and jerk within EXCESS."""
     rng = np.random.default_rng(20_264)

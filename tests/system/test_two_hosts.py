@@ -102,6 +102,7 @@ class Two:
             assert motion["default"] == (self.default == self.motion), said
 
 
+@pytest.mark.long
 def test_two_arms_in_every_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     numbers = random.Random(SEED)
@@ -152,6 +153,7 @@ def test_a_stop_gets_in_and_the_run_says_who_asked(now: tuple[str, ...], tmp_pat
         ended.said("'armtempo stop' asked for a stop")
 
 
+@pytest.mark.long
 def test_a_program_that_hangs_loses_the_port(tmp_path: Path) -> None:
     with moving(tmp_path) as (owner, port):
         owner.send_signal(signal.SIGSTOP)
@@ -168,6 +170,7 @@ def test_a_program_that_hangs_loses_the_port(tmp_path: Path) -> None:
         ended.said("has taken", "over")
 
 
+@pytest.mark.long
 def test_a_program_that_died_gives_the_port_free(tmp_path: Path) -> None:
     with moving(tmp_path) as (owner, port):
         owner.kill()

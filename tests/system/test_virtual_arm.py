@@ -38,6 +38,7 @@ TARGET_DEG = np.array([30.0, -85.0, 60.0])
 GUARDED = replace(commandline.ARM, safety=replace(commandline.ARM.safety, estop_fitted=True))
 
 
+@pytest.mark.long
 @scripted.each(scripted.cases(SCRIPT))
 def test_motor(case: scripted.Case) -> None:
     case.run()
@@ -67,6 +68,7 @@ def swing_deg(degree: int) -> float:
     return float(np.max(np.abs(seen_deg - commanded_deg)[1:7]))
 
 
+@pytest.mark.long
 def test_cubic_starts_ring_more_than_quintic_ones() -> None:
     """As section 4.2 of the paper finds of its arm; by how much is in host/docs/measurements.md."""
     quintic_deg, cubic_deg = swing_deg(5), swing_deg(3)
@@ -210,6 +212,7 @@ def unhomed(
             yield board, stop
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("angle", [-9.0, -12.0])
 def test_homing_run_finds_where_the_arm_stands(
     tmp_path: Path, angle: float, monkeypatch: pytest.MonkeyPatch
@@ -266,6 +269,7 @@ def test_switch_with_a_broken_wire(tmp_path: Path) -> None:
         assert board.status().known == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("start", [190.5, -10.0, -12.0, -17.0])
 def test_homing_from_beyond_the_range_and_from_beyond_the_switch(
     tmp_path: Path, start: float, monkeypatch: pytest.MonkeyPatch

@@ -126,6 +126,12 @@ def play(case: scripted.Case, flashes: Path, tmp_path: Path, program: str = PROG
 
 
 @pytest.mark.long
+@scripted.each(case for case in CORE if case.script.stem != "standalone")
+def test_case_with_the_core_at_length(case: scripted.Case, flashes: Path, core: str, tmp_path: Path) -> None:
+    play(case, flashes, tmp_path, core)
+
+
+@pytest.mark.long
 @scripted.each(case for case in ON_SOURCES if is_again(case))
 def test_case_again(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
     play(case, flashes, tmp_path)
@@ -136,7 +142,7 @@ def test_case(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
     play(case, flashes, tmp_path)
 
 
-@scripted.each(CORE)
+@scripted.each(case for case in CORE if case.script.stem == "standalone")
 def test_case_with_the_core(case: scripted.Case, flashes: Path, core: str, tmp_path: Path) -> None:
     play(case, flashes, tmp_path, core)
 
