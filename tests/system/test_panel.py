@@ -304,6 +304,7 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         said = words.of_job(said) if tab == "Job" else said
         assert said.replace(".0", "") in shown.replace(".0", "")
         field.fill(before)
+        page.wait_for_timeout(300)  # until it is taken
         if tab == "Sequence":
             (folder / file).write_text(_SEQUENCE)  # as it was when it was opened
     assert page.evaluate("window.hurt") is None
@@ -568,8 +569,10 @@ def _moved(page: Any, panel: Panel) -> str:
     return str(page.inner_text("#armtempo-where"))
 
 
-@pytest.mark.parametrize("command", ["jog", "posture"])
-@pytest.mark.parametrize("how", ["stalls", "delays", "cuts", "reorders"])
+@pytest.mark.parametrize("command", ["jog", pytest.param("posture", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "how", ["stalls", *(pytest.param(how, marks=pytest.mark.long) for how in ("delays", "cuts", "reorders"))]
+)
 def test_nothing_moves_that_nobody_means_any_more(
     window: Any, panel: Panel, network: Network, how: str, command: str
 ) -> None:
@@ -610,7 +613,13 @@ def test_nothing_moves_that_nobody_means_any_more(
     page.close()
 
 
-@pytest.mark.parametrize("how", ["button", "key", "cable", "tab", "server", "browser"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        "button",
+        *(pytest.param(how, marks=pytest.mark.long) for how in ("key", "cable", "tab", "server", "browser")),
+    ],
+)
 def test_a_held_jog_ends_with_what_holds_it(chromium: Any, page: Any, running: Panels, how: str) -> None:
     """The arm rests before the end of its range, where it would else have gone."""
     panel = running()
