@@ -131,7 +131,7 @@ def test_a_plan_names_link_obstacle_depth_time_and_via_points() -> None:
         planner.plan(thick(PAPER, 20.0, Workspace((FEEDER,))), job)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_free_path_goes_around_what_is_between_its_via_points(monkeypatch: pytest.MonkeyPatch) -> None:
     """Over a box, as seen by dense samples; if walls leave no way, it is refused as before."""
     calls: list[str] = []

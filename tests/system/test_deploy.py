@@ -99,7 +99,7 @@ def fill(link: Client, data: bytes) -> list[str]:
     raise AssertionError("the flash never was full")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
     """All that fits, refusals by name, a power cycle, damage, and at the end the flash as it was."""
     flash = tmp_path / "flash"

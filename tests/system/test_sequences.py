@@ -168,6 +168,7 @@ def options() -> LaunchOptions:
     return LaunchOptions(arm=ARM, faults=[part_lies_there()], interpreter=interpreters.starter(FASTEST))
 
 
+@pytest.mark.long
 def test_every_row_and_sample_is_recorded(tmp_path: Path) -> None:
     plan = small(tmp_path, 3)
     with launch(options()) as process, armtempo.connect(process.port, ARM) as board:

@@ -126,12 +126,6 @@ def play(case: scripted.Case, flashes: Path, tmp_path: Path, program: str = PROG
 
 
 @pytest.mark.long
-@scripted.each(case for case in CORE if case.script.stem != "standalone")
-def test_case_with_the_core_at_length(case: scripted.Case, flashes: Path, core: str, tmp_path: Path) -> None:
-    play(case, flashes, tmp_path, core)
-
-
-@pytest.mark.long
 @scripted.each(case for case in ON_SOURCES if is_again(case))
 def test_case_again(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
     play(case, flashes, tmp_path)
@@ -142,7 +136,8 @@ def test_case(case: scripted.Case, flashes: Path, tmp_path: Path) -> None:
     play(case, flashes, tmp_path)
 
 
-@scripted.each(case for case in CORE if case.script.stem == "standalone")
+@pytest.mark.long
+@scripted.each(CORE)
 def test_case_with_the_core(case: scripted.Case, flashes: Path, core: str, tmp_path: Path) -> None:
     play(case, flashes, tmp_path, core)
 
