@@ -307,7 +307,8 @@ PRESSED = [
 ]
 
 
-@pytest.mark.long  # on an idle machine the switch at the high end is not seen: the moment of the press is to be found again
+# On an idle machine the switch at the high end is not seen: the moment of the press is to be found again.
+@pytest.mark.long
 def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An encoder reversed, a switch that never comes. The drivers are on then, and the self-test without does nothing:
     the arm is held and homed as before; so without the firmware."""
