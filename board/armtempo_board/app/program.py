@@ -80,11 +80,14 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     try:
         while True:
             run_once()
-            if features.SEQUENCES and app.controller.program:
-                user_program, app.controller.program = app.controller.program, None
-                user_program.execute(app, run_once)
-            if app.leave_requested():
-                break
+            try:
+                if features.SEQUENCES and app.controller.program:
+                    user_program, app.controller.program = app.controller.program, None
+                    user_program.execute(app, run_once)
+                if app.leave_requested():
+                    break
+            except Exception as error:
+                app.fail(error)
     finally:
         app.controller.halt()
 

@@ -47,7 +47,6 @@ class Trap:
 NEVER = (
     "fail", "freeze", "_trip", "halt", "_stopped",  # what stops the outputs
     "run_once", "run", "_serve_panel",  # what catches exceptions
-    "leave_requested",  # called where nothing catches them
     "arm_channel", "release_channel", "disable_irq", "enable_irq", "release",  # interrupts are off there
 )  # fmt: skip
 """What must not fail: nothing would be left to rely on."""
