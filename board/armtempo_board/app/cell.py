@@ -25,7 +25,10 @@ if TYPE_CHECKING:
             """The program is at this line."""
 
         def ticks_ms(self) -> int:
-            """A time that increases, ms."""
+            """The time in ms; after days it begins again."""
+
+        def passed_ms(self, begin_ms: int) -> int:
+            """Since a time of ``ticks_ms``."""
 
         def moving(self) -> bool:
             """Whether a motion runs."""
@@ -156,7 +159,7 @@ class Cell:
             work.serve()
             if not work.moving() if number < 0 else bool(work.level(number)) == bool(active):
                 return True
-            if limit_ms and work.ticks_ms() - begin_ms >= limit_ms:
+            if limit_ms and work.passed_ms(begin_ms) >= limit_ms:
                 return False
 
     # the rest
@@ -167,7 +170,7 @@ class Cell:
         limit_ms = _ms(time_s)
         begin_ms = work.ticks_ms()
         work.serve()
-        while work.ticks_ms() - begin_ms < limit_ms:
+        while work.passed_ms(begin_ms) < limit_ms:
             work.serve()
 
     def count(self, name: str) -> int:

@@ -37,7 +37,6 @@ _MOST_SKIPPED = const(16)
 _SAID_BYTES = const(240)
 _CHARACTERS = const(60)  # of four bytes, as many as fit
 _SAY_MS = const(500)  # longest wait until a host has taken the text before
-_MOST_MS = const(1 << 29)
 
 
 class UserProgram(Sequencer):
@@ -50,9 +49,8 @@ class UserProgram(Sequencer):
         self._source = record.source()
         self._app: "Any" = None
         self._run_once: "Callable[[], None]" = self._nothing
-        self._since_ms: "Any" = 0
         self._served_ms: "Any" = 0
-        self._passed_ms = self._skipped = 0
+        self._skipped = 0
 
     def begin(self) -> None:
         """Let the main loop execute it."""
@@ -69,7 +67,6 @@ class UserProgram(Sequencer):
         """Execute it to its end. ``run_once``: one pass of the main loop."""
         self._app = app
         self._run_once = run_once
-        self._since_ms = time.ticks_ms()
         board = self._controller.board
         try:
             self._execute()
@@ -147,11 +144,12 @@ class UserProgram(Sequencer):
         self.status[STEP] = line
 
     def ticks_ms(self) -> int:
-        """Since its start; after days it begins again."""
-        now_ms = time.ticks_ms()
-        self._passed_ms = (self._passed_ms + time.ticks_diff(now_ms, self._since_ms)) & _MOST_MS - 1
-        self._since_ms = now_ms
-        return self._passed_ms
+        """Of the board."""
+        return int(time.ticks_ms())
+
+    def passed_ms(self, begin_ms: int) -> int:
+        """Also if ``ticks_ms`` began again meanwhile."""
+        return int(time.ticks_diff(time.ticks_ms(), begin_ms))
 
     def moving(self) -> bool:
         """Whether a motion runs."""
