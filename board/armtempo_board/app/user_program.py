@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from armtempo_board.storage.program_file import ProgramFile
 
 _PERCENT = const(100)
-_SLOWEST = const(10)
 _MOST_SKIPPED = const(16)
 _SAID_BYTES = const(240)
 _CHARACTERS = const(60)  # of four bytes, as many as fit
@@ -51,6 +50,7 @@ class UserProgram(Sequencer):
         self._run_once: "Callable[[], None]" = self._nothing
         self._served_ms: "Any" = 0
         self._skipped = 0
+        self._percent = _PERCENT  # of the speed, in the present motion
 
     def begin(self) -> None:
         """Let the main loop execute it."""
@@ -182,10 +182,13 @@ class UserProgram(Sequencer):
 
     def _begin(self, name: str, crc: "int | None", percent: int, what: str) -> None:
         try:
-            rate = max(self._rate * percent // _PERCENT, _SLOWEST)
-            self._controller.begin_motion(name, crc, rate)
+            self._percent = percent
+            self._controller.begin_motion(name, crc, self._share(self._rate))
         except Refused as refused:
             raise CellError("%s is refused: %s" % (what, _reason(refused))) from None
+
+    def _share(self, rate: int) -> int:
+        return max(rate * self._percent // _PERCENT, messages.SLOWEST_PERMILLE)
 
     def brake(self) -> None:
         """Brake the motion."""

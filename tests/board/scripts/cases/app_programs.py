@@ -287,11 +287,14 @@ def case_the_hosts_speed_is_that_of_its_motions():
             assert world.host.ask("speed", (500,))[0] == "ok"
         if engine.moving:
             rates.append(engine.rates.wanted)
+            if len(rates) == 2:
+                assert world.host.ask("speed", (400,))[0] == "ok"
+                rates.append(engine.rates.wanted)
             engine.finish()
 
     world = World("cell.sleep(0.01)\ncell.run('there')\ncell.run('on', speed=0.5)\n", script)
     assert world.run()[0] == "finished"
-    assert rates == [500, 250], rates
+    assert rates == [500, 250, 200], rates
 
 
 def case_a_fault_of_the_board_ends_it():
