@@ -77,14 +77,12 @@ class UserProgram(Sequencer):
         gc.collect()
         while board.engine.moving:
             run_once()
-        if board.fault():
-            self._end(sequence.FAULTED, board.fault())
-        else:
-            self._end(sequence.STOPPED if self.stopping else sequence.FINISHED)
+        ending = sequence.STOPPED if self.stopping else sequence.FINISHED
+        self._end(sequence.FAULTED if board.fault() else ending, board.fault())
+        self.stopping = True  # what is left of it, such as a timer's callback, moves nothing any more
 
     def _execute(self) -> None:
         cell = Cell(self.table, self)
-        armtempo_board.cell = cell
         names = {
             "__name__": "__main__",
             "print": self._print,
@@ -95,10 +93,13 @@ class UserProgram(Sequencer):
         code = compile(source, self.table["file"], "exec")
         del source
         gc.collect()
+        before = list(sys.modules)
+        armtempo_board.cell = cell
         try:
             exec(code, names)
         finally:
             del armtempo_board.cell
+            _forget_modules(before)
 
     def _fail(self, error: "BaseException") -> None:
         """Brake, set a fault, and tell the traceback of the program's own lines."""
@@ -238,6 +239,13 @@ class _Counters:
     def counter(self, number: int) -> bytes:
         """Name of a counter."""
         return self._names[number].encode()
+
+
+def _forget_modules(but: "list[str]") -> None:
+    """Let the next program have its own modules: with its cell, and without tasks of this one (``asyncio``)."""
+    for name in list(sys.modules):
+        if name not in but and not name.startswith("armtempo"):
+            del sys.modules[name]
 
 
 def _reason(refused: Refused) -> str:

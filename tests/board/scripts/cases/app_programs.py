@@ -308,6 +308,33 @@ def case_a_fault_of_the_board_ends_it():
     assert (ending, code) == ("fault", 40) and not world.said()
 
 
+def case_nothing_of_it_acts_after_its_end():
+    from armtempo_board.app.cell import Ended
+
+    world = World(
+        "import cases, sys\n"
+        "sys.modules['helper'] = cases\n"
+        "cases.kept = cell\n"
+    )
+    assert world.run()[0] == "finished"
+    assert "helper" not in sys.modules and cases is sys.modules["cases"]
+    for call in (lambda: cases.kept.goto("there"), lambda: cases.kept.set("gripper", "closed")):
+        try:
+            call()
+            raise AssertionError("it acted")
+        except Ended:
+            pass
+    assert not sequence_rig.runs(world.app) and not world.board.outputs.log
+
+
+def case_wrong_syntax_leaves_nothing():
+    import armtempo_board
+
+    ending, _, line = World("pass\nx = = 1\n").run()
+    assert (ending, line) == ("fault", 3), (ending, line)
+    assert not hasattr(armtempo_board, "cell")
+
+
 def case_a_full_heap_ends_it():
     world = World("found = []\nwhile __at__(3):\n    found.append(bytearray(1 << 40))\n")
     ending, _, line = world.run()
