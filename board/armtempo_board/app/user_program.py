@@ -33,9 +33,8 @@ if TYPE_CHECKING:
 
 _PERCENT = const(100)
 _MOST_SKIPPED = const(16)
-_SAID_BYTES = const(240)
-_CHARACTERS = const(60)  # of four bytes, as many as fit
-_SAY_MS = const(500)  # longest wait until a host has taken the text before
+_SAY_MS = const(500)  # longest wait until a host has taken the text before,
+_ALONE_MS = const(20)  # and if none was heard so long
 
 
 class UserProgram(Sequencer):
@@ -113,6 +112,7 @@ class UserProgram(Sequencer):
             self.status[STEP] = line or self.status[STEP]
         except MemoryError:
             text = "MemoryError in line %d" % self.status[STEP]
+        self._is_said()
         self._app.events.note(text)
 
     def _print(self, *values: object, sep: str = " ", end: str = "\n", file: object = None) -> None:
@@ -217,16 +217,26 @@ class UserProgram(Sequencer):
         return int(self.status[VALUE])
 
     def say(self, text: str) -> None:
-        """Each line as a notice; waits until the one before was sent, if a host is there."""
+        """Each line as a notice, which is lost if no host takes the one before."""
         for line in text.split("\n"):
-            length = _SAID_BYTES if len(line.encode()) == len(line) else _CHARACTERS
-            for at in range(0, len(line) or 1, length):
-                begin_ms = time.ticks_ms()
-                while self._app.events.notice and self._app.commands.greeted:
-                    if time.ticks_diff(time.ticks_ms(), begin_ms) > _SAY_MS:
-                        return
-                    self.serve()
+            length = messages.MAX_PAYLOAD // (1 if len(line.encode()) == len(line) else 4)
+            for at in range(0, len(line), length):
+                if not self._is_said():
+                    return
+                self.check()
                 self._app.events.note(line[at : at + length])
+
+    def _is_said(self) -> bool:
+        """Wait until the text before was sent; returns whether it was."""
+        app = self._app
+        begin_ms = time.ticks_ms()
+        while app.events.notice and app.commands.greeted:
+            now_ms = time.ticks_ms()
+            most_ms = _SAY_MS if time.ticks_diff(now_ms, app.link.heard_ms) < _SAY_MS else _ALONE_MS
+            if time.ticks_diff(now_ms, begin_ms) > most_ms:
+                return False
+            self._run_once()
+        return True
 
 
 class _Counters:

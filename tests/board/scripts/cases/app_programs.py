@@ -170,6 +170,27 @@ def case_an_exception_brakes_and_is_a_fault_with_its_line():
     assert world.host.ask("clear")[0] == "ok"
 
 
+def case_a_text_just_before_an_exception_does_not_hide_it():
+    world = World("cell.sleep(0.2)\nprint('here')\n1 // 0\n")
+    assert world.run()[0] == "fault"
+    assert world.said()[0] == "here" and "ZeroDivisionError" in world.said()[1], world.said()
+
+
+def case_without_a_host_texts_take_little_time():
+    def script(world):
+        if world.turns == 1:
+            world.host.port.room = 0
+
+    world = World("cell.sleep(1)\nfor i in range(20):\n    print(i)\n", script)
+    assert world.start()[0] == "ok"
+    try:
+        world.execute()
+    finally:
+        world.host.port.room = 1 << 30
+    assert world.stands()[0] == "finished"
+    assert world.turns < 80, world.turns
+
+
 def case_what_is_not_possible_is_an_exception_with_words():
     for call, words in (
         ("goto('nowhere')", "the arm has no posture 'nowhere'; it has away, home, there"),
