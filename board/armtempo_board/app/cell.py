@@ -135,10 +135,11 @@ class Cell:
             if not low <= value <= high:
                 raise CellError("output %r: %r is not within %r to %r" % (output, value, low, high))
             raw = int((value - low) / (high - low) * _FULL + 0.5)
+        wait_ms = _ms(wait_s)
         self._work.check()
         self._work.set_output(number, raw)
-        if wait_s:
-            self.sleep(wait_s)
+        if wait_ms:
+            self._sleep(wait_ms)
 
     def active(self, input: str) -> bool:
         """Whether an input is active, debounced."""
@@ -166,8 +167,10 @@ class Cell:
 
     def sleep(self, time_s: float) -> None:
         """Wait; the arm may move meanwhile."""
+        self._sleep(_ms(time_s))
+
+    def _sleep(self, limit_ms: int) -> None:
         work = self._work
-        limit_ms = _ms(time_s)
         begin_ms = work.ticks_ms()
         work.serve()
         while work.passed_ms(begin_ms) < limit_ms:

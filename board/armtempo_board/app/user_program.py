@@ -176,8 +176,11 @@ class UserProgram(Sequencer):
         except TooLongError:
             raise CellError("goto: it would take longer than the board can make a move") from None
         at = 0
-        for piece in move.pieces(board.arm_crc):
-            at = board.once.put(at, move.size, piece)
+        try:
+            for piece in move.pieces(board.arm_crc):
+                at = board.once.put(at, move.size, piece)
+        except Refused as refused:
+            raise _cell_error("goto", refused) from None
         del move
         self._begin(messages.ONCE_NAME, None, _PERCENT, "goto")
 
@@ -186,7 +189,7 @@ class UserProgram(Sequencer):
             self._percent = percent
             self._controller.begin_motion(name, crc, self._share(self._rate))
         except Refused as refused:
-            raise CellError("%s is refused: %s" % (what, _reason(refused))) from None
+            raise _cell_error(what, refused) from None
 
     def _share(self, rate: int) -> int:
         return max(rate * self._percent // _PERCENT, messages.SLOWEST_PERMILLE)
@@ -258,10 +261,11 @@ def _forget_modules(but: "list[str]") -> None:
             del sys.modules[name]
 
 
-def _reason(refused: Refused) -> str:
-    """Name of the code, joint and value."""
+def _cell_error(what: str, refused: Refused) -> CellError:
+    """With the name of the code, joint and value."""
     joint = "" if refused.joint == messages.NO_JOINT else ", joint %d" % (refused.joint + 1)
-    return name_of(refused.code) + joint + (", %d" % refused.value if refused.value else "")
+    value = ", %d" % refused.value if refused.value else ""
+    return CellError("%s is refused: %s%s%s" % (what, name_of(refused.code), joint, value))
 
 
 def _traceback(error: "BaseException", file: str) -> "tuple[str, int]":

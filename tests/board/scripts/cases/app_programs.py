@@ -202,6 +202,8 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("set('lamp', 1)", "the arm has no output 'lamp'; it has gripper"),
         ("wait('past')", "the arm has no input 'past'; it has part"),
         ("sleep(-1)", "-1 s is not within 0 to 3600"),
+        ("set('gripper', 'closed', wait_s=-1)", "-1 s is not within 0 to 3600"),
+        ("goto([0.1, 0])", "goto is refused: too_long, 100"),
         ("run('back')", "run('back') is refused: wrong_start"),
         ("run('none')", "run('none') is refused: not_found"),
     ):
@@ -213,6 +215,8 @@ def case_what_is_not_possible_is_an_exception_with_words():
             world.board.engine.refusal = (22,)
             world.execute()
         else:
+            if "0.1" in call:
+                world.board.once.capacity = 100
             assert world.run()[0] == "finished", call
         assert world.said() == [words], (call, world.said())
         assert not sequence_rig.runs(world.app) and not world.board.outputs.log
