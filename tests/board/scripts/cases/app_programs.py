@@ -360,6 +360,14 @@ def case_wrong_syntax_leaves_nothing():
     assert not hasattr(armtempo_board, "cell")
 
 
+def case_its_moves_have_memory_after_a_sequence():
+    world = World("pass\n")
+    world.board.once.release()
+    assert world.start()[0] == "ok"
+    assert len(world.board.once._data) == world.board.once.capacity
+    world.execute()
+
+
 def case_a_full_heap_ends_it():
     world = World("found = []\nwhile __at__(3):\n    found.append(bytearray(1 << 40))\n")
     ending, _, line = world.run()
