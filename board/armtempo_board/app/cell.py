@@ -90,8 +90,8 @@ class Cell:
         """
         target = self._target(posture)
         percent = _percent(speed)
-        self._begin()
-        if list(target) != self._work.steps():
+        self._rest()
+        if target != self._work.steps():
             self._work.begin_move(target, percent)
         if wait:
             self._rest()
@@ -104,7 +104,7 @@ class Cell:
     def start(self, motion: str, speed: float = 1.0) -> None:
         """Start a stored motion; ``wait()`` waits for its end."""
         percent = _percent(speed)
-        self._begin()
+        self._rest()
         self._work.begin_motion(motion, percent)
 
     def moving(self) -> bool:
@@ -210,12 +210,8 @@ class Cell:
             self.at(line)
             yield value
 
-    def _begin(self) -> None:
-        """Wait for the end of a motion before the next one."""
-        self._rest()
-        self._work.check()
-
     def _rest(self) -> None:
+        """Wait for the end of a motion."""
         self._work.serve()
         while self._work.moving():
             self._work.serve()

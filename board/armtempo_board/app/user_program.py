@@ -18,7 +18,7 @@ from micropython import const
 import armtempo_board
 from armtempo_board import step_rates
 from armtempo_board.app.cell import Cell, CellError, Ended
-from armtempo_board.app.sequence_command import STEP, VALUE
+from armtempo_board.app.sequence_command import STEP
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.code_names import name_of
 from armtempo_board.errors import Refused
@@ -46,7 +46,7 @@ class UserProgram(Sequencer):
         super().__init__(controller, counters, name + program.SUFFIX.encode(), rate)
         self._source = record.source()
         self._app: "Any" = None
-        self._run_once: "Callable[[], None]" = self._nothing
+        self._run_once: "Callable[[], None]" = self.prepare
         self._served_ms: "Any" = 0
         self._skipped = 0
         self._percent = _PERCENT  # of the speed, in the present motion
@@ -56,11 +56,7 @@ class UserProgram(Sequencer):
         super().begin()
         self._controller.program = self
 
-    _nothing = Sequencer.prepare
     advance = Sequencer.prepare  # it goes on by itself
-
-    def tell(self, link: "Any") -> None:
-        """It has no rows."""
 
     def execute(self, app: "Any", run_once: "Callable[[], None]") -> None:
         """Execute it to its end. ``run_once``: one pass of the main loop."""
@@ -216,8 +212,7 @@ class UserProgram(Sequencer):
         number = self._command.named(name.encode()[:MAX_NAME], MAX_COUNTERS)
         if number < 0:
             raise CellError("more than %d counters" % MAX_COUNTERS)
-        self.status[VALUE] = self._command.count(number)
-        return int(self.status[VALUE])
+        return self._command.count(number)
 
     def say(self, text: str) -> None:
         """Each line as a notice, which is lost if no host takes the one before."""
