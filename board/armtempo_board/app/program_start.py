@@ -3,10 +3,10 @@
 import gc
 
 from armtempo_shared import codes, program
+from armtempo_shared.messages import PROGRAM
 
 from armtempo_board.app.user_program import UserProgram
 from armtempo_board.errors import Refused
-from armtempo_board.storage.store import PROGRAM
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

@@ -336,11 +336,7 @@ def case_a_fault_of_the_board_ends_it():
 def case_nothing_of_it_acts_after_its_end():
     from armtempo_board.app.cell import Ended
 
-    world = World(
-        "import cases, sys\n"
-        "sys.modules['helper'] = cases\n"
-        "cases.kept = cell\n"
-    )
+    world = World("import cases, sys\nsys.modules['helper'] = cases\ncases.kept = cell\n")
     assert world.run()[0] == "finished"
     assert "helper" not in sys.modules and cases is sys.modules["cases"]
     for call in (lambda: cases.kept.goto("there"), lambda: cases.kept.set("gripper", "closed")):
