@@ -170,6 +170,9 @@ class _Work:
     def ticks_ms(self) -> int:
         return self._now_ms
 
+    def passed_ms(self, begin_ms: int) -> int:
+        return self._now_ms - begin_ms
+
     def moving(self) -> bool:
         return self._now_ms < self._rests_ms
 

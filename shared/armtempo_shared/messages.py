@@ -19,6 +19,8 @@ ARM_RECORD_NAME = "/arm"
 """Name of the arm record in ``put_begin``."""
 ONCE_NAME = "/once"
 """Name in ``start`` of the motion in the board's memory, which ``put_once`` has put there."""
+MOTION, SEQUENCE, PROGRAM = 0, 1, 2
+"""Kinds of stored records, in the answer to ``list``; what is neither of the last two counts as a motion."""
 
 SAMPLE_BRAKING = 1  # flag of a sample: taken while braking
 PERMILLE = 1000

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from typing import Any
 
 MAGIC = b"ATP1"
-KIND_BYTES = 3
-"""Bytes of the magic that are the same in all versions."""
 SUFFIX = ".py"
 """After the name of a program in the messages of sequences, which are those of programs too."""
 MARK = "__at__"
@@ -99,17 +97,3 @@ class ProgramRecord:
     def source(self) -> str:
         """The marked source."""
         return self.part(HEAD_BYTES + self._table_bytes, self.source_bytes).decode()
-
-
-class ProgramData(ProgramRecord):
-    """A checked view of a record in memory."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-        super().__init__(len(data))
-        if crc32(memoryview(data)[:-_CRC_BYTES]) != struct.unpack_from("<I", data, len(data) - _CRC_BYTES)[0]:
-            raise ProgramError("checksum")
-
-    def part(self, offset: int, size: int) -> bytes:
-        """See ``ProgramRecord``."""
-        return self._data[offset : offset + size]

@@ -36,11 +36,6 @@ class TooLongError(ValueError):
     """The move would take longer than its ramps can be described for: its target is too far for the speed."""
 
 
-def record_size(joints: int) -> int:
-    """Bytes of the largest record."""
-    return motion.size(DEGREE, joints, joints > 1, max([_points(shape) for shape in SHAPES]) - DEGREE, 1)
-
-
 class Move:
     """The move of joints from ``start`` to ``target``, in steps.
 

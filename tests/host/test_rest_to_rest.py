@@ -25,7 +25,7 @@ ARMS = [Arm.paper(), Arm.load("ar4")]
 def record(arm: Arm, start: list[int], target: list[int], percent: int = 100) -> bytes:
     move = Move(start, target, encode.move_limits(arm), limits.MAX_STEP_RATE_SUM, percent)
     data = b"".join(move.pieces(7))
-    assert len(data) == move.size <= rest_to_rest.record_size(len(start)) <= ONCE_BYTES
+    assert len(data) == move.size <= ONCE_BYTES
     assert motion.Motion(data).arm_crc == 7
     return data
 
@@ -121,6 +121,12 @@ def test_slower_moves_take_longer_and_one_that_stays_takes_the_least_time() -> N
     assert times[1] == pytest.approx(4 * times[0], rel=1e-6)
     still = Move(start, start, encode.move_limits(arm), limits.MAX_STEP_RATE_SUM)
     assert still.duration_ticks == rest_to_rest.SHORTEST_TICKS
+
+
+def test_the_largest_record_fits_into_the_boards_memory() -> None:
+    points = max(rest_to_rest._points(shape) for shape in rest_to_rest.SHAPES)
+    degree = rest_to_rest.DEGREE
+    assert motion.size(degree, limits.MAX_JOINTS, True, points - degree, 1) <= ONCE_BYTES
 
 
 def test_a_move_that_takes_minutes_is_refused() -> None:

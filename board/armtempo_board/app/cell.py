@@ -25,7 +25,10 @@ if TYPE_CHECKING:
             """The program is at this line."""
 
         def ticks_ms(self) -> int:
-            """A time that increases, ms."""
+            """The time in ms; after days it begins again."""
+
+        def passed_ms(self, begin_ms: int) -> int:
+            """Since a time of ``ticks_ms``."""
 
         def moving(self) -> bool:
             """Whether a motion runs."""
@@ -87,8 +90,8 @@ class Cell:
         """
         target = self._target(posture)
         percent = _percent(speed)
-        self._begin()
-        if list(target) != self._work.steps():
+        self._rest()
+        if target != self._work.steps():
             self._work.begin_move(target, percent)
         if wait:
             self._rest()
@@ -101,7 +104,7 @@ class Cell:
     def start(self, motion: str, speed: float = 1.0) -> None:
         """Start a stored motion; ``wait()`` waits for its end."""
         percent = _percent(speed)
-        self._begin()
+        self._rest()
         self._work.begin_motion(motion, percent)
 
     def moving(self) -> bool:
@@ -132,10 +135,11 @@ class Cell:
             if not low <= value <= high:
                 raise CellError("output %r: %r is not within %r to %r" % (output, value, low, high))
             raw = int((value - low) / (high - low) * _FULL + 0.5)
+        wait_ms = _ms(wait_s)
         self._work.check()
         self._work.set_output(number, raw)
-        if wait_s:
-            self.sleep(wait_s)
+        if wait_ms:
+            self._sleep(wait_ms)
 
     def active(self, input: str) -> bool:
         """Whether an input is active, debounced."""
@@ -156,18 +160,20 @@ class Cell:
             work.serve()
             if not work.moving() if number < 0 else bool(work.level(number)) == bool(active):
                 return True
-            if limit_ms and work.ticks_ms() - begin_ms >= limit_ms:
+            if limit_ms and work.passed_ms(begin_ms) >= limit_ms:
                 return False
 
     # the rest
 
     def sleep(self, time_s: float) -> None:
         """Wait; the arm may move meanwhile."""
+        self._sleep(_ms(time_s))
+
+    def _sleep(self, limit_ms: int) -> None:
         work = self._work
-        limit_ms = _ms(time_s)
         begin_ms = work.ticks_ms()
         work.serve()
-        while work.ticks_ms() - begin_ms < limit_ms:
+        while work.passed_ms(begin_ms) < limit_ms:
             work.serve()
 
     def count(self, name: str) -> int:
@@ -204,12 +210,8 @@ class Cell:
             self.at(line)
             yield value
 
-    def _begin(self) -> None:
-        """Wait for the end of a motion before the next one."""
-        self._rest()
-        self._work.check()
-
     def _rest(self) -> None:
+        """Wait for the end of a motion."""
         self._work.serve()
         while self._work.moving():
             self._work.serve()

@@ -14,9 +14,11 @@ import time
 from armtempo_shared import codes, messages
 from armtempo_shared.limits import HOLD_TIMEOUT_MS
 from armtempo_shared.messages import (
+    MOTION,
     ONCE_NAME,
     RESUME,
     SAMPLE_BRAKING,
+    SEQUENCE,
     START_HELD,
     START_HOMING,
     START_SWITCHES_BIT,
@@ -28,7 +30,6 @@ from armtempo_board.app import arm_setup
 from armtempo_board.buffers import COMMANDED
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
-from armtempo_board.storage.store import MOTION, SEQUENCE
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

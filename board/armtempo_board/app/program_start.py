@@ -3,10 +3,10 @@
 import gc
 
 from armtempo_shared import codes, program
+from armtempo_shared.messages import PROGRAM
 
 from armtempo_board.app.user_program import UserProgram
 from armtempo_board.errors import Refused
-from armtempo_board.storage.store import PROGRAM
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ def user_program(controller: "Any", name: str, crc: "int | None", rate: int) -> 
         raise Refused(codes.BAD_CHECKSUM)
     if record.arm_crc != controller.board.arm_crc:
         raise Refused(codes.ARM_MISMATCH)
+    controller.board.once.take_memory()  # a sequence may have released it
     if hasattr(gc, "mem_free"):
         gc.collect()
         missing = program.needed_bytes(record.source_bytes) - gc.mem_free()

@@ -3,6 +3,7 @@ of the one before.
 """
 
 from armtempo_shared import codes, sequence
+from armtempo_shared.messages import SEQUENCE
 from armtempo_shared.motion import MotionError
 from armtempo_shared.sequence import SequenceError
 from armtempo_shared.sequence_check import check
@@ -11,7 +12,6 @@ from armtempo_board.app.sequence_ahead import AheadSequencer
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
-from armtempo_board.storage.store import SEQUENCE
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

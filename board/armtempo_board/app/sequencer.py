@@ -125,13 +125,17 @@ class Sequencer:
     def change_rate(self, rate: int) -> None:
         """As ``Engine.change_rate``, also for the following motions."""
         engine = self._controller.board.engine
+        is_pause = rate in (0, messages.RESUME)  # or its end
         if engine.moving:
-            engine.change_rate(rate)
-            self._rate = rate if 0 < rate < messages.RESUME else self._rate
-        elif rate in (0, messages.RESUME):
+            engine.change_rate(rate if is_pause else self._share(rate))
+        elif is_pause:
             raise Refused(codes.NOT_MOVING)
-        else:
+        if not is_pause:
             self._rate = rate
+
+    def _share(self, rate: int) -> int:
+        """The rate of the present motion, of a rate for all."""
+        return rate
 
     def prepare(self) -> None:
         """Called during a motion; does nothing here, see ``sequence_ahead``."""

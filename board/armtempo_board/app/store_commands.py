@@ -6,13 +6,12 @@ of its answer.
 """
 
 from armtempo_shared import codes
-from armtempo_shared.messages import ARM_RECORD_NAME, MAX_PAYLOAD
+from armtempo_shared.messages import ARM_RECORD_NAME, MAX_PAYLOAD, MOTION
 from micropython import const
 
 from armtempo_board import features
 from armtempo_board.errors import Refused
 from armtempo_board.motion import endpoints
-from armtempo_board.storage.store import MOTION
 
 _NUMBER_BYTES = const(1)  # of the command, in front of the answer
 

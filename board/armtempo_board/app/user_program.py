@@ -18,7 +18,7 @@ from micropython import const
 import armtempo_board
 from armtempo_board import step_rates
 from armtempo_board.app.cell import Cell, CellError, Ended
-from armtempo_board.app.sequence_command import STEP, VALUE
+from armtempo_board.app.sequence_command import STEP
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.code_names import name_of
 from armtempo_board.errors import Refused
@@ -32,12 +32,9 @@ if TYPE_CHECKING:
     from armtempo_board.storage.program_file import ProgramFile
 
 _PERCENT = const(100)
-_SLOWEST = const(10)
 _MOST_SKIPPED = const(16)
-_SAID_BYTES = const(240)
-_CHARACTERS = const(60)  # of four bytes, as many as fit
-_SAY_MS = const(500)  # longest wait until a host has taken the text before
-_MOST_MS = const(1 << 29)
+_SAY_MS = const(500)  # longest wait until a host has taken the text before,
+_ALONE_MS = const(20)  # and if none was heard so long
 
 
 class UserProgram(Sequencer):
@@ -49,27 +46,22 @@ class UserProgram(Sequencer):
         super().__init__(controller, counters, name + program.SUFFIX.encode(), rate)
         self._source = record.source()
         self._app: "Any" = None
-        self._run_once: "Callable[[], None]" = self._nothing
-        self._since_ms: "Any" = 0
+        self._run_once: "Callable[[], None]" = self.prepare
         self._served_ms: "Any" = 0
-        self._passed_ms = self._skipped = 0
+        self._skipped = 0
+        self._percent = _PERCENT  # of the speed, in the present motion
 
     def begin(self) -> None:
         """Let the main loop execute it."""
         super().begin()
         self._controller.program = self
 
-    _nothing = Sequencer.prepare
     advance = Sequencer.prepare  # it goes on by itself
-
-    def tell(self, link: "Any") -> None:
-        """It has no rows."""
 
     def execute(self, app: "Any", run_once: "Callable[[], None]") -> None:
         """Execute it to its end. ``run_once``: one pass of the main loop."""
         self._app = app
         self._run_once = run_once
-        self._since_ms = time.ticks_ms()
         board = self._controller.board
         try:
             self._execute()
@@ -80,14 +72,12 @@ class UserProgram(Sequencer):
         gc.collect()
         while board.engine.moving:
             run_once()
-        if board.fault():
-            self._end(sequence.FAULTED, board.fault())
-        else:
-            self._end(sequence.STOPPED if self.stopping else sequence.FINISHED)
+        ending = sequence.STOPPED if self.stopping else sequence.FINISHED
+        self._end(sequence.FAULTED if board.fault() else ending, board.fault())
+        self.stopping = True  # what is left of it, such as a timer's callback, moves nothing any more
 
     def _execute(self) -> None:
         cell = Cell(self.table, self)
-        armtempo_board.cell = cell
         names = {
             "__name__": "__main__",
             "print": self._print,
@@ -98,10 +88,13 @@ class UserProgram(Sequencer):
         code = compile(source, self.table["file"], "exec")
         del source
         gc.collect()
+        before = list(sys.modules)
+        armtempo_board.cell = cell
         try:
             exec(code, names)
         finally:
             del armtempo_board.cell
+            _forget_modules(before)
 
     def _fail(self, error: "BaseException") -> None:
         """Brake, set a fault, and tell the traceback of the program's own lines."""
@@ -115,6 +108,7 @@ class UserProgram(Sequencer):
             self.status[STEP] = line or self.status[STEP]
         except MemoryError:
             text = "MemoryError in line %d" % self.status[STEP]
+        self._is_said()
         self._app.events.note(text)
 
     def _print(self, *values: object, sep: str = " ", end: str = "\n", file: object = None) -> None:
@@ -147,11 +141,12 @@ class UserProgram(Sequencer):
         self.status[STEP] = line
 
     def ticks_ms(self) -> int:
-        """Since its start; after days it begins again."""
-        now_ms = time.ticks_ms()
-        self._passed_ms = (self._passed_ms + time.ticks_diff(now_ms, self._since_ms)) & _MOST_MS - 1
-        self._since_ms = now_ms
-        return self._passed_ms
+        """Of the board."""
+        return int(time.ticks_ms())
+
+    def passed_ms(self, begin_ms: int) -> int:
+        """Also if ``ticks_ms`` began again meanwhile."""
+        return int(time.ticks_diff(time.ticks_ms(), begin_ms))
 
     def moving(self) -> bool:
         """Whether a motion runs."""
@@ -177,17 +172,23 @@ class UserProgram(Sequencer):
         except TooLongError:
             raise CellError("goto: it would take longer than the board can make a move") from None
         at = 0
-        for piece in move.pieces(board.arm_crc):
-            at = board.once.put(at, move.size, piece)
+        try:
+            for piece in move.pieces(board.arm_crc):
+                at = board.once.put(at, move.size, piece)
+        except Refused as refused:
+            raise _cell_error("goto", refused) from None
         del move
         self._begin(messages.ONCE_NAME, None, _PERCENT, "goto")
 
     def _begin(self, name: str, crc: "int | None", percent: int, what: str) -> None:
         try:
-            rate = max(self._rate * percent // _PERCENT, _SLOWEST)
-            self._controller.begin_motion(name, crc, rate)
+            self._percent = percent
+            self._controller.begin_motion(name, crc, self._share(self._rate))
         except Refused as refused:
-            raise CellError("%s is refused: %s" % (what, _reason(refused))) from None
+            raise _cell_error(what, refused) from None
+
+    def _share(self, rate: int) -> int:
+        return max(rate * self._percent // _PERCENT, messages.SLOWEST_PERMILLE)
 
     def brake(self) -> None:
         """Brake the motion."""
@@ -211,20 +212,29 @@ class UserProgram(Sequencer):
         number = self._command.named(name.encode()[:MAX_NAME], MAX_COUNTERS)
         if number < 0:
             raise CellError("more than %d counters" % MAX_COUNTERS)
-        self.status[VALUE] = self._command.count(number)
-        return int(self.status[VALUE])
+        return self._command.count(number)
 
     def say(self, text: str) -> None:
-        """Each line as a notice; waits until the one before was sent, if a host is there."""
+        """Each line as a notice, which is lost if no host takes the one before."""
         for line in text.split("\n"):
-            length = _SAID_BYTES if len(line.encode()) == len(line) else _CHARACTERS
-            for at in range(0, len(line) or 1, length):
-                begin_ms = time.ticks_ms()
-                while self._app.events.notice and self._app.commands.greeted:
-                    if time.ticks_diff(time.ticks_ms(), begin_ms) > _SAY_MS:
-                        return
-                    self.serve()
+            length = messages.MAX_PAYLOAD // (1 if len(line.encode()) == len(line) else 4)
+            for at in range(0, len(line), length):
+                if not self._is_said():
+                    return
+                self.check()
                 self._app.events.note(line[at : at + length])
+
+    def _is_said(self) -> bool:
+        """Wait until the text before was sent; returns whether it was."""
+        app = self._app
+        begin_ms = time.ticks_ms()
+        while app.events.notice and app.commands.greeted:
+            now_ms = time.ticks_ms()
+            most_ms = _SAY_MS if time.ticks_diff(now_ms, app.link.heard_ms) < _SAY_MS else _ALONE_MS
+            if time.ticks_diff(now_ms, begin_ms) > most_ms:
+                return False
+            self._run_once()
+        return True
 
 
 class _Counters:
@@ -239,10 +249,18 @@ class _Counters:
         return self._names[number].encode()
 
 
-def _reason(refused: Refused) -> str:
-    """Name of the code, joint and value."""
+def _forget_modules(but: "list[str]") -> None:
+    """Let the next program have its own modules: with its cell, and without tasks of this one (``asyncio``)."""
+    for name in list(sys.modules):
+        if name not in but and not name.startswith("armtempo"):
+            del sys.modules[name]
+
+
+def _cell_error(what: str, refused: Refused) -> CellError:
+    """With the name of the code, joint and value."""
     joint = "" if refused.joint == messages.NO_JOINT else ", joint %d" % (refused.joint + 1)
-    return name_of(refused.code) + joint + (", %d" % refused.value if refused.value else "")
+    value = ", %d" % refused.value if refused.value else ""
+    return CellError("%s is refused: %s%s%s" % (what, name_of(refused.code), joint, value))
 
 
 def _traceback(error: "BaseException", file: str) -> "tuple[str, int]":

@@ -76,7 +76,7 @@ class Engine:
         self.fault_joint = NO_JOINT
         self.known = 0
         self._watched_joint = self._background_task = 0
-        self._homing = 0  # one bit per joint that moves in a homing motion
+        self._homing = 0  # one bit per joint whose switches end a homing motion
         self._in_service = False  # service() or refill() is running, or did not reach its end
         self.skip_check = False  # the next motion was already checked, and nothing has changed since
 
@@ -130,8 +130,8 @@ class Engine:
         """Check a motion and fill the rings; raises Refused.
 
         ``rate``: of the motion's own time, in thousandths. ``ready``: the ``NextMotion`` that has loaded it.
-        ``homing``: one bit per joint that moves in a homing motion; a switch of these ends it without a
-        fault, and ``fault_joint`` has the joint.
+        ``homing``: one bit per joint whose switches end a homing motion, without a fault; those of others
+        are not watched. ``fault_joint`` then has the joint.
         """
         if self.moving:
             raise Refused(codes.BUSY)
@@ -411,7 +411,7 @@ class Engine:
         self.moving = False
 
     def close(self) -> None:
-        """Release the hardware, the engine_memory and the motion's file; the engine is not used after it."""
+        """Release the hardware, the engine's memory and the motion's file; the engine is not used after it."""
         self.freeze()
         for joint in self.drives:
             joint.close()

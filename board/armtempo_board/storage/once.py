@@ -1,6 +1,6 @@
 """The motion that is run once: its record stays in memory, so it costs no erasure of the flash.
 
-It is there until another one is sent, a sequence starts, which may need the memory, or a reset.
+It is there until another one is sent or made by a program, a sequence starts, which may need the memory, or a reset.
 """
 
 import gc
@@ -43,6 +43,10 @@ class Once:
     def _begin(self, size: int) -> None:
         self._size = size
         self._received = 0
+        self.take_memory()
+
+    def take_memory(self) -> None:
+        """Have the memory for a record, also after ``release``; raises Refused."""
         if not self._data:
             gc.collect()
             try:

@@ -3,8 +3,8 @@
 A record is written to ``NAME.new``, read back, synced and renamed. If a power cut leaves a ``.new`` file,
 ``recover`` uses it if the old file is gone and the new one is complete, and removes it otherwise.
 
-A record has the name of its motion or sequence, or ``ARM_RECORD_NAME``; its first bytes give its kind. No file is
-read or written during a motion.
+A record has the name of its motion, sequence or program, or ``ARM_RECORD_NAME``; its first bytes give its kind. No file
+is read or written during a motion.
 """
 
 import os
@@ -12,7 +12,7 @@ from binascii import crc32, hexlify
 
 from armtempo_shared import armrecord, codes
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_NAME
-from armtempo_shared.messages import ARM_RECORD_NAME
+from armtempo_shared.messages import ARM_RECORD_NAME, MOTION, PROGRAM, SEQUENCE
 from micropython import const
 
 from armtempo_board import features
@@ -37,10 +37,6 @@ _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
 _KIND_BYTES = const(3)  # of a record's magic, of every version
-MOTION = const(0)
-SEQUENCE = const(1)
-PROGRAM = const(2)
-"""Kinds of records; what is neither of the last two counts as a motion."""
 _BLOCK = const(512)
 _0, _9, _A, _Z = const(0x30), const(0x39), const(0x61), const(0x7A)  # letters, small
 _SMALL = const(0x20)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armtempo_shared import limits, wire
-from armtempo_shared.messages import MAX_COMMAND, MAX_PAYLOAD, PERMILLE, START_HELD
+from armtempo_shared.messages import MAX_COMMAND, MAX_PAYLOAD, PERMILLE, PROGRAM, SEQUENCE, START_HELD
 
 from armtempo.basics.errors import BoardError, InputError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.basics.progress import Progress
@@ -24,8 +24,6 @@ LARGEST_PIECE = MAX_COMMAND - 4
 PIECE_TIMEOUT_S = 0.5
 
 _CTRL_C = 3
-SEQUENCE, PROGRAM = 1, 2
-"""Kinds of stored records other than motions."""
 _GREETINGS = 8
 """Number of a session's first frames that can be ``hello``."""
 

@@ -42,7 +42,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
         own_crc(),
         _pieces(definition),
     )
-    _check_workspace(built, made, definition)
+    _check_size(built, made, definition)
     _put(built, made, out)
     return made
 
@@ -96,7 +96,7 @@ def _run(command: list[str], step: Callable[[str], None]) -> None:
         )
 
 
-def _check_workspace(built: Path, made: image.Image, definition: BoardDefinition) -> None:
+def _check_size(built: Path, made: image.Image, definition: BoardDefinition) -> None:
     """ToolError if the firmware is larger than the chip's flash, which MicroPython's linker takes for 1 MB."""
     last = made.pieces[-1]
     end = last.address + (built / last.file).stat().st_size

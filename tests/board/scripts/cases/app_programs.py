@@ -118,6 +118,16 @@ def case_calls_do_what_they_say():
     assert state(world.host) == "idle"
 
 
+def case_waits_end_after_days_too():
+    def script(world):
+        if world.turns == 1:
+            stand_in.Clock.now_ms += (1 << 29) - 200
+
+    world = World("cell.sleep(0.01)\ncell.sleep(1)\nprint(cell.wait('part', timeout_s=0.1))\n", script)
+    assert world.run()[0] == "finished" and world.said() == ["False"]
+    assert world.turns < 30, world.turns
+
+
 def case_a_program_acts_while_a_motion_runs():
     def script(world):
         if world.turns == 5:
@@ -160,6 +170,27 @@ def case_an_exception_brakes_and_is_a_fault_with_its_line():
     assert world.host.ask("clear")[0] == "ok"
 
 
+def case_a_text_just_before_an_exception_does_not_hide_it():
+    world = World("cell.sleep(0.2)\nprint('here')\n1 // 0\n")
+    assert world.run()[0] == "fault"
+    assert world.said()[0] == "here" and "ZeroDivisionError" in world.said()[1], world.said()
+
+
+def case_without_a_host_texts_take_little_time():
+    def script(world):
+        if world.turns == 1:
+            world.host.port.room = 0
+
+    world = World("cell.sleep(1)\nfor i in range(20):\n    print(i)\n", script)
+    assert world.start()[0] == "ok"
+    try:
+        world.execute()
+    finally:
+        world.host.port.room = 1 << 30
+    assert world.stands()[0] == "finished"
+    assert world.turns < 80, world.turns
+
+
 def case_what_is_not_possible_is_an_exception_with_words():
     for call, words in (
         ("goto('nowhere')", "the arm has no posture 'nowhere'; it has away, home, there"),
@@ -171,6 +202,8 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("set('lamp', 1)", "the arm has no output 'lamp'; it has gripper"),
         ("wait('past')", "the arm has no input 'past'; it has part"),
         ("sleep(-1)", "-1 s is not within 0 to 3600"),
+        ("set('gripper', 'closed', wait_s=-1)", "-1 s is not within 0 to 3600"),
+        ("goto([0.1, 0])", "goto is refused: too_long, 100"),
         ("run('back')", "run('back') is refused: wrong_start"),
         ("run('none')", "run('none') is refused: not_found"),
     ):
@@ -182,6 +215,8 @@ def case_what_is_not_possible_is_an_exception_with_words():
             world.board.engine.refusal = (22,)
             world.execute()
         else:
+            if "0.1" in call:
+                world.board.once.capacity = 100
             assert world.run()[0] == "finished", call
         assert world.said() == [words], (call, world.said())
         assert not sequence_rig.runs(world.app) and not world.board.outputs.log
@@ -277,11 +312,14 @@ def case_the_hosts_speed_is_that_of_its_motions():
             assert world.host.ask("speed", (500,))[0] == "ok"
         if engine.moving:
             rates.append(engine.rates.wanted)
+            if len(rates) == 2:
+                assert world.host.ask("speed", (400,))[0] == "ok"
+                rates.append(engine.rates.wanted)
             engine.finish()
 
     world = World("cell.sleep(0.01)\ncell.run('there')\ncell.run('on', speed=0.5)\n", script)
     assert world.run()[0] == "finished"
-    assert rates == [500, 250], rates
+    assert rates == [500, 250, 200], rates
 
 
 def case_a_fault_of_the_board_ends_it():
@@ -293,6 +331,37 @@ def case_a_fault_of_the_board_ends_it():
     world = World("cell.run('there')\nprint('after')\n", script)
     ending, code, _ = world.run()
     assert (ending, code) == ("fault", 40) and not world.said()
+
+
+def case_nothing_of_it_acts_after_its_end():
+    from armtempo_board.app.cell import Ended
+
+    world = World("import cases, sys\nsys.modules['helper'] = cases\ncases.kept = cell\n")
+    assert world.run()[0] == "finished"
+    assert "helper" not in sys.modules and cases is sys.modules["cases"]
+    for call in (lambda: cases.kept.goto("there"), lambda: cases.kept.set("gripper", "closed")):
+        try:
+            call()
+            raise AssertionError("it acted")
+        except Ended:
+            pass
+    assert not sequence_rig.runs(world.app) and not world.board.outputs.log
+
+
+def case_wrong_syntax_leaves_nothing():
+    import armtempo_board
+
+    ending, _, line = World("pass\nx = = 1\n").run()
+    assert (ending, line) == ("fault", 3), (ending, line)
+    assert not hasattr(armtempo_board, "cell")
+
+
+def case_its_moves_have_memory_after_a_sequence():
+    world = World("pass\n")
+    world.board.once.release()
+    assert world.start()[0] == "ok"
+    assert len(world.board.once._data) == world.board.once.capacity
+    world.execute()
 
 
 def case_a_full_heap_ends_it():
