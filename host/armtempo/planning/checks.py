@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from itertools import pairwise
 
 import numpy as np
@@ -23,9 +24,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
-from armtempo.model.job import (
-    Job,
-)
+from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 from armtempo.splines import bspline, extremes
@@ -119,6 +118,12 @@ def check_job(arm: Arm, job: Job) -> None:
             f"{MAX_MOTION_BYTES}",
             "lower refine, use shared timing or fewer via points",
         )
+
+
+def most_segments(arm: Arm, shared: bool = True) -> int:
+    """The most segments of quintic splines, with one of time for each of a path, that the board's record can hold."""
+    sizes = [motion.size(5, len(arm.driven), shared, count, 1) for count in range(1, MAX_SEGMENTS + 1)]
+    return bisect_right(sizes, MAX_MOTION_BYTES)
 
 
 def leads_tool(job: Job) -> bool:
