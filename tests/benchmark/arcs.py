@@ -22,7 +22,7 @@ from armtempo.basics.errors import PlanError  # noqa: E402
 from armtempo.model.arm import Arm  # noqa: E402
 from armtempo.model.job import Job  # noqa: E402
 from armtempo.model.tool_pose import Pose  # noqa: E402
-from armtempo.model.tool_way import ToolWay  # noqa: E402
+from armtempo.model.tool_segment import ToolSegment  # noqa: E402
 from armtempo.planning import planner  # noqa: E402
 from armtempo.planning.fixed_path import FixedPath  # noqa: E402
 from armtempo.planning.line import line_path  # noqa: E402
@@ -47,15 +47,16 @@ def arc(seed: int, tolerance_mm: float) -> tuple[Arm, Job]:
     there = np.clip(here + rng.uniform(-30.0, 30.0, len(here)), low, high)
     between = 0.5 * (here + there) + rng.uniform(-4.0, 4.0, len(here))
     end, through = tool_poses(arm, np.array([there, between]))
-    way = ToolWay(1, True, tuple(through[:3, 3].tolist()), tolerance_mm=tolerance_mm, tolerance_deg=90.0)
+    middle = tuple(through[:3, 3].tolist())
+    segment = ToolSegment(1, True, middle, tolerance_mm=tolerance_mm, tolerance_deg=90.0)
     via = (tuple(here.tolist()), Pose(tuple(map(tuple, end.tolist())), fixed=()))
-    return arm, Job("arc", via=via, ways=(way,))
+    return arm, Job("arc", via=via, tool_segments=(segment,))
 
 
 def reference_s(arm: Arm, job: Job, via_deg: np.ndarray) -> float:
     """The motion time along the exact arc."""
     (led,) = line_path.led_legs(arm, job, via_deg).values()
-    angles = led.followed.at(led.ways(_POSTURES - 1))
+    angles = led.followed.at(led.distances(_POSTURES - 1))
     moving = np.ptp(angles, axis=0) > 1e-9
     limits = [joint.limits for joint, moves in zip(arm.driven, moving, strict=True) if moves]
     path = FixedPath(bspline.fit(angles[:, moving], DEGREE), DEGREE, limits, _REFINE)

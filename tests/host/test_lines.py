@@ -305,7 +305,7 @@ def test_a_straight_wrist_on_the_way_is_named() -> None:
         ({"path": "free", "corridor_deg": 1.0}, "with a corridor"),
         ({"timing": "per-joint"}, 'need timing = "shared"'),
         ({"degree": 3}, "degree 5"),
-        ({"tool_segments": (ToolSegment(3, True),)}, "lead to via points"),
+        ({"tool_segments": (ToolSegment(3, True),)}, "tool_segments lead to via points"),
         ({"tool_segments": (ToolSegment(1, True, blend_mm=5.0),)}, "needs a line on both sides"),
     ],
 )

@@ -105,6 +105,15 @@ def test_no_modules_import_each_other() -> None:
     TopologicalSorter(needs).prepare()  # CycleError, with the modules of the circle
 
 
+def test_benchmarks_import_modules_that_there_are() -> None:
+    """They run seldom, and some need packages that are not installed here."""
+    names = {name_of(path) for path in modules()}
+    for path in (HOST.parents[1] / "tests" / "benchmark").glob("*.py"):
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("armtempo."):
+                assert node.module in names, f"{path.name} imports {node.module}"
+
+
 def name_of(path: Path) -> str:
     """A module's name, with dots."""
     return ".".join(path.relative_to(HOST.parent).with_suffix("").parts).removesuffix(".__init__")

@@ -75,8 +75,10 @@ def test_other_refusals(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
         with pytest.raises(InputError):
             UserProgram.load(tmp_path / name, ARM)
-    with pytest.raises(InputError, match="give the file"):
+    with pytest.raises(InputError, match=r"none\.py: cannot be read"):
         UserProgram.load(tmp_path / "none.py", ARM)
+    (tmp_path / "pick.py").write_text(HEAD, encoding="utf-8-sig")  # as Windows' editor may save it
+    assert UserProgram.load(tmp_path / "pick.py", ARM).source == HEAD
     path = written("match 3:\n    case 3:\n        pass\n", tmp_path)
     with pytest.raises(InputError, match=r"pick.py, line 2: SyntaxError"):
         program_files.check_syntax(path, path.read_text())

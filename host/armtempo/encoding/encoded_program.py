@@ -103,7 +103,7 @@ def moves_that_touch(found: EncodedProgram) -> list[str]:
     The board knows nothing of the workspace; which of these moves the program makes is not known either.
     """
     arm = found.arm
-    if not workspace_check.has_room(arm):
+    if not workspace_check.can_touch(arm):
         return []
     places = {
         f"posture {name!r}": via_points.posture_deg(arm, arm.posture(name)) for name in found.program.postures

@@ -280,8 +280,8 @@ def _vias(
         stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
         found = [tool_segment.read(table, n) for n, table in enumerate(tables)]
         vias = [
-            _via(table, f"{top.file}: via P{n}", arm, way)
-            for n, (table, way) in enumerate(zip(tables, found, strict=True))
+            _via(table, f"{top.file}: via P{n}", arm, segment)
+            for n, (table, segment) in enumerate(zip(tables, found, strict=True))
         ]
         segments = [each for each in found if each]
     if len(vias) < 2:
@@ -308,7 +308,7 @@ def _stop(table: Table, via: int, count: int) -> Stop:
     return Stop(via, dwell_s)
 
 
-def _via(table: Table, where: str, arm: Arm, way: ToolSegment | None) -> tuple[float, ...] | Pose:
+def _via(table: Table, where: str, arm: Arm, segment: ToolSegment | None) -> tuple[float, ...] | Pose:
     forms = [key for key in ("angles_deg", "matrix", "position_mm", "posture") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
@@ -317,22 +317,22 @@ def _via(table: Table, where: str, arm: Arm, way: ToolSegment | None) -> tuple[f
         )
     if forms == ["posture"]:
         name = table.text("posture")
-        _done(table, way)
+        _done(table, segment)
         return _named(name, where, arm)
     if forms == ["angles_deg"]:
         found = read_angles(table, "angles_deg", arm)
-        _done(table, way)
+        _done(table, segment)
         return found
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
     pose = from_table(table, where)
     table.done()
-    if way and way.line:  # its tolerances are read as those of the line
+    if segment and segment.line:  # its tolerances are read as those of the line
         pose = replace(pose, tolerance_mm=TOLERANCE_MM, tolerance_deg=TOLERANCE_DEG)
     return replace(pose, posture_deg=posture)
 
 
-def _done(table: Table, way: ToolSegment | None) -> None:
-    if way and way.line:
+def _done(table: Table, segment: ToolSegment | None) -> None:
+    if segment and segment.line:
         table.known("tolerance_mm", "tolerance_deg")
     table.done()
 

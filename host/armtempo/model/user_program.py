@@ -18,6 +18,7 @@ from armtempo_board.app.cell import Cell
 from armtempo_shared.program import EACH, MARK
 from armtempo_shared.sequence import MAX_COUNTERS
 
+from armtempo.basics import number_table
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.model.arm import Arm
@@ -57,12 +58,7 @@ class UserProgram:
         path = Path(path)
         if not is_name(path.stem):
             raise InputError(f"{path}: its name is not valid on the board", f"give {NAME_RULE}, and .py")
-        try:
-            source = path.read_text(encoding="utf-8")
-        except UnicodeDecodeError:
-            raise InputError(f"{path} is not text in UTF-8", "save it as that") from None
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror}", "give the file of a program") from None
+        source = number_table.text_of(path)
         try:
             tree = ast.parse(source)
         except (SyntaxError, ValueError) as error:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-DIFFERENTIAL, FOUR_BAR = "DifferentialTransmission", "FourBarLinkageTransmission"
+_DIFFERENTIAL, _FOUR_BAR = "DifferentialTransmission", "FourBarLinkageTransmission"
 _SIMPLE = "SimpleTransmission"
 
 
@@ -22,7 +22,6 @@ class Coupling:
     """A transmission between two motors and two joints of a chain."""
 
     name: str
-    kind: str
     joints: tuple[str, str]
     rows: tuple[tuple[float, float], tuple[float, float]]
     """Of the motors, by the angles of the two joints."""
@@ -63,7 +62,7 @@ def _in_order(element: ElementTree.Element, what: str) -> list[ElementTree.Eleme
 
 def _coupling(element: ElementTree.Element, name: str, kind: str, joints: list[str]) -> Coupling | None:
     """None for another class, or one that has not two joints and two actuators, or a reduction that is none."""
-    if kind not in (DIFFERENTIAL, FOUR_BAR):
+    if kind not in (_DIFFERENTIAL, _FOUR_BAR):
         return None
     try:
         first, second = map(_reduction, _in_order(element, "joint"))
@@ -72,8 +71,8 @@ def _coupling(element: ElementTree.Element, name: str, kind: str, joints: list[s
         return None
     if not all(0.0 < abs(ratio) < math.inf for ratio in (first, second, motor, other)):
         return None
-    rows = ((first, second), (first, -second)) if kind == DIFFERENTIAL else ((first, 0.0), (1.0, second))
-    return Coupling(name, kind, (joints[0], joints[1]), rows, (motor, other))
+    rows = ((first, second), (first, -second)) if kind == _DIFFERENTIAL else ((first, 0.0), (1.0, second))
+    return Coupling(name, (joints[0], joints[1]), rows, (motor, other))
 
 
 def _reduction(one: ElementTree.Element) -> float:

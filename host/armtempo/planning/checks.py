@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from itertools import pairwise
 
 import numpy as np
@@ -23,9 +24,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
-from armtempo.model.job import (
-    Job,
-)
+from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
 from armtempo.splines import bspline, extremes
@@ -121,6 +120,12 @@ def check_job(arm: Arm, job: Job) -> None:
         )
 
 
+def most_segments(arm: Arm, shared: bool = True) -> int:
+    """The most segments of quintic splines, with one of time for each of a path, that the board's record can hold."""
+    sizes = [motion.size(5, len(arm.driven), shared, count, 1) for count in range(1, MAX_SEGMENTS + 1)]
+    return bisect_right(sizes, MAX_MOTION_BYTES)
+
+
 def leads_tool(job: Job) -> bool:
     """Whether the job has lines or arcs of the tool, or limits its speed."""
     return bool(job.tool_segments) or job.speed_mm_s is not None or job.acceleration_mm_s2 is not None
@@ -133,7 +138,7 @@ def planner_of(job: Job) -> str:
     return "free" if is_free(job) else "through"
 
 
-def _check_ways(job: Job, where: str) -> None:
+def _check_tool_segments(job: Job, where: str) -> None:
     """Raise InputError for lines and speeds of the tool that contradict the rest of the job."""
     if job.timing != "shared" or job.degree != 5:
         raise InputError(
@@ -145,20 +150,20 @@ def _check_ways(job: Job, where: str) -> None:
             f"{where}: lines and speeds of the tool do not go together with a corridor",
             "leave one of them out",
         )
-    vias = [way.via for way in job.tool_segments]
+    vias = [segment.via for segment in job.tool_segments]
     if vias != sorted(set(vias)) or (vias and vias[-1] >= len(job.via)):
         raise InputError(
-            f"{where}: its ways lead to via points {vias}", "give each via point one way, in order"
+            f"{where}: its tool_segments lead to via points {vias}", "give each via point one, in order"
         )
-    led = {way.via for way in job.tool_segments if way.line}
-    for way in job.tool_segments:
-        if way.blend_mm and way.via + 1 not in led:
+    led = {segment.via for segment in job.tool_segments if segment.line}
+    for segment in job.tool_segments:
+        if segment.blend_mm and segment.via + 1 not in led:
             raise InputError(
-                f"{where}: blend_mm at P{way.via} needs a line on both sides of it",
+                f"{where}: blend_mm at P{segment.via} needs a line on both sides of it",
                 "leave it out: the motion rests there; or give the next via point line = true",
             )
     for stop in job.stops:
-        if any(way.blend_mm and way.via == stop.via for way in job.tool_segments):
+        if any(segment.blend_mm and segment.via == stop.via for segment in job.tool_segments):
             raise InputError(
                 f"{where}: the motion cannot rest at P{stop.via} and cut its corner", "leave one out"
             )
@@ -183,7 +188,7 @@ def _check_path(job: Job) -> None:
             f"{where}: {corridors[0]} must be 0 or more", f"give {corridors[0]} a width, or leave it out"
         )
     if leads_tool(job):
-        _check_ways(job, where)
+        _check_tool_segments(job, where)
     elif planner_of(job) == "line" and (job.timing != "shared" or job.degree != 5):
         raise InputError(
             f'{where}: a stop needs timing = "shared" and degree 5',
@@ -251,7 +256,7 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
         raise InputError(
             f"job {job.name!r}: a via angle is not a finite number", "give every angle as a number of degrees"
         )
-    circles = any(way.circle_through_mm is not None for way in job.tool_segments)
+    circles = any(segment.circle_through_mm is not None for segment in job.tool_segments)
     if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE) and not circles:
         raise PlanError(
             f"job {job.name!r}: all via points are the same, so nothing moves", "change at least one angle"

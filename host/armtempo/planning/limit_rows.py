@@ -16,6 +16,7 @@ from armtempo.basics.arrays import Array
 from armtempo.planning.collocation import Ratios
 from armtempo.planning.linear_rows import WindowRows
 from armtempo.planning.variables import MotionVariables, angle_basis, time_basis
+from armtempo.splines.trajectory import by_time
 
 
 def ratios(angle: Array, time: Array, limits: Array) -> Array:
@@ -24,29 +25,14 @@ def ratios(angle: Array, time: Array, limits: Array) -> Array:
     ``angle`` (3, P, J) holds q', q'', q''' of J joints at P points, ``time`` (3, P) t', t'', t''', ``limits`` (J, 3)
     speed, acceleration, jerk.
     """
-    q1, q2, q3 = angle
-    t1, t2, t3 = time[:, :, None]
-    inverse = 1.0 / t1
-    speed = q1 * inverse
-    acceleration = (q2 - speed * t2) * inverse**2
-    jerk = (q3 - 3.0 * acceleration * t1 * t2 - speed * t3) * inverse**3
-    return np.asarray(np.stack([speed, acceleration, jerk]) / limits.T[:, None, :])
-
-
-def value(kind: int, angle: Array, time: Array) -> Array:
-    """The speed (``kind`` 0), acceleration (1) or jerk (2), (M,), of q', q'', q''' and t', t'', t''', (3, M) each."""
-    inverse = 1.0 / time[0]
-    speed = angle[0] * inverse
-    if kind == 0:
-        return np.asarray(speed)
-    acceleration = (angle[1] - speed * time[1]) * inverse**2
-    if kind == 1:
-        return np.asarray(acceleration)
-    return np.asarray((angle[2] - 3.0 * acceleration * time[0] * time[1] - speed * time[2]) * inverse**3)
+    return np.asarray(np.stack(by_time(angle, time[:, :, None])) / limits.T[:, None, :])
 
 
 def gradient(kind: int, angle: Array, time: Array) -> tuple[Array, Array]:
-    """Derivatives of ``value`` by q', q'', q''' and by t', t'', t''', (kind + 1, M) each; those by the rest are 0."""
+    """Derivatives of the speed (``kind`` 0), acceleration (1) or jerk (2) by q', q'', q''' and by t', t'', t'''.
+
+    ``angle`` and ``time`` hold these, (3, M) each. Returns (kind + 1, M) each; derivatives by the rest are 0.
+    """
     q1, q2, q3 = angle
     t1, t2, t3 = time
     i1 = 1.0 / t1
@@ -86,7 +72,7 @@ class LimitRows:
         angle, time = self._derivatives(x)
         ratio = np.empty(len(self._limits))
         for kind, own in enumerate(self._kinds):
-            ratio[own] = value(kind, angle[:, own], time[:, own])
+            ratio[own] = by_time(angle[:, own], time[:, own], kind + 1)[kind]
         ratio /= self._limits
         return np.concatenate([1.0 - ratio, 1.0 + ratio])
 

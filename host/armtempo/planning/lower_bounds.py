@@ -16,7 +16,7 @@ from armtempo.planning.dual_bound import Cells
 from armtempo.splines import bspline
 
 _WIGGLE = 1e-9
-"""BoardLock smaller than this fraction of the joint's way are rounding."""
+"""Reversals smaller than this fraction of the joint's way are rounding."""
 _ROUNDED = 1.0 - 1e-9
 """Factor on the bounds, for the rounding of angles and sums."""
 _MOST_CELLS, _LEAST_CELLS = 16, 4

@@ -67,7 +67,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
 
 def _swing_note(arm: Arm, job: Job, trajectory: Trajectory) -> list[str]:
     """A note if a joint leaves the angles between two via points by more than ``_SWING_DEG``."""
-    swing = path_deviation.widest_swing(trajectory, [way.via for way in job.tool_segments if way.line])
+    swing = path_deviation.widest_swing(trajectory, [each.via for each in job.tool_segments if each.line])
     if swing.beyond_deg <= _SWING_DEG:
         return []
     helps = 'path = "free" helps' if job.path == "through" else "a via point or a stop = true there keeps it"

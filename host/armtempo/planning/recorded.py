@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from armtempo_shared import motion
-from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
@@ -114,12 +112,10 @@ def _fits(arm: Arm, times: Array, angles: Array, tolerance_deg: float) -> list[_
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     if np.ptp(angles, axis=0).max() <= checks.TOLERANCE:
         raise PlanError("the recording does not move", "give one that does")
-    most = MAX_SEGMENTS
-    while motion.size(DEGREE, len(arm.driven), True, most, 1) > MAX_MOTION_BYTES:
-        most -= 1
     segments = max(int(np.ceil(times[-1] / _COARSEST_S)), 2)
     off_deg = np.inf
     found: list[_Fit] = []
+    most = checks.most_segments(arm)
     while segments <= most and len(found) < _CANDIDATES:
         inside = 0.0
         for _ in range(_TRIES):

@@ -74,7 +74,9 @@ def _parts(job: Job, via_deg: Array, cuts: Sequence[int]) -> list[Job]:
                     replace(stop, via=stop.via - first) for stop in job.stops if first < stop.via < last
                 ),
                 tool_segments=tuple(
-                    replace(way, via=way.via - first) for way in job.tool_segments if first < way.via <= last
+                    replace(each, via=each.via - first)
+                    for each in job.tool_segments
+                    if first < each.via <= last
                 ),
             )
         )

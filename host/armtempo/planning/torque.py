@@ -136,9 +136,7 @@ def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan
     ``dynamics`` or without the torque of a motor, PlanError if slower motions do not help; otherwise as
     ``planner.plan``.
     """
-    from armtempo.planning import (
-        planner,
-    )  # here, as a report needs torques only, and it loads everything that plans
+    from armtempo.planning import planner  # here, as it loads all that plans, and a report needs torques only
 
     held = [held_nm(joint, 0.0) for joint in arm.driven]
     if np.any(np.isnan(held)) or not any(joint.dynamics for joint in arm.joints):

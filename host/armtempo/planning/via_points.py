@@ -106,7 +106,7 @@ def resolve(arm: Arm, job: Job) -> Resolved:
     notes: list[Note] = []
     posture = setup.home
     branch: Branch | None = None
-    led = {way.via for way in job.tool_segments if way.line}
+    led = {segment.via for segment in job.tool_segments if segment.line}
     for number, via in enumerate(job.via):
         where = f"job {job.name!r}, P{number}"
         choice = None

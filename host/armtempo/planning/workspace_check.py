@@ -180,7 +180,7 @@ class Bodies:
         return np.array(found)
 
 
-def has_room(arm: Arm) -> bool:
+def can_touch(arm: Arm) -> bool:
     """Whether there is anything that the arm could touch."""
     thick = sum(joint.radius_mm > 0.0 for joint in arm.joints) + bool(arm.payload and arm.payload.radius_mm)
     return bool(arm.workspace and arm.workspace.obstacles) or thick > 1
@@ -258,7 +258,7 @@ def touch_of(
     arm: Arm, trajectory: Trajectory, speeds_deg_s: Array | None = None, outwards: bool = False
 ) -> Touch | None:
     """As ``first_touch``; skips arms without a workspace, and computes unknown speeds."""
-    if not has_room(arm):
+    if not can_touch(arm):
         return None
     if speeds_deg_s is None:
         speeds_deg_s = np.array([each.speed_deg_s for each in extremes.of_joints(trajectory.joints)])
@@ -267,7 +267,7 @@ def touch_of(
 
 def tell_start(arm: Arm, driven_deg: Iterable[float]) -> None:
     """Log what touches most at a posture (J,) from which the arm moves out."""
-    touches = posture_touches(arm, driven_deg) if has_room(arm) else []
+    touches = posture_touches(arm, driven_deg) if can_touch(arm) else []
     if touches:
         touch = max(touches, key=lambda each: each.depth_mm)
         LOG.warning(f"{touch.description} where it starts; it may move out only, and not back")

@@ -78,7 +78,7 @@ class JointSpline:
 
         angle = [at(self.angle_polynomials, order) for order in range(1, 4)]
         time = [at(self.time_polynomials, order) for order in range(4)]
-        return time[0], np.stack(_by_time(angle, time[1:]))
+        return time[0], np.stack(by_time(angle, time[1:]))
 
 
 @cache
@@ -87,12 +87,18 @@ def _powers(parts: int) -> Array:
     return np.vander(np.linspace(0.0, 1.0, parts), max(bspline.DEGREES) + 1, increasing=True).T.copy()
 
 
-def _by_time(angle: Sequence[Array], time: Sequence[Array]) -> tuple[Array, Array, Array]:
-    """Speed, acceleration and jerk from the first three derivatives of angle and time by u."""
-    speed = angle[0] / time[0]
-    acceleration = (angle[1] - speed * time[1]) / time[0] ** 2
-    jerk = (angle[2] - 3 * acceleration * time[0] * time[1] - speed * time[2]) / time[0] ** 3
-    return speed, acceleration, jerk
+def by_time(angle: Sequence[Array] | Array, time: Sequence[Array] | Array, count: int = 3) -> list[Array]:
+    """The first ``count`` of speed, acceleration and jerk, from as many derivatives of angle and time by u.
+
+    Eqs. (17) to (19), the last as differentiation gives it.
+    """
+    inverse = 1.0 / time[0]
+    found = [angle[0] * inverse]
+    if count > 1:
+        found.append((angle[1] - found[0] * time[1]) * inverse**2)
+    if count > 2:
+        found.append((angle[2] - 3.0 * found[1] * time[0] * time[1] - found[0] * time[2]) * inverse**3)
+    return found
 
 
 def derivatives(angle: Array, time: Array, segment: NDArray[np.intp], u: Array, order: int) -> Array:
@@ -103,15 +109,8 @@ def derivatives(angle: Array, time: Array, segment: NDArray[np.intp], u: Array, 
 
     if order == 0:
         return at(angle, 0)
-    t1 = at(time, 1)
-    speed = at(angle, 1) / t1
-    if order == 1:
-        return speed
-    t2 = at(time, 2)
-    acceleration = (at(angle, 2) - speed * t2) / t1**2
-    if order == 2:
-        return acceleration
-    return (at(angle, 3) - 3 * acceleration * t1 * t2 - speed * at(time, 3)) / t1**3
+    orders = range(1, order + 1)
+    return by_time([at(angle, n) for n in orders], [at(time, n) for n in orders], order)[-1]
 
 
 @checked

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from armtempo_shared import motion as record
-from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
@@ -139,11 +137,8 @@ def _axis_s(demand: Demand, spline: Planned, pieces: int) -> Array:
 
 
 def _most_segments(arm: Arm, job: Job, vias: int) -> int:
-    """The most segments of a free path that the board's record can hold."""
-    shared, joints = job.timing == "shared", len(arm.driven)
-    most = MAX_SEGMENTS
-    while most > 1 and record.size(DEGREE, joints, shared, most, 1) > MAX_MOTION_BYTES:
-        most -= 1
+    """The most segments of a free path that the board's record can hold; raises InputError if too few."""
+    most = checks.most_segments(arm, job.timing == "shared")
     pieces = job.refine if isinstance(job.refine, int) else LEAST_PIECES
     needed = uniform(vias, pieces, {stop.via: stop.dwell_s for stop in job.stops}).segments
     if needed > most:

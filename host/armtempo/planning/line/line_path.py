@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from armtempo_shared import motion as record
-from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
@@ -144,7 +142,7 @@ def proven_paths(
     """
     legs = cut.of_job(job)
     led = {number: one for number, one in parts.items() if isinstance(one, Led)}
-    most = _most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
+    most = checks.most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
     pieces = [
         one.segments if isinstance(one, Between) else _LINE_PIECES * len(leg.tool_segments)
         for leg, (_, one) in zip(legs, sorted(parts.items()), strict=True)
@@ -176,14 +174,6 @@ def proven_paths(
                 f"the board holds {most} in all",
                 "widen tolerance_mm and tolerance_deg, keep away from singular postures, or plan with --split",
             )
-
-
-def _most_segments(arm: Arm) -> int:
-    """The most segments that the board's record can hold."""
-    most = MAX_SEGMENTS
-    while record.size(DEGREE, len(arm.driven), True, most, 1) > MAX_MOTION_BYTES:
-        most -= 1
-    return most
 
 
 def _path(

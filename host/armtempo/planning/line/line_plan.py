@@ -209,17 +209,17 @@ def _floor(
 
 def _asked(job: Job, via: int) -> tuple[float, float]:
     """Limits of the tool's speed and acceleration on the way to a via point; infinite without a limit."""
-    way = tool_segment.at(job.tool_segments, via)
+    segment = tool_segment.at(job.tool_segments, via)
     both = []
     for key in ("speed_mm_s", "acceleration_mm_s2"):
-        own = getattr(way, key) if way else None
+        own = getattr(segment, key) if segment else None
         asked = own if own is not None else getattr(job, key)
         both.append(np.inf if asked is None else asked)
     return both[0], both[1]
 
 
 def _tool_limits(job: Job, path: LinePath) -> ToolLimits:
-    """The tool's limits on each segment; segments of a cut corner have those of both ways."""
+    """The tool's limits on each segment; segments of a cut corner have those of both lines."""
     segments = path.knots[-1]
     limits = np.full((2, segments), np.inf)
     for via, (first, last) in enumerate(pairwise(path.arrivals), 1):
