@@ -33,7 +33,7 @@ def cost_of_looking(engine, at, value):
 
 
 def serve_for(engine, wait_us, idle_us):
-    """BoardLock of the loop for so long."""
+    """Passes of the loop for so long."""
     then = time.ticks_us()
     while time.ticks_diff(time.ticks_us(), then) < wait_us:
         serve(engine, idle_us)
