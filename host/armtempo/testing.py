@@ -143,15 +143,9 @@ class _Work:
         self._ends = ends
         self._now_ms = 0
         self._rests_ms = 0
-        self._steps = self._in_steps(arm.home_deg)
+        self._steps = arm.transmission.whole_steps(arm.home_deg)
         self._limits = [(row["min_steps"], row["max_steps"]) for row in encode.motor_rows(arm)]
         self.run.posture_deg = tuple(float(angle) for angle in arm.home_deg)
-
-    def _in_steps(self, angles_deg: Sequence[float]) -> list[int]:
-        return [
-            round(float(angle) * joint.steps_per_deg)
-            for angle, joint in zip(angles_deg, self._arm.driven, strict=True)
-        ]
 
     def check(self) -> None:
         if self.run.time_s > self._ends.longest_s:
@@ -177,15 +171,15 @@ class _Work:
         return self._now_ms < self._rests_ms
 
     def begin_motion(self, name: str, percent: int) -> None:
-        file = self._program.path.parent / f"{name}.json"
+        file = self._program.motion_file(name)
         if not file.is_file():
             raise InputError(f"no motion {name!r}: {file} does not exist", "plan it")
         motion = Plan.load(file).trajectory
-        start = self._in_steps(motion(0.0).tolist())
+        start = self._arm.transmission.whole_steps(motion(0.0))
         off = np.abs(np.subtract(start, self._steps))
         if off.max() > _AT_START_STEPS:
             raise CellError(f"run({name!r}) is refused: wrong_start, joint {off.argmax() + 1}")
-        self._move(self._in_steps(motion(motion.duration_s).tolist()), percent)
+        self._move(self._arm.transmission.whole_steps(motion(motion.duration_s)), percent)
 
     def begin_move(self, target: Sequence[int], percent: int) -> None:
         for joint, (steps, (low, high)) in enumerate(zip(target, self._limits, strict=True), 1):
@@ -198,9 +192,7 @@ class _Work:
             raise Ended
         self._steps = target
         self._rests_ms = self._now_ms + round(1000 * self._ends.motion_s * 100 / percent)
-        self.run.posture_deg = tuple(
-            steps / joint.steps_per_deg for steps, joint in zip(target, self._arm.driven, strict=True)
-        )
+        self.run.posture_deg = tuple(self._arm.transmission.angles_of_steps(target).tolist())
 
     def brake(self) -> None:
         self._rests_ms = self._now_ms

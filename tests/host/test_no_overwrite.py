@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 
 import pytest
 from armtempo.basics.atomic_file import replace_text
@@ -111,6 +113,15 @@ def test_new_old_and_linked() -> None:
         assert path.read_text() == text
     assert link.is_symlink()
     assert sorted(item.name for item in folder.iterdir()) == ["file", "link"]
+
+
+def test_two_threads_may_write_a_file_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = Barrier(2, timeout=20)
+    monkeypatch.setattr("armtempo.basics.atomic_file._sync", lambda _: both.wait())
+    with ThreadPoolExecutor(2) as threads:
+        list(threads.map(lambda text: replace_text(Path("page"), text), ("one", "two")))
+    assert Path("page").read_text() in ("one", "two")
+    assert not [*Path().glob(".page*")]
 
 
 def test_a_pipe_is_written_to(tmp_path: Path) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import html
 import json
 import re
+import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,7 @@ from armtempo.cli import main
 from armtempo.model.parts import Driver, Joint, Limits
 from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
-from armtempo.report import comparison, plots, run_report, verdict
+from armtempo.report import comparison, drawing, plots, run_report, verdict
 from armtempo.report.evaluation import evaluate
 from armtempo.report.run_folder import MOTION
 from click.testing import CliRunner
@@ -51,6 +53,24 @@ def test_the_page_and_every_figure_are_written(folder: Path) -> None:
     assert text.count("<figure") == len(FIGURES)
     for name in FIGURES:
         assert (folder / f"{name}.svg").read_text().lstrip().startswith("<?xml")
+
+
+def test_figures_of_several_threads_are_drawn_one_at_a_time() -> None:
+    """They have the settings of Matplotlib in common."""
+    drawn: list[bool] = []
+
+    class Drawing:
+        def get_layout_engine(self) -> None:
+            return None
+
+        def savefig(self, *_: object, **__: object) -> None:
+            drawn.append(True)
+            time.sleep(0.05)
+            drawn.append(False)
+
+    with ThreadPoolExecutor(2) as threads:
+        list(threads.map(drawing._svg, (Drawing(), Drawing())))
+    assert drawn == [True, False] * 2
 
 
 def test_labels_of_tiny_errors_stay_within_their_figure(folder: Path) -> None:

@@ -304,7 +304,6 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         said = words.of_job(said) if tab == "Job" else said
         assert said.replace(".0", "") in shown.replace(".0", "")
         field.fill(before)
-        page.wait_for_timeout(300)  # until it is taken
         if tab == "Sequence":
             (folder / file).write_text(_SEQUENCE)  # as it was when it was opened
     assert page.evaluate("window.hurt") is None
@@ -461,6 +460,22 @@ def test_what_is_no_request_of_its_pages_is_refused_and_logged(
     before = len(panel.errors)
     assert panels.asked(panel.address, request_).split(b" ")[1:2] == [status]
     commandline.wait_for(lambda: any(logged in line for line in panel.errors[before:]), logged)
+
+
+_NO_RUNS = {
+    b"/runs/other/report.html": b"422",
+    b"/runs/./report.html": b"422",
+    b"/runs/../report.html": b"404",
+    b"/runs/comparison.html": b"422",
+    b"/runs/comparison.html?run=..&run=%00": b"422",
+}
+
+
+@pytest.mark.parametrize(("path", "status"), _NO_RUNS.items(), ids=map(bytes.decode, _NO_RUNS))
+def test_a_page_of_what_is_no_run_is_refused(panel: Panel, path: bytes, status: bytes) -> None:
+    request_ = b"GET " + path + b" HTTP/1.1\r\nHost: HOST\r\n\r\n"
+    assert panels.asked(panel.address, request_).split(b" ")[1:2] == [status]
+    panel.check()
 
 
 _FOCUS = """async () => {

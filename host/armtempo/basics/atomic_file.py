@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import threading
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -65,7 +66,7 @@ def os_reason(error: Exception) -> str:
 
 
 def _replace(path: Path, text: str, newline: str | None) -> None:
-    aside = path.with_name(f".{path.name}.{os.getpid()}.new")
+    aside = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.new")
     try:
         with aside.open("w", encoding="utf-8", newline=newline) as file:
             file.write(text)

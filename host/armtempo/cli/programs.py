@@ -8,17 +8,15 @@ from typing import Any
 
 import click
 
-from armtempo.basics.errors import LinkError, MissingPackageError
+from armtempo.basics.errors import MissingPackageError
 from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.state import counted
 from armtempo.deploy import program_files
-from armtempo.encoding import encoded_motion, encoded_program
+from armtempo.encoding import encoded_program
 from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.link.board_messages import SequenceState
-from armtempo.model.arm import Arm
-from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
@@ -40,7 +38,9 @@ def program(file: Path, check: bool, force: bool, given: BoardOptions) -> None:
     found = UserProgram.load(file, arm)
     _check_syntax(found)
     if check:
-        _show_check(_without_board(found, arm), given.as_json)
+        _show_check(
+            encoded_program.of_program(found, arm, encoded_program.motions_beside(found)), given.as_json
+        )
         return
     say = results.progress_printer(given.as_json)
     with resolve.board(given, arm) as board:
@@ -50,7 +50,7 @@ def program(file: Path, check: bool, force: bool, given: BoardOptions) -> None:
         with ProgressBar("uploading") as progress:
             board.upload_program(encoded, progress, force)
         say(f"{found.name}: {len(encoded.data)} bytes stored, {encoded.heap_bytes} bytes of heap")
-        run_and_report(board, encoded, given.as_json)
+        run_and_report(board, found.name, given.as_json)
 
 
 def _check_syntax(found: UserProgram) -> None:
@@ -59,15 +59,6 @@ def _check_syntax(found: UserProgram) -> None:
         program_files.check_syntax(found.path, found.source)
     except MissingPackageError as error:
         results.remark(f"its syntax is not checked for MicroPython: {error}")
-
-
-def _without_board(found: UserProgram, arm: Arm) -> EncodedProgram:
-    """With the motions whose files are beside it."""
-    files = {name: found.path.parent / f"{name}.json" for name in found.motions}
-    motions = [
-        encoded_motion.of_plan(Plan.load(path), name) for name, path in files.items() if path.is_file()
-    ]
-    return encoded_program.of_program(found, arm, tuple(motions))
 
 
 def _warn(encoded: EncodedProgram) -> list[str]:
@@ -111,8 +102,8 @@ class _Shown:
             click.echo("\r\x1b[K", nl=False, err=True)
 
 
-def run_and_report(board: Board, what: EncodedProgram | str, as_json: bool = False) -> SequenceState:
-    """Run a program, or the stored program of that name; print what it prints, and its end."""
+def run_and_report(board: Board, name: str, as_json: bool) -> None:
+    """Run a stored program; print what it prints, and its end."""
     say = results.progress_printer(as_json)
     shown = _Shown()
 
@@ -121,15 +112,11 @@ def run_and_report(board: Board, what: EncodedProgram | str, as_json: bool = Fal
         say(text)
 
     try:
-        end = board.run_program(what, listen, shown)
+        end = board.run_program(name, listen, shown)
     except Stopped:
-        shown.clear()
-        say(f"stopped in line {board.client.sequence().step}{counted(board.counters)}")
+        listen(f"stopped in line {board.client.sequence().step}{counted(board.counters)}")
         raise
-    except LinkError:
+    finally:
         shown.clear()
-        raise
-    shown.clear()
     values = {"name": end.name, "ending": end.ending, "line": end.step, "counters": board.counters}
     results.show(as_json, values, [f"{end.ending}{counted(board.counters)}"])
-    return end

@@ -119,7 +119,7 @@ def _input_lines(found: list[tuple[Input, bool]]) -> list[str]:
 
 @dataclass(frozen=True)
 class Wired:
-    """BoardAccess to a board that is set up for ``arm``."""
+    """Access to a board that is set up for ``arm``."""
 
     access: BoardAccess
     arm: Arm
@@ -131,7 +131,7 @@ class Wired:
 
 @contextmanager
 def _board(given: BoardOptions) -> Iterator[Wired]:
-    """BoardAccess to the board; raises LinkError if it is set up for another arm than the one that is set."""
+    """Access to the board; raises LinkError if it is set up for another arm than the one that is set."""
     given = resolve.any_port(given)
     named = resolve.named_arm(given.arm_path)
     with resolve.shared_or_own(given, named) as found:

@@ -10,10 +10,11 @@ from armtempo_shared.limits import FULL_OUTPUT, MAX_MOTION_BYTES
 from armtempo_shared.wire import record_crc
 
 from armtempo.basics.errors import ArmtempoError, InputError, PlanError
-from armtempo.encoding import encode
+from armtempo.encoding import encode, encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.model.arm import Arm
 from armtempo.model.outputs import SWITCH, Output
+from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME
 from armtempo.model.user_program import UserProgram
 from armtempo.planning import point_to_point, via_points, workspace_check
@@ -39,6 +40,14 @@ class EncodedProgram:
     def heap_bytes(self) -> int:
         """Heap that it needs on the board."""
         return program.needed_bytes(len(self.program.marked.encode()))
+
+
+def motions_beside(found: UserProgram) -> tuple[EncodedMotion, ...]:
+    """The motions that a program names and whose plans are beside it."""
+    files = {name: found.motion_file(name) for name in found.motions}
+    return tuple(
+        encoded_motion.of_plan(Plan.load(file), name) for name, file in files.items() if file.is_file()
+    )
 
 
 def of_program(

@@ -48,6 +48,10 @@ class UserProgram:
         """Name of its file, as tracebacks show it."""
         return self.path.name
 
+    def motion_file(self, name: str) -> Path:
+        """Where the plan of a motion that it names is, if not on the board."""
+        return self.path.parent / f"{name}.json"
+
     @classmethod
     def load(cls, path: Path | str, arm: Arm) -> UserProgram:
         """The program of a file, for this arm.

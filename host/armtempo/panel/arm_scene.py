@@ -22,7 +22,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.workspace import FAR_MM
 from armtempo.planning.workspace_check import Bodies
 
-COLOUR, GHOST, RUN, VIA, ROOM = "#4477aa", "#999999", "#ee6677", "#ccbb44", "#aa3377"
+COLOUR, GHOST, RUN, VIA, OBSTACLE = "#4477aa", "#999999", "#ee6677", "#ccbb44", "#aa3377"
 WAY, JOINT = "#66ccee", "#33557a"
 """Paul Tol's bright scheme, which is safe for colour-blind users."""
 _THICK = (0.042, 0.016)
@@ -34,7 +34,7 @@ _DOT = 0.022
 _SHORT_MM = 1e-6
 _OPPOSITE = 1e-9
 _GHOST_OPACITY = 0.25
-_ROOM_OPACITY = 0.3
+_OBSTACLE_OPACITY = 0.3
 _SHOWN = 1.2
 """Size of the displayed walls, as a fraction of the arm's reach."""
 _VIA_NAME = "via "
@@ -230,7 +230,7 @@ class ArmScene:
                 is_wall = not (high - low).all()
                 width, height, depth = (high - low).tolist()
                 box = self.scene.box(width, height, depth, wireframe=is_wall)
-                self._walls.append(box.material(ROOM, _ROOM_OPACITY).move(*((low + high) / 2).tolist()))
+                self._walls.append(box.material(OBSTACLE, _OBSTACLE_OPACITY).move(*((low + high) / 2).tolist()))
 
     @property
     def parts(self) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import tomlkit
 from nicegui import ui
 
+from armtempo.basics import toml_table
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
@@ -44,9 +45,11 @@ def _ask(page: PanelPage) -> None:
 
 
 def _with_floor(arm: Arm, floor_mm: float) -> Arm:
-    """Write the floor into the file of an arm without workspace; the arm that is read from it."""
+    """Write the floor into the file of an arm; the arm that is then read from it. InputError if it is none."""
     file = teaching.arm_file(arm)
     content = tomlkit.parse(file.read_text(encoding="utf-8"))
-    content["workspace"] = {"floor_mm": floor_mm}
-    replace_text(file, tomlkit.dumps(content))
-    return Arm.load(file)
+    content.setdefault("workspace", {})["floor_mm"] = floor_mm
+    text = tomlkit.dumps(content)
+    changed = Arm.of_table(toml_table.parse(text, arm.source))
+    replace_text(file, text)
+    return changed

@@ -7,27 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from nicegui import ui
 
-from armtempo.model.arm import Arm
 from armtempo.panel import words
 from armtempo.panel.panel_board import Needs
+from armtempo.robot.homing import order
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
     from armtempo.panel.press import Press
-
-
-def switches(arm: Arm) -> list[str]:
-    """What the switches of an arm home, group by group in its order; empty if it has none of known angle."""
-    fitted = [joint.name for joint in arm.driven if _angle(joint.switches) is not None]
-    named = [name for group in arm.homing for name in group]
-    groups = [*arm.homing, *((name,) for name in fitted if name not in named)]
-    found = [", ".join(name for name in group if name in fitted) for group in groups]
-    return [group for group in found if group]
-
-
-def _angle(switches: object) -> float | None:
-    low, high = getattr(switches, "low_deg", None), getattr(switches, "high_deg", None)
-    return low if low is not None else high
 
 
 def ask(page: PanelPage, _: Press) -> None:
@@ -50,7 +36,7 @@ def ask(page: PanelPage, _: Press) -> None:
 
     def why_not() -> str:
         joint = chosen()
-        fitted = joint is None or any(joint in group.split(", ") for group in groups)
+        fitted = joint is None or any(joint in group for group in groups)
         return "" if fitted else words.NO_SWITCH.format(joint=joint)
 
     def angles() -> str:
@@ -62,12 +48,12 @@ def ask(page: PanelPage, _: Press) -> None:
         return words.plain(", ".join(shown))
 
     asked = page.ask(words.SURE, words.HOME, declare, lambda: page.show_ghost(None))
-    groups = switches(arm)
+    groups = order(arm)
     with asked.place:
         names = {"": words.ALL_JOINTS, **{joint.name: words.plain(joint.name) for joint in arm.driven}}
         which = ui.select(names, value="", label=words.WHICH_JOINTS).props("dense outlined")
         label = ui.label(angles()).classes("text-weight-bold")
         which.on_value_change(lambda: label.set_text(angles()))
         if groups:
-            ui.label(words.BY_SWITCHES.format(order=words.plain(" → ".join(groups))))
+            ui.label(words.BY_SWITCHES.format(order=words.plain(" → ".join(map(", ".join, groups)))))
             page.button(words.HOME_BY_SWITCHES, seek, Needs.COMMAND, why_not)

@@ -146,16 +146,17 @@ class JobTab:
                     switch = ui.switch(label, value=text == "true")
                     named(switch, f"P{number}: {label}")
                     self._cells.add(partial(_switch, switch), value)
-                    switch.on_value_change(
-                        lambda event, key=key: self._edit(
-                            self._jobs.set_key, number, key, "true" if event.value else ""
-                        )
-                    )
+                    switch.on_value_change(lambda event, key=key: self._turn(number, key, event.value))
                     continue
                 box = ui.input(label, value=text).props("dense outlined").classes("armtempo-value")
                 named(box, f"P{number}: {label}")
                 self._cells.add(box.set_value, value)
                 self._on_typed(box, self._jobs.set_key, number, key)
+
+    def _turn(self, number: int, key: str, on: bool) -> None:
+        """Set or remove a key by its switch; one that was turned to show the file changes nothing."""
+        if on != (self._jobs.vias[number].text(key) == "true"):
+            self._edit(self._jobs.set_key, number, key, "true" if on else "")
 
     def _toggle(self, number: int) -> None:
         self._open ^= {number}

@@ -130,8 +130,9 @@ class SequenceTab:
         self._page.control(box.classes("armtempo-value"), Needs.CONTROL)
 
     def _set(self, index: int, key: str, text: str) -> None:
-        """Set a value."""
+        """Set a value, and show how the file has it at once: later it would replace what is typed next."""
         self._page.attempt(lambda: self._editor.set(index, key, text))
+        self._look()
 
     def _look(self) -> None:
         self._file.look()

@@ -8,7 +8,6 @@ import json
 import logging
 import socket
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import ifaddr
@@ -17,9 +16,8 @@ from fastapi import FastAPI
 from nicegui import Client, app, background_tasks, ui
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse
+from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse
 
-from armtempo import pipeline
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.panel import layout, past_runs, words
 from armtempo.panel.access import MOST_BYTES, Access, Policy
@@ -121,32 +119,28 @@ class Panel:
 
     async def _comparison(self, request: Request) -> Any:
         """Make the page that compares the runs of a query."""
-        runs = self._operator.runs.resolve()
-        folders = [(runs / name).resolve() for name in request.query_params.getlist("run")]
-        if not all(folder.parent == runs for folder in folders):
-            return PlainTextResponse("no such run", 404)
-        return await _made(lambda: pipeline.compare(folders))
+        names = request.query_params.getlist("run")
+        return await _made(lambda: past_runs.comparison(self._operator.runs, names))
 
     async def _run_file(self, name: str, file: str) -> Any:
-        """Serve a file of a run folder, and no other file; its report is made if there is none yet."""
+        """Serve a file of a run folder, and no other file."""
         runs = self._operator.runs.resolve()
         path = (runs / name / file).resolve()
         if path.suffix not in _SUFFIXES or not path.is_relative_to(runs):
             return PlainTextResponse("no such file", 404)
-        if path.is_file():
-            return FileResponse(path, headers=_NO_SCRIPTS)
-        if path.name != past_runs.REPORT_PAGE or path.parent.parent != runs or not path.parent.is_dir():
+        if file == past_runs.REPORT_PAGE:
+            return await _made(lambda: past_runs.report(runs, name))
+        if not path.is_file():
             return PlainTextResponse("no such file", 404)
-        return await _made(lambda: past_runs.report(path.parent))
+        return FileResponse(path, headers=_NO_SCRIPTS)
 
 
-async def _made(make: Callable[[], Path]) -> Any:
-    """The page that ``make`` writes, in a thread so that no other page waits; why it cannot."""
+async def _made(make: Callable[[], bytes]) -> Any:
+    """The page that ``make`` makes, in a thread so that no other page waits; why it cannot."""
     try:
-        file = await asyncio.to_thread(make)
-    except ArmtempoError as error:
-        return PlainTextResponse(words.of_error(error), 422)
-    return FileResponse(file, headers=_NO_SCRIPTS)
+        return HTMLResponse(await asyncio.to_thread(make), headers=_NO_SCRIPTS)
+    except (ArmtempoError, OSError) as error:
+        return PlainTextResponse(words.of_text(str(error)), 422)
 
 
 def listen(host: str, port: int) -> socket.socket:

@@ -7,6 +7,7 @@ import re
 from functools import lru_cache
 from html import escape
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING
 
 from armtempo.basics.text import visible
@@ -21,6 +22,8 @@ _LARGEST = 1.4
 """Largest magnification of a figure on a page."""
 _MARGIN_PT = 10.0
 """Space to the right of the axes, for the half of a label."""
+_SETTINGS = Lock()
+"""Matplotlib's settings are those of all threads."""
 _QUICK = 3
 """zlib's level: a third of the time of the default 6, files 10 % larger."""
 
@@ -100,7 +103,7 @@ def _svg(figure: Figure) -> str:
 
     _lay_out(figure)
     buffer = io.StringIO()
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "armtempo"}):
+    with _SETTINGS, rc_context({"svg.fonttype": "none", "svg.hashsalt": "armtempo"}):
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
     return re.sub(r' d="[^"]*"', _rounded, buffer.getvalue())
 

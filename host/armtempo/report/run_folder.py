@@ -93,13 +93,13 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
             if joint.coupling
             else "the same in degrees of the joint"
         )
-        of_motor = "of its motor" if joint.coupling else ""
+        of_motor = " of its motor" if joint.coupling else ""
         found |= {
-            f"j{number}_commanded_steps": f"{joint.name}: step pulses made{of_motor and ' ' + of_motor}, signed",
+            f"j{number}_commanded_steps": f"{joint.name}: step pulses made{of_motor}, signed",
             f"j{number}_commanded_deg": f"{joint.name}: {same}",
         }
         if joint.counts_per_deg:
-            found[f"j{number}_counts"] = f"{joint.name}: encoder counts{of_motor and ' ' + of_motor}"
+            found[f"j{number}_counts"] = f"{joint.name}: encoder counts{of_motor}"
         if seen:
             same = same.replace("steps of all motors", "encoders of all motors")
             found[f"j{number}_angle_deg"] = f"{joint.name}: {same}"

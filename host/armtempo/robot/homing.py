@@ -126,6 +126,11 @@ def _groups(arm: Arm) -> list[dict[int, _Switch]]:
     return [group for group in fitted if group]
 
 
+def order(arm: Arm) -> list[tuple[str, ...]]:
+    """Names of the joints that are homed by switches, those that are homed together in an entry."""
+    return [tuple(arm.driven[index].name for index in group) for group in _groups(arm)]
+
+
 def _switch(joint: DrivenJoint) -> _Switch | None:
     low_deg, high_deg = joint.range_deg
     switches = joint.switches

@@ -14,7 +14,7 @@ _LOOK_S = 0.02
 
 
 class BoardAccess(Protocol):
-    """BoardAccess to the board: a client, or a program that has its port."""
+    """Access to the board: a client, or a program that has its port."""
 
     def set_output(self, number: int, value: int) -> None:
         """Set an output of the arm record, from 0, to a value of 0 to 65535."""

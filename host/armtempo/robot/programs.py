@@ -7,13 +7,12 @@ from pathlib import Path
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion, encoded_program
+from armtempo.encoding import encoded_program
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.arm import Arm
 from armtempo.model.job import is_name
-from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
 from armtempo.robot import program_run
 from armtempo.robot.connection import Connection
@@ -36,20 +35,19 @@ class Programs:
         """
         arm = Arm.of(arm)
         found = program if isinstance(program, UserProgram) else UserProgram.load(program, arm)
-        motions, stored = [], []
+        motions = encoded_program.motions_beside(found)
+        beside, stored = [motion.name for motion in motions], []
         for name, line in found.motions.items():
-            file = found.path.parent / f"{name}.json"
-            kept = None if file.is_file() else self._board.client.find(name)
-            if file.is_file():
-                motions.append(encoded_motion.of_plan(Plan.load(file), name))
-            elif kept is not None and kept.joints:
-                stored.append(MotionKey(name, kept.crc))
-            else:
+            if name in beside:
+                continue
+            kept = self._board.client.find(name)
+            if kept is None or not kept.joints:
                 raise InputError(
                     f"{found.path}, line {line}: no motion {name!r}",
-                    f"plan it as {file}, or store it with 'armtempo upload FILE --name {name}'",
+                    f"plan it as {found.motion_file(name)}, or store it with 'armtempo upload FILE --name {name}'",
                 )
-        return encoded_program.of_program(found, arm, tuple(motions), tuple(stored))
+            stored.append(MotionKey(name, kept.crc))
+        return encoded_program.of_program(found, arm, motions, tuple(stored))
 
     def upload(
         self,

@@ -64,6 +64,18 @@ def test_what_is_being_typed_stays_when_another_field_changes(operator: PanelBoa
         assert operator.jobs.vias[2].angles_deg == pytest.approx(wanted)
 
 
+def test_a_switch_that_shows_the_file_again_does_not_change_it(operator: PanelBoard) -> None:
+    text = POSES.replace("[310, 0, 210]", "[310, 0, 210]\nstop = false")
+    with pages(operator) as page:
+        opened(page, text)
+        page.fire(page.named(f"{words.MORE} P1"), "click", {})
+        page.named(f"P1: {words.VIA_KEYS['stop']}").set_value(True)
+        assert operator.jobs.vias[1].text("stop") == "true"
+        operator.jobs.undo()
+        page.look()
+        assert operator.jobs.text == text
+
+
 def test_what_is_being_typed_stays_when_a_wrong_text_beside_it_is_put_right(operator: PanelBoard) -> None:
     with pages(operator) as page:
         opened(page, 'name = "poses"\nvia_deg = [[0.0, -60.0, 40.0], [20.0, -75.0, 50.0]]\n')

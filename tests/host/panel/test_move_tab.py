@@ -12,8 +12,9 @@ from armtempo.basics.errors import PlanError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
-from armtempo.panel import homing, teaching, words
+from armtempo.panel import teaching, words
 from armtempo.panel.panel_board import PanelBoard
+from armtempo.robot import homing
 
 from tests.host.panel import fakes
 from tests.host.panel.fakes import ARM, board_state, unhomed
@@ -30,13 +31,11 @@ def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
 
 
 def test_what_the_switches_home_is_named_in_its_order() -> None:
-    assert homing.switches(ARM) == []
+    assert homing.order(ARM) == []
     ar4 = Arm.of("ar4")
-    groups = homing.switches(ar4)
-    assert sorted(name for group in groups for name in group.split(", ")) == sorted(
-        joint.name for joint in ar4.driven
-    )
-    assert groups[: len(ar4.homing)] == [", ".join(group) for group in ar4.homing]
+    groups = homing.order(ar4)
+    assert sorted(name for group in groups for name in group) == sorted(joint.name for joint in ar4.driven)
+    assert groups[: len(ar4.homing)] == list(ar4.homing)
 
 
 ARM_TEXT = """
@@ -130,12 +129,17 @@ def test_the_table_is_asked_for_where_the_arm_file_names_none(
     with pages(operator) as page:
         assert words.NO_FLOOR in page.texts()
         page.press(words.ASK_FLOOR)
+        page.named(words.FLOOR_HEIGHT).set_value(1e9)
+        page.answer(words.STORE)
+        assert (tmp_path / "arm.toml").read_text() == text
+        text += "\n[workspace]\nx_mm = [-500, 500]  # by another program, meanwhile\n"
+        (tmp_path / "arm.toml").write_text(text)
         page.named(words.FLOOR_HEIGHT).set_value(20.0)
         page.answer(words.STORE)
         page.look()
         assert words.NO_FLOOR not in page.texts()
         assert operator.arm.workspace is not None
-        assert operator.arm.workspace.low_mm[2] == 20.0
+        assert operator.arm.workspace.low_mm[::2] == (-500.0, 20.0)
         assert (tmp_path / "arm.toml").read_text().startswith(text.rstrip())
         assert operator.live.arm is operator.jobs.arm is operator.arm  # jogs and plans keep to it
     operator.close()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +39,43 @@ def test_runs_of_the_command_line_are_listed_the_newest_first(tmp_path: Path) ->
     ]
     assert {row.ending for row in rows[2:]} == {"cannot be read"}
     with pytest.raises(RunFolderError, match="cannot be read"):
-        past_runs.report(tmp_path / "damaged")
+        past_runs.report(tmp_path, "damaged")
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "../runs/feed", "feed/../feed", "/", "feed\0", "other"])
+def test_only_runs_of_the_list_have_a_report(tmp_path: Path, name: str) -> None:
+    for folder in (tmp_path, tmp_path / "runs", tmp_path / "runs" / "feed"):
+        folder.mkdir(exist_ok=True)
+        (folder / "run.json").write_text("{}")
+    for call in (past_runs.report, lambda runs, name: past_runs.comparison(runs, ["feed", name])):
+        with pytest.raises(RunFolderError, match="there is no run"):
+            call(tmp_path / "runs", name)
+
+
+def test_a_report_is_made_once_and_again_when_the_run_was_written_since(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[Path] = []
+    meta = tmp_path / "feed" / "run.json"
+    meta.parent.mkdir()
+    meta.write_text("{}")
+
+    def write(folder: Path) -> None:
+        made.append(folder)
+        time.sleep(0.05)  # the other thread asks for it meanwhile
+        (folder / past_runs.REPORT_PAGE).write_text(f"report {len(made)}")
+        if len(made) == 2:
+            meta.write_text('{"ended": true}')  # by the program that runs it
+
+    def asked() -> set[bytes]:
+        with ThreadPoolExecutor(2) as threads:
+            return set(threads.map(lambda _: past_runs.report(tmp_path, "feed"), range(2)))
+
+    monkeypatch.setattr(past_runs, "_write_report", write)
+    assert asked() == {b"report 1"}
+    os.utime(meta.with_name(past_runs.REPORT_PAGE), (1, 1))  # the run was written since
+    assert asked() == {b"report 2", b"report 3"}
+    assert past_runs.report(tmp_path, "feed") == b"report 3"
 
 
 def planned(operator: PanelBoard) -> None:

@@ -98,6 +98,20 @@ def test_cycles_are_counted_from_one(operator: PanelBoard, ending: str, cycle: i
         assert said in page.texts()
 
 
+def test_what_is_typed_on_into_a_step_that_was_just_taken_stays(operator: PanelBoard, tmp_path: Path) -> None:
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    operator.sequences.open("day.toml")
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        typed = page.named("step 3: wait_s")
+        for event, text in (("update:value", "7"), ("change", "7"), ("update:value", "7.5")):
+            page.fire(typed, event, text)
+        page.look()
+        assert typed.value == "7.5"
+        page.fire(typed, "change", "7.5")
+    assert operator.sequences.steps[2]["wait_s"] == "7.5"
+
+
 def test_what_is_being_typed_into_a_step_stays_when_another_changes(
     operator: PanelBoard, tmp_path: Path
 ) -> None:

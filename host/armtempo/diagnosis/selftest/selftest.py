@@ -68,14 +68,14 @@ def run(client: Client, progress: Progress | None = None) -> SelfTest:
         work(0, 1)
         found.data[link_part.PART] = link_part.trips(client)
         _leave(client, found, lambda prompt: _at_prompt(prompt, found, work))
-        found.add([_same_room(info.engine_bytes, client.info.engine_bytes), _largest_motion(client.info)])
+        found.add([_same_memory(info.engine_bytes, client.info.engine_bytes), _largest_motion(client.info)])
         found.add(_watchdog(client, found))
         found.add(rate_part.judge_stated(found.data.get(rate_part.PART), client.info))
         work(1, 1)
     return found
 
 
-def _same_room(before: int, after: int) -> Measurement:
+def _same_memory(before: int, after: int) -> Measurement:
     return judged(
         board_part.MEMORY,
         "memory for motions, before and after",
