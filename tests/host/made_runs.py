@@ -91,7 +91,7 @@ def _samples(made: Plan, scatter_deg: float, rng: np.random.Generator) -> list[S
     ticks = np.append(np.arange(0, end, SAMPLE_TICKS), end)
     angles = made.trajectory(ticks / TICK_HZ)
     seen = angles + rng.normal(scale=scatter_deg, size=angles.shape)
-    motors = np.array(made.arm.coupling) if made.arm.coupling else np.eye(len(scales))
+    motors = made.arm.transmission.matrix
     steps = np.rint(angles @ motors.T * [scale.steps_per_deg for scale in scales]).astype(int).tolist()
     counts = np.rint(seen @ motors.T * [scale.counts_per_deg for scale in scales]).astype(int).tolist()
     rows = enumerate(zip(ticks.tolist(), steps, counts, strict=True))

@@ -167,7 +167,7 @@ def test_a_refusal_is_left_to_the_command() -> None:
     assert quick_stop.take_answer(PORT, False) is None
 
 
-@pytest.mark.skipif(not claim.LOCAL_SOCKETS, reason="other sockets wait by themselves")
+@pytest.mark.skipif(not claim.LOCAL_SOCKETS, reason="those of Windows wait by themselves")
 def test_a_stop_waits_for_a_program_that_many_ask() -> None:
     """Whose system refuses more callers for a moment."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening, ExitStack() as callers:

@@ -9,6 +9,7 @@ import os
 import random
 import shutil
 import stat
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -106,7 +107,7 @@ def test_folders_never_collide(tmp_path: Path) -> None:
     names = [new_folder(tmp_path).name for _ in range(3)]
     assert names == ["feed-001", "feed-002", "feed-003"]
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot be made"):
+    with pytest.raises(InputError, match="the run folder cannot be made"):
         new_folder(tmp_path / "file")
 
 
@@ -135,10 +136,9 @@ def test_damaged_folders_are_named(tmp_path: Path) -> None:
         run_reader.load(run.path)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="the full disk of Linux, /dev/full")
 def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
     full = Path("/dev/full")
-    if not full.exists():  # not on every system
-        return
     run = folder(tmp_path)
     with (  # noqa: PT012
         pytest.raises(RunFolderError, match=r"samples-01\.csv: cannot be written: No space"),
@@ -294,9 +294,6 @@ def test_a_damaged_run_folder_is_read_or_refused_in_words(
 def test_two_runs_at_once_get_folders_of_their_own(tmp_path: Path) -> None:
     (tmp_path / "feed-001").symlink_to(tmp_path / "nowhere")  # as if it came into being after a look
     assert new_folder(tmp_path).name == "feed-002"
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="the run folder cannot be made"):
-        new_folder(tmp_path / "file")
 
 
 # analysis of samples: what is put in comes out, gaps and lags included; peaks next to limits

@@ -45,7 +45,6 @@ def message(
 
 
 def test_the_message_of_the_export_comes_back() -> None:
-    pytest.importorskip("yaml")
     plan = shipped_plan()
     found = joint_trajectory.of_text(plan.to_ros(20.0), "feed.yaml", ARM)
     np.testing.assert_allclose(found.angles_deg, plan.trajectory(found.times_s), atol=1e-3)
@@ -172,7 +171,9 @@ def test_a_table_without_times_has_no_timing(tmp_path: Path) -> None:
 
 def bag(path: Path, kind: str, messages: list[Any], mcap: bool) -> Path:
     """A recording of one topic."""
-    rosbag2, store = pytest.importorskip("rosbags.rosbag2"), typestore()
+    from rosbags import rosbag2  # takes long, and every process that collects the tests would do it
+
+    store = typestore()
     plugin = rosbag2.StoragePlugin.MCAP if mcap else rosbag2.StoragePlugin.SQLITE3
     with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
         connection = writer.add_connection("/topic", kind, typestore=store)
@@ -182,7 +183,8 @@ def bag(path: Path, kind: str, messages: list[Any], mcap: bool) -> Path:
 
 
 def typestore() -> Any:
-    typesys = pytest.importorskip("rosbags.typesys")
+    from rosbags import typesys
+
     return typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
 
 

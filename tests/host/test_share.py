@@ -167,7 +167,7 @@ def test_a_sign_of_life_is_given_all_the_time(server: Server, monkeypatch: pytes
             other.ask("echo", 5.0, text="1")
 
 
-@pytest.mark.skipif(not claim.LOCAL_SOCKETS, reason="other sockets wait by themselves")
+@pytest.mark.skipif(not claim.LOCAL_SOCKETS, reason="those of Windows wait by themselves")
 def test_a_program_with_many_callers_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forty at once on a program that lets two wait: none takes it for one that hangs."""
     monkeypatch.setattr("armtempo.ports.server._BACKLOG", 1)

@@ -198,7 +198,7 @@ def test_each_says_where_its_figures_are_from_and_can_be_planned_for(name: str) 
     path = shipped.files()[name]
     head = path.read_text(encoding="utf-8").split("name =")[0]
     assert name == shipped.PAPER or ("Source" in head or "Geometry" in head)
-    assert name == shipped.PAPER or "ssumed" in head.lower() or "assumed" in head.lower()
+    assert name == shipped.PAPER or "assumed" in head.lower()
     arm = Arm.load(name)
     home = np.array([joint.home_deg for joint in arm.driven])
     middle = np.array([np.mean(joint.range_deg) for joint in arm.driven])

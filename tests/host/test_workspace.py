@@ -68,7 +68,7 @@ def test_inside_a_box_says_how_deep() -> None:
 
 @pytest.mark.slow
 @pytest.mark.seeds(*range(4))
-def test_motions_in_random_rooms_agree_with_dense_samples(seed: int) -> None:
+def test_motions_in_random_workspaces_agree_with_dense_samples(seed: int) -> None:
     arm, trajectory = random_workspace(seed)
     touch = workspace_check.touch_of(arm, trajectory)
     least = dense_least(arm, trajectory, 200)
@@ -80,7 +80,7 @@ def test_motions_in_random_rooms_agree_with_dense_samples(seed: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.seeds
-def test_free_paths_in_random_rooms_touch_nothing(seed: int) -> None:
+def test_free_paths_in_random_workspaces_touch_nothing(seed: int) -> None:
     arm, trajectory = random_workspace(seed)
     via = trajectory(np.array([0.0, trajectory.duration_s]))
     if not workspace_check.touch_of(arm, trajectory) or workspace_check.posture_touches(arm, via[1]):

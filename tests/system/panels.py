@@ -28,25 +28,13 @@ from armtempo.robot.outputs import BoardOutput
 from armtempo.simulator import LaunchOptions, launch
 
 from tests import browser, interpreters
+from tests.host import arms
 from tests.system import commandline
 from tests.system.commandline import SOURCES_BLOCKS
 from tests.system.relay import Cable, Relay
 
-_ARM_TEXT = f"""{shipped.arm_path().read_text(encoding="utf-8")}
-[output.gripper]
-kind = "servo"
-pin = "PB8"
-pulse_us = [500, 2500]
-angles_deg = [0, 180]
-states = {{ open = 20.0, closed = 95.0 }}
-safe = "open"
-
-[posture.away]
-angles_deg = [30, -50, 30]
-
-[input.part]
-pin = "PD0"
-"""
+_AWAY = "\n[posture.away]\nangles_deg = [30, -50, 30]\n"
+_ARM_TEXT = shipped.arm_path().read_text(encoding="utf-8") + arms.GRIPPER + arms.PART + _AWAY
 ARM = armtempo.Arm.of_table(toml_table.parse(_ARM_TEXT, "arm.toml"))
 """The paper's arm with an output and an input."""
 Answer = TypeVar("Answer")

@@ -246,7 +246,7 @@ class Terminal:
         return self.process.wait(1)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals")
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
 def test_keys_move_the_arm_in_steps_and_while_held(tmp_path: Path) -> None:
     with homed() as port:
         screen = Terminal("jog", "--arm", "paper", "--port", port, folder=tmp_path)
@@ -280,7 +280,7 @@ def test_keys_move_the_arm_in_steps_and_while_held(tmp_path: Path) -> None:
         assert joint_2 == pytest.approx(-49.0, abs=0.02)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals")
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
 def test_a_terminal_that_vanishes_ends_it_with_the_arm_at_rest(tmp_path: Path) -> None:
     with homed() as port:
         screen = Terminal("jog", "--arm", "paper", "--port", port, folder=tmp_path)
@@ -291,7 +291,7 @@ def test_a_terminal_that_vanishes_ends_it_with_the_arm_at_rest(tmp_path: Path) -
 
 
 @pytest.mark.long
-@pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals")
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
 def test_teach_collects_points_into_a_job_that_plans(tmp_path: Path) -> None:
     with homed() as port:
         arguments = ("teach", "shelf.toml", "--arm", "paper", "--port", port)

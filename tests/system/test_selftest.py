@@ -300,18 +300,19 @@ def test_drivers_stay_off_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.M
     assert not is_enabled(tmp_path)
 
 
-PRESSED = [
-    InjectedFault("input", at_s, run, name=pin, level=level)
-    for run, pin in ((6, "D8"), (9, "E15"))  # after the joint's four motions and one away from the switch
-    for at_s, level in ((0.1, 0), (0.2, 1))
-]
+def press(pin: str, *moments: float) -> list[InjectedFault]:
+    """Presses of a switch or the E-stop: motion, seconds into it, the same of the release, and so on."""
+    pairs = zip(moments[::2], moments[1::2], strict=True)
+    return [
+        InjectedFault("input", at_s, int(run), name=pin, level=index % 2)
+        for index, (run, at_s) in enumerate(pairs)
+    ]
 
 
-# On an idle machine the switch at the high end is not seen: the moment of the press is to be found again.
-@pytest.mark.long
 def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An encoder reversed, a switch that never comes. The drivers are on then, and the self-test without does nothing:
-    the arm is held and homed as before; so without the firmware."""
+    """An encoder reversed, a switch that never comes, after one that is still pressed when its fault is cleared. The
+    drivers are on then, and the self-test without does nothing: the arm is held and homed as before; so without the
+    firmware."""
     for name, value in (("_TRIES", 1), ("_SPEED", 0.5), ("SLOWEST", 0.2)):
         monkeypatch.setattr(motor_test, name, value)
     (joint,) = commandline.ARM.joints[:1]
@@ -319,7 +320,9 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     real = replace(commandline.ARM, joints=(joint,), safety=Safety(estop_fitted=True))
     named = replace(real, joints=(_encoder(joint, direction=-1),))
     said: list[str] = []
-    with board(tmp_path, named, arm=real, faults=PRESSED) as port, connect(port) as used:
+    # Four motions of the joint, up, down to the switch, on to it, down; up, down; up to the E-stop.
+    pressed = [*press("D8", 6, 0.1, 7, 0.02), *press("E15", 11, 0.1, 11, 0.2)]
+    with board(tmp_path, named, arm=real, faults=pressed) as port, connect(port) as used:
         used.home(named)
         with pytest.raises(ArmtempoError, match="nothing moved"):
             used.motor_test(named, lambda _: False)
@@ -344,6 +347,24 @@ def test_what_the_motors_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         "the switch at the high end of joint 1": (Level.ERROR, "not seen"),
         "the E-stop": (Level.GOOD, "stopped the joint"),
     }
+
+
+def test_switches_that_are_swapped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who presses the one at the high end stops the joint on its way down. It moves there and back as confirmed."""
+    for name, value in (("_TRIES", 1), ("SLOWEST", 0.2)):
+        monkeypatch.setattr(motor_test, name, value)
+    monkeypatch.setattr(motor_test.MotorTest, "_joint", lambda *_: None)
+    (joint,) = commandline.ARM.joints[:1]
+    arm = replace(commandline.ARM, joints=(replace(joint, switches=LimitSwitches(low=1, high=2)),))
+    # each in a motion down after one up; then it goes on down
+    pressed = press("D8", 2, 0.1, 2, 0.1001, 5, 0.1, 5, 0.1001)
+    with board(tmp_path, arm, arm=arm, faults=pressed) as port, connect(port) as used:
+        used.home(arm)
+        found = used.motor_test(arm, lambda _: True, lambda _: None)
+        assert used.status().positions.commanded_steps == (0,)
+    lines = [(line.verdict, line.measured) for line in found.lines[:2]]
+    stopped = "stopped the joint"
+    assert lines == [(Level.GOOD, stopped), (Level.ERROR, f"{stopped} on its way to the other end")]
 
 
 def test_backlash_by_the_encoder_of_the_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -92,9 +92,9 @@ class MotorTest:
         try:
             for joint, at_deg in zip(self._arm.driven, posture_deg, strict=True):
                 self._joint(joint, way_deg(joint, at_deg))
-            for joint in self._arm.driven:
-                self._switches(joint)
-            self._estop()
+            for joint, at_deg in zip(self._arm.driven, posture_deg, strict=True):
+                self._switches(joint, at_deg)
+            self._estop(posture_deg[0])
         except BoardError as error:
             self.found.add([judged(PART, "the rest", error.problem, "no fault", False, error.hint)])
         return self.found
@@ -152,41 +152,53 @@ class MotorTest:
         move = move_of(self._arm, joint.name, None, by_deg, None)
         jog.step(self._client, self._arm, move, speed, self._stop)
 
-    def _switches(self, joint: DrivenJoint) -> None:
+    def _switches(self, joint: DrivenJoint, at_deg: float) -> None:
         for end, side, switch in (("low", -1, joint.switches.low), ("high", 1, joint.switches.high)):
             if isinstance(switch, int):  # a switch on a pin is used for homing only
-                self._press(f"the switch at the {end} end of {joint.name}", codes.LIMIT_SWITCH, joint, side)
+                what = f"the switch at the {end} end of {joint.name}"
+                self._press(what, codes.LIMIT_SWITCH, joint, at_deg, side)
 
-    def _estop(self) -> None:
+    def _estop(self, at_deg: float) -> None:
         if self._arm.safety.estop_fitted:
-            self._press("the E-stop", codes.ESTOP, self._arm.driven[0], 1)
+            self._press("the E-stop", codes.ESTOP, self._arm.driven[0], at_deg)
         else:
             self.found.add([Measurement(PART, "E-stop", "the arm file has none")])
 
-    def _press(self, what: str, code: int, joint: DrivenJoint, side: int) -> None:
-        """Move ``joint`` slowly away from and towards ``side`` until the pressed switch stops it."""
+    def _press(self, what: str, code: int, joint: DrivenJoint, at_deg: float, side: int = 0) -> None:
+        """Move ``joint`` slowly from ``at_deg`` and back until the pressed switch stops it, on its way to ``side``."""
         self._tell(f"press {what} now, while {joint.name} moves slowly to and fro; keep clear of the arm")
-        size_deg = abs(way_deg(joint, joint.home_deg))
-        seen = 0
-        for by_deg in (-side * size_deg, side * size_deg) * _TRIES:
+        by_deg = way_deg(joint, at_deg)
+        measured, is_seen = "not seen", False
+        for to_deg, way in ((at_deg + by_deg, by_deg), (at_deg, -by_deg)) * _TRIES:
             try:
-                with suppress(InputError):  # the joint is at the end of its range
-                    self._jog(joint, by_deg, SLOWEST)
+                self._go(joint, to_deg)
             except BoardError as error:
-                seen = error.code
-                self._released(what)
+                measured = f"fault {error.code}"
+                if error.code == code:
+                    is_seen = side * way >= 0.0
+                    measured = f"stopped the joint{'' if is_seen else ' on its way to the other end'}"
+                self._released(what, error.code, joint, to_deg)
                 break
-        is_seen = seen == code
-        measured = "stopped the joint" if is_seen else f"fault {seen}" if seen else "not seen"
         self.found.add([judged(PART, what, measured, "stops the joint", is_seen, _WIRING)])
 
-    def _released(self, what: str) -> None:
-        """Clear the fault once its cause is gone; raises BoardError if that takes too long."""
+    def _go(self, joint: DrivenJoint, to_deg: float) -> None:
+        here_deg = arm_state.posture_deg(self._client, self._arm)
+        by_deg = jog.distance_deg(here_deg, self._arm, joint.name, to_deg)
+        with suppress(InputError):  # it is as far as it can go
+            if by_deg:
+                self._jog(joint, by_deg, SLOWEST)
+
+    def _released(self, what: str, code: int, joint: DrivenJoint, to_deg: float) -> None:
+        """Clear the fault once its cause is gone: a limit switch, once the joint can go on, as a switch that is still
+        pressed would be taken for the next one. Raises BoardError if that takes too long."""
         limit_s = time.monotonic() + _RELEASE_S
         self._tell(f"release {what}")
         while True:
             try:
-                return self._client.clear()
+                self._client.clear()
+                if code == codes.LIMIT_SWITCH:
+                    self._go(joint, to_deg)
+                return
             except BoardError:
                 if time.monotonic() > limit_s:
                     raise

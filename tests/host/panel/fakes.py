@@ -161,11 +161,11 @@ def unhomed() -> BoardState:
 
 
 class Telling:
-    """A board that says where its arm is."""
+    """A board that says where its arm is, with the gripper of ``arms`` closed."""
 
     def __init__(self, state: BoardState) -> None:
         self._state = state
-        self.client = type("Client", (), {"levels": lambda _: Levels(0b1, (65535,))})()
+        self.client = type("Client", (), {"levels": lambda _: Levels(0b1, (34588,))})()
 
     def state(self, arm: Arm) -> BoardState:
         return self._state

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.basics import toml_table
 from armtempo.link.board_messages import Positions, Sample
-from armtempo.model import shipped
-from armtempo.model.arm import Arm
 from armtempo.panel import layout, problem
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.live import LiveArm
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.problem import Cure
 
+from tests.host import arms
 from tests.host.panel.fakes import ARM, Telling, board_state, unhomed
 
 
@@ -64,23 +63,8 @@ def test_no_angle_is_minus_zero(operator: PanelBoard) -> None:
     assert "-0.0" not in layout.position(operator)
 
 
-def test_outputs_and_inputs_are_those_of_the_board() -> None:
-    text = (
-        shipped.arm_path().read_text()
-        + """
-[output.gripper]
-kind = "servo"
-pin = "PB8"
-pulse_us = [500, 2500]
-angles_deg = [0, 180]
-states = { open = 0.0, closed = 180.0 }
-safe = "open"
-
-[input.part]
-pin = "PD0"
-"""
-    )
-    live = LiveArm(Arm.of_table(toml_table.parse(text, "arm.toml")))
+def test_outputs_and_inputs_are_those_of_the_board(tmp_path: Path) -> None:
+    live = LiveArm(arms.load(tmp_path, arms.GRIPPER, arms.PART))
     live.ask(Telling(board_state(arm="paper")))  # type: ignore[arg-type]
     assert (live.outputs, live.inputs) == ({"gripper": "closed"}, {"part": True})
 

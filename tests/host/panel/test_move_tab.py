@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from armtempo.basics import toml_table
 from armtempo.basics.errors import PlanError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import shipped
@@ -16,7 +16,7 @@ from armtempo.panel import teaching, words
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.robot import homing
 
-from tests.host.panel import fakes
+from tests.host import arms
 from tests.host.panel.fakes import ARM, board_state, unhomed
 from tests.host.panel.pages import pages
 
@@ -38,33 +38,19 @@ def test_what_the_switches_home_is_named_in_its_order() -> None:
     assert groups[: len(ar4.homing)] == list(ar4.homing)
 
 
-ARM_TEXT = """
-[output.gripper]
-kind = "servo"
-pin = "PB8"
-pulse_us = [500, 2500]
-angles_deg = [0, 180]
-states = { open = 0.0, closed = 180.0 }
-safe = "open"
-"""
-
-
 def test_an_output_is_marked_as_the_board_says_and_set_by_a_press(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    operator_of: Callable[[Arm], PanelBoard], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
-    arm = Arm.of_table(toml_table.parse(shipped.arm_path().read_text() + ARM_TEXT, "arm.toml"))
-    operator, board = fakes.operator(made := fakes.Board(), tmp_path, arm), made
+    operator = operator_of(arms.load(tmp_path, arms.GRIPPER))
     operator.live.state = board_state()
     with pages(operator) as page:
         page.press("gripper: closed")
-        assert board.calls == [("output", "gripper", "closed")]
+        assert operator.board.calls == [("output", "gripper", "closed")]  # type: ignore[attr-defined]
         pressed = page.named("gripper: closed").props
         assert pressed["aria-pressed"] == "false"  # until the board says it
         operator.live.outputs = {"gripper": "closed"}
         page.look()
         assert pressed["aria-pressed"] == "true"
-    operator.close()
 
 
 def test_a_jog_that_is_not_possible_is_grey_with_the_reason(operator: PanelBoard) -> None:
@@ -104,9 +90,8 @@ def test_a_joint_is_homed_alone(operator: PanelBoard) -> None:
         assert operator.live.doubt  # of the others
 
 
-def test_homing_by_switches_tells_each_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
-    operator = fakes.operator(fakes.Board(), tmp_path, Arm.of("ar4"))
+def test_homing_by_switches_tells_each_joint(operator_of: Callable[[Arm], PanelBoard]) -> None:
+    operator = operator_of(Arm.of("ar4"))
     with pages(operator) as page:
         page.press(words.HOMING)
         page.named(words.WHICH_JOINTS).set_value(operator.arm.driven[2].name)
@@ -114,17 +99,15 @@ def test_homing_by_switches_tells_each_joint(tmp_path: Path, monkeypatch: pytest
         page.done()
         assert any("switch seen" in line for line in operator.log.last)
         assert operator.progress == 0.5
-    operator.close()
 
 
 def test_the_table_is_asked_for_where_the_arm_file_names_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    operator_of: Callable[[Arm], PanelBoard], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
     text = "# mine\n" + shipped.arm_path().read_text()
     (tmp_path / "arm.toml").write_text(text)
-    operator = fakes.operator(fakes.Board(), tmp_path, Arm.load(tmp_path / "arm.toml"))
+    operator = operator_of(Arm.load(tmp_path / "arm.toml"))
     operator.live.state = board_state()
     with pages(operator) as page:
         assert words.NO_FLOOR in page.texts()
@@ -142,4 +125,3 @@ def test_the_table_is_asked_for_where_the_arm_file_names_none(
         assert operator.arm.workspace.low_mm[::2] == (-500.0, 20.0)
         assert (tmp_path / "arm.toml").read_text().startswith(text.rstrip())
         assert operator.live.arm is operator.jobs.arm is operator.arm  # jogs and plans keep to it
-    operator.close()

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from armtempo.basics.errors import InputError, LinkError, PortInUseError
+from armtempo.model.arm import Arm
 from armtempo.panel import words
 from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.panel_board import Needs, PanelBoard
@@ -67,15 +68,15 @@ def test_a_stop_of_an_arm_at_rest_is_no_stop_to_freeze_after(operator: PanelBoar
     assert not operator.can_freeze
 
 
-def test_a_freeze_says_which_joints_nothing_measures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+def test_a_freeze_says_which_joints_nothing_measures(
+    operator_of: Callable[[Arm], PanelBoard], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("armtempo.panel.panel_board.FREEZE_AFTER_S", -1.0)
     blind = replace(ARM, joints=tuple(replace(joint, encoder=None) for joint in ARM.joints))
-    made = fakes.operator(Board(), tmp_path, blind)
+    made = operator_of(blind)
     made.stop()
     made.freeze()
     assert "joint 1, joint 2, joint 3 may have moved on" in made.live.doubt
-    made.close()
 
 
 def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_path: Path) -> None:

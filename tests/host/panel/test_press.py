@@ -81,8 +81,8 @@ def test_a_jog_ends_with_its_button(operator: PanelBoard, how: str) -> None:
     hold, jog = ButtonHold(operator), operator.board.jog  # type: ignore[attr-defined]
     begun = press(operator)
     hold.press(ME, begun, "jog", lambda: jog)
-    wait(lambda: hold.alive(ME, replace(begun, made_s=operator.presses.clock())) or jog.held > 2)
     begin_s = time.monotonic()
+    wait(lambda: hold.alive(ME, replace(begun, made_s=operator.presses.clock())) or jog.held > 2)
     if how == "released":
         hold.release(ME, begun.number)
     elif how == "other in control":

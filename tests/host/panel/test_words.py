@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.panel import layout, words
+from armtempo.panel.panel_board import PanelBoard
 
 from tests.host.panel import fakes
 from tests.host.panel.pages import pages
@@ -69,12 +70,8 @@ def _texts(value: object) -> Iterator[str]:
         yield from (text for one in value for text in _texts(one))
 
 
-def test_names_from_files_and_boards_turn_no_line_on_any_tab(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)
+def test_names_from_files_and_boards_turn_no_line_on_any_tab(operator: PanelBoard) -> None:
     name = 'j"\u202e<b>\x1b'  # an arm file with such a name is refused
-    operator = fakes.operator(fakes.Board(), tmp_path)
     operator.live.state = fakes.board_state(arm=name, fault=name, port=name)
     operator.log.add([name])
     (operator.runs / name).mkdir(parents=True)
@@ -91,4 +88,3 @@ def test_names_from_files_and_boards_turn_no_line_on_any_tab(
             assert not any("\u202e" in one or "\x1b" in one for one in found), (element, found)
             shown += found
         assert any('j"□<b>□' in text for text in shown)
-    operator.close()
