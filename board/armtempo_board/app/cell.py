@@ -24,10 +24,10 @@ if TYPE_CHECKING:
         def note_line(self, line: int) -> None:
             """The program is at this line."""
 
-        def ticks_ms(self) -> int:
+        def ticks_ms(self) -> "Any":
             """The time in ms; after days it begins again."""
 
-        def passed_ms(self, begin_ms: int) -> int:
+        def passed_ms(self, begin_ms: "Any") -> int:
             """Since a time of ``ticks_ms``."""
 
         def moving(self) -> bool:

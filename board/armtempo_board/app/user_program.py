@@ -64,17 +64,19 @@ class UserProgram(Sequencer):
         self._run_once = run_once
         board = self._controller.board
         try:
-            self._execute()
-        except (Ended, SystemExit):
-            pass
-        except BaseException as error:
-            self._fail(error)
-        gc.collect()
-        while board.engine.moving:
-            run_once()
-        ending = sequence.STOPPED if self.stopping else sequence.FINISHED
-        self._end(sequence.FAULTED if board.fault() else ending, board.fault())
-        self.stopping = True  # what is left of it, such as a timer's callback, moves nothing any more
+            try:
+                self._execute()
+            except (Ended, SystemExit):
+                pass
+            except BaseException as error:
+                self._fail(error)
+            gc.collect()
+            while board.engine.moving:
+                run_once()
+        finally:
+            ending = sequence.STOPPED if self.stopping else sequence.FINISHED
+            self._end(sequence.FAULTED if board.fault() else ending, board.fault())
+            self.stopping = True  # what is left of it, such as a timer's callback, moves nothing any more
 
     def _execute(self) -> None:
         cell = Cell(self.table, self)
@@ -140,11 +142,11 @@ class UserProgram(Sequencer):
         """For 'status'."""
         self.status[STEP] = line
 
-    def ticks_ms(self) -> int:
+    def ticks_ms(self) -> "Any":
         """Of the board."""
-        return int(time.ticks_ms())
+        return time.ticks_ms()
 
-    def passed_ms(self, begin_ms: int) -> int:
+    def passed_ms(self, begin_ms: "Any") -> int:
         """Also if ``ticks_ms`` began again meanwhile."""
         return int(time.ticks_diff(time.ticks_ms(), begin_ms))
 
