@@ -1,5 +1,6 @@
 # make demo: plan the paper's feeding motion and replay it on the virtual board
 # make test: bring the interpreters, run all tests
+# make long: the tests that take long, which the others leave out
 # make quick: those that take about a minute together, for the inner loop of work
 # make check: lint and types
 # make docs: the documentation site, in build/site
@@ -13,7 +14,7 @@ BIN := $(VENV)/bin
 # tests/conftest.py says how many that are.
 WORKERS ?= auto
 
-.PHONY: demo test quick check docs clean
+.PHONY: demo test long quick check docs clean
 
 demo: $(VENV)/demo
 	"$(BIN)/armtempo" demo
@@ -21,6 +22,9 @@ demo: $(VENV)/demo
 test: $(VENV)/test
 	"$(BIN)/python" .ci/get_micropython.py
 	"$(BIN)/python" -m pytest -n $(WORKERS) --dist loadgroup $(PYTEST_ARGS)
+
+long: PYTEST_ARGS = --long -m long
+long: test
 
 quick: $(VENV)/test
 	"$(BIN)/python" -m pytest -q -n $(WORKERS) --dist loadgroup -m "not slow" --ignore=tests/system $(PYTEST_ARGS)
