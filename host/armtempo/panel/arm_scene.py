@@ -230,7 +230,9 @@ class ArmScene:
                 is_wall = not (high - low).all()
                 width, height, depth = (high - low).tolist()
                 box = self.scene.box(width, height, depth, wireframe=is_wall)
-                self._walls.append(box.material(OBSTACLE, _OBSTACLE_OPACITY).move(*((low + high) / 2).tolist()))
+                self._walls.append(
+                    box.material(OBSTACLE, _OBSTACLE_OPACITY).move(*((low + high) / 2).tolist())
+                )
 
     @property
     def parts(self) -> str:
