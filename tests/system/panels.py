@@ -38,7 +38,9 @@ _ARM_TEXT = shipped.arm_path().read_text(encoding="utf-8") + arms.GRIPPER + arms
 ARM = armtempo.Arm.of_table(toml_table.parse(_ARM_TEXT, "arm.toml"))
 """The paper's arm with an output and an input."""
 Answer = TypeVar("Answer")
-OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+_DRAWN = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+OPTIONS = ["--no-sandbox", "--disable-gpu-rasterization", "--disable-gpu-compositing", *_DRAWN]
+"""A processor draws the pages, too: as a graphics card's it would take five times as long."""
 WAIT_S = 120.0
 """Nothing here takes longer, on however loaded a machine."""
 DESKTOP = {"width": 1280, "height": 800}
@@ -244,9 +246,12 @@ def wait_for(page: Any, *words: str, place: str = "armtempo-state") -> None:
 
 def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> str:
     """Press a button (or ``act``) until a press is in time, which a busy machine may not manage; why it was refused."""
+    refusal = "it was grey"
     for _ in range(30):
         before = page.evaluate("armtempo.number")
         act() if act else button.click()
+        if not act and page.evaluate("armtempo.number") == before:  # grey since Playwright had looked
+            continue
         page.wait_for_function("before => armtempo.answered && armtempo.answered[0] > before", arg=before)
         refusal = str(page.evaluate("armtempo.answered[1]"))
         if not refusal.startswith("Not done"):

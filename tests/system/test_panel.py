@@ -189,6 +189,11 @@ _BALL = """(name => {
   const objects = [...getElement(armtempo.parts.scene).objects.values()];
   return objects.find(one => one.mesh && one.mesh.name === name);
 })"""
+_IS_DRAWN = f"""name => {{
+  const mesh = {_BALL}(name)?.mesh;
+  return mesh && mesh.position.x && mesh.matrixWorld.elements[12] == mesh.position.x;
+}}"""
+"""Where it is, which is then where a click finds it."""
 _PLACE = f"""name => {{
   const scene = getElement(armtempo.parts.scene), frame = scene.renderer.domElement.getBoundingClientRect();
   const at = {_BALL}(name).mesh.position.clone().project(scene.camera);
@@ -199,7 +204,7 @@ _PLACE = f"""name => {{
 def test_a_via_point_is_clicked_and_dragged_in_the_picture(picture: Any) -> None:
     page = picture
     show(page, "Job")
-    page.wait_for_function(f"{_BALL}('via 3')")
+    page.wait_for_function(_IS_DRAWN, arg="via 3")
     cell = page.get_by_label("P3 joint 1")
     before = cell.input_value()
     page.mouse.click(*page.evaluate(_PLACE, "via 3"))

@@ -56,6 +56,7 @@ window.armtempo = {
     this.state = message.state;
     this.offsets_ms = [...this.offsets_ms.slice(1 - this.OFFSETS), this.heard - 1000 * message.clock_s];
     document.body.classList.remove("lost"); // which covers the page
+    document.body.inert = false;
     this.target = message.ghost;
     document.body.classList.toggle("unknown", message.unknown); // the arm is then drawn as its ghost
     document.body.classList.toggle("freezes", message.freeze);
@@ -245,3 +246,4 @@ window.armtempo = {
     }
   },
 };
+document.body.inert = true; // until the server is heard: a press before would be lost in silence
