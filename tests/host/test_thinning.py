@@ -53,6 +53,7 @@ def apart_deg(one: np.ndarray, other: np.ndarray) -> float:
     return max(away(one, other), away(other, one))
 
 
+@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize(
     "rows",
