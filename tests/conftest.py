@@ -25,7 +25,7 @@ NEEDS = {
     "host/panel": "nicegui",
     "host/test_recordings.py": "rosbags",
     "host/test_urdf.py": "trimesh",
-    "system/test_panel.py": "nicegui",
+    "system/panel": "nicegui",
 }
 """What test modules, or all of a folder, import that armtempo itself does without: an extra, or a tool of the tests."""
 _NONE = (pytest.param(0, marks=pytest.mark.skip("takes long: only with --cases")),)
