@@ -110,6 +110,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "Teach: store the arm's present position.",
             "teach points.toml",
             "teach --posture above_tray",
+            "teach frame tray",
         ),
         "run": Entry(
             "run:run",
