@@ -30,6 +30,8 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.model.tool_pose import WHOLE, Pose
 from armtempo.panel.job_editor import JobEditor
 from armtempo.planning import via_points
+from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.robot import arm_state
 from armtempo.robot.connection import Connection
 from click.testing import CliRunner
@@ -315,6 +317,30 @@ def test_goto_refuses_a_wrong_pose_before_a_port_is_opened(
     assert result.exit_code == 2
     assert said in result.output
     assert "nowhere" not in result.output
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--frame", "trya", "--axis", "x", "--by", "1"], "no frame 'trya'; did you mean 'tray'"),
+        (["--frame", "tray", "--joint", "1", "--by", "1"], "--frame says whose x, y or z is meant"),
+        (["--frame", "tray", "--axis", "tool-x", "--by", "1"], "--frame says whose x, y or z is meant"),
+    ],
+)
+def test_a_jog_in_a_wrong_frame_is_refused_before_a_port_is_opened(
+    tmp_path: Path, words: list[str], said: str
+) -> None:
+    result = cli("jog", *words, "--arm", str(arm_file(tmp_path)), "--port", "nowhere")
+    assert result.exit_code == 2
+    assert said in result.output
+    assert "nowhere" not in result.output
+
+
+@pytest.mark.parametrize("axis", ["tray-w", "trya-x", "-x", "tray-", "", "tray-xy"])
+def test_a_jog_along_no_axis_is_refused(tmp_path: Path, axis: str) -> None:
+    arm = Arm.load(arm_file(tmp_path))
+    with pytest.raises(InputError, match=r"there is no axis|there is no frame|either a joint or the tool"):
+        jog_motion.plan("j", arm, [0, -60, 40], JogMove(1.0, axis=axis))
 
 
 # plans that are old

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from armtempo.basics.errors import PlanError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
+from armtempo.model.frame import ArmFrame
 from armtempo.panel import teaching, words
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.robot import homing
@@ -60,6 +62,17 @@ def test_a_jog_that_is_not_possible_is_grey_with_the_reason(operator: PanelBoard
         assert not page.named("⟳ x +").enabled
         reasons = [control.reason for control in page.of.controls if control.element is page.named("⟳ x +")]
         assert "the arm cannot turn the tool about x from here" in reasons[0]
+
+
+def test_the_tool_is_jogged_along_the_axes_of_a_frame(operator_of: Callable[[Arm], PanelBoard]) -> None:
+    turned = ((0.0, -1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    operator = operator_of(replace(ARM, frames=(ArmFrame("tray", turned),)))
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        assert page.named("tray z +").enabled
+        turn = page.named("⟳ tray y +")  # about the base's x
+        (reason,) = [control.reason for control in page.of.controls if control.element is turn]
+        assert "the arm cannot turn the tool about tray-y from here" in reason
 
 
 def test_homing_names_and_shows_the_posture_of_home_first(
