@@ -145,9 +145,9 @@ def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
         run.begin_repetition() as file,
     ):
         file.append(sample(0))
-        file._rows._file.close()
-        file._rows._file = full.open("w", encoding="utf-8", newline="")
-        file._rows._csv = csv.writer(file._rows._file)
+        file._samples._file.close()
+        file._samples._file = full.open("w", encoding="utf-8", newline="")
+        file._samples._csv = csv.writer(file._samples._file)
         file.append(sample(1))
     found = run_reader.load(run.path).repetitions[0]
     assert (found.state, found.index.tolist()) == (run_folder.BROKEN, [0])
@@ -320,8 +320,9 @@ def samples(delay_s: float = 0.0, seed: int | None = None, resolution: float = 0
         angles = angles + np.random.default_rng(seed).normal(scale=0.05, size=angles.shape)
     if resolution:
         angles = np.rint(angles / resolution) * resolution
+    nothing, index = np.zeros(angles.shape, int), np.arange(len(times))
     return RepetitionData(
-        "x", "complete", np.arange(len(times)), times, times, np.zeros(angles.shape, int), PLAN(times), angles
+        "x", "complete", index, times, times, nothing, PLAN(times), angles, 0 * index, 0 * index
     )
 
 
