@@ -39,7 +39,7 @@ def program(file: Path, check: bool, force: bool, given: BoardOptions) -> None:
     _check_syntax(found)
     if check:
         _show_check(
-            encoded_program.of_program(found, arm, encoded_program.motions_beside(found)), given.as_json
+            encoded_program.of_program(found, arm, encoded_program.motions_beside(found, arm)), given.as_json
         )
         return
     say = results.progress_printer(given.as_json)
