@@ -21,6 +21,7 @@ TYPE_CHECKING = False  # as in "typing", whose import takes longer than the rest
 
 __all__ = [
     "Arm",
+    "ArmFrame",
     "ArmPosture",
     "ArmtempoError",
     "Board",
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
     )
     from armtempo.kinematics.of_arm import forward, inverse, inverse_many
     from armtempo.model.arm import Arm
+    from armtempo.model.frame import ArmFrame
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
     from armtempo.model.parts import (
@@ -144,6 +146,7 @@ _HOMES = {
     "armtempo.kinematics.of_arm": ("forward", "inverse", "inverse_many"),
     "armtempo.ports.board_port": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
+    "armtempo.model.frame": ("ArmFrame",),
     "armtempo.model.job": ("Job", "Stop"),
     "armtempo.model.outputs": ("Input", "Output"),
     "armtempo.model.parts": (

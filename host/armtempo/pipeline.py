@@ -18,9 +18,9 @@ from collections import abc
 from pathlib import Path
 
 from armtempo.basics.arguments import checked
-from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.basics.errors import RunFolderError
 from armtempo.basics.progress import Progress, part
-from armtempo.encoding import encode
+from armtempo.encoding import planned_for
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -99,14 +99,12 @@ def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Pla
     """The plan of a trajectory file.
 
     ``altered``: accept a file that was altered after it had been written. Raises InputError if it is no
-    trajectory file, is damaged or altered, or was planned for another arm than ``arm``.
+    trajectory file, is damaged or altered, or was planned for another arm than ``arm``, or for one of its frames
+    that has changed since.
     """
     found = Plan.load(path, altered)
-    if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
-        raise InputError(
-            f"{path} was planned for a different arm than {arm.name!r} ({arm.source})",
-            "plan it again with this arm",
-        )
+    if arm is not None:
+        planned_for.check(path, found.arm, found.job.frames, arm)
     return found
 
 

@@ -91,7 +91,12 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "posture:home", "Declare the arm's position.", "home", "home 0,-60,40", "home --switches"
         ),
         "goto": Entry(
-            "posture:goto", "Move straight to a posture.", "goto home", "goto 10,-50,30", "goto first.json"
+            "posture:goto",
+            "Move straight to a posture, or the tool to a pose.",
+            "goto home",
+            "goto 10,-50,30",
+            "goto --frame tray --position 0 0 50",
+            "goto first.json",
         ),
         "jog": Entry(
             "jog:jog",
@@ -105,6 +110,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "Teach: store the arm's present position.",
             "teach points.toml",
             "teach --posture above_tray",
+            "teach frame tray",
         ),
         "run": Entry(
             "run:run",

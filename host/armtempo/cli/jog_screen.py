@@ -215,12 +215,12 @@ class JogScreen:
             where = self._where(angles_deg or self._board.posture_deg().tolist())
         except LinkError as error:
             where = [error.problem]
-        parts = (
-            [self.choice.describe(names), self._said, *where]
-            if self._said
-            else [self.choice.describe(names), *where]
-        )
-        click.echo(f"{_CLEAR_LINE}{fitted(parts, shutil.get_terminal_size().columns - 1)}", nl=False)
+        what, width = self.choice.describe(names), shutil.get_terminal_size().columns - 1
+        if len(f"{what} | {self._said}") > width:  # on lines of its own, as its end may matter most
+            click.echo(f"{_CLEAR_LINE}{self._said}")
+            self._said = ""
+        parts = [what, self._said, *where] if self._said else [what, *where]
+        click.echo(f"{_CLEAR_LINE}{fitted(parts, width)}", nl=False)
 
     def _where(self, angles_deg: list[float]) -> list[str]:
         """Angles and tool pose, the selected ones first."""

@@ -40,7 +40,7 @@ def program(file: Path, check: bool, force: bool, given: BoardOptions) -> None:
     found = load(file, arm)
     if check:
         _show_check(
-            encoded_program.of_program(found, arm, encoded_program.motions_beside(found)), given.as_json
+            encoded_program.of_program(found, arm, encoded_program.motions_beside(found, arm)), given.as_json
         )
         return
     with resolve.board(given, arm) as board:

@@ -162,6 +162,12 @@ def to_rpy_deg(matrix: ArrayLike) -> RollPitchYaw:
     return RollPitchYaw(_degrees(roll), _degrees(pitch), _degrees(yaw))
 
 
+def angle_deg(rotation: ArrayLike) -> float:
+    """The angle of a rotation (3, 3), degrees from 0 to 180."""
+    w, *vector = to_quaternion(rotation)
+    return math.degrees(2.0 * math.atan2(math.hypot(*vector), w))
+
+
 def _degrees(angle_rad: float) -> float:
     """Degrees in (-180, 180], never -0."""
     angle_deg = math.degrees(angle_rad)

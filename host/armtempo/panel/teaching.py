@@ -16,13 +16,12 @@ from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import taught
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
 from armtempo.model.pose import from_rpy
 from armtempo.model.posture import name_problem
 from armtempo.model.tool_pose import Pose
 from armtempo.panel import words
 from armtempo.panel.panel_board import Needs
-from armtempo.planning import planner
+from armtempo.planning import via_points
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -44,9 +43,7 @@ def nearest(arm: Arm, position_mm: Sequence[float], rpy_deg: Sequence[float], he
         5: lambda: Pose.of_approach(position_mm, direction),
         4: lambda: Pose.of_angles(position_mm, {"pitch": pitch}),
     }.get(len(arm.driven), lambda: Pose.of_angles(position_mm, {}))()
-    job = Job("target", via=(tuple(map(float, here_deg)), pose))
-    found: Array = planner.via_angles(arm, job)[0][-1]
-    return found
+    return via_points.nearest(arm, pose, here_deg.tolist())
 
 
 def ask(page: PanelPage, changed: Callable[[], object]) -> None:

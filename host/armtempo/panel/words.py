@@ -108,6 +108,7 @@ OPTIONS = {
     "speed_mm_s": "Tool speed, mm/s",
     "acceleration_mm_s2": "Tool acceleration, mm/s²",
     "holds": "Tool holds",
+    "frame": "Frame",
 }
 VIA_KEYS = {
     "line": "Straight line to it",
@@ -125,6 +126,7 @@ VIA_KEYS = {
     "pitch_deg": "Pitch, deg",
     "yaw_deg": "Yaw, deg",
     "matrix": "Pose, 4 × 4",
+    "frame": "Frame",
     "posture": "Posture",
     "posture_deg": "Near the angles, deg",
     "tolerance_mm": "Tolerance, mm",

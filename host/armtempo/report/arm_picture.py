@@ -122,14 +122,13 @@ def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) 
 
 def _draw_workspace(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
     """The boxes, and the walls as lines."""
-    from matplotlib.patches import Rectangle
+    from scipy.spatial import ConvexHull  # here, as few arms have boxes
 
     workspace = arm.workspace or Workspace()
     for box in workspace.keep_out:
-        low, high = np.array(box.low_mm)[list(seen)], np.array(box.high_mm)[list(seen)]
-        axis.add_patch(Rectangle(tuple(low), *(high - low), color=HIGH, alpha=0.25, zorder=0))
-        axis.update_datalim([low, high])
-        axis.annotate(box.name, tuple(low), fontsize=7, color=HIGH)
+        corners = box.corners_mm[:, list(seen)]
+        axis.fill(*corners[ConvexHull(corners).vertices].T, color=HIGH, alpha=0.25, zorder=0)
+        axis.annotate(box.name, tuple(corners.min(axis=0)), fontsize=7, color=HIGH)
     for place, draw in zip(seen, (axis.axvline, axis.axhline), strict=True):
         for end in (workspace.low_mm[place], workspace.high_mm[place]):
             if abs(end) < FAR_MM:

@@ -17,6 +17,8 @@ from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.tool_pose import Pose
+from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.report.run import Run
 from armtempo.report.sequence_reader import SequenceRun
@@ -49,7 +51,7 @@ class Motions:
 
     def goto(
         self,
-        where: Where,
+        where: Where | Pose,
         progress: Progress | None = None,
         stop: StopRequest | None = None,
         speed: float = 1.0,
@@ -57,16 +59,20 @@ class Motions:
     ) -> None:
         """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
 
-        ``where``: a posture, or a plan, sequence or its file (the start). ``speed``: fraction of the fastest
+        ``where``: a posture, a pose of the tool (its posture nearest to the present one), or a plan, sequence or
+        its file (the start). ``speed``: fraction of the fastest
         move, 0.01 to 1. ``line``: move the tool in a straight line. Raises LinkError if the position is
         unknown, InputError for a posture that does not fit the arm, PlanError if the arm cannot follow the
         line.
         """
         permille(speed)  # raises InputError for an invalid speed
         arm = self._board.known_arm()
-        target_deg = posture_deg(where, arm)
+        target_deg = None if isinstance(where, Pose) else posture_deg(where, arm)
         with self._board.stoppable(stop) as wanted:
             self._board.start.home_virtual_arm(arm)
+            if isinstance(where, Pose):
+                target_deg = via_points.nearest(arm, where, self._posture_deg().tolist())
+            assert target_deg is not None
             goto.go_to(self._board.client, arm, target_deg, wanted, progress, goto.MovePace(speed, line))
 
     def jog(
@@ -276,9 +282,11 @@ class Motions:
             motion = Plan.load(motion)
         if isinstance(motion, str):
             return self._store.read(motion)
-        encoded = encoded_motion.of_plan(motion) if isinstance(motion, Plan) else motion
-        self._board.configure(encoded.arm)
-        return encoded
+        if isinstance(motion, Plan):
+            self._board.configure_for(motion)
+            return encoded_motion.of_plan(motion)
+        self._board.configure(motion.arm)
+        return motion
 
     def _default(self) -> str:
         for entry in self._board.client.stored():

@@ -35,7 +35,7 @@ class Programs:
         """
         arm = Arm.of(arm)
         found = program if isinstance(program, UserProgram) else UserProgram.load(program, arm)
-        motions = encoded_program.motions_beside(found)
+        motions = encoded_program.motions_beside(found, arm)
         beside, stored = [motion.name for motion in motions], []
         for name, line in found.motions.items():
             if name in beside:
