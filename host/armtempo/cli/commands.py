@@ -210,9 +210,10 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "upload": Entry(
             "stored:upload",
-            "Store a trajectory file, or a planned sequence with its motions, on the board.",
+            "Store a trajectory file, a planned sequence or a program, with their motions, on the board.",
             "upload first.json",
             "upload first.json --name pick --default",
+            "upload pick_place.py --arm my_arm.toml --default",
         ),
         "list": Entry(
             "stored:list_motions",

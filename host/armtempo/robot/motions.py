@@ -21,7 +21,6 @@ from armtempo.model.tool_pose import Pose
 from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.report.run import Run
-from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot import arm_state, goto, jog, recording, sequence_recording, sequence_run, stored_motion
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.connection import Connection
@@ -228,9 +227,9 @@ class Motions:
         return Run.load(self._last_folder) if self._last_folder else None
 
     @property
-    def last_sequence(self) -> SequenceRun | None:
+    def last_sequence(self) -> Run | None:
         """The last sequence that this object recorded, even if it ended early; None before the first."""
-        return SequenceRun.load(self._last_sequence) if self._last_sequence else None
+        return Run.load(self._last_sequence) if self._last_sequence else None
 
     def fetch(self, motion: Plan | EncodedMotion | Path | str | None = None, out: Path | str = "runs") -> Run:
         """Write the samples that the board kept of its last run into a new run folder in ``out``.

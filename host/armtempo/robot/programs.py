@@ -54,16 +54,21 @@ class Programs:
         program: EncodedProgram | UserProgram | Path | str,
         progress: Progress | None = None,
         replace: bool = False,
+        default: bool = False,
     ) -> MotionKey:
         """Store a program with the motions that it names; a program of this name is replaced.
 
-        ``replace``: replace something else of one of the names too. Raises InputError for what is wrong in it,
-        LinkError if the board has too little memory, or something else under one of the names.
+        ``replace``: replace something else of one of the names too. ``default``: let the board's button start it.
+        Raises InputError for what is wrong in it, LinkError if the board has too little memory, or something else
+        under one of the names.
         """
         if not isinstance(program, EncodedProgram):
             program = self.encode(program, self._board.known_arm())
         self._board.configure(program.arm)
-        return program_run.store(self._board.client, program, progress, replace)
+        key = program_run.store(self._board.client, program, progress, replace)
+        if default:
+            self._board.client.set_default(key.name)
+        return key
 
     def run(
         self,

@@ -70,10 +70,10 @@ def origin(client: Client, arm: Arm, port: str) -> dict[str, Any]:
 
 def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> RunFolder:
     """A new run folder with everything that is needed to repeat the run."""
-    where = {**origin(client, motion.arm, port), "motion_crc": f"{motion.key.crc:08x}"}
+    where = origin(client, motion.arm, port)
     with run_folder.new_folder(parent, motion.name) as path:
         folder = RunFolder(path, motion.name, run_folder.scales(motion.arm), where)
-        folder.write_motion(motion.data)
+        folder.write_legs([motion.data])
         if motion.plan is not None:
             motion.plan.save(path / run_folder.TRAJECTORY)
         else:

@@ -17,8 +17,8 @@ from armtempo.link.board_messages import Event, RowBegun, Sample, SequenceState
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.report import run_folder, sequence_folder
-from armtempo.report.sequence_folder import SequenceFolder
+from armtempo.report import run_folder
+from armtempo.report.run_folder import Recording, RunFolder, RunRow
 from armtempo.robot.recording import origin
 
 ACKNOWLEDGED = 8
@@ -79,54 +79,53 @@ def fetched(client: Client, name: str, arm: Arm) -> SequenceContent:
 @contextmanager
 def recorder(client: Client, content: SequenceContent, parent: Path, port: str) -> Iterator[Recorder]:
     """A recorder that writes one run into a new run folder in ``parent``."""
-    rows = [content.record.row(index) for index in range(content.record.rows)]
+    record = content.record
+    rows = tuple(
+        RunRow(row[4], row[1] + 1 if row[0] == sequence.MOVE else 0, words)
+        for row, words in zip(map(record.row, range(record.rows)), content.words, strict=True)
+    )
     with ExitStack() as ends:
         with run_folder.new_folder(parent, content.name) as path:
-            for number, leg in enumerate(content.legs, 1):
-                file = path / sequence_folder.leg_file(number)
-                with run_folder.writing(file):
-                    file.write_bytes(leg)
-            if content.plan is not None:
-                content.plan.save(path / sequence_folder.SEQUENCE)
-            else:
-                arm_json.save(content.arm, path / run_folder.ARM)
-            names = [content.record.motion(index)[0] for index in range(content.record.motions)]
-            folder = SequenceFolder(
+            folder = RunFolder(
                 path,
                 content.name,
                 run_folder.scales(content.arm),
-                content.words,
-                tuple(row[4] for row in rows),
-                tuple(row[1] + 1 if row[0] == sequence.MOVE else 0 for row in rows),
-                {**origin(client, content.arm, port), "motions": names},
+                origin(client, content.arm, port),
+                legs=tuple(record.motion(index)[0] for index in range(record.motions)),
+                rows=rows,
             )
-            ends.enter_context(folder)
-        yield _FolderRecorder(client, folder)
+            folder.write_legs(content.legs)
+            if content.plan is not None:
+                content.plan.save(path / run_folder.SEQUENCE)
+            else:
+                arm_json.save(content.arm, path / run_folder.ARM)
+            recording = ends.enter_context(folder.begin_repetition(with_rows=True))
+        yield _FolderRecorder(client, folder, recording)
 
 
 class _FolderRecorder(Recorder):
-    def __init__(self, client: Client, folder: SequenceFolder) -> None:
+    def __init__(self, client: Client, folder: RunFolder, recording: Recording) -> None:
         self.path = folder.path
         self._client = client
-        self._folder = folder
+        self._rows = folder.rows
+        self._recording = recording
         self._begun_s = client.session.clock()
         self._run, self._row = 0, -1  # number of the motion's run that was reported last, and its row
-        self._kept = 0
 
     def take(self, event: Event) -> None:
         if isinstance(event, RowBegun):
-            self._folder.add_row(event, self._client.session.clock() - self._begun_s)
-            if event.row < len(self._folder.motions) and self._folder.motions[event.row]:
+            self._recording.begin_row(event, self._client.session.clock() - self._begun_s)
+            if event.row < len(self._rows) and self._rows[event.row].leg:
                 self._run, self._row = event.run, event.row
         elif isinstance(event, Sample):
-            self._folder.add_sample(event, self._row if event.run == self._run else None)
-            self._kept += 1
-            if self._kept % ACKNOWLEDGED == 0:
+            self._recording.append(event, self._row if event.run == self._run else None)
+            if self._recording.repetition.samples % ACKNOWLEDGED == 0:
                 self._client.samples(event.index + 1)
 
     def end(self, state: SequenceState) -> None:
         code = wire.ERRORS[state.code][0] if state.code in wire.ERRORS else str(state.code or "")
-        self._folder.end(state, code, self._client.counters())
+        taken_s = self._client.session.clock() - self._begun_s
+        self._recording.repetition.end_rows(state, code, self._client.counters(), taken_s)
 
 
 _THEN = {NEXT_THEN: "next", FAULT_THEN: "fault"}
