@@ -16,7 +16,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.frame import TOOL
-from armtempo.model.pose import to_rpy_deg
+from armtempo.model.pose import checked, from_rpy, to_rpy_deg
 from armtempo.model.tool_pose import BASE
 from armtempo.panel import arm_scene, floor, homing, teaching, words
 from armtempo.panel.hold import SHOWN_S
@@ -157,6 +157,9 @@ class MoveTab:
                 ]
             with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="pose"):
                 self._pose = {name: _number(name, 0.0) for name in words.POSE_FIELDS}
+                names = {BASE: words.IN_BASE} | {each.name: words.plain(each.name) for each in arm.frames}
+                self._frame = ui.select(names, value=BASE).props("dense outlined")
+                named(self._frame, words.FRAME_OF_POSE).set_visibility(bool(arm.frames))
                 if len(arm.driven) < len(words.POSE_FIELDS):
                     ui.label(words.FEW_JOINTS.format(joints=len(arm.driven))).classes("armtempo-note")
             with ui.row():
@@ -207,14 +210,17 @@ class MoveTab:
             return np.array([_value(field) for field in self._angles])
         position = [_value(self._pose[name]) for name in words.POSE_FIELDS[:3]]
         turns = [_value(self._pose[name]) for name in words.POSE_FIELDS[3:]]
-        return teaching.nearest(self._operator.arm, position, turns, self._operator.live.angles_deg)
+        arm = self._operator.arm
+        wanted = checked(arm.frame(str(self._frame.value)) @ from_rpy(position, turns))
+        return teaching.nearest(arm, wanted, self._operator.live.angles_deg)
 
     def _take_present(self) -> None:
         """Fill the fields with where the arm is."""
         angles = self._operator.live.angles_deg
         for field, angle in zip(self._angles, angles, strict=True):
             field.set_value(round(float(angle), 3))
-        pose = forward(self._operator.arm, angles)
+        arm = self._operator.arm
+        pose = np.linalg.inv(arm.frame(str(self._frame.value))) @ forward(arm, angles)
         values = [*pose[:3, 3], *to_rpy_deg(pose)]
         for field, value in zip(self._pose.values(), values, strict=True):
             field.set_value(round(float(value), 2) + 0.0)
