@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from armtempo.cli.taught_points import FramePoints, NewFrame
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import frame, shipped, workspace
+from armtempo.model import frame, shipped, taught, workspace
 from armtempo.model.arm import Arm
 from armtempo.model.frame import ArmFrame
 from armtempo.model.job import Job
@@ -127,6 +128,11 @@ def test_a_frame_that_cannot_be_is_refused_with_its_key(tmp_path: Path, more: st
 
 
 def test_frames_made_in_code_are_checked_too() -> None:
+    for wrong in (((1.0, 2.0), (3.0,)), ((1.0,),), ()):
+        with pytest.raises(InputError, match=r"frame.a: what is given is not the matrix of a pose"):
+            ArmFrame("a", wrong)
+        with pytest.raises(InputError, match=r"'bin': axes: what is given is not the matrix"):
+            workspace.KeepOut("bin", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), wrong)
     with pytest.raises(InputError, match="not a rotation"):
         ArmFrame("a", rows(2.0 * np.eye(4) - np.diag([0.0, 0.0, 0.0, 1.0])))
     here = rows(np.eye(4))
@@ -580,6 +586,24 @@ def test_a_frame_that_is_in_another_one_stays_in_it(tmp_path: Path) -> None:
     arm = Arm.load(path)
     assert [each.frame for each in arm.frames if each.name == "tray"] == ["table"]
     np.testing.assert_allclose(arm.frame("tray"), LEANING, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[frame.a]\nmatrix = [\n [1,0,0,5],\n [0, 1, 0, 6],\n [0,0,1,7],\n [0, 0, 0, 1]\n]\n# end\n",
+        '[frame.a]\nframe = "b" # on it\n# c\nposition_mm = [1,\n 2, 3]\nrpy_deg = [1,2,3]\n',
+        '[frame.a]\nrpy_deg = [1,2,3] # r\n# p\nframe = "b"\nposition_mm = [1, 2, 3]\n',
+        "[frame.a] # a\nposition_mm = [1, 2, 3]\n# turned\nyaw_deg = 5\n",
+    ],
+)
+def test_only_the_table_of_the_frame_changes(text: str) -> None:
+    values = {"frame": "b", "position_mm": [7.0, 8.5, -9.0], "rpy_deg": [0.0, 0.0, 1.0]}
+    after = "\n[frame.b]\nposition_mm = [1, 2, 3]\n"
+    changed = taught.with_table(text + after, ("frame", "a"), values, Path("arm.toml"))
+    assert tomllib.loads(changed) == {"frame": {"a": values, "b": {"position_mm": [1, 2, 3]}}}
+    assert changed.endswith(after)
+    assert changed.count("#") == text.count("#")
 
 
 @pytest.mark.parametrize(

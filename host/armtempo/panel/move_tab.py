@@ -36,7 +36,9 @@ _THERE_DEG = 0.1
 """An arm that is this close to a target has arrived."""
 STEPS = {HOLD: words.HOLD, 0.1: "0.1", 1.0: "1", 10.0: "10"}
 """Lengths of a jog, in mm and degrees."""
-FRAMES = {"joints": words.JOINTS, BASE: words.BASE_FRAME, TOOL: words.TOOL_FRAME}
+JOINTS = ""
+"""No frame may have this name."""
+FRAMES = {JOINTS: words.JOINTS, BASE: words.BASE_FRAME, TOOL: words.TOOL_FRAME}
 
 
 class MoveTab:
@@ -72,11 +74,11 @@ class MoveTab:
         page = self._page
         with ui.row().classes("armtempo-choices"):
             own = {frame.name: words.plain(frame.name) for frame in page.operator.arm.frames}
-            frames = ui.toggle({**FRAMES, **own}, value="joints")
+            frames = ui.toggle({**FRAMES, **own}, value=JOINTS)
             named(frames.props("dense no-caps unelevated"), words.FRAME)
             steps = ui.toggle(STEPS, value=HOLD, on_change=lambda event: setattr(self, "_step", event.value))
             named(steps.props("dense no-caps unelevated"), words.STEP_OF_JOG)
-        with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value="joints"):
+        with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value=JOINTS):
             for number, joint in enumerate(page.operator.arm.driven):
                 low, high = joint.range_deg
                 with ui.element("div").classes("armtempo-jog"):

@@ -68,13 +68,22 @@ def test_a_jog_that_is_not_possible_is_grey_with_the_reason(operator: PanelBoard
 
 def test_the_tool_is_jogged_along_the_axes_of_a_frame(operator_of: Callable[[Arm], PanelBoard]) -> None:
     turned = ((0.0, -1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-    operator = operator_of(replace(ARM, frames=(ArmFrame("tray", turned),)))
+    operator = operator_of(replace(ARM, frames=(ArmFrame("tray", turned), ArmFrame("joints", turned))))
     operator.live.state = board_state()
     with pages(operator) as page:
         assert page.named("tray z +").enabled
+        assert not _in_view(page.named("joints z +"))
+        assert _in_view(page.named("joint 1 +"))
+        page.named(words.FRAME).value = "joints"
+        assert _in_view(page.named("joints z +"))
+        assert not _in_view(page.named("joint 1 +"))
         turn = page.named("⟳ tray y +")  # about the base's x
         (reason,) = [control.reason for control in page.of.controls if control.element is turn]
         assert "the arm cannot turn the tool about tray-y from here" in reason
+
+
+def _in_view(element: Any) -> bool:
+    return all(around.visible for around in element.ancestors(include_self=True))
 
 
 def test_a_typed_pose_is_in_the_chosen_frame(operator_of: Callable[[Arm], PanelBoard]) -> None:
