@@ -17,6 +17,7 @@ from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
 from armtempo.cli.jog_screen import JogScreen
 from armtempo.cli.taught_points import FramePoints, NewFrame
+from armtempo.diagnosis.arm_check import check_arm
 from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import frame, shipped, workspace
@@ -30,6 +31,8 @@ from armtempo.model.sequence_plan import SequencePlan
 from armtempo.model.tool_pose import WHOLE, Pose
 from armtempo.panel.job_editor import JobEditor
 from armtempo.planning import via_points
+from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.robot import arm_state
 from armtempo.robot.connection import Connection
 from click.testing import CliRunner
@@ -317,6 +320,69 @@ def test_goto_refuses_a_wrong_pose_before_a_port_is_opened(
     assert "nowhere" not in result.output
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--frame", "trya", "--axis", "x", "--by", "1"], "no frame 'trya'; did you mean 'tray'"),
+        (["--frame", "tray", "--joint", "1", "--by", "1"], "--frame says whose x, y or z is meant"),
+        (["--frame", "tray", "--axis", "tool-x", "--by", "1"], "--frame says whose x, y or z is meant"),
+    ],
+)
+def test_a_jog_in_a_wrong_frame_is_refused_before_a_port_is_opened(
+    tmp_path: Path, words: list[str], said: str
+) -> None:
+    result = cli("jog", *words, "--arm", str(arm_file(tmp_path)), "--port", "nowhere")
+    assert result.exit_code == 2
+    assert said in result.output
+    assert "nowhere" not in result.output
+
+
+@pytest.mark.parametrize("axis", ["tray-w", "trya-x", "-x", "tray-", "", "tray-xy"])
+def test_a_jog_along_no_axis_is_refused(tmp_path: Path, axis: str) -> None:
+    arm = Arm.load(arm_file(tmp_path))
+    with pytest.raises(InputError, match=r"there is no axis|there is no frame|either a joint or the tool"):
+        jog_motion.plan("j", arm, [0, -60, 40], JogMove(1.0, axis=axis))
+
+
+def test_poses_of_a_table_are_imported_into_a_frame(tmp_path: Path) -> None:
+    path = arm_file(tmp_path)
+    table, out = tmp_path / "points.csv", tmp_path / "points.toml"
+    place = place_of(Arm.load(path), [20.0, -40.0, 30.0], "tray")
+    table.write_text("x_mm,y_mm,z_mm\n" + 2 * (",".join(map(str, place)) + "\n"), encoding="utf-8")
+    words = ["import", str(table), "--arm", str(path), "--frame", "tray", "-o", str(out)]
+    assert cli(*words).exit_code == 0
+    arm = Arm.load(path)
+    found = Job.load(out, arm)
+    assert found.frames == ("tray",)
+    np.testing.assert_allclose(
+        np.array(cast(Pose, found.via[0]).matrix)[:3, 3], forward(arm, [20, -40, 30])[:3, 3], atol=1e-3
+    )
+    out.unlink()
+    for said, change in (
+        ("no frame 'trya'; did you mean 'tray'", lambda: words.__setitem__(5, "trya")),
+        (
+            "has angles, which are in no frame",
+            lambda: table.write_text("10,-50,30\n11,-51,31\n", encoding="utf-8"),
+        ),
+        ("--own-timing is for angles", lambda: words.append("--own-timing")),
+    ):
+        change()
+        result = cli(*words)
+        assert result.exit_code == 2
+        assert said in " ".join(result.output.split())
+        assert not out.exists()
+
+
+def test_check_finds_frames_in_metres_or_out_of_reach(tmp_path: Path) -> None:
+    more = "\n[frame.far]\nposition_mm = [3000, 0, 0]\n[frame.small]\nframe = 'far'\nposition_mm = [0.25, 0, 0.1]\n"
+    found = {
+        (each.where, each.level.value): each.what for each in check_arm(Arm.load(arm_file(tmp_path, more)))
+    }
+    assert "3000 mm from the base" in found["frame far", "note"]
+    assert "0.269 mm from that of frame 'far': is it in metres?" in found["frame small", "warning"]
+    assert not [each for each in check_arm(Arm.load(arm_file(tmp_path))) if "frame" in each.where]
+
+
 # plans that are old
 
 
@@ -377,6 +443,31 @@ def test_a_plan_is_old_when_its_frame_is_elsewhere(
             with pytest.raises(InputError, match="plan it again") as refused:
                 call()
             assert said in str(refused.value)
+
+
+def test_a_sequence_takes_a_plan_unless_its_own_frame_is_elsewhere(
+    tmp_path: Path, planned: tuple[Plan, SequencePlan]
+) -> None:
+    """Teaching a posture or a frame makes no other plan old."""
+    plan, _ = planned
+    plan.save(tmp_path / "plan.json")
+    text = 'name = "s"\n[[step]]\nrun = "plan.json"\n'
+    more = postures(new=[1.0, -60.0, 40.0]) + "[frame.new]\nposition_mm = [5, 6, 7]\n"
+    source = Path(plan.arm.source)
+    before = source.read_text(encoding="utf-8")
+    try:
+        for change in (more, more.replace("[5, 6", "[6, 6")):
+            source.write_text(before + change, encoding="utf-8")
+            arm = Arm.load(source)
+            sequence = Sequence.of_table(toml_table.parse(text, str(tmp_path / "s.toml")), arm)
+            assert pipeline.plan_sequence(arm, sequence).frames == ("tray",)
+        source.write_text(before.replace("yaw_deg = 20", "yaw_deg = 22"), encoding="utf-8")
+        arm = Arm.load(source)
+        sequence = Sequence.of_table(toml_table.parse(text, str(tmp_path / "s.toml")), arm)
+        with pytest.raises(InputError, match=r"step\[1\].run: it is old: frame 'tray' has changed"):
+            pipeline.plan_sequence(arm, sequence)
+    finally:
+        source.write_text(before, encoding="utf-8")
 
 
 def test_run_and_upload_refuse_an_old_plan_before_a_port_is_opened(

@@ -104,6 +104,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "jog",
             "jog --joint 2 --by -5",
             "jog --axis z --by 10 --speed 50",
+            "jog --frame tray --axis x --by 5",
         ),
         "teach": Entry(
             "teach:teach",

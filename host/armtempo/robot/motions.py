@@ -86,11 +86,11 @@ class Motions:
     ) -> Array:
         """Move a joint or the tool: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
 
-        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y",
-        "tool-z": the tool moves along it by ``by_mm``, or turns about it by ``by_deg``; ``speed``: fraction
-        of the speed limits, 0.01 to 1. The jog ends early at the end of a range, or if the tool cannot
-        continue along the line (``last_jog_ends`` says why). Returns the posture in degrees, (J,). Raises
-        LinkError if the position is unknown, InputError if no motion in that direction is possible.
+        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base, "tool-x", … of the tool or
+        "tray-x", … of a frame of the arm: the tool moves along it by ``by_mm``, or turns about it by
+        ``by_deg``; ``speed``: fraction of the speed limits, 0.01 to 1. The jog ends early at the end of a range,
+        or if the tool cannot continue along the line (``last_jog_ends`` says why). Returns the posture in degrees,
+        (J,). Raises LinkError if the position is unknown, InputError if no motion in that direction is possible.
         """
         arm = self._board.known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
