@@ -6,15 +6,18 @@ import json
 import random
 import shutil
 from pathlib import Path
+from typing import Any
 
 import armtempo
 import numpy as np
 import pytest
 from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.cli import main
+from armtempo.encoding import encoded_sequence
 from armtempo.report import verdict
 from armtempo.report.evaluation import evaluate
 from armtempo.report.verdict import BAD, GOOD, OPEN
+from armtempo.robot import recording
 from click.testing import CliRunner
 
 from tests.host import made_runs
@@ -132,6 +135,32 @@ def test_a_sequence_without_a_motion_has_a_page(tmp_path: Path) -> None:
         file.write_text("")
     with pytest.raises(RunFolderError, match="contains no samples"):
         evaluate(folder)
+
+
+class Stored:
+    """A client of a board that has the small sequence."""
+
+    def __init__(self) -> None:
+        encoded = encoded_sequence.of_plan(made_runs.small_sequence())
+        self.records = {motion.name: motion.data for motion in encoded.motions} | {"pick": encoded.data}
+
+    def fetch(self, name: str) -> bytes:
+        return self.records[name]
+
+
+def test_what_is_recorded_of_a_stored_sequence_is_that_of_its_plan() -> None:
+    plan = made_runs.small_sequence()
+    planned = recording.of_sequence(plan)
+    board: Any = Stored()
+    stored = recording.of_stored_sequence(board, "pick", plan.arm)
+    assert stored.legs == planned.legs
+    assert [(row.step, row.leg) for row in stored.rows] == [(row.step, row.leg) for row in planned.rows]
+    assert [row.words for row in stored.rows] == [
+        *("repeat for ever", "run pick-1", "run pick-2", "count parts", "end of repeat")
+    ]
+    board.records["pick"] = board.records["pick"][:-1]
+    with pytest.raises(ArmtempoError, match="sequence 'pick' on the board"):
+        recording.of_stored_sequence(board, "pick", plan.arm)
 
 
 @pytest.mark.slow
