@@ -123,8 +123,7 @@ if TYPE_CHECKING:
     from armtempo.model.tool_segment import ToolSegment
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.board_port import find_ports
-    from armtempo.report.run import Run
-    from armtempo.report.sequence_reader import SequenceRun
+    from armtempo.report.run import Run, SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
@@ -181,10 +180,9 @@ _HOMES = {
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.board_state": ("BoardState",),
     "armtempo.robot.recording": ("Watcher",),
-    "armtempo.report.run": ("Run",),
+    "armtempo.report.run": ("Run", "SequenceRun"),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
-    "armtempo.report.sequence_reader": ("SequenceRun",),
     "armtempo.splines.bspline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }

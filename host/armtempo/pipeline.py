@@ -28,9 +28,8 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
-from armtempo.report import comparison, sequence_report, text_summary
+from armtempo.report import comparison, text_summary
 from armtempo.report.run import Run
-from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 
@@ -123,10 +122,9 @@ def run(
         return board.run(plan, repeat, out, progress, watcher)
 
 
-def report(run: Run | SequenceRun) -> Path:
-    """Write report.html (for a motion, also its figures) into the run folder; returns the page. Raises as
-    ``Run.report``."""
-    return sequence_report.write(run.path) if isinstance(run, SequenceRun) else run.report()
+def report(run: Run) -> Path:
+    """``Run.report``."""
+    return run.report()
 
 
 @checked

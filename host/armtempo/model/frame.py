@@ -16,6 +16,8 @@ from armtempo.model import outputs_file, pose, tool_pose
 from armtempo.model.tool_pose import APPROACH, BASE, WHOLE, Pose, Rows, rows_of
 from armtempo.model.tool_segment import ToolSegment
 
+KIND = "frame"
+"""The tables [frame.NAME] of an arm file."""
 TOOL = "tool"
 _RESERVED = {BASE: "the frame of the arm itself", TOOL: "the frame of its tool"}
 _LEVEL = 1e-9
@@ -35,18 +37,22 @@ class ArmFrame:
     """The frame in which the pose is given."""
 
     def __post_init__(self) -> None:
-        """Raise InputError for a reserved name, or a matrix that is no pose."""
-        where = f"frame.{self.name}"
-        if self.name in _RESERVED:
-            raise InputError(
-                f"{where}: {self.name!r} is {_RESERVED[self.name]}", "choose another name for the frame"
-            )
+        """Raise InputError for a name that is not allowed, or a matrix that is no pose."""
+        check_name(self.name)
+        where = f"{KIND}.{self.name}"
         object.__setattr__(self, "matrix", rows_of(pose.checked(self.matrix, where)))
+
+
+def check_name(name: str) -> None:
+    """Raise InputError for a name that no frame may have."""
+    if name in _RESERVED:
+        raise InputError(f"{KIND}.{name}: {name!r} is {_RESERVED[name]}", "choose another name for the frame")
+    outputs_file.check_name(f"{KIND}.{name}", name)
 
 
 def read(top: Table) -> tuple[ArmFrame, ...]:
     """The tables [frame.NAME] of an arm file; raises InputError, with file, key and value, for invalid ones."""
-    found = tuple(_frame(name, table) for name, table in outputs_file.named(top, "frame"))
+    found = tuple(_frame(name, table) for name, table in outputs_file.named(top, KIND))
     check(found, top.file)
     return found
 

@@ -56,6 +56,7 @@ VIEWS = {"side": "Side", "top": "Top", "free": "Free", "follow": "Follow"}
 JOINTS, OUTPUTS, INPUTS = "Joints", "Outputs", "Inputs"
 OWN = "own"
 FRAME, BASE_FRAME, TOOL_FRAME = "What is jogged", "Tool, base frame", "Tool, own frame"
+FRAME_OF_POSE, IN_BASE = "Frame of the pose", "in the base"
 STEP_OF_JOG, HOLD = "Length of a jog, mm or degrees", "While held"
 SPEED_OF_JOG = "Speed of jogs and targets"
 JOG_STEP = "step"

@@ -9,6 +9,7 @@ from armtempo_shared import sequence as record
 
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.basics.progress import Progress
+from armtempo.model import frame
 from armtempo.model import steps as kinds
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
@@ -245,12 +246,19 @@ class _Compiler:
         found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
         return found
 
+    def _check_arm(self, plan: Plan, where: str) -> None:
+        """Raise InputError for a plan for another arm; its postures, and frames that it does not use, may differ."""
+        arm = replace(plan.arm, postures=self.arm.postures, frames=self.arm.frames)
+        if arm != self.arm:
+            raise InputError(
+                f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
+            )
+        if change := frame.changed(plan.arm.frames, self.arm.frames, plan.job.frames):
+            raise InputError(f"{where}run: it is old: {change}", "plan it again")
+
     def _of(self, source: Job | Plan, where: str) -> Trajectory:
         if isinstance(source, Plan):
-            if source.arm != self.arm:
-                raise InputError(
-                    f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
-                )
+            self._check_arm(source, where)
             arm = self.arm.holding(source.job.holds or self._holds)
             workspace_check.check(arm, source.trajectory, source.job.start_touches)
             return source.trajectory

@@ -97,7 +97,7 @@ class BoardStore:
         self._board.client.rename(stored_name(old), stored_name(new))
 
     def set_default(self, name: str) -> None:
-        """Set the motion or sequence that the board's button starts; "" for none."""
+        """Set the motion, sequence or program that the board's button starts; "" for none."""
         self._board.client.set_default(stored_name(name) if name else name)
 
 

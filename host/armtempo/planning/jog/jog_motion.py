@@ -17,7 +17,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning import brake_time, move_law, point_to_point, workspace_check
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.planning.jog.jog_line import AXES, STRAY_DEG, STRAY_MM, FollowedLine, ToolLine
+from armtempo.planning.jog.jog_line import STRAY_DEG, STRAY_MM, FollowedLine, ToolLine, direction_of
 from armtempo.planning.move_law import DEGREE, WayLimits
 from armtempo.splines import bspline, extremes
 from armtempo.splines.trajectory import Trajectory
@@ -44,7 +44,7 @@ class JogMove:
     joint: int | None = None
     """Index among the driven joints, from 0."""
     axis: str = ""
-    """One of AXES, if it is not a joint."""
+    """As ``jog_line.direction_of`` takes it, if it is not a joint."""
     about: bool = False
     """Turn the tool about the axis instead of moving it along."""
 
@@ -221,8 +221,7 @@ def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tup
 
 def _line(arm: Arm, start: Array, move: JogMove) -> ToolLine:
     """The line of the tool; InputError if there is no such axis, or the arm cannot be at ``start``."""
-    if move.axis not in AXES:
-        raise InputError(f"there is no axis {move.axis!r}", f"give one of {', '.join(AXES)}")
+    direction_of(arm, move.axis, np.eye(4))  # raises InputError for an axis that there is not
     point_to_point.posture(start, arm)
     return ToolLine(arm, start, move.axis, move.about, 1 if move.by > 0 else -1)
 
