@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from armtempo.panel import layout, words
 from armtempo.panel.panel_board import PanelBoard
+from nicegui import ui
 
 from tests.host.panel import fakes
 from tests.host.panel.pages import pages
@@ -88,3 +89,13 @@ def test_names_from_files_and_boards_turn_no_line_on_any_tab(operator: PanelBoar
             assert not any("\u202e" in one or "\x1b" in one for one in found), (element, found)
             shown += found
         assert any('j"□<b>□' in text for text in shown)
+
+
+def test_hints_are_found_by_the_elements_own_number(operator: PanelBoard) -> None:
+    """Quasar looks for the element of a hint by the id that NiceGUI gives it."""
+    with pages(operator) as page:
+        for tab in (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD):
+            page.show(tab)
+        hints = page.elements(ui.tooltip)
+        assert words.FREEZE_HINT in {hint.text for hint in hints}
+        assert not [hint.text for hint in hints if "id" in hint.parent_slot.parent.props]
