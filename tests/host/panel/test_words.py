@@ -96,6 +96,6 @@ def test_hints_are_found_by_the_elements_own_number(operator: PanelBoard) -> Non
     with pages(operator) as page:
         for tab in (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD):
             page.show(tab)
-        hints = page.elements(ui.tooltip)
-        assert words.FREEZE_HINT in {hint.text for hint in hints}
-        assert not [hint.text for hint in hints if "id" in hint.parent_slot.parent.props]
+        targets = {str(hint.props["target"]) for hint in page.elements(ui.tooltip) if "target" in hint.props}
+        assert targets
+        assert not [one for one in page.elements() if "id" in one.props and f"#{one.html_id}" in targets]
