@@ -49,7 +49,7 @@ $(VENV)/test: pyproject.toml | $(BIN)/python
 	@touch $@ $(VENV)/demo
 
 .cache/typings: board/mypy.ini | $(VENV)/test
-	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check --upgrade --target $@ micropython-stm32-stubs
+	"$(BIN)/uv" pip install --quiet --python "$(BIN)/python" --upgrade --target $@ micropython-stm32-stubs
 	# A viper function takes any buffer or address for a pointer, which the stubs cannot say.
 	sed -i.old 's/def viper(_func: Callable\[_Param, _Ret\], \/) -> Callable\[_Param, _Ret\]/def viper(_func: Callable[_Param, _Ret], \/) -> Callable[..., _Ret]/' $@/micropython.pyi
 	grep -q 'Callable\[..., _Ret\]' $@/micropython.pyi

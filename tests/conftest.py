@@ -25,7 +25,7 @@ NEEDS = {
     "host/panel": "nicegui",
     "host/test_recordings.py": "rosbags",
     "host/test_urdf.py": "trimesh",
-    "system/test_panel.py": "nicegui",
+    "system/panel": "nicegui",
 }
 """What test modules, or all of a folder, import that armtempo itself does without: an extra, or a tool of the tests."""
 _NONE = (pytest.param(0, marks=pytest.mark.skip("takes long: only with --cases")),)
@@ -98,9 +98,8 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """All of ``system/`` is slow. Several workers begin with what takes long, so that they end together."""
     if not config.getoption("long"):
-        left_out = [item for item in items if item.get_closest_marker("long")]
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if item not in set(left_out)]
+        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
     for item in items:
         if item.path.is_relative_to(interpreters.ROOT / "tests" / "system"):
             item.add_marker(pytest.mark.slow)

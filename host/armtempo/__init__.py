@@ -21,6 +21,7 @@ TYPE_CHECKING = False  # as in "typing", whose import takes longer than the rest
 
 __all__ = [
     "Arm",
+    "ArmFrame",
     "ArmPosture",
     "ArmtempoError",
     "Board",
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
     )
     from armtempo.kinematics.of_arm import forward, inverse, inverse_many
     from armtempo.model.arm import Arm
+    from armtempo.model.frame import ArmFrame
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
     from armtempo.model.parts import (
@@ -121,8 +123,7 @@ if TYPE_CHECKING:
     from armtempo.model.tool_segment import ToolSegment
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.board_port import find_ports
-    from armtempo.report.run import Run
-    from armtempo.report.sequence_reader import SequenceRun
+    from armtempo.report.run import Run, SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
@@ -144,6 +145,7 @@ _HOMES = {
     "armtempo.kinematics.of_arm": ("forward", "inverse", "inverse_many"),
     "armtempo.ports.board_port": ("find_ports",),
     "armtempo.model.arm": ("Arm",),
+    "armtempo.model.frame": ("ArmFrame",),
     "armtempo.model.job": ("Job", "Stop"),
     "armtempo.model.outputs": ("Input", "Output"),
     "armtempo.model.parts": (
@@ -178,10 +180,9 @@ _HOMES = {
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.board_state": ("BoardState",),
     "armtempo.robot.recording": ("Watcher",),
-    "armtempo.report.run": ("Run",),
+    "armtempo.report.run": ("Run", "SequenceRun"),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
-    "armtempo.report.sequence_reader": ("SequenceRun",),
     "armtempo.splines.bspline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }

@@ -18,9 +18,9 @@ from collections import abc
 from pathlib import Path
 
 from armtempo.basics.arguments import checked
-from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.basics.errors import RunFolderError
 from armtempo.basics.progress import Progress, part
-from armtempo.encoding import encode
+from armtempo.encoding import planned_for
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -28,9 +28,8 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
-from armtempo.report import comparison, sequence_report, text_summary
+from armtempo.report import comparison, text_summary
 from armtempo.report.run import Run
-from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 
@@ -99,14 +98,12 @@ def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Pla
     """The plan of a trajectory file.
 
     ``altered``: accept a file that was altered after it had been written. Raises InputError if it is no
-    trajectory file, is damaged or altered, or was planned for another arm than ``arm``.
+    trajectory file, is damaged or altered, or was planned for another arm than ``arm``, or for one of its frames
+    that has changed since.
     """
     found = Plan.load(path, altered)
-    if arm is not None and encode.arm_record(arm) != encode.arm_record(found.arm):
-        raise InputError(
-            f"{path} was planned for a different arm than {arm.name!r} ({arm.source})",
-            "plan it again with this arm",
-        )
+    if arm is not None:
+        planned_for.check(path, found.arm, found.job.frames, arm)
     return found
 
 
@@ -125,10 +122,9 @@ def run(
         return board.run(plan, repeat, out, progress, watcher)
 
 
-def report(run: Run | SequenceRun) -> Path:
-    """Write report.html (for a motion, also its figures) into the run folder; returns the page. Raises as
-    ``Run.report``."""
-    return sequence_report.write(run.path) if isinstance(run, SequenceRun) else run.report()
+def report(run: Run) -> Path:
+    """``Run.report``."""
+    return run.report()
 
 
 @checked

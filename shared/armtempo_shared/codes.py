@@ -42,7 +42,6 @@ NO_SUCH_PIN = 35
 NO_SEQUENCE_MEMORY = 36
 OTHER_VERSION = 37
 NEEDS_FIRMWARE = 38
-NEEDS_HOST = 39
 # faults: they stop the motion and stay until cleared
 ESTOP = 40
 LIMIT_SWITCH = 41

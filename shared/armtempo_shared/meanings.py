@@ -118,11 +118,6 @@ _ROWS = (
         "the program's core on stock MicroPython can only run single motions; nothing has moved",
         "put the program into the firmware: 'armtempo flash'",
     ),
-    (
-        "needs_host",
-        "a program is started by a host only",
-        "start it with 'armtempo program' or 'armtempo run'",
-    ),
     ("estop", "the E-stop input tripped", "release it, then 'armtempo clear' and home"),
     ("limit_switch", "a limit switch tripped", "'armtempo clear', then move the arm away from it"),
     (

@@ -15,6 +15,7 @@ from armtempo.model.parts import Load
 from armtempo.model.workspace import KeepOut, Workspace
 from armtempo.planning import point_to_point, workspace_check
 from armtempo.splines.trajectory import Trajectory
+from scipy.spatial.transform import Rotation
 
 ARMS = ("parol6", "ar4", "thor", "community", "moveo", "scara", "paper")
 _POINTS = 41
@@ -23,7 +24,7 @@ _POINTS = 41
 
 def random_workspace(seed: int) -> tuple[Arm, Trajectory]:
     """An arm in a workspace, and a motion from a posture that touches nothing."""
-    rng = np.random.default_rng([seed, 32])
+    rng, turns = np.random.default_rng([seed, 32]), np.random.default_rng([seed, 33])
     for _ in range(1000):
         name = ARMS[int(rng.integers(len(ARMS)))]
         arm = Arm.paper() if name == "paper" else Arm.of(name)
@@ -36,7 +37,13 @@ def random_workspace(seed: int) -> tuple[Arm, Trajectory]:
             links = chains_mm(arm, start + rng.random() * (end - start))[2:]
             centre = links[rng.integers(len(links))] + rng.normal(0.0, 0.1, 3) * reach
             half = rng.uniform(0.01, 0.1, 3) * reach
-            boxes.append(KeepOut(f"box {number}", tuple(centre - half), tuple(centre + half)))
+            axes = np.eye(4)
+            if seed % 2:  # along the axes of a frame
+                axes[:3, :3] = Rotation.random(random_state=turns).as_matrix()
+                axes[:3, 3] = turns.normal(0.0, reach, 3)
+            middle = axes[:3, :3].T @ (centre - axes[:3, 3])
+            ends = tuple(middle - half), tuple(middle + half)
+            boxes.append(KeepOut(f"box {number}", *ends, tuple(map(tuple, axes.tolist()))))
         radius = float(rng.choice([0.0, 0.01, 0.04])) * reach
         joints = tuple(replace(joint, radius_mm=radius) for joint in arm.joints)
         load = None
@@ -86,7 +93,8 @@ def _least(arm: Arm, points: np.ndarray) -> float:
     """Of points (N, 3, P) from all boxes; they count as 0 inside."""
     found = np.inf
     for box in (arm.workspace or Workspace()).keep_out:
-        low, high = np.array(box.low_mm)[:, None], np.array(box.high_mm)[:, None]
-        away = np.maximum(np.maximum(low - points, points - high), 0.0)
+        low, high, axes = np.array(box.low_mm)[:, None], np.array(box.high_mm)[:, None], np.array(box.axes)
+        local = axes[:3, :3].T @ (points - axes[:3, 3:])
+        away = np.maximum(np.maximum(low - local, local - high), 0.0)
         found = min(found, float(np.linalg.norm(away, axis=1).min()))
     return found

@@ -194,6 +194,7 @@ def test_what_another_module_changes_is_no_constant() -> None:
     assert folded["made.main"] == texts["made.main"].replace("state.two", "2")
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_every_module_of_the_core_is_whole() -> None:
     """No module is imported that is not there, and no name that is not in it."""
@@ -234,6 +235,7 @@ def test_the_short_message_table_says_the_same() -> None:
         assert short["offset"](*place) == table.offset(*place)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("folder", ["", "/flash/lib/", "names"])
 def test_tracebacks_say_classes(folder: str) -> None:

@@ -1,59 +1,30 @@
-"""Jogs as they are planned: within ranges and limits, on their line, quick to brake; the keys of the screen."""
+"""The law of a jog of a joint: within ranges and limits, nearly the fastest, quick to brake."""
 
 from __future__ import annotations
 
 import math
 import random
-import sys
-from collections import deque
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.cli.jog_screen import JogChoice, JogScreen, _StopKeys
-from armtempo.cli.keys import INTERRUPT, WindowsKeys
 from armtempo.encoding import encode
-from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.planning import brake_time, move_law
 from armtempo.planning.jog import jog_motion
-from armtempo.planning.jog.jog_line import FollowedLine
-from armtempo.planning.jog.jog_motion import JogMotion, JogMove
-from armtempo.planning.move_law import WayLimits
+from armtempo.planning.jog.jog_motion import JogMove
+from armtempo.planning.move_law import MoveLimits
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared.engine_memory import ONCE_BYTES
 from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.motion import Motion
 
-PAPER, AR4 = Arm.paper(), Arm.load("ar4")
-ELBOW_DEG = [20.0, 10.0, -20.0, 15.0, 40.0, 30.0]
-"""A posture of AR4 far from any singular one."""
+from tests.host.jogs import AR4, ELBOW_DEG, PAPER, check_limits, on_steps
+
 INF = math.inf
-NAMES = ["waist", "shoulder"]
-
-
-def on_steps(arm: Arm, angles_deg: list[float]) -> list[float]:
-    """The posture of whole steps next to the angles."""
-    return [
-        round(angle * joint.steps_per_deg) / joint.steps_per_deg
-        for angle, joint in zip(angles_deg, arm.driven, strict=True)
-    ]
-
-
-def check_limits(motion: JogMotion, arm: Arm, speed: float) -> None:
-    """Speed and ramps keep their parts of the limits, and every joint its range."""
-    for reached, joint in zip(extremes.of_joints(motion.trajectory.joints), arm.driven, strict=True):
-        most = joint.limits
-        assert reached.speed_deg_s <= speed * most.speed_deg_s * (1 + 1e-9)
-        assert reached.acceleration_deg_s2 <= move_law.ACCELERATION * most.acceleration_deg_s2 * (1 + 1e-9)
-        assert reached.jerk_deg_s3 <= move_law.JERK * most.jerk_deg_s3 * (1 + 1e-9)
-    angles = motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 2000))
-    low, high = np.array([joint.range_deg for joint in arm.driven]).T
-    assert np.all(angles >= low)
-    assert np.all(angles <= high)
 
 
 @pytest.mark.slow
@@ -62,21 +33,21 @@ def test_the_law_keeps_its_limits_and_is_nearly_the_fastest() -> None:
     print("seed", seed)
     rng = random.Random(seed)
     for _ in range(100):
-        limits = WayLimits(*(10 ** rng.uniform(-1, 3) for _ in range(3)))
+        limits = MoveLimits(*(10 ** rng.uniform(-1, 3) for _ in range(3)))
         length = 10 ** rng.uniform(-3, 3)
         law = move_law.law(length, limits, rng.choice([INF, length / 10]))
-        way = JointSpline(move_law.DEGREE, 1, law.way, law.time_s)
+        spline = JointSpline(move_law.DEGREE, 1, law.distance, law.time_s)
         assert np.all(np.diff(law.time_s) > 0)
-        assert way(0.0) == pytest.approx(0.0, abs=1e-9 * length)
-        assert way(way.duration_s) == pytest.approx(length)
-        reached = extremes.of_joint(way)
+        assert spline(0.0) == pytest.approx(0.0, abs=1e-9 * length)
+        assert spline(spline.duration_s) == pytest.approx(length)
+        reached = extremes.of_joint(spline)
         for value, most in zip(reached.values, (limits.speed, limits.acceleration, limits.jerk), strict=True):
             assert value <= most * (1 + 1e-6)
         for order in (1, 2):
-            assert way(0.0, order) == pytest.approx(0.0, abs=1e-6 * reached.values[order - 1])
+            assert spline(0.0, order) == pytest.approx(0.0, abs=1e-6 * reached.values[order - 1])
         peak = min(limits.peak(length), limits.speed)
         optimum_s = 2.0 * limits.ramp_s(peak) + max(0.0, length - peak * limits.ramp_s(peak)) / peak
-        assert way.duration_s <= max(move_law.SHORTEST_S * (1 + 1e-9), 1.15 * optimum_s)
+        assert spline.duration_s <= max(move_law.SHORTEST_S * (1 + 1e-9), 1.15 * optimum_s)
 
 
 TIMES_S = (0.1, 0.2, 0.5, 1.0, 2.0)
@@ -144,7 +115,7 @@ TIMES_S at the limits of a jog, by ruckig's velocity interface (``python -m test
 def held(arm: Arm, joint: int, speed: float) -> Array:
     """Way of a held jog after TIMES_S, degrees, far from its end."""
     found = move_law.law(3000.0, move_law.of_joints([arm.driven[joint].limits], [1.0], speed))
-    return JointSpline(move_law.DEGREE, 1, found.way, found.time_s)(np.array(TIMES_S))
+    return JointSpline(move_law.DEGREE, 1, found.distance, found.time_s)(np.array(TIMES_S))
 
 
 @pytest.mark.parametrize("name", OPTIMUM_DEG)
@@ -164,7 +135,7 @@ def test_a_held_jog_goes_never_less_far_at_a_higher_speed(name: str) -> None:
         assert np.diff(ways, axis=0).min() >= -1e-9
 
 
-def rest_s(limits: WayLimits, speed: float, acceleration: float) -> float:
+def rest_s(limits: MoveLimits, speed: float, acceleration: float) -> float:
     """The shortest time to rest from a speed that still rises."""
     most = speed + 0.5 * acceleration**2 / limits.jerk
     return acceleration / limits.jerk + limits.ramp_s(most)
@@ -178,7 +149,7 @@ def test_a_released_jog_is_soon_at_rest(name: str) -> None:
     for percent in (1, 10, 100):
         limits = move_law.of_joints([driven], [1.0], percent / 100)
         law = move_law.law(400.0, limits)
-        spline = JointSpline(move_law.DEGREE, 1, law.way, law.time_s)
+        spline = JointSpline(move_law.DEGREE, 1, law.distance, law.time_s)
         brakes = brake_time.of_motion(Trajectory(name, (spline,), True), [driven])
         times_s = np.append(limits.ramp_s(limits.speed) * np.linspace(0.1, 0.9, 9), 0.4 * spline.duration_s)
         for time_s in times_s:
@@ -253,92 +224,6 @@ def test_a_step_goes_as_far_as_it_says(by: float, speed: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("axis", "by"),
-    [("x", -INF), ("y", 5.0), ("z", -0.1), ("tool-x", 5.0), ("tool-y", -0.1), ("tool-z", -INF)],
-)
-def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: float) -> None:
-    here = on_steps(AR4, ELBOW_DEG)
-    motion = jog_motion.plan("x", AR4, here, JogMove(by, axis=axis))
-    check_limits(motion, AR4, jog_motion.SPEED)
-    start = forward(AR4, here)
-    unit = np.eye(3)["xyz".index(axis[-1])] * math.copysign(1, by)
-    direction = start[:3, :3] @ unit if axis.startswith("tool") else unit
-    poses = forward(AR4, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 500)))
-    gaps = poses[:, :3, 3] - start[:3, 3]
-    along = gaps @ direction
-    assert np.abs(gaps - along[:, None] * direction).max() < 0.5
-    assert np.abs(poses[:, :3, :3] - start[:3, :3]).max() < 0.01
-    assert np.all(np.diff(along) > -0.02)
-    if math.isinf(by):
-        assert motion.ends
-        assert along[-1] > 10.0
-    else:
-        assert along[-1] == pytest.approx(abs(by), abs=0.01)
-
-
-@pytest.mark.parametrize("by", [10.0, -INF])
-def test_the_tool_turns_about_its_own_point(by: float) -> None:
-    here = on_steps(AR4, ELBOW_DEG)
-    motion = jog_motion.plan("x", AR4, here, JogMove(by, axis="tool-y", about=True))
-    check_limits(motion, AR4, jog_motion.SPEED)
-    start = forward(AR4, here)
-    poses = forward(AR4, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 300)))
-    assert np.abs(poses[:, :3, 3] - start[:3, 3]).max() < 0.5
-    assert np.abs(poses[:, :3, 1] - start[:3, 1]).max() < 0.01  # the axis stays
-    if by > 0:
-        turned = math.degrees(math.acos(poses[-1, :3, 0] @ start[:3, 0]))
-        assert turned == pytest.approx(by, abs=0.02)
-
-
-def test_an_arm_of_three_joints_moves_its_tool_and_lets_it_turn() -> None:
-    here = on_steps(PAPER, [0.0, -60.0, 40.0])
-    motion = jog_motion.plan("x", PAPER, here, JogMove(10.0, axis="z"))
-    way = forward(PAPER, motion.end_deg)[:3, 3] - forward(PAPER, here)[:3, 3]
-    np.testing.assert_allclose(way, [0.0, 0.0, 10.0], atol=0.05)
-    with pytest.raises(InputError, match="cannot turn the tool about z"):
-        jog_motion.plan("x", PAPER, here, JogMove(10.0, axis="z", about=True))
-
-
-def test_a_fast_jog_stays_on_its_line_where_its_ramps_take_all_of_it() -> None:
-    here = on_steps(PAPER, [42.186, -67.396, 17.178])
-    motion = jog_motion.plan("x", PAPER, here, JogMove(-INF, axis="x"), 1.0)
-    check_limits(motion, PAPER, 1.0)
-    start = forward(PAPER, here)[:3, 3]
-    tool = forward(PAPER, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 800)))[:, :3, 3]
-    assert np.linalg.norm((tool - start)[:, 1:], axis=1).max() < 1.1 * jog_motion.STRAY_MM
-    assert start[0] - tool[-1, 0] > 700.0
-
-
-def test_a_line_ends_before_a_singular_posture() -> None:
-    motion = jog_motion.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(INF, axis="x"))
-    assert "singular" in motion.ends
-    assert (
-        np.abs(np.diff(motion.trajectory(np.linspace(0, motion.trajectory.duration_s, 400)), axis=0)).max()
-        < 2.0
-    )
-
-
-@pytest.mark.parametrize(("by", "said"), [(20.0, "cannot follow the line any further"), (INF, "singular")])
-def test_a_line_that_the_joints_cannot_follow_is_made_shorter(
-    by: float, said: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """And says so, if nothing else has ended it before."""
-    lengths: list[float] = []
-    on_line = jog_motion._on_line
-
-    def hindered(name: str, followed: FollowedLine, length: float, speed: float) -> Trajectory | None:
-        lengths.append(length)
-        return on_line(name, followed, length, speed) if len(lengths) > 1 else None
-
-    monkeypatch.setattr(jog_motion, "_on_line", hindered)
-    motion = jog_motion.plan("x", AR4, on_steps(AR4, ELBOW_DEG), JogMove(by, axis="x"))
-    assert len(lengths) == 2
-    assert lengths[1] < lengths[0]
-    assert said in motion.ends
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.01, 0.25, 1.0])
 def test_the_boards_memory_holds_a_held_jog(speed: float) -> None:
     for move in (
@@ -368,14 +253,6 @@ def test_what_is_no_jog_is_refused(move: JogMove, speed: float, said: str) -> No
         jog_motion.plan("x", PAPER, [0.0, -60.0, 40.0], move, speed)
 
 
-@pytest.mark.parametrize(
-    ("start", "said"), [([0.0, -60.0], "3 angles, not 2"), ([0.0, -60.0, 400.0], "outside of its range")]
-)
-def test_the_tool_moves_from_a_posture_of_the_arm_only(start: list[float], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        jog_motion.plan("x", PAPER, start, JogMove(1.0, axis="x"), 0.25)
-
-
 def test_joints_have_numbers_and_names() -> None:
     named = replace(PAPER, joints=tuple(replace(j, name=f"j{n}") for n, j in enumerate(PAPER.joints, 1)))
     assert (
@@ -387,160 +264,3 @@ def test_joints_have_numbers_and_names() -> None:
     for wrong in (0, 4, "j9", "-1", -1):
         with pytest.raises(InputError, match="drives no joint"):
             jog_motion.number_of_joint(named, wrong)
-
-
-@pytest.mark.parametrize("stretched", [(0.0, 0.0), (30.0, 0.0)])
-def test_a_stretched_arm_is_said_to_be_singular(stretched: tuple[float, float]) -> None:
-    arm = Arm.load("scara")
-    here = [*stretched, *[joint.home_deg for joint in arm.driven[2:]]]
-    axis = "x" if stretched[0] == 0.0 else "tool-x"
-    with pytest.raises(
-        InputError, match="the posture is singular, stretched or folded; bend it first"
-    ) as refused:
-        jog_motion.plan("jog", arm, here, JogMove(10.0, axis=axis))
-    assert jog_motion.problem(arm, here, JogMove(INF, axis=axis)) == str(refused.value)
-
-
-@pytest.mark.parametrize(("axis", "about"), [("z", False), ("x", True)])
-def test_an_arm_without_the_joints_is_not_said_to_be_singular(axis: str, about: bool) -> None:
-    """No joint of the SCARA moves its tool up, stretched or bent."""
-    arm = Arm.load("scara")
-    for bent in (0.0, 40.0):
-        here = [0.0, bent, *[joint.home_deg for joint in arm.driven[2:]]]
-        with pytest.raises(InputError, match="too few joints"):
-            jog_motion.plan("jog", arm, here, JogMove(5.0, axis=axis, about=about))
-
-
-@pytest.mark.parametrize(
-    ("keys", "said"),
-    [
-        ("", "waist, step 1°, 25 %"),
-        ("2", "shoulder, step 1°, 25 %"),
-        ("3", "waist, step 1°, 25 %"),  # there is no third joint
-        ("s", "waist, step 10°, 25 %"),
-        ("ss", "waist, step 0.1°, 25 %"),
-        ("h", "waist, held, 25 %"),
-        ("hs", "waist, step 10°, 25 %"),
-        ("y", "tool along y, step 1 mm, 25 %"),
-        ("Zf", "tool about tool's z, step 1°, 25 %"),
-        ("z1", "waist, step 1°, 25 %"),
-        (">", "waist, step 1°, 50 %"),
-        (">" * 9, "waist, step 1°, 100 %"),
-        ("<" * 9, "waist, step 1°, 1 %"),
-    ],
-)
-def test_keys_choose_what_moves(keys: str, said: str) -> None:
-    choice = JogChoice()
-    for key in keys:
-        assert choice.press(key, len(NAMES)) is (key != "3")
-    assert choice.describe(NAMES) == said
-    assert not choice.press("+", len(NAMES))
-
-
-def test_the_axis_has_the_librarys_name() -> None:
-    choice = JogChoice()
-    assert choice.tool_axis is None
-    choice.press("Y", 2)
-    assert choice.tool_axis == "y"
-    choice.press("f", 2)
-    assert choice.tool_axis == "tool-y"
-
-
-class Typed:
-    """Keys that were pressed already; then none."""
-
-    def __init__(self, *keys: str) -> None:
-        self._keys = deque(keys)
-
-    def read(self, _seconds: float) -> str:
-        return self._keys.popleft() if self._keys else ""
-
-    def flush(self) -> None:
-        self._keys.clear()
-
-
-class Jogged:
-    """A board that notes what is to move."""
-
-    arm = Arm.paper()
-    last_jog_ends = "joint 1 is at the end of its range, 190 degrees"
-
-    def __init__(self) -> None:
-        self.moves: list[tuple[object, ...]] = []
-
-    def posture_deg(self) -> np.ndarray:
-        return np.array(self.arm.home_deg)
-
-    def jog(self, *move: object) -> None:
-        """The last of it is the wish to stop."""
-        self.moves.append(move[:-1])
-
-
-@pytest.mark.parametrize("arm", ["paper", "ar4"])
-def test_the_line_never_wraps_in_80_columns(
-    arm: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(Jogged, "arm", Arm.load(arm))
-    monkeypatch.setenv("COLUMNS", "80")
-    screen = JogScreen(Jogged(), Typed())  # type: ignore[arg-type]
-    for key in ("", "Z", "+", "%", "2", "-"):
-        screen._act(key)
-        screen._show()
-    lines = [line.removeprefix("\x1b[K") for line in capsys.readouterr().out.split("\r")[1:]]
-    assert max(map(len, lines)) <= 79
-    assert any("at the end of its range" in line for line in lines)
-    assert any(line.endswith("°") and "mm" in line for line in lines)
-
-
-def test_a_question_mark_says_the_keys(capsys: pytest.CaptureFixture[str]) -> None:
-    screen = JogScreen(Jogged(), Typed(), {"p": str}, "  p  the caller's")  # type: ignore[arg-type]
-    screen._act("?")
-    said = capsys.readouterr().out
-    assert "steps, or moving while" in said
-    assert said.endswith("the caller's\n")
-
-
-def test_a_step_goes_to_the_board_as_it_was_chosen() -> None:
-    board = Jogged()
-    screen = JogScreen(board, Typed())  # type: ignore[arg-type]
-    for key in "+>2s-zf+":
-        screen._act(key)
-    assert board.moves == [
-        (1, 1.0, None, None, 0.25),
-        (2, -10.0, None, None, 0.5),
-        (None, None, "tool-z", 10.0, 0.5),
-    ]
-
-
-@pytest.mark.parametrize("key", [" ", "q"])
-def test_space_and_what_ends_the_screen_end_a_step(key: str) -> None:
-    with _StopKeys(Typed("x", key)) as stop:  # type: ignore[arg-type]
-        stop._thread.join(10.0)
-    assert stop.request.wanted
-    assert stop.pressed == key
-
-
-class Console:
-    """Python's ``msvcrt`` with keys that were pressed."""
-
-    def __init__(self, *codes: str) -> None:
-        self._codes = deque(codes)
-
-    def kbhit(self) -> bool:
-        return bool(self._codes)
-
-    def getwch(self) -> str:
-        return self._codes.popleft()
-
-
-def test_keys_of_a_windows_console(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "msvcrt", Console("\xe0", "H", "\x00", "K", "\xe0", "?", "a", "\x03"))
-    keys = WindowsKeys()
-    assert [keys.read(0.0) for _ in range(6)] == ["up", "left", "", "a", INTERRUPT, ""]
-
-
-def test_other_keys_end_no_step() -> None:
-    with _StopKeys(Typed("x", "s")) as stop:  # type: ignore[arg-type]
-        pass
-    assert not stop.request.wanted
-    assert not stop._thread.is_alive()

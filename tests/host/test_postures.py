@@ -157,7 +157,9 @@ def test_a_new_posture_is_put_behind_and_the_rest_stays(tmp_path: Path) -> None:
     ],
 )
 def test_only_the_one_table_changes(old: str, new: str) -> None:
-    assert taught.with_posture(old, "park", [7.0, 8.5, -9.0], Path("arm.toml")) == new
+    assert (
+        taught.with_table(old, ("posture", "park"), {"angles_deg": [7.0, 8.5, -9.0]}, Path("arm.toml")) == new
+    )
 
 
 @pytest.mark.parametrize(
@@ -171,7 +173,7 @@ def test_only_the_one_table_changes(old: str, new: str) -> None:
 )
 def test_a_layout_that_cannot_be_changed_safely_is_left_alone(text: str) -> None:
     with pytest.raises(InputError, match="cannot be changed here") as refused:
-        taught.with_posture(text, "park", [7.0, 8.5, -9.0], Path("arm.toml"))
+        taught.with_table(text, ("posture", "park"), {"angles_deg": [7.0, 8.5, -9.0]}, Path("arm.toml"))
     assert "[posture.park] angles_deg = [7, 8.5, -9]" in str(refused.value)
 
 
@@ -186,7 +188,7 @@ def test_random_files_change_in_the_one_table_only() -> None:
         text = "".join([parts[0], *rng.sample(parts[1:], len(parts) - 1)])
         name = rng.choice(["park", "new"])
         angles = [round(rng.uniform(-90, 90), 3) for _ in range(3)]
-        after = taught.with_posture(text, name, angles, Path("arm.toml"))
+        after = taught.with_table(text, ("posture", name), {"angles_deg": angles}, Path("arm.toml"))
         expected = tomllib.loads(text)
         expected["posture"][name] = {"angles_deg": angles}
         assert tomllib.loads(after) == expected

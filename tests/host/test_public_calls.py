@@ -122,6 +122,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "pin": "PE9",
         "safe": 0.0,
         "bounds": [(0, 1)],
+        "frame": "base",
         "function": lambda x: (x**2).sum(1),
         "rng": np.random.default_rng(1),
         "limits": armtempo.Limits(10, 10, 10),

@@ -18,12 +18,13 @@ SEED = 5
 READ_BY_PROGRAMS = {
     "exchange.py": 1,  # CSV
     "help.py": 1,  # a page
-    "jog_screen.py": 4,  # fits its line to the terminal itself
+    "jog_screen.py": 5,  # fits its line to the terminal itself
     "panel.py": 1,  # an address
     "programs.py": 2,  # a line that is written again and again
     "results.py": 3,
     "sequences.py": 2,  # a line that is written again and again
-    "teach.py": 2,  # TOML, and a line that is written again and again
+    "taught_points.py": 1,  # TOML
+    "teach.py": 1,  # a line that is written again and again
     "virtual_board.py": 1,  # a path
 }
 """Files that print without ``results.echo``, and how often."""

@@ -12,7 +12,7 @@ import pytest
 from armtempo.model import arm_json, sequence_plan
 from armtempo.model import plan as plan_file
 from armtempo.ports import claim_file
-from armtempo.report import run_folder, sequence_folder
+from armtempo.report import run_folder
 from armtempo_shared import (
     armrecord,
     codes,
@@ -301,7 +301,6 @@ def test_versions_are_those_of_files_that_exist() -> None:
         "trajectory": plan_file.VERSION,
         "sequence": sequence_plan.VERSION,
         "run": run_folder.VERSION,
-        "sequence run": sequence_folder.VERSION,
         "claim": claim_file.VERSION,
         "arm record": armrecord.VERSION,
         "protocol": messages.PROTOCOL_VERSION,
@@ -310,8 +309,7 @@ def test_versions_are_those_of_files_that_exist() -> None:
         "arm": 1,
         "trajectory": 2,
         "sequence": 2,
-        "run": 1,
-        "sequence run": 1,
+        "run": 2,
         "claim": 1,
         "arm record": 2,
         "protocol": 7,

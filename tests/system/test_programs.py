@@ -126,8 +126,14 @@ def test_commands_around_a_program(tmp_path: Path) -> None:
         told = json.loads(commandline.run("status", "--json", folder=tmp_path, **port).output)["sequence"]
         assert (told["name"], told["ending"], told["step"]) == ("pick.py", "running", 3)
         assert commandline.run("stop", folder=tmp_path, **port).exit_code == 0
+        done = commandline.run(
+            "upload", "pick.py", "--name", "pack", "--arm", arm, "--default", folder=tmp_path, **port
+        )
+        assert (done.exit_code, "has the name of its file" in done.errors) == (2, True)
+        done = commandline.run("upload", "pick.py", "--arm", arm, "--default", folder=tmp_path, **port)
+        assert (done.exit_code, "bytes stored" in done.output) == (0, True), done.errors
         done = commandline.run("list", folder=tmp_path, **port)
-        assert re.search(r"pick +\d+ +program ", done.output)
+        assert re.search(r"pick \* +\d+ +program ", done.output)
         with armtempo.connect(process.port, SHIPPED) as board:
             assert board.client.sequence().ending == "stopped"
             board.configure(SHIPPED)

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.deploy import program_files
-from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding import encode, encoded_motion, encoded_program
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.user_program import UserProgram
 from armtempo.planning import planner
 from armtempo_shared.limits import TICK_HZ
 
@@ -25,6 +26,12 @@ ARM = Arm.paper()
 HOME_DEG = np.array(ARM.home_deg)
 HOME_STEPS = [round(angle * joint.steps_per_deg) for angle, joint in zip(HOME_DEG, ARM.driven, strict=True)]
 AWAY_DEG = ([3.0, 2.0, -2.0], [-1.0, 1.0, 2.0])
+PICK = f"""from armtempo_board import cell
+cell.goto({(HOME_DEG + 1.0).tolist()})
+print("first\\nsecond")
+while True:
+    cell.sleep(1)
+"""
 FEWER = {"micropython": 8, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
 QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
@@ -58,7 +65,7 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Flashes of boards for the shipped arm, ``finish`` and ``stop`` being what it does without its host.
 
     ``broken`` has a main.py that raises. ``go`` leaves home with all joints, turns, and comes back in about
-    2.3 s; how long exactly is in ``ticks``.
+    2.3 s; how long exactly is in ``ticks``. ``pick`` is a program: it moves, prints, and waits.
     """
     folder = tmp_path_factory.mktemp("flashes")
     postures = (HOME_DEG, *(HOME_DEG + np.array(away) for away in AWAY_DEG), HOME_DEG)
@@ -77,6 +84,9 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name / "armtempo" / "go.atm").write_bytes(
             encoded_motion.of_trajectory(trajectory, arm).data
         )
+        (folder / "pick.py").write_text(PICK)
+        program = encoded_program.of_program(UserProgram.load(folder / "pick.py", arm), arm)
+        (folder / name / "armtempo" / "pick.atm").write_bytes(program.data)
     _add_legs(folder / "legs" / "armtempo")
     (folder / "ticks").write_text(str(round(trajectory.duration_s * TICK_HZ)))
     shutil.copytree(folder / "finish", folder / "broken")

@@ -16,11 +16,16 @@ from armtempo_shared import codes
 from armtempo_shared.messages import MAX_PAYLOAD
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.app.board import Board
 from armtempo_board.app.commands import Commands
 from armtempo_board.app.controller import Controller
 from armtempo_board.app.events import Events
 from armtempo_board.link.serial_link import SerialLink
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _EXTRA_SERVICES_PER_PASS = const(3)  # calls of the engine, during a motion
 _SPARE_BYTES = const(512)  # reserved for reporting an exception: a traceback, and its end for the host
@@ -48,6 +53,14 @@ class App:
         self.commands.leaving = False
         self.commands.greeted = False
         self.link.forget()
+
+    if features.SEQUENCES:
+
+        def execute_program(self, run_once: "Callable[[], None]") -> None:
+            """Execute the user's program that was started, if one was; ``run_once``: one pass of the loop."""
+            program, self.controller.program = self.controller.program, None
+            if program:
+                program.execute(self, run_once)
 
     def leave_requested(self) -> int:
         """Whether a host has asked for the REPL, and the reply was sent."""

@@ -355,5 +355,6 @@ def _lowest(mask: int) -> int:
 
 
 def _free_heap() -> int:
+    gc.collect()  # what is no longer in use counts as free
     free = getattr(gc, "mem_free", None)
     return free() if free else 0

@@ -81,9 +81,8 @@ def run(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
         while True:
             run_once()
             try:
-                if features.SEQUENCES and app.controller.program:
-                    user_program, app.controller.program = app.controller.program, None
-                    user_program.execute(app, run_once)
+                if features.SEQUENCES:
+                    app.execute_program(run_once)
                 if app.leave_requested():
                     break
             except Exception as error:

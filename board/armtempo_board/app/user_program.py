@@ -110,7 +110,8 @@ class UserProgram(Sequencer):
             self.status[STEP] = line or self.status[STEP]
         except MemoryError:
             text = "MemoryError in line %d" % self.status[STEP]
-        self._is_said()
+        if not self._is_said():
+            self._app.events.notice = b""  # the host is gone, and the next one is to be told what happened
         self._app.events.note(text)
 
     def _print(self, *values: object, sep: str = " ", end: str = "\n", file: object = None) -> None:
@@ -217,14 +218,18 @@ class UserProgram(Sequencer):
         return self._command.count(number)
 
     def say(self, text: str) -> None:
-        """Each line as a notice, which is lost if no host takes the one before."""
+        """Each line as a notice, which is lost if no host takes the one before, or none has said hello."""
+        app = self._app
         for line in text.split("\n"):
             length = messages.MAX_PAYLOAD // (1 if len(line.encode()) == len(line) else 4)
             for at in range(0, len(line), length):
                 if not self._is_said():
                     return
                 self.check()
-                self._app.events.note(line[at : at + length])
+                app.events.note(line[at : at + length])
+                if not app.commands.greeted:
+                    self._run_once()  # at the REPL ``replay`` shows it; the next host does not get it
+                    app.events.notice = b""
 
     def _is_said(self) -> bool:
         """Wait until the text before was sent; returns whether it was."""

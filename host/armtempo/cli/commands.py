@@ -91,7 +91,12 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "posture:home", "Declare the arm's position.", "home", "home 0,-60,40", "home --switches"
         ),
         "goto": Entry(
-            "posture:goto", "Move straight to a posture.", "goto home", "goto 10,-50,30", "goto first.json"
+            "posture:goto",
+            "Move straight to a posture, or the tool to a pose.",
+            "goto home",
+            "goto 10,-50,30",
+            "goto --frame tray --position 0 0 50",
+            "goto first.json",
         ),
         "jog": Entry(
             "jog:jog",
@@ -99,12 +104,14 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "jog",
             "jog --joint 2 --by -5",
             "jog --axis z --by 10 --speed 50",
+            "jog --frame tray --axis x --by 5",
         ),
         "teach": Entry(
             "teach:teach",
             "Teach: store the arm's present position.",
             "teach points.toml",
             "teach --posture above_tray",
+            "teach frame tray",
         ),
         "run": Entry(
             "run:run",
@@ -203,9 +210,10 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "upload": Entry(
             "stored:upload",
-            "Store a trajectory file, or a planned sequence with its motions, on the board.",
+            "Store a trajectory file, a planned sequence or a program, with their motions, on the board.",
             "upload first.json",
             "upload first.json --name pick --default",
+            "upload pick_place.py --arm my_arm.toml --default",
         ),
         "list": Entry(
             "stored:list_motions",

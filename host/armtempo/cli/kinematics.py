@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.text import aligned
-from armtempo.cli import options, posture, resolve, results
+from armtempo.cli import options, posture, resolve, results, typed_pose
 from armtempo.cli.results import show_json
+from armtempo.cli.typed_pose import TypedPose
 from armtempo.kinematics import pose_file
 from armtempo.kinematics.chain import spread_deg
 from armtempo.kinematics.forward import all_frames
@@ -26,58 +27,15 @@ from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.rejection import out_of_range
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.pose import from_quaternion, to_quaternion, to_rpy_deg
-from armtempo.model.tool_pose import Pose
-
-Three = tuple[float, float, float]
-Four = tuple[float, float, float, float]
-
-
-@dataclass(frozen=True)
-class _Given:
-    """The options that describe the pose."""
-
-    matrix: str | None
-    position: Three | None
-    rpy: Three | None
-    quaternion: Four | None
-    roll: float | None
-    pitch: float | None
-    yaw: float | None
-    approach: Three | None
-    poses: Path | None
+from armtempo.model.pose import to_quaternion, to_rpy_deg
+from armtempo.model.tool_pose import BASE, Pose
 
 
 @click.command("ik")
 @options.arm
 @click.option("--matrix", metavar="NUMBERS", help="12 or 16 numbers in quotes: its rows, lengths in mm.")
-@click.option(
-    "--position",
-    type=float,
-    nargs=3,
-    metavar="X Y Z",
-    help="Tool position in mm; alone, or with an orientation.",
-)
-@click.option(
-    "--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw in deg: the whole orientation."
-)
-@click.option("--quaternion", type=float, nargs=4, metavar="W X Y Z", help="The same as a quaternion.")
-@click.option(
-    "--roll", type=float, metavar="DEG", help="Roll in deg; alone or with the pitch (the rest is free)."
-)
-@click.option(
-    "--pitch", type=float, metavar="DEG", help="Pitch in deg; alone or with roll or yaw, the rest is free."
-)
-@click.option(
-    "--yaw", type=float, metavar="DEG", help="Yaw in deg; alone or with the pitch, the rest is free."
-)
-@click.option(
-    "--approach",
-    type=float,
-    nargs=3,
-    metavar="X Y Z",
-    help="Direction of the tool's z axis; rotation about it is free.",
-)
+@typed_pose.options
+@options.frame
 @options.file(
     "--poses",
     help="One pose per line: x y z alone, with roll pitch yaw (- if free) or a quaternion, or 12 or 16 "
@@ -103,6 +61,9 @@ class _Given:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def ik(
     arm_path: Path | None,
+    matrix: str | None,
+    poses: Path | None,
+    frame: str,
     previous: str | None,
     numerical: bool,
     as_json: bool,
@@ -116,8 +77,10 @@ def ik(
     components, or an arm without a closed form, is solved by a numerical search over the joints that have a
     motor. Exit code 1 if a pose has no solution.
     """
-    wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in _poses(_Given(**given))]
+    found_poses = _poses(matrix, poses, TypedPose(**given))
     solver = PoseSolver(resolve.arm_or_paper(arm_path, for_shape=True))
+    in_base = [solver.arm.in_base(pose, frame) for pose in found_poses]
+    wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in in_base]
     found = listings(solver, wanted, _posture(previous, solver), numerical)
     show = _print_json if as_json else _print_text
     show(solver, found)
@@ -130,42 +93,18 @@ def _within(pose: Pose, tolerance_mm: float | None, tolerance_deg: float | None)
     return pose if tolerance_deg is None else replace(pose, tolerance_deg=tolerance_deg)
 
 
-def _poses(given: _Given) -> list[Pose]:
+def _poses(matrix: str | None, poses: Path | None, typed: TypedPose) -> list[Pose]:
     """The poses of the options; raises InputError unless exactly one of the three forms is given."""
-    if sum(form is not None for form in (given.matrix, given.position, given.poses)) != 1:
+    if sum(form is not None for form in (matrix, typed.position, poses)) != 1:
         raise InputError(
             "no pose, or more than one, is given", "give one of --matrix, --position and --poses"
         )
-    angles = {
-        name: getattr(given, name) for name in ("roll", "pitch", "yaw") if getattr(given, name) is not None
-    }
-    orientations = sum(form is not None for form in (given.rpy, given.quaternion, given.approach)) + bool(
-        angles
-    )
-    if orientations > (given.position is not None):
-        raise InputError(
-            "these options do not describe a pose",
-            "--position goes alone or with one of --rpy, --quaternion, --approach, or any of --roll, --pitch and "
-            "--yaw; and they go with it",
-        )
-    if given.poses is not None:
-        return pose_file.read(given.poses)
-    if given.matrix is not None:
-        return [pose_file.parse(given.matrix, "--matrix", (12, 16))]
-    return [_positioned(given, angles)]
-
-
-def _positioned(given: _Given, angles: dict[str, float]) -> Pose:
-    """The pose of --position and its orientation options."""
-    assert given.position is not None
-    if given.quaternion is not None:
-        matrix = from_quaternion(given.position, given.quaternion, "--position --quaternion")
-        return Pose.of_matrix(matrix)
-    if given.approach is not None:
-        return Pose.of_approach(given.position, given.approach, "--approach")
-    if given.rpy is not None:
-        angles = dict(zip(("roll", "pitch", "yaw"), given.rpy, strict=True))
-    return Pose.of_angles(given.position, angles, " ".join(("--position", *(f"--{name}" for name in angles))))
+    typed.check()
+    if poses is not None:
+        return pose_file.read(poses)
+    if matrix is not None:
+        return [pose_file.parse(matrix, "--matrix", (12, 16))]
+    return [typed.pose]
 
 
 def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
@@ -216,12 +155,18 @@ def _fail(without: list[int]) -> None:
 
 @click.command("fk", cls=options.TakesNumbers)
 @click.argument("where", nargs=-1)
+@options.frame
 @options.job
 @options.arm
 @options.altered
 @options.as_json
 def fk(
-    where: tuple[str, ...], job_path: Path | None, arm_path: Path | None, altered: bool, as_json: bool
+    where: tuple[str, ...],
+    frame: str,
+    job_path: Path | None,
+    arm_path: Path | None,
+    altered: bool,
+    as_json: bool,
 ) -> None:
     """Print the tool's pose and every frame for given joint angles.
 
@@ -240,9 +185,9 @@ def fk(
         arm = resolve.arm_or_paper(arm_path, for_shape=True)
         angles_deg = _angles(where, arm)
     if as_json:
-        results.show_json(_values(arm, angles_deg))
+        results.show_json(_values(arm, angles_deg, frame))
     else:
-        results.echo("\n".join(_lines(arm, angles_deg)))
+        results.echo("\n".join(_lines(arm, angles_deg, frame)))
 
 
 def _angles(where: tuple[str, ...], arm: Arm) -> Array:
@@ -252,27 +197,36 @@ def _angles(where: tuple[str, ...], arm: Arm) -> Array:
     return spread_deg(arm, numbers(" ".join(where), "the angles"))
 
 
-def _lines(arm: Arm, angles_deg: Array) -> Iterator[str]:
+def _frames(arm: Arm, angles_deg: Array, frame: str) -> Array:
+    """The rows' frames at the angles of all joints, (joints,), in a frame of the arm: (joints + 1, 4, 4)."""
+    return np.asarray(
+        np.linalg.inv(arm.frame(frame)) @ all_frames(Geometry.of(arm), np.radians(angles_deg).tolist())
+    )
+
+
+def _lines(arm: Arm, angles_deg: Array, frame: str) -> Iterator[str]:
     """The table for the angles of all joints, (joints,): one row per frame, then the tool's pose."""
-    frames = all_frames(Geometry.of(arm), np.radians(angles_deg).tolist())
-    yield f"{arm.name} at {' '.join(_number(angle) for angle in angles_deg)} deg"
+    frames = _frames(arm, angles_deg, frame)
+    seen = "" if frame == BASE else f", in frame {frame}"
+    yield f"{arm.name} at {' '.join(_number(angle) for angle in angles_deg)} deg{seen}"
     rows = [["frame", "x", "y", "z", "roll", "pitch", "yaw"], ["", "mm", "mm", "mm", "deg", "deg", "deg"]]
-    for name, frame in zip(_names(arm), frames, strict=True):
-        rows.append([name, *(_number(value) for value in (*frame[:3, 3], *to_rpy_deg(frame)))])
+    for name, row in zip(_names(arm), frames, strict=True):
+        rows.append([name, *(_number(value) for value in (*row[:3, 3], *to_rpy_deg(row)))])
     yield from aligned(rows, (8, *(12,) * 6))
     yield "tool as a matrix, lengths in mm:"
-    for row in frames[-1]:
-        yield "".join(f"{round(value, 6) + 0.0:14.6f}" for value in row)
+    for numbers_of_row in frames[-1]:
+        yield "".join(f"{round(value, 6) + 0.0:14.6f}" for value in numbers_of_row)
     yield "tool as a quaternion w x y z: " + " ".join(f"{value:.8f}" for value in to_quaternion(frames[-1]))
     for reason in _outside(arm, angles_deg):
         yield f"note: {reason}"
 
 
-def _values(arm: Arm, angles_deg: Array) -> dict[str, Any]:
+def _values(arm: Arm, angles_deg: Array, frame: str) -> dict[str, Any]:
     """The same as JSON values."""
-    frames = all_frames(Geometry.of(arm), np.radians(angles_deg).tolist())
+    frames = _frames(arm, angles_deg, frame)
     return {
         "arm": arm.name,
+        "frame": frame,
         "angles_deg": angles_deg.tolist(),
         "tool": {**tool_values(frames[-1]), "quaternion": list(to_quaternion(frames[-1]))},
         "frames": [

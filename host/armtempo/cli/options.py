@@ -98,6 +98,12 @@ replace_arm = click.option(
 gamepad = click.option(
     "--gamepad", is_flag=True, help="Use a gamepad in addition to the keys (needs the extra 'gamepad')."
 )
+frame = click.option(
+    "--frame",
+    default="base",
+    metavar="NAME",
+    help="Frame of the arm file in which poses are.  [default: base]",
+)
 holds = click.option(
     "--holds",
     metavar="NAME",

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.cli import options, resolve, results, state
+from armtempo.cli import options, resolve, results, state, typed_pose
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
+from armtempo.cli.typed_pose import TypedPose
 from armtempo.model import via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -21,40 +23,59 @@ from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
 from armtempo.model.sequence_plan import SequencePlan, is_sequence_plan
+from armtempo.model.tool_pose import BASE
 from armtempo.planning import point_to_point, via_points
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
 
 
 @click.command("goto", cls=options.TakesNumbers)
-@click.argument("where", nargs=-1, required=True, shell_complete=options.files)
+@click.argument("where", nargs=-1, shell_complete=options.files)
+@typed_pose.options
+@options.frame
 @click.option("--line", is_flag=True, help="Move the tool in a straight line, turning evenly.")
 @options.holds
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
 def goto(
-    where: tuple[str, ...], line: bool, holds: str | None, job_path: Path | None, given: BoardOptions
+    where: tuple[str, ...],
+    frame: str,
+    line: bool,
+    holds: str | None,
+    job_path: Path | None,
+    given: BoardOptions,
+    **pose: Any,
 ) -> None:
-    """Move straight to a posture.
+    """Move straight to a posture, or the tool to a pose.
 
     WHERE: 'home' or another posture of the arm file, angles such as '0,-60,40', a via point of the job such
-    as P0, or a trajectory file or a planned sequence (its start). All joints move together, within their
-    limits; with --line the tool moves in a straight line. The arm must be homed. Ctrl-C, or 'armtempo stop'
-    in another terminal, brakes.
+    as P0, or a trajectory file or a planned sequence (its start). Or give a pose by --position, alone or with
+    an orientation, in the base or in a --frame of the arm file: the arm takes the nearest posture that reaches it.
+    All joints move together, within their limits; with --line the tool moves in a straight line. The arm must be
+    homed. Ctrl-C, or 'armtempo stop' in another terminal, brakes.
     """
+    typed = TypedPose(**pose)
+    if bool(where) == (typed.position is not None):
+        raise InputError("give a posture as WHERE, or a pose by --position", "armtempo goto home")
+    typed.check()
+    if where and frame != BASE:
+        raise InputError("--frame is the frame of --position", "leave it out with WHERE")
     if len(where) > 1:
         raise InputError(
             f"{len(where)} values for one posture",
             f"write them as one, with commas: armtempo goto {','.join(where)}",
         )
-    wanted = NamedPosture.of(where[0], given.arm_path, given.altered)
-    with resolve.board(given, wanted.arm) as board:
-        arm = resolve.arm_of_board(board, wanted.arm).holding(holds)
-        target_deg = wanted.angles_deg(arm, job_path)
+    wanted = NamedPosture.of(where[0], given.arm_path, given.altered) if where else None
+    named = wanted.arm if wanted else resolve.named_arm(given.arm_path)
+    if named is not None:
+        named.frame(frame)  # a wrong name is reported before a port is opened
+    with resolve.board(given, named) as board:
+        arm = resolve.arm_of_board(board, named).holding(holds)
+        target = wanted.angles_deg(arm, job_path) if wanted else arm.in_base(typed.pose, frame)
         board.configure(arm, replace=given.replace_arm)
         try:
             with ProgressBar("moving") as progress:
-                board.goto(target_deg, progress, line=line)
+                board.goto(target, progress, line=line)
         except Stopped:
             print_position(board, given.as_json)
             raise

@@ -17,6 +17,7 @@ from armtempo.deploy import program_files
 from armtempo.encoding import encoded_program
 from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.link.board_messages import SequenceState
+from armtempo.model.arm import Arm
 from armtempo.model.user_program import UserProgram
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
@@ -33,32 +34,57 @@ def program(file: Path, check: bool, force: bool, given: BoardOptions) -> None:
     FILE: a Python file with 'from armtempo_board import cell'; 'armtempo help programs' explains it. Motions that
     it names are planned files NAME.json beside it, or on the board. The arm must be homed ('armtempo home').
     Ctrl-C, or 'armtempo stop' in another terminal, brakes and ends it; 'armtempo status' shows its line.
+    'armtempo upload FILE --default' only stores it, for the board's button.
     """
     arm = resolve.load_arm(given.arm_path)
-    found = UserProgram.load(file, arm)
-    _check_syntax(found)
+    found = load(file, arm)
     if check:
         _show_check(
-            encoded_program.of_program(found, arm, encoded_program.motions_beside(found)), given.as_json
+            encoded_program.of_program(found, arm, encoded_program.motions_beside(found, arm)), given.as_json
         )
         return
-    say = results.progress_printer(given.as_json)
     with resolve.board(given, arm) as board:
-        board.configure(arm, replace=given.replace_arm)
-        encoded = board.encode_program(found, arm)
-        _warn(encoded)
-        with ProgressBar("uploading") as progress:
-            board.upload_program(encoded, progress, force)
-        say(f"{found.name}: {len(encoded.data)} bytes stored, {encoded.heap_bytes} bytes of heap")
+        encoded = store(board, found, arm, given, force)
+        results.progress_printer(given.as_json)(_stored(encoded))
         run_and_report(board, found.name, given.as_json)
 
 
-def _check_syntax(found: UserProgram) -> None:
-    """Compile it as MicroPython does, which knows less syntax than Python."""
+def load(file: Path, arm: Arm) -> UserProgram:
+    """The program of a file, compiled as MicroPython does, which knows less syntax than Python."""
+    found = UserProgram.load(file, arm)
     try:
         program_files.check_syntax(found.path, found.source)
     except MissingPackageError as error:
         results.remark(f"its syntax is not checked for MicroPython: {error}")
+    return found
+
+
+def store(
+    board: Board, found: UserProgram, arm: Arm, given: BoardOptions, force: bool, as_default: bool = False
+) -> EncodedProgram:
+    """Store a program with its motions, and say which moves would leave the workspace."""
+    board.configure(arm, replace=given.replace_arm)
+    encoded = board.encode_program(found, arm)
+    _warn(encoded)
+    with ProgressBar("uploading") as progress:
+        board.upload_program(encoded, progress, force, as_default)
+    return encoded
+
+
+def _stored(encoded: EncodedProgram) -> str:
+    name = encoded.program.name
+    return f"{name}: {len(encoded.data)} bytes stored, {encoded.heap_bytes} bytes of heap"
+
+
+def upload_and_report(file: Path, as_default: bool, force: bool, given: BoardOptions) -> None:
+    """Store the program of a file."""
+    arm = resolve.load_arm(given.arm_path)
+    found = load(file, arm)
+    with resolve.board(given, arm) as board:
+        encoded = store(board, found, arm, given, force, as_default)
+        virtual = board.info.virtual
+    values = {"name": found.name, "program": True, "size_bytes": len(encoded.data), "virtual": virtual}
+    results.show(given.as_json, values, [_stored(encoded)])
 
 
 def _warn(encoded: EncodedProgram) -> list[str]:

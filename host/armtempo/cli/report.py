@@ -12,9 +12,8 @@ from armtempo import pipeline
 from armtempo.basics.atomic_file import check_replaceable
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.cli import options, results
-from armtempo.report import evaluation, sequence_report, verdict
+from armtempo.report import evaluation, verdict
 from armtempo.report.run import Run
-from armtempo.report.sequence_reader import SequenceRun, is_sequence_run
 
 
 @click.command("report")
@@ -40,8 +39,7 @@ def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool)
                 "--out needs two or more runs",
                 "leave it out: the page of one run is report.html in its folder",
             )
-        sequence = is_sequence_run(runs[0])
-        page = pipeline.report(SequenceRun.load(runs[0]) if sequence else Run.load(runs[0]))
+        page = pipeline.report(Run.load(runs[0]))
         values = {"runs": [_values(runs[0], page)], "comparison": None} if as_json else None
         results.show(as_json, values, [f"wrote {page}"])
         return
@@ -64,7 +62,7 @@ def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool)
 
 def _values(run: Path, page: Path) -> dict[str, Any]:
     """The verdict (``good``, ``bad`` or ``open``) and the findings of a page."""
-    result = sequence_report.verdict_of(run) if is_sequence_run(run) else verdict.of(evaluation.evaluate(run))
+    result = verdict.of(evaluation.evaluate(run))
     findings = [asdict(finding) for finding in result.findings]
     return {"folder": str(run), "page": str(page), "verdict": result.state, "findings": findings}
 

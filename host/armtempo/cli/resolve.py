@@ -180,18 +180,15 @@ def as_recorded(
 
 def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = None) -> SequencePlan:
     """A planned sequence; raises InputError if an arm is set and it does not fit, or if ``name`` is given."""
-    from armtempo.encoding.encode import arm_record
+    from armtempo.encoding import planned_for
     from armtempo.model.sequence_plan import SequencePlan
 
     if name is not None:
         raise InputError("--name: the name of a sequence is in its file", "change it there and plan it again")
     found = SequencePlan.load(path)
     named = named_arm(arm_path)
-    if named is not None and arm_record(named) != arm_record(found.arm):
-        raise InputError(
-            f"{path} was planned for a different arm than {named.name!r} ({named.source})",
-            "plan it again with this arm",
-        )
+    if named is not None:
+        planned_for.check(path, found.arm, found.frames, named)
     return found
 
 

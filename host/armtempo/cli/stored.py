@@ -7,10 +7,11 @@ from typing import Any
 
 import click
 import numpy as np
+from armtempo_shared.program import SUFFIX
 
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
-from armtempo.cli import options, posture, resolve, results
+from armtempo.cli import options, posture, programs, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
 from armtempo.encoding import encoded_motion
@@ -29,10 +30,15 @@ from armtempo.robot.board_state import record_crc
 @options.force("another motion of this name on the board")
 @options.board(options.arm_of_file, options.replace_arm, options.altered)
 def upload(file: Path, name: str | None, as_default: bool, force: bool, given: BoardOptions) -> None:
-    """Store a trajectory file, or a planned sequence with its motions, on the board.
+    """Store a trajectory file, a planned sequence or a program, with their motions, on the board.
 
-    FILE: written by 'armtempo plan'.
+    FILE: written by 'armtempo plan', or a program in MicroPython ('armtempo help programs'), NAME.py.
     """
+    if file.suffix == SUFFIX:
+        if name not in (None, file.stem):
+            raise InputError(f"--name {name}: a program has the name of its file", "rename the file")
+        programs.upload_and_report(file, as_default, force, given)
+        return
     if is_sequence_plan(file):
         plan = resolve.load_sequence_plan(file, given.arm_path, name)
         with resolve.board(given, plan.arm) as board:

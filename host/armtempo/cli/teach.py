@@ -1,4 +1,4 @@
-"""``armtempo teach``: stores the arm's position as a posture in its file, or as via points of a job."""
+"""``armtempo teach``: stores the arm's position as a posture in its file, as via points of a job, or as a frame."""
 
 from __future__ import annotations
 
@@ -7,34 +7,40 @@ from pathlib import Path
 
 import click
 
-from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.basics.settings import ARM, ProjectSettings, missing_setting
 from armtempo.cli import jog, keys, options, resolve, results
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
+from armtempo.cli.taught_points import FramePoints, JobPoints, NewFrame, TaughtPoints, row
 from armtempo.model import posture, shipped, taught
-from armtempo.model.arm import Arm
 from armtempo.robot.board import Board
 
 
 @click.command("teach")
-@click.argument("job_file", required=False, metavar="[JOB.toml]", type=options.FILE)
+@click.argument("what", nargs=-1, metavar="[WHAT]", shell_complete=options.files)
 @click.option(
     "--posture", "name", metavar="NAME", help="Write the position as [posture.NAME] into the arm file."
 )
+@click.option(
+    "--at",
+    metavar="NAMES",
+    help="Postures of the arm file at the three points of a frame, with commas, instead of keys: origin,on_x,on_y.",
+)
+@click.option("--level", is_flag=True, help="Make the z axis of a frame parallel to the base's.")
 @click.option("--by-hand", is_flag=True, help="Switch the motors' current off and follow the encoders.")
 @click.option(
-    "--replace", "replace_old", is_flag=True, help="Replace the posture, or the job file, of that name."
+    "--replace", "replace_old", is_flag=True, help="Replace the posture, frame or job file of that name."
 )
 @options.gamepad
 @options.arm_of_board
 @options.port
 @options.log_traffic
 def teach(
-    job_file: Path | None,
+    what: tuple[str, ...],
     name: str | None,
+    at: str | None,
+    level: bool,
     by_hand: bool,
     replace_old: bool,
     gamepad: bool,
@@ -44,37 +50,60 @@ def teach(
 ) -> None:
     """Teach: store the arm's present position.
 
-    JOB.toml: a new job file for the via points: move by the keys of 'armtempo jog' and press p for a point,
-    or move the arm --by-hand. --posture NAME writes one posture into the arm file and keeps its comments and
-    layout; nothing moves. Then 'armtempo goto NAME' moves the arm there, and a job can use it: [[via]]
-    posture = "NAME".
+    WHAT: a new job file, such as points.toml, for via points; or 'frame NAME' for a frame of the arm file. Move
+    by the keys of 'armtempo jog' and press p for a point, or move the arm --by-hand. A frame takes three points of
+    the tool: its origin, one on its x axis, one on the side of y; [frame.NAME] is written with what they say of
+    its accuracy. --posture NAME writes the present position as a posture; nothing moves. Then 'armtempo goto NAME'
+    moves the arm there, and a job can use it: [[via]] posture = "NAME". The arm file keeps its comments and layout.
     """
-    if (job_file is None) == (name is None) or (name is not None and by_hand):
+    is_frame = what[:1] == ("frame",)
+    if len(what) > 1 + is_frame or (len(what) < 1 + is_frame) == (name is None) or (is_frame and name):
         raise InputError(
-            "give either a job file or a posture", "give JOB.toml, or --posture NAME without --by-hand"
+            "give one thing to teach", "give JOB.toml, frame NAME, or --posture NAME; nothing else beside it"
         )
-    if gamepad and (by_hand or name is not None):
-        raise InputError("--gamepad is for teach JOB.toml by keys", "leave it out")
+    if (at or level) and not is_frame:
+        raise InputError("--at and --level are for frames", "armtempo teach frame NAME")
+    if by_hand and (name or at):
+        raise InputError("--by-hand is for points that are taken one by one", "leave it out")
+    if gamepad and (by_hand or name or at):
+        raise InputError("--gamepad is for teaching by keys", "leave it out")
+    board_options = BoardOptions(port, log_traffic)
     if name is not None:
-        file = _own_arm_file(arm_path, name)
-        arm = resolve.load_arm(arm_path)
-        with resolve.board(BoardOptions(port, log_traffic), arm) as board:
+        if problem := posture.name_problem(name):
+            raise InputError(f"--posture {name}: {problem}", "choose another name")
+        file, arm = _own_arm_file(arm_path), resolve.load_arm(arm_path)
+        with resolve.board(board_options, arm) as board:
             jog.prepare(board, arm)
             _write_posture(board, file, name, replace_old)
-    elif job_file is not None:
-        check_free(job_file, replace_old)
-        if not keys.is_terminal():
-            raise InputError("teach by keys needs a terminal", "run it in one")
-        named = resolve.named_arm(arm_path)
-        with resolve.board(BoardOptions(port, log_traffic), named) as board:
-            jog.prepare(board, resolve.arm_of_board(board, named))
-            _write_job(board, job_file, by_hand, gamepad)
+        return
+    if is_frame:
+        file, arm = _own_arm_file(arm_path), resolve.load_arm(arm_path)
+        new = NewFrame(file, arm, what[1], level, replace_old)
+        if at is not None:
+            new.save(new.postures_deg(at.split(",")))
+            return
+        _check_terminal()
+        with resolve.board(board_options, arm) as board:
+            jog.prepare(board, arm)
+            _collect(board, FramePoints(arm, board.posture_deg, new), by_hand, gamepad)
+        return
+    job_file = Path(what[0])
+    check_free(job_file, replace_old)
+    _check_terminal()
+    named = resolve.named_arm(arm_path)
+    with resolve.board(board_options, named) as board:
+        arm = resolve.arm_of_board(board, named)
+        jog.prepare(board, arm)
+        _collect(board, JobPoints(arm, board.posture_deg, job_file), by_hand, gamepad)
 
 
-def _own_arm_file(arm_path: Path | None, name: str) -> Path:
-    """The arm file to write to; raises InputError for a shipped arm, and for an invalid posture name."""
-    if problem := posture.name_problem(name):
-        raise InputError(f"--posture {name}: {problem}", "choose another name")
+def _check_terminal() -> None:
+    if not keys.is_terminal():
+        raise InputError("teach by keys needs a terminal", "run it in one")
+
+
+def _own_arm_file(arm_path: Path | None) -> Path:
+    """The arm file to write to; raises InputError for a shipped arm."""
     setting = ProjectSettings().get(ARM, arm_path)
     if not setting:
         raise missing_setting(ARM, "no arm file is set")
@@ -98,18 +127,15 @@ def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> No
     results.echo(f"{file}: posture {name!r}: {words}")
 
 
-def _write_job(board: Board, file: Path, by_hand: bool, gamepad: bool) -> None:
+def _collect(board: Board, points: TaughtPoints, by_hand: bool, gamepad: bool) -> None:
     """Collect the points and write them; print them if that fails."""
-    arm = board.arm
-    assert arm is not None  # it was configured
-    points = TaughtPoints(arm, board.posture_deg)
     try:
         with jog.pressed_keys(board, gamepad) as pressed:
             if by_hand:
                 _guide(board, pressed, points)
             else:
                 jog.screen(board, pressed, more=points.keys, more_help=_MORE).loop()
-        points.save(file)
+        points.save()
     except BaseException:
         points.tell()
         raise
@@ -134,52 +160,7 @@ def _guide(board: Board, pressed: Keys, points: TaughtPoints) -> None:
         by_hand(pressed, points, guided.button_pressed)
 
 
-TAKE, UNDO = "p", "u"
 _BY_HAND_S = 0.3
-
-
-class TaughtPoints:
-    """The points taught up to now; ``where`` returns the posture of the arm, degrees (J,)."""
-
-    def __init__(self, arm: Arm, where: Callable[[], Array]) -> None:
-        self.points_deg: list[list[float]] = []
-        self._arm = arm
-        self.where = where
-
-    @property
-    def keys(self) -> dict[str, Callable[[], str]]:
-        """The keys for the jog screen, with their functions."""
-        return {TAKE: self.take, UNDO: self.undo}
-
-    def take(self) -> str:
-        """Store the arm's position; returns a message."""
-        point = taught.digits(self._arm, self.where().tolist())
-        if problem := self._arm.angles_problem(point):
-            return f"not taken: {problem}"
-        if self.points_deg and point == self.points_deg[-1]:
-            return "not taken: the arm is at the last point"
-        self.points_deg.append(point)
-        return f"point {len(self.points_deg)} taken: {_row(point)}"
-
-    def undo(self) -> str:
-        """Remove the last point; returns a message."""
-        if not self.points_deg:
-            return "there is no point to remove"
-        self.points_deg.pop()
-        return f"point {len(self.points_deg) + 1} removed"
-
-    def save(self, file: Path) -> None:
-        """Write the job; raises InputError for fewer than two points."""
-        text = taught.of_points(taught.name_of(file), self.points_deg)
-        replace_text(file, text)
-        results.echo(
-            f"written: {file}, {len(self.points_deg)} via points; 'armtempo plan --job {file}' plans it"
-        )
-
-    def tell(self) -> None:
-        """Print the points if the file cannot be written, so that they are not lost."""
-        for point in self.points_deg:
-            click.echo(f"[[via]]\nangles_deg = [{_row(point)}]", err=True)
 
 
 def check_free(file: Path, replace_old: bool) -> None:
@@ -197,7 +178,7 @@ def by_hand(keys: Keys, points: TaughtPoints, button: Callable[[], bool] = lambd
     """
     said = ""
     while True:
-        shown = f"{_row(points.where().round(2).tolist())} ° by the encoders"
+        shown = f"{row(points.where().round(2).tolist())} ° by the encoders"
         click.echo(
             f"\r\x1b[K{len(points.points_deg)} points | {shown}{' | ' if said else ''}{said}", nl=False
         )
@@ -212,7 +193,3 @@ def by_hand(keys: Keys, points: TaughtPoints, button: Callable[[], bool] = lambd
         if button():
             said = points.take()
     results.echo()
-
-
-def _row(point: list[float]) -> str:
-    return ", ".join(f"{angle + 0.0:.12g}" for angle in point)

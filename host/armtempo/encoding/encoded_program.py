@@ -10,7 +10,7 @@ from armtempo_shared.limits import FULL_OUTPUT, MAX_MOTION_BYTES
 from armtempo_shared.wire import record_crc
 
 from armtempo.basics.errors import ArmtempoError, InputError, PlanError
-from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding import encode, encoded_motion, planned_for
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.model.arm import Arm
 from armtempo.model.outputs import SWITCH, Output
@@ -42,12 +42,13 @@ class EncodedProgram:
         return program.needed_bytes(len(self.program.marked.encode()))
 
 
-def motions_beside(found: UserProgram) -> tuple[EncodedMotion, ...]:
-    """The motions that a program names and whose plans are beside it."""
+def motions_beside(found: UserProgram, arm: Arm) -> tuple[EncodedMotion, ...]:
+    """The motions that a program names and whose plans are beside it; InputError for one that does not fit the arm."""
     files = {name: found.motion_file(name) for name in found.motions}
-    return tuple(
-        encoded_motion.of_plan(Plan.load(file), name) for name, file in files.items() if file.is_file()
-    )
+    plans = {name: Plan.load(file) for name, file in files.items() if file.is_file()}
+    for name, plan in plans.items():
+        planned_for.check(files[name], plan.arm, plan.job.frames, arm)
+    return tuple(encoded_motion.of_plan(plan, name) for name, plan in plans.items())
 
 
 def of_program(

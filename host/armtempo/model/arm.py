@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
+from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
@@ -26,7 +27,9 @@ from armtempo.model import (
     transmission,
     workspace,
 )
+from armtempo.model import frame as frames_of
 from armtempo.model import posture as named
+from armtempo.model.frame import ArmFrame
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
@@ -68,6 +71,8 @@ class Arm:
     coupling: transmission.Matrix = field(default=(), metadata=json_codec.ADDED)
     """Angles of the motors behind their gears (rows) by those of the driven joints (columns); (): each turns its own
     joint."""
+    frames: tuple[ArmFrame, ...] = field(default=(), metadata=json_codec.ADDED)
+    """Frames of what is around it; not sent to the board."""
 
     def __post_init__(self) -> None:
         """Raise InputError for values that a file may not have either."""
@@ -87,6 +92,7 @@ class Arm:
             )
         if self.coupling:
             self._check_coupling()
+        frames_of.check(self.frames, self.source or f"arm {self.name!r}")
 
     def _check_coupling(self) -> None:
         """Raise InputError for a coupling that is none, or for what the board cannot do with coupled joints."""
@@ -155,7 +161,8 @@ class Arm:
         board = top.choice("board", tuple(boards.BOARDS), boards.DEFAULT)
         outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
         postures = top.table("posture")
-        around = workspace.read(top)
+        frames = frames_of.read(top)
+        around = workspace.read(top, frames)
         loads = parts_file.loads(top)
         homing = parts_file.homing(top, [joint.name for joint in joints])
         driven = [joint.name for joint in joints if joint.motor is not None]
@@ -174,6 +181,7 @@ class Arm:
             loads=loads,
             homing=homing,
             coupling=coupling,
+            frames=frames,
         )
         if not postures:
             return arm
@@ -253,6 +261,17 @@ class Arm:
         return replace(
             self, payload=self.loads[self._number("load", load, [each.name for each in self.loads])]
         )
+
+    def frame(self, name: str) -> Array:
+        """The pose of a frame in the base, (4, 4); "base": the base itself. InputError if the arm has no such frame."""
+        return frames_of.in_base(self.frames, name)
+
+    def in_base(self, pose: Pose, frame: str) -> Pose:
+        """A pose that is given in a frame of the arm, as jobs take it.
+
+        Raises InputError if the arm has no such frame, or the pose gives single angles in a tilted frame.
+        """
+        return frames_of.pose_in_base(pose, self.frames, frame, f"arm {self.name!r}")
 
     def _number(self, what: str, name: str, names: list[str]) -> int:
         if name in names:
@@ -350,7 +369,9 @@ def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
     if forms == ["angles_deg"]:
         found = ArmPosture(name, table.numbers("angles_deg", len(arm.driven)))
     else:
-        found = ArmPosture(name, replace(tool_pose.from_table(table, where), posture_deg=arm.all_home_deg))
+        pose = tool_pose.from_table(table, where)
+        pose = frames_of.pose_in_base(pose, arm.frames, frames_of.named(table, arm.frames), where)
+        found = ArmPosture(name, replace(pose, posture_deg=arm.all_home_deg))
     table.done()
     if problem := arm.posture_problem(found):
         raise InputError(f"{where}: {problem}", "give a posture that the arm can take")

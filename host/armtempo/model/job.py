@@ -13,10 +13,10 @@ from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
-from armtempo.model import shipped, tool_segment, via_table
+from armtempo.model import frame, shipped, tool_segment, via_table
 from armtempo.model.arm import Arm
-from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, Pose, from_table
-from armtempo.model.tool_segment import ToolSegment
+from armtempo.model.tool_pose import BASE, TOLERANCE_DEG, TOLERANCE_MM, Pose, from_table
+from armtempo.model.tool_segment import POINTS, ToolSegment
 from armtempo.optimise import ALGORITHMS
 
 GRADIENT = "gradient"
@@ -138,6 +138,13 @@ class Job:
                     f"job {self.name!r}: {key} {getattr(self, key)} must be a whole number from {least} to {most}",
                     f"give {key} such a number, or leave it out",
                 )
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The frames of the arm in which something of it was given, in order; not the base."""
+        given = [via.frame for via in self.via if isinstance(via, Pose)]
+        given += [segment.frame for segment in self.tool_segments]
+        return tuple(name for name in dict.fromkeys(given) if name != BASE)
 
     @classmethod
     def of(cls, job: Job | Path | str, arm: Arm) -> Job:
@@ -264,26 +271,29 @@ def is_name(name: str, longest: int = MAX_NAME) -> bool:
 def _vias(
     top: Table, arm: Arm
 ) -> tuple[tuple[tuple[float, ...] | Pose, ...], tuple[Stop, ...], tuple[ToolSegment, ...]]:
-    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose, stops and lines too."""
+    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose, stops and lines too.
+
+    Poses and points of arcs are turned into the base.
+    """
+    default = frame.named(top, arm.frames)
     if top.has("via_deg") == top.has("via"):
         raise top.fail("via_deg", "given, or else [[via]] tables, but not both")
     stops: list[Stop] = []
     segments: list[ToolSegment] = []
+    vias: list[tuple[float, ...] | Pose] = []
     if top.has("via_deg"):
         rows = top.array("via_deg", "a list of at least 2 lists of angles")
         named = Table({f"via_deg P{n}": row for n, row in enumerate(rows)}, top.file)
-        vias: list[tuple[float, ...] | Pose] = [
-            read_angles(named, f"via_deg P{n}", arm) for n in range(len(rows))
-        ]
+        vias.extend(read_angles(named, f"via_deg P{n}", arm) for n in range(len(rows)))
     else:
         tables = top.tables("via", lambda n: f"via P{n}")
         stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
-        found = [tool_segment.read(table, n) for n, table in enumerate(tables)]
-        vias = [
-            _via(table, f"{top.file}: via P{n}", arm, segment)
-            for n, (table, segment) in enumerate(zip(tables, found, strict=True))
-        ]
-        segments = [each for each in found if each]
+        for n, table in enumerate(tables):
+            name = frame.named(table, arm.frames, default)
+            segment = tool_segment.read(table, n)
+            vias.append(_via(table, name, arm, segment))
+            if segment:
+                segments.append(frame.segment_in_base(segment, arm.frames, name))
     if len(vias) < 2:
         raise InputError(f"{top.file}: {len(vias)} via point is not a motion", "at least 2 are needed")
     if len(vias) - 1 > MAX_SEGMENTS:
@@ -308,13 +318,18 @@ def _stop(table: Table, via: int, count: int) -> Stop:
     return Stop(via, dwell_s)
 
 
-def _via(table: Table, where: str, arm: Arm, segment: ToolSegment | None) -> tuple[float, ...] | Pose:
+def _via(table: Table, name: str, arm: Arm, segment: ToolSegment | None) -> tuple[float, ...] | Pose:
+    """A via point; of a pose in the frame ``name``, in the base."""
+    where = f"{table.file}: {table.place.removesuffix('.')}"
     forms = [key for key in ("angles_deg", "matrix", "position_mm", "posture") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
             f"{where}: exactly one of angles_deg, matrix, position_mm and posture is needed",
             "leave all but one of them out",
         )
+    in_frame = forms[0] in ("matrix", "position_mm") or any(table.has(key) for key in POINTS)
+    if table.has("frame") and not in_frame:
+        raise table.fail("frame", "left out, as nothing of this via point is given in a frame")
     if forms == ["posture"]:
         name = table.text("posture")
         _done(table, segment)
@@ -324,7 +339,7 @@ def _via(table: Table, where: str, arm: Arm, segment: ToolSegment | None) -> tup
         _done(table, segment)
         return found
     posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
-    pose = from_table(table, where)
+    pose = frame.pose_in_base(from_table(table, where), arm.frames, name, where)
     table.done()
     if segment and segment.line:  # its tolerances are read as those of the line
         pose = replace(pose, tolerance_mm=TOLERANCE_MM, tolerance_deg=TOLERANCE_DEG)

@@ -38,12 +38,16 @@ def named(top: Table, key: str, most: int | None = None) -> list[tuple[str, Tabl
     if most is not None and len(found) > most:
         raise InputError(f"{top.file}: {len(found)} tables [{key}.NAME]", f"the board has room for {most}")
     for name, _ in found:
-        if not _NAME.fullmatch(name):
-            raise InputError(
-                f"{top.file}: {key}.{name}: the name is not allowed",
-                "choose one of 1 to 24 letters, digits, '-' and '_'",
-            )
+        check_name(f"{top.file}: {key}.{name}", name)
     return found
+
+
+def check_name(where: str, name: str) -> None:
+    """Raise InputError, which begins with ``where``, for a name that a table may not have."""
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f"{where}: the name is not allowed", "choose one of 1 to 24 letters, digits, '-' and '_'"
+        )
 
 
 def _output(name: str, table: Table) -> Output:

@@ -45,12 +45,15 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
 
     A rounded rotation is replaced by the nearest one (by singular value decomposition).
     """
-    pose = np.array(matrix, dtype=np.float64)
+    try:
+        pose = np.array(matrix, dtype=np.float64)
+    except ValueError:  # rows of different lengths
+        pose = np.empty(0)
     if pose.shape == (3, 4):
         pose = np.vstack((pose, (0.0, 0.0, 0.0, 1.0)))
     if pose.shape != (4, 4):
         raise InputError(
-            f"{what}: a matrix of shape {pose.shape} is not a pose",
+            f"{what}: what is given is not the matrix of a pose",
             "give 4 rows of 4 numbers, or the first 3 of them",
         )
     if not np.all(np.abs(pose) <= LARGEST):
@@ -160,6 +163,12 @@ def to_rpy_deg(matrix: ArrayLike) -> RollPitchYaw:
         return RollPitchYaw(0.0, _degrees(pitch), _degrees(math.atan2(-r[0, 1], r[1, 1])))
     roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])
     return RollPitchYaw(_degrees(roll), _degrees(pitch), _degrees(yaw))
+
+
+def angle_deg(rotation: ArrayLike) -> float:
+    """The angle of a rotation (3, 3), degrees from 0 to 180."""
+    w, *vector = to_quaternion(rotation)
+    return math.degrees(2.0 * math.atan2(math.hypot(*vector), w))
 
 
 def _degrees(angle_rad: float) -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ class Sequence:
 
     def __post_init__(self) -> None:
         """Raise InputError for a name that is invalid on the board."""
-        object.__setattr__(self, "steps", tuple(self.steps))
+        object.__setattr__(self, "steps", _numbered(self.steps, count(1)))
         if not is_name(self.name, LONGEST_NAME):
             raise InputError(
                 f"sequence {self.name!r}: not a valid name on the board",
@@ -90,6 +91,18 @@ class Sequence:
         steps = reader.steps(top)
         top.done()
         return cls(name, steps, start, top.file)
+
+
+def _numbered(steps: Iterable[Step], numbers: Iterator[int]) -> tuple[Step, ...]:
+    """The steps with numbers as in a file, where those made in code have none; the end of a repeat counts too."""
+    found: list[Step] = []
+    for step in steps:
+        number = next(numbers)
+        if isinstance(step, Repeat):
+            step = replace(step, steps=_numbered(step.steps, numbers))
+            next(numbers)
+        found.append(step if step.step else replace(step, step=number))
+    return tuple(found)
 
 
 def arm_named(path: Path | str) -> Path | None:

@@ -89,6 +89,8 @@ class SequencePlan:
     """What the tool holds in each leg; "": nothing."""
     notes: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
     """On the motions that were planned, each with the motion's name."""
+    frames: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
+    """The frames of the arm in which something of it was given."""
 
     def __repr__(self) -> str:
         return f"<SequencePlan {self.name!r} for {self.arm.name!r}: {len(self.rows)} rows, {len(self.legs)} motions>"

@@ -1,10 +1,11 @@
-"""What was taught, as text: a posture in an arm file, of which everything else is unchanged; a job of via points."""
+"""What was taught, as text: a table in an arm file, of which everything else is unchanged; a job of via points."""
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ from armtempo.model import posture as named
 from armtempo.model.arm import Arm
 
 _HEADER = re.compile(r"\s*\[\[?[\w.\"' -]+\]\]?\s*(#.*)?")
-_ANGLES = re.compile(r"(?m)^(\s*angles_deg\s*=\s*)\[[^\]]*\]")
+_LIST = r"(?m)^(\s*{key}\s*=\s*)(\[[^\]]*\])"
+_POSTURE = "posture"
 _MARK = "\ufeff"
 _HEAD = """\
 # Via points that were taught with 'armtempo teach'; every key: armtempo help files
@@ -38,18 +40,36 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
         raise InputError(f"posture {name!r}: {problem}", "choose another name")
     if problem := arm.angles_problem(angles_deg):
         raise InputError(f"posture {name!r}: {problem}", "move the arm into its ranges")
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            text = file.read()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {os_reason(error)}", "check the path") from None
-    known = _parsed(text, path).get("posture", {})
-    if name in known and not replace:
+    save_table(path, (_POSTURE, name), {"angles_deg": angles_deg}, replace)
+
+
+def save_table(path: Path, place: tuple[str, str], values: Mapping[str, Any], replace: bool) -> None:
+    """Write the table ``[KIND.NAME]`` into an arm file, atomically, keeping its comments and layout.
+
+    ``place``: kind and name; ``values``: its keys. Raises InputError if the file has it and ``replace`` is false, or
+    cannot be read, written, or changed in this one place.
+    """
+    text = _text(path)
+    check_free(path, place, replace)
+    replace_text(path, with_table(text, place, values, path), newline="")
+
+
+def check_free(path: Path, place: tuple[str, str], replace: bool) -> None:
+    """Raise InputError if the file has the table ``[KIND.NAME]`` already and ``replace`` is false."""
+    kind, name = place
+    if name in _parsed(_text(path), path).get(kind, {}) and not replace:
         raise InputError(
-            f"{path} already has a posture {name!r}",
+            f"{path} already has a {kind} {name!r}",
             "choose another name, or replace it with --replace",
         )
-    replace_text(path, with_posture(text, name, angles_deg, path), newline="")
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return file.read()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {os_reason(error)}", "check the path") from None
 
 
 def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
@@ -67,38 +87,47 @@ def digits(arm: Arm, angles_deg: list[float]) -> list[float]:
     return found
 
 
-def with_posture(text: str, name: str, angles_deg: list[float], path: Path) -> str:
-    """The text of an arm file with the posture; raises InputError if that would change anything else."""
+def with_table(text: str, place: tuple[str, str], values: Mapping[str, Any], path: Path) -> str:
+    """The text of an arm file with the table; raises InputError if that would change anything else."""
     end = "\r\n" if "\r\n" in text else "\n"
-    values = f"[{', '.join(f'{angle:.12g}' for angle in angles_deg)}]"
+    kind, name = place
+    written = {key: _value(value) for key, value in values.items()}
     before = _parsed(text, path)
-    wanted = {**before, "posture": {**before.get("posture", {}), name: {"angles_deg": [*angles_deg]}}}
+    wanted = {**before, kind: {**before.get(kind, {}), name: dict(values)}}
     try:
-        changed = _changed(text, name, values, end)
+        changed = _changed(text, place, written, end)
         same = _content(changed) == wanted
     except ValueError:
         same = False
     if not same:
         raise InputError(
-            f"{path}: its postures are written in a way that cannot be changed here",
-            f"write it yourself: [posture.{name}] angles_deg = {values}",
+            f"{path}: its {kind}s are written in a way that cannot be changed here",
+            f"write it yourself: [{kind}.{name}] {', '.join(f'{key} = {said}' for key, said in written.items())}",
         )
     return changed
 
 
-def _changed(text: str, name: str, values: str, end: str) -> str:
+def _value(value: str | Sequence[float]) -> str:
+    return json.dumps(value) if isinstance(value, str) else f"[{', '.join(f'{one:.12g}' for one in value)}]"
+
+
+def _changed(text: str, place: tuple[str, str], values: Mapping[str, str], end: str) -> str:
     lines = text.splitlines(keepends=True)
-    place = _place(lines, name)
-    if place is None:
+    found = _place(lines, *place)
+    if found is None:
         gap = "" if not text else end if text.endswith("\n") else 2 * end
-        return f"{text}{gap}[posture.{name}]{end}angles_deg = {values}{end}"
-    head, tail = place
+        return f"{text}{gap}[{'.'.join(place)}]{end}" + "".join(_lines(values, end))
+    head, tail = found
     return "".join([*lines[: head + 1], *_replaced(lines[head + 1 : tail], values, end), *lines[tail:]])
 
 
-def _place(lines: list[str], name: str) -> tuple[int, int] | None:
+def _lines(values: Mapping[str, str], end: str) -> list[str]:
+    return [f"{key} = {value}{end}" for key, value in values.items()]
+
+
+def _place(lines: list[str], kind: str, name: str) -> tuple[int, int] | None:
     """The first line of the table, and the line after its last; None if there is no such table."""
-    header = re.compile(rf"\s*\[\s*posture\s*\.\s*[\"']?{re.escape(name)}[\"']?\s*\]\s*(#.*)?")
+    header = re.compile(rf"\s*\[\s*{kind}\s*\.\s*[\"']?{re.escape(name)}[\"']?\s*\]\s*(#.*)?")
     heads = [number for number, line in enumerate(lines) if header.fullmatch(line.rstrip("\r\n"))]
     for head in heads[:1]:
         for tail in range(head + 1, len(lines)):
@@ -116,17 +145,29 @@ def _is_whole(lines: list[str]) -> bool:
     return True
 
 
-def _replaced(table: list[str], values: str, end: str) -> list[str]:
+def _replaced(table: list[str], values: Mapping[str, str], end: str) -> list[str]:
     """The lines of a table with new values; comments are kept."""
     text = "".join(table)
     keys = tomllib.loads(text.replace("\r\n", "\n"))
-    if [*keys] == ["angles_deg"]:
-        return [_ANGLES.sub(lambda found: found[1] + values, text, count=1)]
+    if keys.keys() == values.keys():
+        for key, value in values.items():  # a text stays: it is the same
+            before, found, rest = _around(text, key)
+            text = f"{before}{value}{rest}" if found else text
+        return [text]
     plain = [
         number for number, line in enumerate(table) if line.strip() and not line.lstrip().startswith("#")
     ]
     first, last = (plain[0], plain[-1]) if plain else (0, -1)
-    return [*table[:first], f"angles_deg = {values}{end}", *table[last + 1 :]]
+    comments = [line for line in table[first : last + 1] if line.lstrip().startswith("#")]
+    return [*table[:first], *comments, *_lines(values, end), *table[last + 1 :]]
+
+
+def _around(text: str, key: str) -> list[str]:
+    """What is before the list of a key, the list, and what is after it; without it the text and twice ""."""
+    found = re.search(_LIST.format(key=key), text)
+    if not found:
+        return [text, "", ""]
+    return [text[: found.end(1)], found[2], text[found.end() :]]
 
 
 def _content(text: str) -> dict[str, Any]:

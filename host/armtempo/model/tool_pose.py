@@ -16,6 +16,8 @@ from armtempo.basics.toml_table import Table
 from armtempo.model import pose
 
 Rows = tuple[tuple[float, ...], ...]
+BASE = "base"
+"""The frame in which everything is planned."""
 
 ROLL, PITCH, YAW, APPROACH = "roll", "pitch", "yaw", "approach"
 WHOLE = (ROLL, PITCH, YAW)
@@ -50,7 +52,7 @@ class Pose:
     """
 
     matrix: Rows
-    """4 rows of 4, lengths in mm; its rotation is one of the allowed ones."""
+    """In the base: 4 rows of 4, lengths in mm; its rotation is one of the allowed ones."""
     posture_deg: tuple[float, ...] | None = None
     """In a job: angles of all joints; the solution nearest to them is used. None: nearest to the via point before."""
     fixed: tuple[str, ...] = field(default=WHOLE, metadata=json_codec.ADDED)
@@ -58,6 +60,8 @@ class Pose:
     z axis."""
     tolerance_mm: float = field(default=TOLERANCE_MM, metadata=json_codec.ADDED)
     tolerance_deg: float = field(default=TOLERANCE_DEG, metadata=json_codec.ADDED)
+    frame: str = field(default=BASE, metadata=json_codec.ADDED)
+    """The frame of the arm in which it was given; ``matrix`` is in the base (frame.py)."""
 
     def __post_init__(self) -> None:
         """Raise InputError for an invalid pose."""
@@ -93,13 +97,13 @@ class Pose:
 
     def exact(self, what: str = "the pose") -> Pose:
         """The pose with its rotation made exact; raises InputError, naming ``what``, if it is not a pose."""
-        return replace(self, matrix=_rows(pose.checked(self.matrix, what)))
+        return replace(self, matrix=rows_of(pose.checked(self.matrix, what)))
 
     @classmethod
     def of_matrix(cls, matrix: Array, fixed: tuple[str, ...] = WHOLE) -> Pose:
         """A pose from a checked matrix, (4, 4)."""
         rows = np.asarray(matrix, dtype=float)
-        return cls(_rows(rows) if rows.shape == (4, 4) else (), fixed=fixed)
+        return cls(rows_of(rows) if rows.shape == (4, 4) else (), fixed=fixed)
 
     @classmethod
     def of_angles(
@@ -136,13 +140,14 @@ class Pose:
         return cls.of_matrix(pose.checked(matrix, what), (APPROACH,))
 
 
-def _rows(matrix: Array) -> Rows:
+def rows_of(matrix: Array) -> Rows:
+    """A matrix as the rows of a pose."""
     return tuple(map(tuple, matrix.tolist()))
 
 
 def from_table(table: Table, where: str) -> Pose:
     """The pose that ``table`` gives as ``matrix`` or ``position_mm``; InputError, naming ``where``, else."""
-    found = _matrix(table, where) if table.has("matrix") else _positioned(table, where)
+    found = given(table, where)
     return replace(
         found,
         tolerance_mm=table.number("tolerance_mm", found.tolerance_mm, least=SMALLEST, most=LARGEST_MM),
@@ -150,11 +155,16 @@ def from_table(table: Table, where: str) -> Pose:
     )
 
 
+def given(table: Table, where: str) -> Pose:
+    """As ``from_table``, without tolerances."""
+    return _matrix(table, where) if table.has("matrix") else _positioned(table, where)
+
+
 def _matrix(table: Table, where: str) -> Pose:
-    given = table.array("matrix", "the 4 rows of a pose, lengths in mm")
-    if len(given) != 4:
+    entries = table.array("matrix", "the 4 rows of a pose, lengths in mm")
+    if len(entries) != 4:
         raise table.fail("matrix", "4 rows of 4 numbers")
-    rows = Table({f"row {n}": row for n, row in enumerate(given, 1)}, table.file, "matrix ")
+    rows = Table({f"row {n}": row for n, row in enumerate(entries, 1)}, table.file, "matrix ")
     matrix = np.array([rows.numbers(f"row {n}", 4) for n in range(1, 5)])
     return Pose.of_matrix(pose.checked(matrix, f"{where}.matrix"))
 
@@ -162,18 +172,18 @@ def _matrix(table: Table, where: str) -> Pose:
 def _positioned(table: Table, where: str) -> Pose:
     position = table.numbers("position_mm", 3)
     angles = {name: table.number(f"{name}_deg") for name in WHOLE if table.has(f"{name}_deg")}
-    given = [key for key in ORIENTATIONS if table.has(key)]
-    if len(given) + bool(angles) > 1:
+    turned = [key for key in ORIENTATIONS if table.has(key)]
+    if len(turned) + bool(angles) > 1:
         raise InputError(
-            f"{where}: {', '.join((*given, *(f'{name}_deg' for name in angles)))} cannot be given together",
+            f"{where}: {', '.join((*turned, *(f'{name}_deg' for name in angles)))} cannot be given together",
             "give position_mm alone, with one of rpy_deg, quaternion and approach, or with any of roll_deg, "
             "pitch_deg and yaw_deg",
         )
-    if given == ["quaternion"]:
+    if turned == ["quaternion"]:
         matrix = pose.from_quaternion(position, table.numbers("quaternion", 4), f"{where}.quaternion")
         return Pose.of_matrix(matrix)
-    if given == ["approach"]:
+    if turned == ["approach"]:
         return Pose.of_approach(position, table.numbers("approach", 3), f"{where}.approach")
-    if given == ["rpy_deg"]:
+    if turned == ["rpy_deg"]:
         angles = dict(zip(WHOLE, table.numbers("rpy_deg", 3), strict=True))
     return Pose.of_angles(position, angles, where)

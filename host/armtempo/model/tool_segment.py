@@ -9,6 +9,7 @@ from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
+from armtempo.model.tool_pose import BASE
 
 LINE_TOLERANCE_MM, LINE_TOLERANCE_DEG = 0.5, 0.5
 """Default tolerances of a line or an arc."""
@@ -17,7 +18,8 @@ TOLERANCE_MM, TOLERANCE_DEG = (0.01, 100.0), (0.01, 90.0)
 LEAST = 1e-3
 """Least speed, acceleration and size of a cut corner."""
 MOST = 1e6
-KEYS = ("line", "arc_through_mm", "circle_through_mm", "blend_mm", "speed_mm_s", "acceleration_mm_s2")
+POINTS = ("arc_through_mm", "circle_through_mm")
+KEYS = ("line", *POINTS, "blend_mm", "speed_mm_s", "acceleration_mm_s2")
 """Keys of a via point's table for the way to it."""
 
 
@@ -41,6 +43,8 @@ class ToolSegment:
     """The tool's limits; None: those of the job."""
     circle_through_mm: tuple[tuple[float, ...], ...] | None = field(default=None, metadata=json_codec.ADDED)
     """Two points (3,) of a full circle, which ends where it began."""
+    frame: str = field(default=BASE, metadata=json_codec.ADDED)
+    """The frame of the arm in which the points were given; they are in the base (frame.py)."""
 
     def __post_init__(self) -> None:
         """Raise InputError for invalid requirements."""

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from nicegui import ui
@@ -44,6 +45,16 @@ EYES = {"side": (0.0, -1.4, 0.25), "top": (0.0, -0.001, 1.6), "free": (0.7, -0.8
 """Where the views look from; from above x is to the right and y up."""
 _SLOW_TO_FAST = ((0.20, 0.35, 0.75), (0.13, 0.55, 0.35), (0.85, 0.65, 0.10), (0.85, 0.15, 0.25))
 """Colours of a path, red, green and blue, seen on light and dark: blue where it is slow, red where it is fastest."""
+
+
+class Obstacle(NamedTuple):
+    """A box to keep out of, or a wall, which is flat, in parts of the arm's reach."""
+
+    low: Array
+    """Its least corner, (3,), along ``axes``."""
+    high: Array
+    axes: Array
+    """Its frame in the base, (4, 4)."""
 
 
 class ArmShape:
@@ -114,15 +125,17 @@ class ArmShape:
         return [(radius * link, 2 * half * radius * link) for link in links]
 
     @property
-    def workspace(self) -> list[tuple[Array, Array]]:
-        """The corners, (3,), of each box to keep out of, and of each wall, which is flat."""
+    def workspace(self) -> list[Obstacle]:
+        """The boxes to keep out of, and the walls."""
         found = []
         for box in Bodies(self.arm).obstacles:
             low, high = np.array(box.low_mm), np.array(box.high_mm)
             below, above = low <= -FAR_MM, high >= FAR_MM
             low, high = np.where(below & ~above, high, low), np.where(above & ~below, low, high)
             low, high = np.clip(np.array((low, high)) / self.reach_mm, -_SHOWN, _SHOWN)
-            found.append((low, high))
+            axes = np.array(box.axes)
+            axes[:3, 3] /= self.reach_mm
+            found.append(Obstacle(low, high, axes))
         return found
 
     def poses(self, angles_deg: Array) -> list[list[float]]:
@@ -226,13 +239,13 @@ class ArmScene:
         while self._walls:
             self._walls.pop().delete()
         with self.scene:
-            for low, high in self._shape.workspace:
+            for low, high, axes in self._shape.workspace:
                 is_wall = not (high - low).all()
                 width, height, depth = (high - low).tolist()
                 box = self.scene.box(width, height, depth, wireframe=is_wall)
-                self._walls.append(
-                    box.material(OBSTACLE, _OBSTACLE_OPACITY).move(*((low + high) / 2).tolist())
-                )
+                middle = axes[:3, :3] @ ((low + high) / 2) + axes[:3, 3]
+                box.material(OBSTACLE, _OBSTACLE_OPACITY).move(*middle.tolist())
+                self._walls.append(box.rotate_R(axes[:3, :3].tolist()))
 
     @property
     def parts(self) -> str:

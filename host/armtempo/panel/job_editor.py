@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 from tomlkit.items import Array
 
@@ -18,7 +19,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.pose import to_rpy_deg
-from armtempo.model.tool_pose import WHOLE
+from armtempo.model.tool_pose import BASE, WHOLE
 from armtempo.panel.file_editor import FileEditor, put, text_of
 from armtempo.panel.toml_blocks import TomlBlocks
 from armtempo.planning import planner
@@ -37,6 +38,7 @@ OPTIONS = (
     "speed_mm_s",
     "acceleration_mm_s2",
     "holds",
+    "frame",
 )
 """Keys of the job that are edited as fields."""
 WAY_KEYS = (*tool_segment.KEYS, "stop", "dwell_s")
@@ -169,9 +171,15 @@ class JobEditor(FileEditor):
         if text != self.vias[number].text(key):
             self._change_table(number, lambda table: put(table, key, text))
 
+    def _frame(self, number: int) -> str:
+        """The frame in which a via point is given."""
+        return str(self._rows()[number].get("frame", self._values.get("frame", BASE)))
+
     def set_position(self, number: int, position_mm: Sequence[float]) -> None:
-        """Move a via point that is given as a pose with ``position_mm``; its orientation stays."""
-        values = [round(float(value), 3) for value in position_mm]
+        """Move a via point that is given as a pose with ``position_mm``, here in the base; its orientation stays."""
+        frame = self.arm.frame(self._frame(number))
+        own = frame[:3, :3].T @ (np.asarray(position_mm) - frame[:3, 3])
+        values = [round(float(value), 3) for value in own]
         self._change_table(number, lambda table: table.update({POSE: values}))
 
     def set_pose(self, number: int) -> None:
@@ -179,14 +187,15 @@ class JobEditor(FileEditor):
         angles = self.vias[number].angles_deg
         if angles is None:
             raise InputError(f"P{number} has no angles", "correct the job first")
-        pose = pose_values(self.arm, angles)
+        pose = pose_values(self.arm, angles, self._frame(number))
         self._change_table(number, lambda table: _place(table, pose))
 
     def insert(self, number: int, values: dict[str, Any] | Sequence[float] | None = None) -> None:
         """Insert a via point before ``number``: angles (J,), or keys; default: where the one before it is."""
         if values is None:
             before = self.vias[max(0, number - 1)].values if self.vias else {ANGLES: list(self.arm.home_deg)}
-            values = {key: value for key, value in before.items() if key in _WHERE}
+            pose = {"frame"} if POSE in before or "matrix" in before else set()
+            values = {key: value for key, value in before.items() if key in {*_WHERE, *pose}}
         found = values if isinstance(values, dict) else {ANGLES: _rounded(values)}
         if self._is_list and set(found) == {ANGLES}:
             self._change_list(lambda rows: rows.insert(number, found[ANGLES]))
@@ -217,7 +226,7 @@ class JobEditor(FileEditor):
 
     def set_vias(self, vias: Sequence[dict[str, Any]]) -> None:
         """Replace all via points by these, given by keys; raises InputError if keys of the others would be lost."""
-        if any(set(via.values) - set(_WHERE) for via in self.vias):
+        if any(set(via.values) - {*_WHERE, "frame"} for via in self.vias):
             raise InputError(
                 "the via points have keys, such as lines, that the pasted rows do not have",
                 "make a new job for the rows",
@@ -275,12 +284,12 @@ class JobEditor(FileEditor):
         return blocks.text
 
 
-def pose_values(arm: Arm, angles_deg: Sequence[float]) -> dict[str, Any]:
-    """The keys of a pose of the tool at these angles, (J,), with as many components as the arm has joints.
+def pose_values(arm: Arm, angles_deg: Sequence[float], frame: str = BASE) -> dict[str, Any]:
+    """The keys of a pose of the tool in a frame at angles (J,), with as many components as the arm has joints.
 
     Raises InputError for an arm with too few joints for one.
     """
-    pose = forward(arm, list(angles_deg))
+    pose = np.linalg.inv(arm.frame(frame)) @ forward(arm, list(angles_deg))
     position = [round(float(value), 3) + 0.0 for value in pose[:3, 3]]
     turns = [round(value, 3) + 0.0 for value in to_rpy_deg(pose)]
     orientations: dict[int, dict[str, Any]] = {
@@ -310,7 +319,9 @@ def _rounded(angles_deg: Sequence[float]) -> list[float]:
 
 
 def _place(table: Any, values: dict[str, Any]) -> None:
-    """Say where a via point is by other keys."""
+    """Say where a via point is by other keys; its frame stays with what is given in it."""
     for key in _WHERE:
         table.pop(key, None)
+    if POSE not in values and not any(key in table for key in tool_segment.POINTS):
+        table.pop("frame", None)
     table.update(values)

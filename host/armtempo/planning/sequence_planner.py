@@ -9,6 +9,7 @@ from armtempo_shared import sequence as record
 
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.basics.progress import Progress
+from armtempo.model import frame
 from armtempo.model import steps as kinds
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
@@ -17,7 +18,7 @@ from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
-from armtempo.model.tool_pose import Pose
+from armtempo.model.tool_pose import BASE, Pose
 from armtempo.planning import checks, planner, via_points, workspace_check
 from armtempo.splines.trajectory import Trajectory
 
@@ -52,6 +53,7 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
         planner.versions(),
         tuple(compiler.loads),
         tuple(dict.fromkeys(compiler.notes)),
+        tuple(dict.fromkeys(compiler.frames)),
     )
 
 
@@ -80,6 +82,8 @@ class _Compiler:
     loads: list[str] = field(default_factory=list)
     """The load in each leg."""
     notes: list[str] = field(default_factory=list)
+    frames: list[str] = field(default_factory=list)
+    """Those in which poses were given."""
     _holds: str = ""
     """The present load."""
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
@@ -150,6 +154,8 @@ class _Compiler:
         """A straight line of the tool; to a pose in the present branch of the arm."""
         posture = self.arm.posture(step.target) if isinstance(step.target, str) else step.target
         pose = posture.where if isinstance(posture, ArmPosture) else None
+        if isinstance(posture, ArmPosture):
+            self._note_frame(posture)
         target = None if isinstance(pose, Pose) else self._target(step)
         if here.angles_deg is None:
             raise InputError(
@@ -217,14 +223,20 @@ class _Compiler:
         trajectory = self._planned(motion, "")
         return _Place(_angles(trajectory(0.0)), f"the start of {motion.name}")
 
+    def _note_frame(self, posture: ArmPosture) -> None:
+        if isinstance(posture.where, Pose) and posture.where.frame != BASE:
+            self.frames.append(posture.where.frame)
+
     def posture(self, posture: ArmPosture, where: str) -> _Place:
         """The arm at that posture; raises PlanError if it cannot be there."""
+        self._note_frame(posture)
         try:
             return _Place(_angles(via_points.posture_deg(self.arm, posture)), posture.name)
         except ArmtempoError as error:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
+        self.frames.extend(_job(motion).frames)
         # A plan with another load is accepted if it keeps to the workspace
         for (known, _), found in self._plans.items():
             arm = self.arm.holding(_job(motion).holds or self._holds)
@@ -234,12 +246,19 @@ class _Compiler:
         found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
         return found
 
+    def _check_arm(self, plan: Plan, where: str) -> None:
+        """Raise InputError for a plan for another arm; its postures, and frames that it does not use, may differ."""
+        arm = replace(plan.arm, postures=self.arm.postures, frames=self.arm.frames)
+        if arm != self.arm:
+            raise InputError(
+                f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
+            )
+        if change := frame.changed(plan.arm.frames, self.arm.frames, plan.job.frames):
+            raise InputError(f"{where}run: it is old: {change}", "plan it again")
+
     def _of(self, source: Job | Plan, where: str) -> Trajectory:
         if isinstance(source, Plan):
-            if source.arm != self.arm:
-                raise InputError(
-                    f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
-                )
+            self._check_arm(source, where)
             arm = self.arm.holding(source.job.holds or self._holds)
             workspace_check.check(arm, source.trajectory, source.job.start_touches)
             return source.trajectory

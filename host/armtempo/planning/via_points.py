@@ -14,6 +14,7 @@ A pose that asks for less than the whole orientation is solved for the driven jo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -157,10 +158,22 @@ def posture_deg(arm: Arm, posture: ArmPosture) -> Array:
     """
     if not isinstance(posture.where, Pose):
         return np.array(arm.placed(posture.where))
-    setup = _Setup.of(arm)
-    where = f"posture {posture.name!r}"
-    target = posture.where.exact(where)
-    needed, _ = _solve(setup, target, setup.home, True, where)
+    return _reached(_Setup.of(arm), posture.where, None, f"posture {posture.name!r}")
+
+
+def nearest(arm: Arm, pose: Pose, here_deg: Sequence[float]) -> Array:
+    """The driven joints' angles that bring the tool to a pose, degrees (J,), nearest to ``here_deg`` (J,).
+
+    Raises PlanError if the arm cannot take it.
+    """
+    setup, where = _Setup.of(arm), "the pose"
+    return _reached(setup, pose, _spread(setup, tuple(here_deg), where), where)
+
+
+def _reached(setup: _Setup, pose: Pose, near: Array | None, where: str) -> Array:
+    """The driven joints' angles for a pose, degrees (J,), nearest to ``near``, (joints,) in rad; None: to home."""
+    target = pose.exact(where)
+    needed, _ = _solve(setup, target, setup.home if near is None else near, True, where)
     if not Constraint.of(target).reached(setup.miss(target, needed)):
         raise PlanError(
             f"{where}: the pose needs joints that have no motor: {_needs(setup, needed)}",

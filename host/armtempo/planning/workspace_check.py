@@ -154,7 +154,7 @@ class Bodies:
         count, found = len(driven_deg), []
         if self.obstacles and len(self.moves):
             flat = starts[self.moves].reshape(-1, 3), ends[self.moves].reshape(-1, 3)
-            away = np.stack([box_distance(*flat, box.low_mm, box.high_mm) for box in self.obstacles])
+            away = np.stack([_away(box, *flat) for box in self.obstacles])
             away = away.reshape(len(self.obstacles), -1, count) - self.radius_mm[self.moves, None]
             found.append(np.swapaxes(away, 0, 1).reshape(-1, count))
         if self.pairs:
@@ -178,6 +178,13 @@ class Bodies:
             after = np.arange(len(rows)) >= one // 2 + one % 2
             found.append(float(self.reach_mm[other, after] @ rows[after]))
         return np.array(found)
+
+
+def _away(box: KeepOut, starts: Array, ends: Array) -> Array:
+    """Distance of segments (N, 3) to (N, 3) from a box, (N,)."""
+    axes = np.array(box.axes)
+    start, end = ((points - axes[:3, 3]) @ axes[:3, :3] for points in (starts, ends))
+    return box_distance(start, end, box.low_mm, box.high_mm)
 
 
 def can_touch(arm: Arm) -> bool:

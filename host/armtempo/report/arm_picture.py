@@ -85,6 +85,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_AXES_SHOWN = 0.1
+"""Length of a frame's axes, as a fraction of the arm's extent."""
+
+
 def arm_picture(arm: Arm) -> Figure:
     """One field for the home posture from the side and from above, one for each driven joint.
 
@@ -113,6 +117,7 @@ def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) 
     _draw(axis, arm, np.array(arm.all_home_deg), np.eye(3)[list(seen)], HOME, size)
     _draw_workspace(axis, arm, seen)
     _draw_capsules(axis, arm, seen)
+    _draw_frames(axis, arm, seen, _AXES_SHOWN * size)
     if seen[1] == 2:
         axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
     axis.set_xlabel(f"{'xyz'[seen[0]]} (mm)")
@@ -122,18 +127,27 @@ def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) 
 
 def _draw_workspace(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
     """The boxes, and the walls as lines."""
-    from matplotlib.patches import Rectangle
+    from scipy.spatial import ConvexHull  # here, as few arms have boxes
 
     workspace = arm.workspace or Workspace()
     for box in workspace.keep_out:
-        low, high = np.array(box.low_mm)[list(seen)], np.array(box.high_mm)[list(seen)]
-        axis.add_patch(Rectangle(tuple(low), *(high - low), color=HIGH, alpha=0.25, zorder=0))
-        axis.update_datalim([low, high])
-        axis.annotate(box.name, tuple(low), fontsize=7, color=HIGH)
+        corners = box.corners_mm[:, list(seen)]
+        axis.fill(*corners[ConvexHull(corners).vertices].T, color=HIGH, alpha=0.25, zorder=0)
+        axis.annotate(box.name, tuple(corners.min(axis=0)), fontsize=7, color=HIGH)
     for place, draw in zip(seen, (axis.axvline, axis.axhline), strict=True):
         for end in (workspace.low_mm[place], workspace.high_mm[place]):
             if abs(end) < FAR_MM:
                 draw(end, color=HIGH, linewidth=1.0, zorder=0)
+
+
+def _draw_frames(axis: Axes, arm: Arm, seen: tuple[int, int], length: float) -> None:
+    """The frames of the arm file: their x axes solid, their y axes dotted, their names at their origins."""
+    for each in arm.frames:
+        pose = arm.frame(each.name)
+        for column, style in ((0, "-"), (1, ":")):
+            ends = pose[:3, 3] + np.outer([0.0, length], pose[:3, column])
+            axis.plot(*ends[:, list(seen)].T, style, color=GROUND, linewidth=1.2)
+        axis.annotate(each.name, tuple(pose[list(seen), 3]), fontsize=7, color=GROUND)
 
 
 def _draw_capsules(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:

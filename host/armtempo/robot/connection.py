@@ -8,8 +8,12 @@ from pathlib import Path
 
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError
+from armtempo.encoding import planned_for
+from armtempo.encoding.encode import arm_record
 from armtempo.link import Client
 from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.robot import arm_state, stop_request
 from armtempo.robot.goto import StartPosition
 from armtempo.robot.stop_request import StopRequest
@@ -36,6 +40,19 @@ class Connection:
         arm = Arm.of(arm)
         arm_state.configure(self.client, arm, replace)
         self.arm = arm
+
+    def configure_for(self, plan: Plan | SequencePlan) -> None:
+        """Set the board up for the arm of a plan, as ``configure``; InputError if a frame has changed since."""
+        name, frames = (
+            (f"plan {plan.job.name!r}", plan.job.frames)
+            if isinstance(plan, Plan)
+            else (f"sequence {plan.name!r}", plan.frames)
+        )
+        if self.arm is None or arm_record(self.arm) != arm_record(plan.arm):
+            self.configure(plan.arm)
+            return
+        planned_for.check_frames(name, plan.arm, frames, self.arm)
+        self.configure(self.arm)  # it may have postures and frames that the plan's arm has not
 
     @contextmanager
     def stoppable(self, given: StopRequest | None) -> Iterator[StopRequest]:

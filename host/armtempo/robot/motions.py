@@ -17,15 +17,17 @@ from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.tool_pose import Pose
+from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.report.run import Run
-from armtempo.report.sequence_reader import SequenceRun
-from armtempo.robot import arm_state, goto, jog, recording, sequence_recording, sequence_run, stored_motion
+from armtempo.report.run_folder import RunFolder
+from armtempo.robot import arm_state, goto, jog, recording, sequence_run, stored_motion
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
-from armtempo.robot.recording import Watcher
+from armtempo.robot.recording import RunContent, Watcher
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest
@@ -49,7 +51,7 @@ class Motions:
 
     def goto(
         self,
-        where: Where,
+        where: Where | Pose,
         progress: Progress | None = None,
         stop: StopRequest | None = None,
         speed: float = 1.0,
@@ -57,16 +59,20 @@ class Motions:
     ) -> None:
         """Move straight to a posture, all joints together within their limits; ``progress`` counts seconds.
 
-        ``where``: a posture, or a plan, sequence or its file (the start). ``speed``: fraction of the fastest
+        ``where``: a posture, a pose of the tool (its posture nearest to the present one), or a plan, sequence or
+        its file (the start). ``speed``: fraction of the fastest
         move, 0.01 to 1. ``line``: move the tool in a straight line. Raises LinkError if the position is
         unknown, InputError for a posture that does not fit the arm, PlanError if the arm cannot follow the
         line.
         """
         permille(speed)  # raises InputError for an invalid speed
         arm = self._board.known_arm()
-        target_deg = posture_deg(where, arm)
+        target_deg = None if isinstance(where, Pose) else posture_deg(where, arm)
         with self._board.stoppable(stop) as wanted:
             self._board.start.home_virtual_arm(arm)
+            if isinstance(where, Pose):
+                target_deg = via_points.nearest(arm, where, self._posture_deg().tolist())
+            assert target_deg is not None
             goto.go_to(self._board.client, arm, target_deg, wanted, progress, goto.MovePace(speed, line))
 
     def jog(
@@ -80,11 +86,11 @@ class Motions:
     ) -> Array:
         """Move a joint or the tool: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
 
-        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y",
-        "tool-z": the tool moves along it by ``by_mm``, or turns about it by ``by_deg``; ``speed``: fraction
-        of the speed limits, 0.01 to 1. The jog ends early at the end of a range, or if the tool cannot
-        continue along the line (``last_jog_ends`` says why). Returns the posture in degrees, (J,). Raises
-        LinkError if the position is unknown, InputError if no motion in that direction is possible.
+        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base, "tool-x", … of the tool or
+        "tray-x", … of a frame of the arm: the tool moves along it by ``by_mm``, or turns about it by
+        ``by_deg``; ``speed``: fraction of the speed limits, 0.01 to 1. The jog ends early at the end of a range,
+        or if the tool cannot continue along the line (``last_jog_ends`` says why). Returns the posture in degrees,
+        (J,). Raises LinkError if the position is unknown, InputError if no motion in that direction is possible.
         """
         arm = self._board.known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
@@ -159,8 +165,7 @@ class Motions:
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._board.stoppable(stop) as wanted:
             self._bring_to_start(encoded, wanted)
-            folder = recording.new_run(Path(out), encoded, self._board.port, self._board.client)
-            self._last_folder = folder.path
+            folder = self._recorded(recording.of_motion(encoded), Path(out))
             seen.begin(encoded, folder)
             for _ in recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen):
                 pass
@@ -186,16 +191,17 @@ class Motions:
             key = self._sequence(sequence, wanted, replace)
             if out is None:
                 return sequence_run.run(self._board.client, key, wanted, watcher)
+            client = self._board.client
             content = (
-                sequence_recording.fetched(self._board.client, sequence, self._board.known_arm())
+                recording.of_stored_sequence(client, sequence, self._board.known_arm())
                 if isinstance(sequence, str)
-                else sequence_recording.of_plan(sequence)
+                else recording.of_sequence(sequence)
             )
-            with sequence_recording.recorder(
-                self._board.client, content, Path(out), self._board.port
-            ) as recorder:
-                self._last_sequence = recorder.path
-                return sequence_run.run(self._board.client, key, wanted, watcher, recorder)
+            folder = self._recorded(content, Path(out))
+            self._last_sequence = folder.path
+            with folder.begin_repetition(with_rows=True) as file:
+                events = recording.RowRecorder(client, file, content.rows)
+                return sequence_run.run(client, key, wanted, watcher, events)
 
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
         """Store the sequence if it is a plan, and move a virtual arm to its start; returns its key."""
@@ -216,15 +222,22 @@ class Motions:
         )
         return key
 
+    def _recorded(self, content: RunContent, out: Path) -> RunFolder:
+        """A new run folder in ``out``, that of ``last_run``."""
+        folder = recording.new_run(out, content, self._board.port, self._board.client)
+        self._last_folder = folder.path
+        return folder
+
     @property
     def last_run(self) -> Run | None:
-        """The last run that this object recorded, even if it ended early; None before the first."""
+        """The last run that this object recorded, of a motion or a sequence, even if it ended early; None before the
+        first."""
         return Run.load(self._last_folder) if self._last_folder else None
 
     @property
-    def last_sequence(self) -> SequenceRun | None:
+    def last_sequence(self) -> Run | None:
         """The last sequence that this object recorded, even if it ended early; None before the first."""
-        return SequenceRun.load(self._last_sequence) if self._last_sequence else None
+        return Run.load(self._last_sequence) if self._last_sequence else None
 
     def fetch(self, motion: Plan | EncodedMotion | Path | str | None = None, out: Path | str = "runs") -> Run:
         """Write the samples that the board kept of its last run into a new run folder in ``out``.
@@ -276,9 +289,11 @@ class Motions:
             motion = Plan.load(motion)
         if isinstance(motion, str):
             return self._store.read(motion)
-        encoded = encoded_motion.of_plan(motion) if isinstance(motion, Plan) else motion
-        self._board.configure(encoded.arm)
-        return encoded
+        if isinstance(motion, Plan):
+            self._board.configure_for(motion)
+            return encoded_motion.of_plan(motion)
+        self._board.configure(motion.arm)
+        return motion
 
     def _default(self) -> str:
         for entry in self._board.client.stored():

@@ -45,8 +45,12 @@ class BoardStore:
         """
         if isinstance(motion, Path | str):
             motion = Plan.load(motion)
-        encoded = encoded_motion.of_plan(motion, name) if isinstance(motion, Plan) else motion
-        self._board.configure(encoded.arm)
+        if isinstance(motion, Plan):
+            self._board.configure_for(motion)
+            encoded = encoded_motion.of_plan(motion, name)
+        else:
+            self._board.configure(motion.arm)
+            encoded = motion
         stored_motion.store(self._board.client, encoded.name, encoded.data, progress, replace)
         if default:
             self._board.client.set_default(encoded.name)
@@ -61,7 +65,7 @@ class BoardStore:
     ) -> MotionKey:
         """Store a planned sequence and its motions; arguments and errors as in ``upload``."""
         encoded = encoded_sequence.of_plan(sequence)
-        self._board.configure(encoded.arm)
+        self._board.configure_for(sequence)
         key = sequence_run.store(self._board.client, encoded, progress, replace)
         if default:
             self._board.client.set_default(key.name)
@@ -93,7 +97,7 @@ class BoardStore:
         self._board.client.rename(stored_name(old), stored_name(new))
 
     def set_default(self, name: str) -> None:
-        """Set the motion or sequence that the board's button starts; "" for none."""
+        """Set the motion, sequence or program that the board's button starts; "" for none."""
         self._board.client.set_default(stored_name(name) if name else name)
 
 

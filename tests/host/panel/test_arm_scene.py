@@ -29,8 +29,8 @@ def test_the_picture_has_the_radii_and_the_room_of_the_arm_file() -> None:
     radii = {index // 2: radius * shape.reach_mm for index, _, radius in shape.pieces}
     assert radii[2] == pytest.approx(40.0)
     assert all(radius > 5.0 for radius in radii.values())  # what the file does not say is drawn all the same
-    tray, (floor_low, floor_high) = shape.workspace
-    assert np.array(tray) * shape.reach_mm == pytest.approx(np.array([[100, -50, 0], [200, 50, 30]]))
+    tray, (floor_low, floor_high, _) = shape.workspace
+    assert np.array(tray[:2]) * shape.reach_mm == pytest.approx(np.array([[100, -50, 0], [200, 50, 30]]))
     assert floor_low[2] == floor_high[2] == pytest.approx(-20.0 / shape.reach_mm)
     assert all(floor_high[:2] - floor_low[:2] > 1.0)
 

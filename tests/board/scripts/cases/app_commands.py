@@ -2,6 +2,7 @@
 
 # all cases: slow on CPython
 
+import gc
 import os
 
 import cases
@@ -141,6 +142,17 @@ def case_each_hello_tells_what_is_free_now():
     assert host.hello(session=2)[0] == "ok"
     assert app.controller.free_flash > 0
     assert app.controller.free_heap >= 0
+
+
+def case_what_is_no_longer_used_counts_as_free():
+    app, host = connected()
+    assert host.hello(session=2)[0] == "ok"
+    free = app.controller.free_heap
+    if free:  # it is known
+        gc.threshold(-1)
+        [bytearray(1000) for _ in range(500)]
+        assert host.hello(session=3)[0] == "ok"
+        assert app.controller.free_heap > free - 100_000, (free, app.controller.free_heap)
 
 
 def case_start_only_when_everything_is_valid():

@@ -55,8 +55,7 @@ class World:
 
     def execute(self):
         """As the main loop does."""
-        user_program, self.controller.program = self.controller.program, None
-        user_program.execute(self.app, self.turn)
+        self.app.execute_program(self.turn)
         self.host.turn(5)
 
     def run(self):
@@ -390,19 +389,42 @@ def case_other_programs_than_the_stored_one_are_refused():
     assert motion.MAGIC not in (program.MAGIC, sequence.MAGIC)
 
 
-def case_nothing_starts_it_without_a_host_or_before_homing():
+def case_the_button_starts_it_but_not_before_homing():
     from armtempo_board.errors import Refused
 
-    world = World("pass\n")
+    def script(world):
+        if world.turns == 30:
+            world.controller.stop(0)
+
+    world = World("print('begins')\nwhile True:\n    cell.active('part')\n", script)
     assert world.host.upload("pick", world.data)[-1][0] == "ok"
-    try:
-        world.controller.begin("pick", 0)
-        raise AssertionError("not refused")
-    except Refused as refused:
-        assert wire.ERRORS[refused.code][0] == "needs_host"
-    assert not world.controller.moving() and world.controller.program is None
+    assert world.host.ask("set_default", (), "pick")[0] == "ok"
     world.board.engine.known = 0
     assert world.host.ask("start", (0, wire.record_crc(world.data)), "pick")[1] == "unhomed"
+    try:
+        world.controller.begin(world.board.store().default(), 0)
+        raise AssertionError("not refused")
+    except Refused as refused:
+        assert wire.ERRORS[refused.code][0] == "unhomed"
+    assert not world.controller.moving() and world.controller.program is None
+    world.board.engine.known = 3
+    world.app.commands.greeted = False  # no host has ever been there
+    world.controller.begin(world.board.store().default(), 0)
+    world.execute()
+    assert not world.app.events.notice and not world.said()  # nothing of it for the next host
+    world.app.commands.greeted = True
+    assert world.stands()[0] == "stopped" and world.turns == 30
+
+
+def case_what_a_lost_host_was_not_told_gives_way_to_the_traceback():
+    def script(world):
+        world.app.link.room = lambda size: False
+
+    world = World("print('one')\nprint('two')\n1 // 0\n", script)
+    assert world.start()[0] == "ok"
+    world.host.turn = lambda times=1: [world.app.run_once() for _ in range(times)]
+    world.execute()
+    assert b"ZeroDivisionError" in world.app.events.notice, world.app.events.notice
 
 
 cases.run(globals())

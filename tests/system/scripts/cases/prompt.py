@@ -197,6 +197,22 @@ def case_ctrl_c_stops_a_replay_wherever_it_comes(world):  # not compiled
         world.printed = bytearray()
 
 
+def case_a_program_at_the_prompt_prints_there(world):  # not compiled
+    """Homed, as a motion; Ctrl-C ends it."""
+    yield from prompt(world)
+    yield from typed(world, "import armtempo_board")
+    answer = yield from typed(world, "armtempo_board.replay('pick')")
+    assert answer.split() == ["refused:", "unhomed", "joint", "1"], answer
+    yield from typed(world, "program = armtempo_board.load_program()")
+    yield from typed(world, "program.app.controller.home(7, %s)" % HOME)
+    world.type(b"armtempo_board.replay('pick')\r")
+    yield from shown(world, b"first\r\nsecond\r\n", 10_000)
+    world.type(b"\x03")
+    answer = yield from shown(world, b">>> ")
+    made = [home + steps for home, steps in zip(HOME, world.steps())]
+    assert answer == "done at steps %s\r\n>>> " % made, answer
+
+
 for name in cases.wanted(globals()):
     flash = FLASHES + ("/broken" if "broken" in name else "/finish")
     whole_board.run(globals()[name], flash, PROGRAM)

@@ -243,6 +243,35 @@ def case_a_run_by_button_needs_no_host(world):  # on CPython
     yield from moved(world, 1)
 
 
+def case_button_starts_a_program_and_ends_it(world):  # not compiled
+    """It moves, waits for its input, and goes on; the next press brakes it, the one after starts it anew."""
+    yield from ready(world, "pick")
+    yield from tap(world)
+    yield from world.until(lambda: world.led() == "moving")
+    yield from world.still()
+    yield from world.until(lambda: world.steps() != [0, 0, 0])
+    yield from world.wait(500)
+    assert world.led() == "moving"  # it waits, and has not ended
+    assert notices(world) == ["first", "second"]
+    for _ in range(2):
+        yield from tap(world)
+        yield from world.until(lambda: world.led() == "idle")
+        kept = world.steps()
+        yield from world.wait(500)
+        assert world.steps() == kept
+        yield from tap(world)
+        yield from world.until(lambda: world.led() == "moving")
+
+
+def case_before_homing_no_program_starts(world):  # not compiled
+    yield from world.hello()
+    yield from world.ask("set_default", (), "pick")
+    yield from tap(world)
+    yield from unmoved(world)
+    told = notices(world)
+    assert told == ["button: error %d" % wire.ERROR_CODES["unhomed"]], told
+
+
 def case_level_present_at_power_up(world):
     yield from ready(world)
     yield from unmoved(world)

@@ -1,18 +1,14 @@
-"""URDF in: rows of every kind of chain against a forward kinematics of the tests' own, and what does not fit."""
+"""URDF in: rows of every kind of chain against a forward kinematics of the tests' own."""
 
 from __future__ import annotations
 
 import math
 import re
-import shutil
-import sys
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import trimesh
-from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
 from armtempo.kinematics import Geometry, all_frames, forward, of_arm
 from armtempo.kinematics.chain import outline_mm
@@ -20,63 +16,17 @@ from armtempo.kinematics.dynamics import joint_torques
 from armtempo.kinematics.shape import refusals
 from armtempo.model import mesh_files
 from armtempo.model.arm import Arm
-from armtempo.new_arm import urdf_fitting as fitting
 from armtempo.new_arm import urdf_reader as reader
 from armtempo.new_arm import urdf_rows as dh
 from armtempo.planning.capsules import point_distance
 from click.testing import CliRunner
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tests.host.arms import run_check
+from tests.host.urdf.files import FOLDER, J2_LIMIT, Array, about, imported, tool_pose
 
 pytestmark = pytest.mark.slow
-
-Array = NDArray[np.float64]
-FOLDER = Path(__file__).parents[1] / "data" / "urdf"
 SEED = 20_260_102
-
-
-@pytest.fixture(autouse=True)
-def _few_postures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The reader's own forward kinematics takes a millisecond a posture."""
-    monkeypatch.setattr(fitting, "POSTURES", 100)
-
-
-def about(axis: Array, angle: float) -> Array:
-    """A (4, 4) rotation, by Rodrigues' formula."""
-    axis = axis / np.linalg.norm(axis)
-    cross = np.cross(np.eye(3), axis)
-    pose = np.eye(4)
-    pose[:3, :3] += math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-    return pose
-
-
-def tool_pose(path: Path, angles: dict[str, float], link: str = "tool") -> Array:
-    """The pose of a link in mm, straight from the XML."""
-    pose = np.eye(4)
-    above = {joint.find("child").get("link"): joint for joint in ElementTree.parse(path).iter("joint")}  # type: ignore[union-attr]
-    while link in above:
-        joint = above[link]
-        origin = joint.find("origin")
-        numbers = {key: np.array(origin.get(key).split(), float) for key in ("xyz", "rpy")}  # type: ignore[union-attr]
-        move = np.eye(4)
-        move[:3, 3] = 1000 * numbers["xyz"]
-        for unit, angle in zip(np.eye(3)[::-1], numbers["rpy"][::-1], strict=True):
-            move = move @ about(unit, angle)
-        if joint.get("name") in angles:
-            axis = np.array(joint.find("axis").get("xyz").split(), float)  # type: ignore[union-attr]
-            move = move @ about(axis, angles[str(joint.get("name"))])
-        pose, link = move @ pose, joint.find("parent").get("link")  # type: ignore[union-attr, assignment]
-    return pose
-
-
-def imported(tmp_path: Path, name: str, *options: str) -> tuple[Path, str]:
-    """The arm file of a URDF of the tests, and what the command said."""
-    out = tmp_path / f"{name}.toml"
-    result = CliRunner().invoke(main, ["import-urdf", str(FOLDER / f"{name}.urdf"), "-o", str(out), *options])
-    assert result.exit_code == 0, result.output
-    return out, result.output
 
 
 @pytest.mark.parametrize(
@@ -231,136 +181,6 @@ def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
     assert "3 joints from link 'l1' to 'left_finger'" in said
 
 
-J2_LIMIT = '    <limit lower="-2.0" upper="2.0" effort="10" velocity="1.5"/>\n'
-J3_LIMIT = '    <limit lower="-3.0" upper="3.0" effort="10" velocity="2.0"/>\n'
-MIMIC = '<mimic joint="{}" multiplier="{}" offset="{}"/>'
-
-
-@pytest.mark.parametrize(("limit", "master", "offset"), [(J2_LIMIT, "j1", 0.0), (J3_LIMIT, "j2", 0.3)])
-def test_a_joint_that_a_parallelogram_turns(tmp_path: Path, limit: str, master: str, offset: float) -> None:
-    """It turns by minus the angle of the joint before, has no motor, and its link keeps its direction."""
-    urdf, out = tmp_path / "linkage.urdf", tmp_path / "arm.toml"
-    text = (FOLDER / "three_planar.urdf").read_text()
-    urdf.write_text(text.replace(limit, MIMIC.format(master, -1, offset)))
-    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
-    assert result.exit_code == 0, result.output
-    content = out.read_text()
-    assert [content.count(f"# motor = {{ channel = {channel}") for channel in (1, 2, 3)] == [1, 1, 0]
-    arm = Arm.shape(out)
-    slave = "j2" if master == "j1" else "j3"
-    assert [joint.name for joint in arm.joints if joint.parallel_linkage] == [slave]
-    assert slave not in [joint.name for joint in arm.driven]
-    rng = np.random.default_rng(SEED)
-    for driven in rng.uniform(-2.0, 2.0, (20, 2)):
-        angles = dict(zip((joint.name for joint in arm.driven), driven, strict=True))
-        angles[slave] = offset - angles[master]
-        pose = of_arm.forward(arm, np.degrees(driven))
-        np.testing.assert_allclose(pose, tool_pose(urdf, angles), atol=0.02)
-
-
-@pytest.mark.parametrize(("master", "factor"), [("j1", -1), ("j2", 1), ("j2", -0.5)])
-def test_other_linkages_are_refused(tmp_path: Path, master: str, factor: float) -> None:
-    urdf = tmp_path / "linkage.urdf"
-    text = (FOLDER / "three_planar.urdf").read_text()
-    urdf.write_text(text.replace(J3_LIMIT, MIMIC.format(master, factor, 0)))
-    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
-    assert result.exit_code == 2
-    assert (
-        f"joint 'j3': it mimics '{master}' by a factor of {factor:g}; an arm file has only linkages"
-        in result.output
-    )
-    assert not (tmp_path / "arm.toml").exists()
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        (J2_LIMIT, J2_LIMIT + MIMIC.format("j1", 1, 0), "joint 'j2': it mimics 'j1'"),
-        ('name="j2" type="revolute"', 'name="j2" type="prismatic"', "joint 'j2': it slides"),
-        ('name="j3" type="revolute"', 'name="j3" type="prismatic"', "joint 'j3': it slides"),
-    ],
-)
-def test_joints_of_the_main_chain_are_not_taken_for_fingers(
-    tmp_path: Path, old: str, new: str, said: str
-) -> None:
-    """The tool was the link before them, silently."""
-    text = (FOLDER / "three_planar.urdf").read_text()
-    assert old in text
-    urdf = tmp_path / "changed.urdf"
-    urdf.write_text(text.replace(old, new))
-    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
-    assert result.exit_code == 2
-    assert said in result.output
-
-
-DIFFERENTIAL = """
-  <transmission name="wrist">
-    <type>transmission_interface/DifferentialTransmission</type>
-    <actuator name="a"><role>actuator1</role><mechanicalReduction>50</mechanicalReduction></actuator>
-    <actuator name="b"><role>actuator2</role><mechanicalReduction>-40</mechanicalReduction></actuator>
-    <joint name="j3"><role>joint2</role><mechanicalReduction>0.5</mechanicalReduction></joint>
-    <joint name="j2"><role>joint1</role><mechanicalReduction>2.0</mechanicalReduction></joint>
-  </transmission>
-"""
-FOUR_BAR = """
-  <ros2_control name="arm" type="system">
-    <transmission name="elbow">
-      <plugin>transmission_interface/FourBarLinkageTransmission</plugin>
-      <actuator name="a" role="actuator1"/>
-      <actuator name="b" role="actuator2"><mechanical_reduction>30</mechanical_reduction></actuator>
-      <joint name="j1" role="joint1"/>
-      <joint name="j2" role="joint2"><mechanical_reduction>-1.5</mechanical_reduction></joint>
-    </transmission>
-  </ros2_control>
-"""
-
-
-@pytest.mark.parametrize(
-    ("element", "coupling", "ratios"),
-    [
-        (DIFFERENTIAL, [[1, 0, 0], [0, 2, 0.5], [0, 2, -0.5]], ["= 50", "= -40"]),
-        (FOUR_BAR, [[1, 0, 0], [1, -1.5, 0], [0, 0, 1]], ["= 1\n", "= 30"]),
-        (DIFFERENTIAL.replace("Differential", "Simple"), [], []),
-        ("", [], []),
-    ],
-)
-def test_transmissions_that_couple_joints(
-    tmp_path: Path, element: str, coupling: list[list[float]], ratios: list[str]
-) -> None:
-    """By the formulas of transmission_interface, once the '#' of motors and coupling are taken off."""
-    urdf, out = tmp_path / "coupled.urdf", tmp_path / "arm.toml"
-    urdf.write_text((FOLDER / "three_planar.urdf").read_text().replace("</robot>", f"{element}</robot>"))
-    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
-    assert result.exit_code == 0, result.output
-    assert ("[coupling]" in result.output) == bool(coupling)
-    text = out.read_text()
-    assert all(f"gear_ratio {ratio}" in text for ratio in ratios)
-    out.write_text(re.sub(r"^# (limits|motor|\[coupling\]|\"j\d\") ?", r"\1 ", text, flags=re.M))
-    np.testing.assert_array_equal(np.array(Arm.load(out).coupling), np.array(coupling))
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('name="j3"><role', 'name="gripper"><role'),
-        (">50<", ">0<"),
-        (">50<", "> <"),
-        (">50<", ">x<"),
-        (">50<", ">nan<"),
-        ("Differential", "Planetary"),
-    ],
-)
-def test_transmissions_that_cannot_be_used_are_told(tmp_path: Path, old: str, new: str) -> None:
-    urdf = tmp_path / "coupled.urdf"
-    element = DIFFERENTIAL.replace(old, new)
-    assert element != DIFFERENTIAL
-    urdf.write_text((FOLDER / "three_planar.urdf").read_text().replace("</robot>", f"{element}</robot>"))
-    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
-    assert result.exit_code == 0, result.output
-    assert "note: transmission 'wrist' couples 'j2' and " in result.output
-    assert "[coupling]" not in (tmp_path / "arm.toml").read_text()
-
-
 def test_limits_in_degrees_are_suspected_at_import_and_by_check(tmp_path: Path) -> None:
     text = (FOLDER / "three_planar.urdf").read_text()
     urdf, out = tmp_path / "degrees.urdf", tmp_path / "arm.toml"
@@ -376,88 +196,6 @@ def test_limits_in_degrees_are_suspected_at_import_and_by_check(tmp_path: Path) 
     assert "if so, write range_deg = [-90, 90]" in checked.output
 
 
-REFUSED = [
-    ("two_ends", [], ["choose with --tip", ": tool (j1, j2, j3), l2 (j1, j2), camera (j1, j2), l1 (j1)\n"]),
-    ("wheel", [], ["turning without end, as wheels do: 'wheel';"]),
-    ("gripper", ["--tip", "right_finger"], ["joint 'right': it mimics 'left'"]),
-    ("gripper", ["--tip", "thumb"], ["has no link 'thumb' for --tip", "left_finger"]),
-    ("gripper", ["--base", "hand", "--tip", "l1"], ["no chain leads from link 'hand' to 'l1'"]),
-    ("gripper", ["--base", "hand", "--tip", "hand"], ["the same link"]),
-    ("four_skew", ["--tip", "base"], ["no joint between 'world' and 'base' turns"]),
-    ("no_limits", [], ["joint 'j2': it has no limits", "<limit lower="]),
-    ("broken", [], ["not valid XML", "line"]),
-    ("xacro", [], ["make a URDF of it first: xacro"]),
-    ("optenv", [], ["'$(optenv LENGTH 0.3) 0 0' still to be filled in", "make a URDF of it first: xacro"]),
-    (
-        "does_not_fit",
-        [],
-        [
-            "joint 'slide': it slides",
-            "joint 'copy': it mimics 'turn'",
-            "joint 'float': it is free",
-            "joint 'glide': it moves in a plane",
-            "joint 'backwards': its limits 2 to -2 rad are no range",
-            "joint 'aimless': its axis has no direction",
-            "choose another chain with --base and --tip",
-        ],
-    ),
-    ("is_not_there", [], ["no such file"]),
-    ("light", [], ["joint 'j3': a mass"]),
-    ("long", [], ["joint[1].a_mm = 2500000.0 is not allowed"]),
-]
-
-
-TOOL = '<link name="tool"/>'
-SPOILED = {
-    "broken": lambda text: text[: text.index(J2_LIMIT)],
-    "no_limits": lambda text: text.replace(J2_LIMIT, ""),
-    "optenv": lambda text: text.replace('"0 0 0.08"', '"$(optenv LENGTH 0.3) 0 0"'),
-    "light": lambda text: text.replace(
-        TOOL, TOOL.replace("/>", ">") + '<inertial><mass value="-1"/></inertial></link>'
-    ),
-    "long": lambda text: text.replace("0.25 0 0.02", "2500 0 0"),
-    "xacro": lambda text: text.replace("<link", '<xacro:property name="a" value="1"/>\n  <link', 1).replace(
-        "<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"'
-    ),
-}
-"""By name: what is done to the planar arm."""
-
-
-@pytest.mark.parametrize(("name", "options", "said"), REFUSED)
-def test_what_does_not_fit_is_refused_with_its_reasons(
-    tmp_path: Path, name: str, options: list[str], said: list[str]
-) -> None:
-    urdf, out = FOLDER / f"{name}.urdf", tmp_path / "arm.toml"
-    if name in SPOILED:
-        urdf = tmp_path / urdf.name
-        urdf.write_text(SPOILED[name]((FOLDER / "three_planar.urdf").read_text()))
-    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out), *options])
-    assert result.exit_code == 2
-    for text in said:
-        assert text in result.output
-    assert not out.exists()
-
-
-LINK = '<link name="a"/>'
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("<html/>", "not <robot>"),
-        (f"<robot>{LINK}</robot>", "has no name"),
-        (f'<robot name="x">{LINK}<joint name="j" type="revolute"/></robot>', "not a URDF that can be read"),
-        ('<robot name="x"/>', "has no joints"),
-        (f'<robot name="x">{LINK}</robot>', "has no joints"),
-    ],
-)
-def test_xml_that_is_no_robot(tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / "robot.urdf"
-    path.write_text(text)
-    with pytest.raises(InputError, match=said):
-        reader.read(path)
-
-
 def test_names_of_any_kind_are_written_safely_and_blank_ones_replaced(tmp_path: Path) -> None:
     path, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
     text = (FOLDER / "three_planar.urdf").read_text().replace('"three planar"', '" "')
@@ -468,43 +206,6 @@ def test_names_of_any_kind_are_written_safely_and_blank_ones_replaced(tmp_path: 
     arm = Arm.read(out)
     assert (arm.name, arm.joints[1].name, arm.joints[2].name) == ("imported arm", "joint 2", "j3")
     assert arm.joints[0].name.startswith('j "1"')
-
-
-def test_nothing_is_overwritten(tmp_path: Path) -> None:
-    urdf, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
-    shutil.copy(FOLDER / "three_planar.urdf", urdf)
-    out.write_text("mine")
-    for command, kept in (([str(out)], out), ([str(urdf)], urdf), ([str(urdf), "--force"], urdf)):
-        before = kept.read_bytes()
-        result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", *command])
-        assert result.exit_code == 2
-        assert kept.read_bytes() == before
-    assert CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out), "--force"]).exit_code == 0
-    assert Arm.read(out).name == "three planar"
-
-
-def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(sys.modules, "yourdfpy", None)
-    result = CliRunner().invoke(
-        main, ["import-urdf", str(FOLDER / "three_planar.urdf"), "-o", str(tmp_path / "a")]
-    )
-    assert result.exit_code == 1
-    assert "pip install 'yourdfpy" in result.output
-
-
-def test_a_table_that_does_not_keep_to_the_urdf_is_not_written(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    derive = dh.derive
-
-    def wrong(*arguments: object) -> list[dh.DhRow]:
-        first, *rest = derive(*arguments)  # type: ignore[arg-type]
-        return [first._replace(a_mm=first.a_mm + 0.1), *rest]
-
-    monkeypatch.setattr(dh, "derive", wrong)
-    chain = reader.read(FOLDER / "three_planar.urdf")
-    with pytest.raises(PlanError, match=r"off by 0\.1 mm"):
-        fitting.fit(chain)
 
 
 def random_turn(rng: np.random.Generator) -> Array:

@@ -1,0 +1,169 @@
+"""Points that are taught one by one, and what becomes of them: the via points of a job, or a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import click
+import numpy as np
+
+from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import replace_text
+from armtempo.basics.errors import InputError
+from armtempo.cli import results
+from armtempo.diagnosis import figures
+from armtempo.kinematics.of_arm import forward
+from armtempo.model import frame, taught, taught_frame
+from armtempo.model.arm import Arm
+from armtempo.planning import via_points
+
+TAKE, UNDO = "p", "u"
+
+
+class TaughtPoints:
+    """The points taught up to now; ``where`` returns the posture of the arm, degrees (J,)."""
+
+    def __init__(self, arm: Arm, where: Callable[[], Array]) -> None:
+        self.points_deg: list[list[float]] = []
+        self._arm = arm
+        self.where = where
+
+    @property
+    def keys(self) -> dict[str, Callable[[], str]]:
+        """The keys for the jog screen, with their functions."""
+        return {TAKE: self.take, UNDO: self.undo}
+
+    def take(self) -> str:
+        """Store the arm's position; returns a message."""
+        point = taught.digits(self._arm, self.where().tolist())
+        if problem := self._arm.angles_problem(point):
+            return f"not taken: {problem}"
+        if self.points_deg and point == self.points_deg[-1]:
+            return "not taken: the arm is at the last point"
+        self.points_deg.append(point)
+        return f"point {len(self.points_deg)} taken: {row(point)}"
+
+    def undo(self) -> str:
+        """Remove the last point; returns a message."""
+        if not self.points_deg:
+            return "there is no point to remove"
+        self.points_deg.pop()
+        return f"point {len(self.points_deg) + 1} removed"
+
+    def save(self) -> None:
+        """Write what they are; raises InputError for too few points."""
+        raise NotImplementedError
+
+    def tell(self) -> None:
+        """Print the points if the file cannot be written, so that they are not lost."""
+        for point in self.points_deg:
+            click.echo(f"[[via]]\nangles_deg = [{row(point)}]", err=True)
+
+
+class JobPoints(TaughtPoints):
+    """The via points of a new job."""
+
+    def __init__(self, arm: Arm, where: Callable[[], Array], file: Path) -> None:
+        super().__init__(arm, where)
+        self._file = file
+
+    def save(self) -> None:
+        """Write the job; raises InputError for fewer than two points."""
+        text = taught.of_points(taught.name_of(self._file), self.points_deg)
+        replace_text(self._file, text)
+        results.echo(
+            f"written: {self._file}, {len(self.points_deg)} via points; 'armtempo plan --job {self._file}' plans it"
+        )
+
+
+class NewFrame:
+    """The frame that is taught, and the arm file that gets it."""
+
+    def __init__(self, file: Path, arm: Arm, name: str, level: bool, replace_old: bool) -> None:
+        """Raise InputError for a name that is not allowed or taken, before anything moves."""
+        frame.check_name(name)
+        taught.check_free(file, (frame.KIND, name), replace_old)
+        self._file = file
+        self._arm = arm
+        self._name = name
+        self._level = level
+        self._replace = replace_old
+        self._step_error_mm = 0.5 * sum(resolution.step_mm for resolution in figures.resolutions(arm))
+        """By how much half a step of each joint moves the tool at most."""
+
+    def postures_deg(self, names: Sequence[str]) -> list[list[float]]:
+        """The angles, (J,), of three postures of the arm file."""
+        if len(names) != len(taught_frame.POINTS):
+            raise InputError(
+                f"--at {','.join(names)}: {len(names)} postures",
+                f"give three: at {', '.join(taught_frame.POINTS)}",
+            )
+        return [via_points.posture_deg(self._arm, self._arm.posture(name.strip())).tolist() for name in names]
+
+    def problem(self, points_deg: Sequence[Sequence[float]]) -> str:
+        """Why the first points of a frame, (1 to 3, J), cannot be its points; "" if they can."""
+        points_mm = self._points_mm(points_deg)
+        try:
+            taught_frame.check_apart(points_mm, self._step_error_mm)
+            if len(points_mm) == len(taught_frame.POINTS):
+                taught_frame.of_points(points_mm, self._step_error_mm, self._level)
+        except InputError as error:
+            return f"{error.problem}; {error.hint}"
+        return ""
+
+    def _points_mm(self, points_deg: Sequence[Sequence[float]]) -> Array:
+        return np.array([forward(self._arm, angles)[:3, 3] for angles in points_deg])
+
+    def save(self, points_deg: Sequence[Sequence[float]]) -> None:
+        """Write the frame through the tool's points at postures, (3, J); InputError if they give none."""
+        arm, name, step_error_mm = self._arm, self._name, self._step_error_mm
+        found = taught_frame.of_points(self._points_mm(points_deg), step_error_mm, self._level)
+        values = taught_frame.values(arm, name, found.matrix)
+        taught.save_table(self._file, (frame.KIND, name), values, self._replace)
+        tilt = "made level, it was tilted" if self._level else "it is tilted"
+        results.echo(
+            f"{self._file}: frame {name!r}: {', '.join(f'{key} {value}' for key, value in values.items())}"
+        )
+        results.echo(
+            f"the points are {found.apart_mm[0]:.4g} and {found.apart_mm[1]:.4g} mm from the origin, "
+            f"{found.angle_deg:.3g} degrees apart; {tilt} by {found.tilt_deg:.3g} degrees; half a step of each joint "
+            f"is up to {step_error_mm:.2g} mm at the tool, which turns the axes by up to {found.axes_error_deg:.2g} "
+            "degrees"
+        )
+
+
+class FramePoints(TaughtPoints):
+    """The three points of a frame."""
+
+    def __init__(self, arm: Arm, where: Callable[[], Array], new: NewFrame) -> None:
+        super().__init__(arm, where)
+        self._new = new
+
+    def take(self) -> str:
+        """Store the arm's position as the next point; returns a message."""
+        count = len(self.points_deg)
+        if count == len(taught_frame.POINTS):
+            return "not taken: all three points are there; q writes the frame, u removes the last"
+        said = super().take()
+        if len(self.points_deg) == count:
+            return said
+        if problem := self._new.problem(self.points_deg):
+            self.points_deg.pop()
+            return f"not taken: {problem}"
+        then = [*taught_frame.POINTS[1:], "q writes the frame"][count]
+        return f"{taught_frame.POINTS[count]} taken; next: {then}"
+
+    def save(self) -> None:
+        """Write the frame; raises InputError if it has not three points."""
+        if len(self.points_deg) < len(taught_frame.POINTS):
+            raise InputError(
+                f"{len(self.points_deg)} of 3 points, so no frame was written",
+                f"take {', '.join(taught_frame.POINTS)}",
+            )
+        self._new.save(self.points_deg)
+
+
+def row(point: Sequence[float]) -> str:
+    """A posture as the list in a file has it."""
+    return ", ".join(f"{angle + 0.0:.12g}" for angle in point)

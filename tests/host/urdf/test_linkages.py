@@ -1,0 +1,144 @@
+"""Joints of a URDF that others turn: mimics, fingers and transmissions."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from armtempo.cli import main
+from armtempo.kinematics import of_arm
+from armtempo.model.arm import Arm
+from click.testing import CliRunner
+
+from tests.host.urdf.files import FOLDER, J2_LIMIT, J3_LIMIT, tool_pose
+
+pytestmark = pytest.mark.slow
+SEED = 20_260_102
+MIMIC = '<mimic joint="{}" multiplier="{}" offset="{}"/>'
+
+
+@pytest.mark.parametrize(("limit", "master", "offset"), [(J2_LIMIT, "j1", 0.0), (J3_LIMIT, "j2", 0.3)])
+def test_a_joint_that_a_parallelogram_turns(tmp_path: Path, limit: str, master: str, offset: float) -> None:
+    """It turns by minus the angle of the joint before, has no motor, and its link keeps its direction."""
+    urdf, out = tmp_path / "linkage.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    urdf.write_text(text.replace(limit, MIMIC.format(master, -1, offset)))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    content = out.read_text()
+    assert [content.count(f"# motor = {{ channel = {channel}") for channel in (1, 2, 3)] == [1, 1, 0]
+    arm = Arm.shape(out)
+    slave = "j2" if master == "j1" else "j3"
+    assert [joint.name for joint in arm.joints if joint.parallel_linkage] == [slave]
+    assert slave not in [joint.name for joint in arm.driven]
+    rng = np.random.default_rng(SEED)
+    for driven in rng.uniform(-2.0, 2.0, (20, 2)):
+        angles = dict(zip((joint.name for joint in arm.driven), driven, strict=True))
+        angles[slave] = offset - angles[master]
+        pose = of_arm.forward(arm, np.degrees(driven))
+        np.testing.assert_allclose(pose, tool_pose(urdf, angles), atol=0.02)
+
+
+@pytest.mark.parametrize(("master", "factor"), [("j1", -1), ("j2", 1), ("j2", -0.5)])
+def test_other_linkages_are_refused(tmp_path: Path, master: str, factor: float) -> None:
+    urdf = tmp_path / "linkage.urdf"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    urdf.write_text(text.replace(J3_LIMIT, MIMIC.format(master, factor, 0)))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
+    assert result.exit_code == 2
+    assert (
+        f"joint 'j3': it mimics '{master}' by a factor of {factor:g}; an arm file has only linkages"
+        in result.output
+    )
+    assert not (tmp_path / "arm.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (J2_LIMIT, J2_LIMIT + MIMIC.format("j1", 1, 0), "joint 'j2': it mimics 'j1'"),
+        ('name="j2" type="revolute"', 'name="j2" type="prismatic"', "joint 'j2': it slides"),
+        ('name="j3" type="revolute"', 'name="j3" type="prismatic"', "joint 'j3': it slides"),
+    ],
+)
+def test_joints_of_the_main_chain_are_not_taken_for_fingers(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    """The tool was the link before them, silently."""
+    text = (FOLDER / "three_planar.urdf").read_text()
+    assert old in text
+    urdf = tmp_path / "changed.urdf"
+    urdf.write_text(text.replace(old, new))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
+    assert result.exit_code == 2
+    assert said in result.output
+
+
+DIFFERENTIAL = """
+  <transmission name="wrist">
+    <type>transmission_interface/DifferentialTransmission</type>
+    <actuator name="a"><role>actuator1</role><mechanicalReduction>50</mechanicalReduction></actuator>
+    <actuator name="b"><role>actuator2</role><mechanicalReduction>-40</mechanicalReduction></actuator>
+    <joint name="j3"><role>joint2</role><mechanicalReduction>0.5</mechanicalReduction></joint>
+    <joint name="j2"><role>joint1</role><mechanicalReduction>2.0</mechanicalReduction></joint>
+  </transmission>
+"""
+FOUR_BAR = """
+  <ros2_control name="arm" type="system">
+    <transmission name="elbow">
+      <plugin>transmission_interface/FourBarLinkageTransmission</plugin>
+      <actuator name="a" role="actuator1"/>
+      <actuator name="b" role="actuator2"><mechanical_reduction>30</mechanical_reduction></actuator>
+      <joint name="j1" role="joint1"/>
+      <joint name="j2" role="joint2"><mechanical_reduction>-1.5</mechanical_reduction></joint>
+    </transmission>
+  </ros2_control>
+"""
+
+
+@pytest.mark.parametrize(
+    ("element", "coupling", "ratios"),
+    [
+        (DIFFERENTIAL, [[1, 0, 0], [0, 2, 0.5], [0, 2, -0.5]], ["= 50", "= -40"]),
+        (FOUR_BAR, [[1, 0, 0], [1, -1.5, 0], [0, 0, 1]], ["= 1\n", "= 30"]),
+        (DIFFERENTIAL.replace("Differential", "Simple"), [], []),
+        ("", [], []),
+    ],
+)
+def test_transmissions_that_couple_joints(
+    tmp_path: Path, element: str, coupling: list[list[float]], ratios: list[str]
+) -> None:
+    """By the formulas of transmission_interface, once the '#' of motors and coupling are taken off."""
+    urdf, out = tmp_path / "coupled.urdf", tmp_path / "arm.toml"
+    urdf.write_text((FOLDER / "three_planar.urdf").read_text().replace("</robot>", f"{element}</robot>"))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    assert ("[coupling]" in result.output) == bool(coupling)
+    text = out.read_text()
+    assert all(f"gear_ratio {ratio}" in text for ratio in ratios)
+    out.write_text(re.sub(r"^# (limits|motor|\[coupling\]|\"j\d\") ?", r"\1 ", text, flags=re.M))
+    np.testing.assert_array_equal(np.array(Arm.load(out).coupling), np.array(coupling))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('name="j3"><role', 'name="gripper"><role'),
+        (">50<", ">0<"),
+        (">50<", "> <"),
+        (">50<", ">x<"),
+        (">50<", ">nan<"),
+        ("Differential", "Planetary"),
+    ],
+)
+def test_transmissions_that_cannot_be_used_are_told(tmp_path: Path, old: str, new: str) -> None:
+    urdf = tmp_path / "coupled.urdf"
+    element = DIFFERENTIAL.replace(old, new)
+    assert element != DIFFERENTIAL
+    urdf.write_text((FOLDER / "three_planar.urdf").read_text().replace("</robot>", f"{element}</robot>"))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
+    assert result.exit_code == 0, result.output
+    assert "note: transmission 'wrist' couples 'j2' and " in result.output
+    assert "[coupling]" not in (tmp_path / "arm.toml").read_text()
