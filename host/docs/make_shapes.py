@@ -44,10 +44,10 @@ def law(ramp: float, has_constant: bool) -> Trajectory:
     """The law as a motion over about 1 deg, of one joint."""
     speed = 1.0 / (1.0 - ramp)
     acceleration, jerk = (1.5, 4.5) if has_constant else (2.0, 4.0)
-    limits = move_law.WayLimits(speed, acceleration * speed / ramp, jerk * speed / ramp**2)
+    limits = move_law.MoveLimits(speed, acceleration * speed / ramp, jerk * speed / ramp**2)
     found = move_law.law(1.0, limits)
-    times = found.time_s / found.trajectory("", [found.way]).duration_s
-    return move_law.WayLaw(found.way, times).trajectory("shape", [found.way])
+    times = found.time_s / found.trajectory("", [found.distance]).duration_s
+    return move_law.MoveLaw(found.distance, times).trajectory("shape", [found.distance])
 
 
 def text(motion: Trajectory) -> str:

@@ -21,7 +21,7 @@ from armtempo.cli.taught_points import FramePoints, NewFrame
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import frame, shipped, taught, workspace
+from armtempo.model import frame, shipped, taught, taught_frame, workspace
 from armtempo.model.arm import Arm
 from armtempo.model.frame import ArmFrame
 from armtempo.model.job import Job
@@ -206,7 +206,7 @@ def test_single_angles_in_a_level_frame_mean_the_same(fixed: tuple[str, ...], fl
             assert (seen[name] - wanted[name] + 180) % 360 - 180 == pytest.approx(0, abs=1e-9)
 
 
-def test_single_angles_in_a_frame_that_leans_are_refused(tmp_path: Path) -> None:
+def test_single_angles_in_a_tilted_frame_are_refused(tmp_path: Path) -> None:
     arm = Arm.load(arm_file(tmp_path))
     text = 'frame = "{}"\n[[via]]\nposture = "home"\n[[via]]\nposition_mm = [0, 0, 50]\npitch_deg = 90\n'
     with pytest.raises(
@@ -507,12 +507,12 @@ def test_the_panel_keeps_poses_in_their_frame(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     editor = JobEditor(arm, tmp_path, tmp_path / "job.toml")
-    for number, angles in ((1, [20.0, -40.0, 30.0]), (2, [25.0, -45.0, 30.0])):
-        tool_mm = forward(arm, angles)[:3, 3]
-        np.testing.assert_allclose(forward(arm, editor.vias[number].angles_deg)[:3, 3], tool_mm, atol=0.1)
-        there = np.add(tool_mm, (3.0, -2.0, 4.0))
-        editor.set_position(number, there.tolist())
-        np.testing.assert_allclose(forward(arm, editor.vias[number].angles_deg)[:3, 3], there, atol=0.1)
+    there = np.array([forward(arm, angles)[:3, 3] for angles in ([20.0, -40.0, 30.0], [25.0, -45.0, 30.0])])
+    there += (3.0, -2.0, 4.0)
+    for number, place in enumerate(there.tolist(), 1):
+        editor.set_position(number, place)
+    for via, place in zip(editor.vias[1:], there, strict=True):
+        np.testing.assert_allclose(forward(arm, via.angles_deg)[:3, 3], place, atol=0.1)
     editor.set_angles(2, [25.0, -45.0, 30.0])
     assert "frame" not in editor.vias[2].values
     editor.set_pose(2)
@@ -552,12 +552,12 @@ def postures(**angles_deg: list[float]) -> str:
 
 
 AR4 = Arm.load("ar4")
-LEANING = pose([280, 40, 120], Rotation.from_euler("xyz", [4, -3, 30], degrees=True))
+TILTED = pose([280, 40, 120], Rotation.from_euler("xyz", [4, -3, 30], degrees=True))
 
 
 @pytest.mark.parametrize("level", [False, True])
 def test_a_frame_is_taught_from_three_postures(tmp_path: Path, level: bool) -> None:
-    o, x, y = taught_points(AR4, LEANING, [0, 0, 0], [90, 0, 0], [-20, 60, 0])
+    o, x, y = taught_points(AR4, TILTED, [0, 0, 0], [90, 0, 0], [-20, 60, 0])
     before = "\n# the tray\n[frame.tray]\n# old\nposition_mm = [1, 2, 3]\nyaw_deg = 4 # old\n# end\n"
     path = arm_file(tmp_path, before + postures(o=o, x=x, y=y), "ar4")
     words = ["teach", "frame", "tray", "--at", "o,x,y", "--arm", str(path)] + ["--level"] * level
@@ -569,23 +569,43 @@ def test_a_frame_is_taught_from_three_postures(tmp_path: Path, level: bool) -> N
     assert result.exit_code == 0, result.output
     said = " ".join(result.output.split())
     assert "90 and 63.25 mm from the origin, 108 degrees apart" in said
-    assert ("made level, it leant by 5 degrees" if level else "it leans by 5 degrees") in said
+    assert ("made level, it was tilted by 5 degrees" if level else "it is tilted by 5 degrees") in said
     found = Arm.load(path).frame("tray")
-    x_axis = LEANING[:3, 0] * [1, 1, 0 if level else 1]
+    x_axis = TILTED[:3, 0] * [1, 1, 0 if level else 1]
     np.testing.assert_allclose(found[:3, 0], x_axis / np.linalg.norm(x_axis), atol=1e-4)
-    np.testing.assert_allclose(found[:3, 2], [0, 0, 1] if level else LEANING[:3, 2], atol=1e-4)
-    np.testing.assert_allclose(found[:3, 3], LEANING[:3, 3], atol=0.01)
+    np.testing.assert_allclose(found[:3, 2], [0, 0, 1] if level else TILTED[:3, 2], atol=1e-4)
+    np.testing.assert_allclose(found[:3, 3], TILTED[:3, 3], atol=0.01)
     text = path.read_text(encoding="utf-8")
     assert all(comment in text for comment in ("# the tray", "\n# old\n", "# end"))
 
 
+@pytest.mark.seeds(*range(2))
+def test_random_errors_of_the_points_turn_the_axes_by_no_more_than_is_said(seed: int) -> None:
+    rng = np.random.default_rng([seed, 44])
+    worst = 0.0
+    for _ in range(30):
+        turn, error_mm = Rotation.random(random_state=rng).as_matrix(), 10 ** rng.uniform(-3, -1)
+        along = rng.uniform(-150, 250)
+        local = np.array([[0, 0, 0], [rng.uniform(50, 100), 0, 0], [along, 40 + abs(along), 0]])
+        points = local @ turn.T + rng.normal(0, 300, 3)
+        found = taught_frame.of_points(points, error_mm)
+        np.testing.assert_allclose(found.matrix[:3, :3], turn, atol=1e-9)
+        for _ in range(8):
+            off = rng.normal(size=(3, 3))
+            off *= error_mm / np.linalg.norm(off, axis=1, keepdims=True)
+            there = taught_frame.of_points(points + off, error_mm).matrix[:3, :3]
+            turned_deg = np.degrees(Rotation.from_matrix(there @ turn.T).magnitude())
+            worst = max(worst, turned_deg / found.axes_error_deg)
+    assert 0.5 < worst < 1.01
+
+
 def test_a_frame_that_is_in_another_one_stays_in_it(tmp_path: Path) -> None:
-    o, x, y = taught_points(AR4, LEANING, [0, 0, 0], [90, 0, 0], [20, 60, 0])
+    o, x, y = taught_points(AR4, TILTED, [0, 0, 0], [90, 0, 0], [20, 60, 0])
     path = arm_file(tmp_path, FRAMES + postures(o=o, x=x, y=y), "ar4")
     assert cli("teach", "frame", "tray", "--at", "o,x,y", "--arm", str(path), "--replace").exit_code == 0
     arm = Arm.load(path)
     assert [each.frame for each in arm.frames if each.name == "tray"] == ["table"]
-    np.testing.assert_allclose(arm.frame("tray"), LEANING, atol=0.02)
+    np.testing.assert_allclose(arm.frame("tray"), TILTED, atol=0.02)
 
 
 @pytest.mark.parametrize(
@@ -623,7 +643,7 @@ def test_only_the_table_of_the_frame_changes(text: str) -> None:
 def test_points_that_say_too_little_are_refused(
     tmp_path: Path, points: list[list[float]], more: list[str], said: str
 ) -> None:
-    o, x, y = taught_points(AR4, LEANING, [0, 0, 0], *points)
+    o, x, y = taught_points(AR4, TILTED, [0, 0, 0], *points)
     path = arm_file(tmp_path, postures(o=o, x=x, y=y), "ar4")
     before = path.read_text(encoding="utf-8")
     result = cli("teach", "frame", "tray", "--at", "o,x,y", "--arm", str(path), *more)
@@ -659,7 +679,7 @@ def test_a_frame_is_taught_only_as_far_as_it_makes_sense(tmp_path: Path, words: 
 
 def test_the_keys_take_the_three_points_one_by_one(tmp_path: Path) -> None:
     o, x, near, line, y = taught_points(
-        AR4, LEANING, [0, 0, 0], [90, 0, 0], [2, 0, 0], [150, 0.5, 0], [20, 60, 0]
+        AR4, TILTED, [0, 0, 0], [90, 0, 0], [2, 0, 0], [150, 0.5, 0], [20, 60, 0]
     )
     path = arm_file(tmp_path, "", "ar4")
     new = NewFrame(path, AR4, "tray", level=False, replace_old=False)
@@ -682,7 +702,7 @@ def test_the_keys_take_the_three_points_one_by_one(tmp_path: Path) -> None:
     ):
         assert one.startswith(wanted), one
     points.save()
-    np.testing.assert_allclose(Arm.load(path).frame("tray"), LEANING, atol=0.03)
+    np.testing.assert_allclose(Arm.load(path).frame("tray"), TILTED, atol=0.03)
 
 
 def test_the_screen_says_the_whole_reason_why_a_point_is_not_taken(

@@ -89,7 +89,7 @@ class NewFrame:
         self._name = name
         self._level = level
         self._replace = replace_old
-        self._known_mm = 0.5 * sum(resolution.step_mm for resolution in figures.resolutions(arm))
+        self._step_error_mm = 0.5 * sum(resolution.step_mm for resolution in figures.resolutions(arm))
         """By how much half a step of each joint moves the tool at most."""
 
     def postures_deg(self, names: Sequence[str]) -> list[list[float]]:
@@ -105,9 +105,9 @@ class NewFrame:
         """Why the first points of a frame, (1 to 3, J), cannot be its points; "" if they can."""
         points_mm = self._points_mm(points_deg)
         try:
-            taught_frame.check_apart(points_mm, self._known_mm)
+            taught_frame.check_apart(points_mm, self._step_error_mm)
             if len(points_mm) == len(taught_frame.POINTS):
-                taught_frame.of_points(points_mm, self._known_mm, self._level)
+                taught_frame.of_points(points_mm, self._step_error_mm, self._level)
         except InputError as error:
             return f"{error.problem}; {error.hint}"
         return ""
@@ -117,18 +117,19 @@ class NewFrame:
 
     def save(self, points_deg: Sequence[Sequence[float]]) -> None:
         """Write the frame through the tool's points at postures, (3, J); InputError if they give none."""
-        arm, name, known_mm = self._arm, self._name, self._known_mm
-        found = taught_frame.of_points(self._points_mm(points_deg), known_mm, self._level)
+        arm, name, step_error_mm = self._arm, self._name, self._step_error_mm
+        found = taught_frame.of_points(self._points_mm(points_deg), step_error_mm, self._level)
         values = taught_frame.values(arm, name, found.matrix)
         taught.save_table(self._file, (frame.KIND, name), values, self._replace)
-        lean = "made level, it leant" if self._level else "it leans"
+        tilt = "made level, it was tilted" if self._level else "it is tilted"
         results.echo(
             f"{self._file}: frame {name!r}: {', '.join(f'{key} {value}' for key, value in values.items())}"
         )
         results.echo(
             f"the points are {found.apart_mm[0]:.4g} and {found.apart_mm[1]:.4g} mm from the origin, "
-            f"{found.angle_deg:.3g} degrees apart; {lean} by {found.lean_deg:.3g} degrees; half a step of each joint "
-            f"is up to {known_mm:.2g} mm at the tool, which turns the axes by up to {found.open_deg:.2g} degrees"
+            f"{found.angle_deg:.3g} degrees apart; {tilt} by {found.tilt_deg:.3g} degrees; half a step of each joint "
+            f"is up to {step_error_mm:.2g} mm at the tool, which turns the axes by up to {found.axes_error_deg:.2g} "
+            "degrees"
         )
 
 

@@ -264,7 +264,7 @@ class Arm:
     def in_base(self, pose: Pose, frame: str) -> Pose:
         """A pose that is given in a frame of the arm, as jobs take it.
 
-        Raises InputError if the arm has no such frame, or the pose gives single angles in a frame that leans.
+        Raises InputError if the arm has no such frame, or the pose gives single angles in a tilted frame.
         """
         return frames_of.pose_in_base(pose, self.frames, frame, f"arm {self.name!r}")
 
