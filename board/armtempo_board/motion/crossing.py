@@ -48,7 +48,7 @@ _LAST_TIME = const(3)
 
 @micropython.viper
 def root(value: int) -> int:
-    """64 times the square root, rounded down."""
+    """64 times the square root, rounded down. 470 to 660 instructions."""
     rest = value << 12
     found = 0
     bit = _ROOT_BIT
@@ -96,7 +96,7 @@ def _move(words: ptr32, state: ptr32, timer: ptr32, gap_ticks: int) -> object:
 def merge(words: ptr32, tapped: ptr32, queue: ptr32, extra_kiticks: int) -> object:
     """Put steps into the queue until it is full: of the joint those that were tapped, of the play up to a time.
 
-    ``tapped``: pairs of a rising and a falling edge, as in a ring. About 700 instructions for a step of the play.
+    ``tapped``: pairs of a rising and a falling edge, as in a ring.
     """
     while (queue[_IN] - queue[_OUT]) & _COUNT_MASK < _FULL:
         item = ptr32(int(queue) + 4 * (_ITEMS + _ITEM_WORDS * (queue[_IN] & _ITEMS_MASK)))
