@@ -40,6 +40,9 @@ _ALONE_MS = const(20)  # and if none was heard so long
 class UserProgram(Sequencer):
     """See ``Sequencer``; ``record``: the program's."""
 
+    start_bytes = 8_000
+    """Less: its own garbage is collected while a motion runs, too."""
+
     def __init__(self, controller: "Runner", record: "ProgramFile", name: bytes, rate: int) -> None:
         self.table = record.table()
         counters: "Any" = _Counters(self.table["counters"])
