@@ -46,6 +46,7 @@ class App:
         self.passes = self._failed = 0  # number of passes, and number of the last one that failed
         self._failures = 0
         self._spare: "bytearray | None" = bytearray(_SPARE_BYTES)
+        self.fills_heap = False  # a user's program executes: without memory it is at fault
         self.controller.configure()
 
     def enter(self) -> None:
@@ -100,7 +101,13 @@ class App:
             self.commands.leaving = True
 
     def fail(self, error: "BaseException") -> None:
-        """Freeze and note the fault; raises the error again after too many consecutive failures."""
+        """Freeze and note the fault.
+
+        Raises the error again after too many consecutive failures, and if it is a user's program that has filled the
+        heap: the program gets it, in its call of the cell.
+        """
+        if self.fills_heap and isinstance(error, MemoryError):
+            raise error
         again = (self.passes - self._failed) & 0xFFFF <= 1
         self._failures = self._failures + 1 if again else 1
         self._failed = self.passes

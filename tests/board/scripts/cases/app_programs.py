@@ -371,6 +371,27 @@ def case_a_full_heap_ends_it():
     assert "MemoryError" in text or "OverflowError" in text, text
 
 
+def case_a_pass_without_memory_is_the_programs_fault():
+    """The program has filled the heap, and what the board's own work lacks is missing."""
+
+    def script(world):
+        engine = world.board.engine
+        if "brake" in engine.calls:
+            engine.finish()
+        elif world.turns == 10:
+            world.app.link.poll = full
+
+    def full():
+        del world.app.link.poll
+        raise MemoryError
+
+    world = World("cell.start('there')\nwhile True:\n    cell.moving()\n", script)
+    ending, code, line = world.run()
+    assert (ending, wire.ERRORS[code][0], line) == ("fault", "program_failed", 4), (ending, code, line)
+    assert "brake" in world.board.engine.calls and "freeze" not in world.board.engine.calls
+    assert "MemoryError" in world.said()[0]
+
+
 def case_other_programs_than_the_stored_one_are_refused():
     world = World("pass\n")
     assert world.start()[0] == "ok"
