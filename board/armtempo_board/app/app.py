@@ -30,6 +30,13 @@ if TYPE_CHECKING:
 _EXTRA_SERVICES_PER_PASS = const(3)  # calls of the engine, during a motion
 _SPARE_BYTES = const(512)  # reserved for reporting an exception: a traceback, and its end for the host
 _MOST_FAILURES = const(10)  # consecutive failing passes of the loop after which the program ends
+_OF_PROGRAMS = (
+    "armtempo_board.app.program_start",
+    "armtempo_board.app.user_program",
+    "armtempo_board.app.cell",
+    "armtempo_shared.rest_to_rest",
+    "armtempo_shared.shapes",
+)
 
 
 class App:
@@ -61,7 +68,10 @@ class App:
             """Execute the user's program that was started, if one was; ``run_once``: one pass of the loop."""
             program, self.controller.program = self.controller.program, None
             if program:
-                program.execute(self, run_once)
+                try:
+                    program.execute(self, run_once)
+                finally:
+                    _forget_modules()
 
     def leave_requested(self) -> int:
         """Whether a host has asked for the REPL, and the reply was sent."""
@@ -121,6 +131,15 @@ class App:
             self.events.note_bytes(b"MemoryError, and no memory left to say where")
         if self._failures >= _MOST_FAILURES:
             raise error
+
+
+def _forget_modules() -> None:
+    """Give back the memory of what only programs need; the next one imports it again."""
+    for name in _OF_PROGRAMS:
+        if name in sys.modules:
+            del sys.modules[name]
+            package, _, last = name.rpartition(".")
+            delattr(sys.modules[package], last)
 
 
 def _traceback(error: "BaseException") -> str:

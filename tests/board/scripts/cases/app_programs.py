@@ -333,17 +333,22 @@ def case_a_fault_of_the_board_ends_it():
 
 
 def case_nothing_of_it_acts_after_its_end():
-    from armtempo_board.app.cell import Ended
-
-    world = World("import cases, sys\nsys.modules['helper'] = cases\ncases.kept = cell\n")
+    world = World(
+        "import cases, sys\nsys.modules['helper'] = cases\ncases.kept = cell\n"
+        "cases.Ended = sys.modules['armtempo_board.app.cell'].Ended\n"
+    )
     assert world.run()[0] == "finished"
     assert "helper" not in sys.modules and cases is sys.modules["cases"]
+    assert not [name for name in sys.modules if name.endswith(("cell", "user_program", "rest_to_rest"))]
+    assert not hasattr(sys.modules["armtempo_board.app"], "cell")
     for call in (lambda: cases.kept.goto("there"), lambda: cases.kept.set("gripper", "closed")):
         try:
             call()
             raise AssertionError("it acted")
-        except Ended:
+        except cases.Ended:
             pass
+    assert world.start_stored()[0] == "ok"  # what it needs is imported again
+    world.execute()
     assert not sequence_rig.runs(world.app) and not world.board.outputs.log
 
 
