@@ -83,6 +83,21 @@ def test_round_trip_with_outputs_and_inputs(outputs: int, inputs: int) -> None:
     assert armrecord.unpack_outputs(data) == wired(outputs, inputs)
 
 
+@pytest.mark.parametrize(("outputs", "inputs"), [(0, 0), (3, 2)])
+def test_round_trip_with_backlash(outputs: int, inputs: int) -> None:
+    head, rows = made(3)
+    others = wired(outputs, inputs)
+    backlash = [{"steps": steps, "on_motor": 1, "spare": 0, "pace": 70_000 * steps} for steps in (0, 40, 5)]
+    data = armrecord.pack(head, rows, *others, backlash)
+    assert armrecord.unpack(data)[:2] == (head, rows)
+    assert armrecord.unpack_outputs(data) == others
+    assert armrecord.unpack_backlash(data) == backlash
+    assert armrecord.backlash_count(backlash) == 2
+    assert armrecord.unpack_backlash(armrecord.pack(head, rows, *others)) == []
+    with pytest.raises(armrecord.ArmRecordError, match="length"):
+        armrecord.unpack(data[:-12] + data[-4:])
+
+
 def test_an_arm_without_has_the_bytes_that_it_always_had() -> None:
     """Layout of version 2, written out here: a board of that version takes it."""
     head, rows = made(2)

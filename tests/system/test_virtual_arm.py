@@ -129,6 +129,35 @@ def test_a_fault_ends_the_run_by_its_name(fault: InjectedFault, ends: str, joint
         assert "injected crash" in end.notices[0]
 
 
+@pytest.mark.parametrize(
+    ("compensated_deg", "lost_deg"), [(0.0, 0.5), pytest.param(0.5, 0.0, marks=pytest.mark.slow)]
+)
+def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float) -> None:
+    """There and back, by an encoder on the joint: it stands as far from its command after both."""
+    plain = commandline.ARM.joints[0]
+    assert plain.encoder is not None
+    assert plain.motor is not None
+    arm = first_joint(
+        commandline.ARM,
+        encoder=replace(plain.encoder, counts_per_rev=FINE_COUNTS),
+        motor=replace(plain.motor, backlash_deg=compensated_deg),
+        model=replace(plain.model, backlash_deg=0.5, scatter_deg=0.0),
+    )
+    places = np.array(arm.home_deg), TARGET_DEG
+    off_deg = []
+    with launch(LaunchOptions(arm=arm)) as process, open_board(process.port) as board, StopRequest() as stop:
+        arm_state.configure(board, arm, replace=True)
+        arm_state.home(board, arm)
+        for here, there in (places, places[::-1]):
+            record = encode.motion_record(point_to_point.straight("move", here, there, arm), arm)
+            end = stored_motion.replay(board, stored_motion.store(board, "move", record, replace=True), stop)
+            assert not end.fault
+            positions = board.status().positions
+            assert abs(positions.commanded_steps[0] - there[0] * arm.driven[0].steps_per_deg) <= 0.5
+            off_deg.append(positions.counts[0] * 360 / FINE_COUNTS - there[0])
+    assert off_deg[1] - off_deg[0] == pytest.approx(lost_deg, abs=2.0 / arm.driven[0].steps_per_deg)
+
+
 @pytest.mark.parametrize("at_s", [0.0, 0.41, 0.77])
 def test_estop_freezes_within_20_us(at_s: float, tmp_path: Path) -> None:
     log = tmp_path / "edges"
