@@ -25,7 +25,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
 from armtempo.report import comparison, text_summary
@@ -94,16 +94,16 @@ def summary(plan: Plan, verbose: bool = False) -> list[str]:
     return text_summary.lines(plan, verbose)
 
 
-def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:
-    """The plan of a trajectory file.
+def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan | SequencePlan:
+    """The plan of a file, of a motion or a sequence.
 
     ``altered``: accept a file that was altered after it had been written. Raises InputError if it is no
-    trajectory file, is damaged or altered, or was planned for another arm than ``arm``, or for one of its frames
+    plan's file, is damaged or altered, or was planned for another arm than ``arm``, or for one of its frames
     that has changed since.
     """
-    found = Plan.load(path, altered)
+    found = load_plan(path, altered)
     if arm is not None:
-        planned_for.check(path, found.arm, found.job.frames, arm)
+        planned_for.check(path, found.arm, found.frames, arm)
     return found
 
 

@@ -11,13 +11,13 @@ from typing import Any
 import armtempo
 import numpy as np
 import pytest
-from armtempo.basics.errors import ArmtempoError, RunFolderError
+from armtempo.basics.errors import ArmtempoError, InputError, RunFolderError
 from armtempo.cli import main
 from armtempo.encoding import encoded_sequence
 from armtempo.report import verdict
 from armtempo.report.evaluation import evaluate
 from armtempo.report.verdict import BAD, GOOD, OPEN
-from armtempo.robot import recording
+from armtempo.robot import goto, recording
 from click.testing import CliRunner
 
 from tests.host import made_runs
@@ -161,6 +161,15 @@ def test_what_is_recorded_of_a_stored_sequence_is_that_of_its_plan() -> None:
     board.records["pick"] = board.records["pick"][:-1]
     with pytest.raises(ArmtempoError, match="sequence 'pick' on the board"):
         recording.of_stored_sequence(board, "pick", plan.arm)
+
+
+def test_a_sequence_is_run_and_gone_to_as_a_motion_is(tmp_path: Path) -> None:
+    plan = made_runs.small_sequence()
+    plan.save(tmp_path / "pick.json")
+    assert goto.posture_deg(tmp_path / "pick.json", plan.arm) == pytest.approx(plan.start_deg)
+    board: Any = None
+    with pytest.raises(InputError, match="a sequence takes no repeat"):
+        armtempo.Board(board, "port").run(tmp_path / "pick.json", repeat=2)
 
 
 @pytest.mark.slow

@@ -331,8 +331,12 @@ def test_the_file_of_a_plan_holds_all_of_it(tmp_path: Path) -> None:
     content = json.loads(path.read_text())
     content["sequence"]["rows"][0]["number"] = 7
     path.write_text(json.dumps(content))
-    with pytest.raises(InputError, match="altered"):
+    with pytest.raises(InputError, match=r"altered .* --altered"):
         SequencePlan.load(path)
+    with pytest.raises(InputError, match="a motion or counter that does not exist"):
+        SequencePlan.load(path, altered=True)
+    with pytest.raises(InputError, match="exists with other content"):
+        plan.save(path)  # what somebody altered is not thrown away
     path.write_text(path.read_text()[:-50])
     with pytest.raises(InputError, match="damaged or cut"):
         SequencePlan.load(path)

@@ -22,7 +22,7 @@ from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
-from armtempo.model.sequence_plan import SequencePlan, is_sequence_plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.model.tool_pose import BASE
 from armtempo.planning import point_to_point, via_points
 from armtempo.robot.board import Board
@@ -140,17 +140,13 @@ class NamedPosture:
 
     text: str
     arm: Arm | None
-    """The arm that is set, else the arm of the trajectory file; None: the arm that the board is set up for."""
-    plan: Plan | None
-    """Of the trajectory file."""
-    sequence: SequencePlan | None = None
+    """The arm that is set, else the arm of the plan; None: the arm that the board is set up for."""
+    plan: Plan | SequencePlan | None
+    """Of the file."""
 
     @classmethod
     def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
-        """The posture of ``text``; raises InputError if its trajectory file or the arm cannot be read."""
-        if text.endswith(".json") and is_sequence_plan(Path(text)):
-            sequence = resolve.load_sequence_plan(Path(text), arm_path)
-            return cls(text, sequence.arm, None, sequence)
+        """The posture of ``text``; raises InputError if its file or the arm cannot be read."""
         if text.endswith(".json") or via_table.is_recording(Path(text)):
             plan = resolve.load_plan(Path(text), arm_path, altered)
             return cls(text, plan.arm, plan)
@@ -163,10 +159,9 @@ class NamedPosture:
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
         """Angles in degrees (J,); raises InputError if the text is not a posture or does not fit the arm."""
-        if self.sequence is not None:
-            return point_to_point.posture(self.sequence.start_deg or arm.home_deg, arm)
         if self.plan is not None:
-            return self.plan.trajectory(0.0)
+            start_deg = arm.home_deg if self.plan.start_deg is None else self.plan.start_deg
+            return point_to_point.posture(start_deg, arm)
         if not name_problem(self.text):
             return via_points.posture_deg(arm, arm.posture(self.text))
         if self.text == HOME:

@@ -232,6 +232,11 @@ class Arm:
         return coupled.motors(self.driven, self.transmission)
 
     @cached_property
+    def crossings(self) -> tuple[drive_limits.Crossing | None, ...]:
+        """How each motor crosses its backlash; None without."""
+        return tuple(drive_limits.crossings(self.table_joints, self.coupling, self.driver))
+
+    @cached_property
     def transmission(self) -> Transmission:
         """From the driven joints to their motors' steps and counts, and back."""
         return Transmission(

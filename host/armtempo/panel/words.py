@@ -197,6 +197,7 @@ STEP_KEYS = {
     "on_timeout": "then",
 }
 ADD_HERE = "Add where the arm is"
+PLANNING = "Planning…"
 TOTAL_TIME, CYCLE_TIME = "{time:.2f} s in all, without waits for inputs", "{time:.2f} s a cycle"
 
 STATE_KEYS = {

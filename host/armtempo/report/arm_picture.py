@@ -216,7 +216,7 @@ def _explain(figure: Figure, arm: Arm) -> None:
         Line2D([], [], color=colour, linewidth=2.6, label=label)
         for colour, label in ((HOME, "home"), (LOW, "low end"), (HIGH, "high end"))
     ]
-    lines.append(Line2D([], [], color=GROUND, linestyle=":", label="tool's way"))
+    lines.append(Line2D([], [], color=GROUND, linestyle=":", label="tool's path"))
     lines.append(
         Line2D([], [], color=HOME, linestyle="", marker="o", markerfacecolor="none", label="its axis")
     )

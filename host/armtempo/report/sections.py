@@ -29,7 +29,7 @@ _STEPS = {
     "steps made": "what the board counted in the last repetition",
     "one step (°)": "what one step turns the joint by; a coupled joint: one step of each of its motors",
     "command off plan (°)": "largest difference of the commanded from the planned angle at a sample: half a step is "
-    "rounding",
+    "rounding; up to its backlash while a motor crosses that",
 }
 _PEAKS = {
     "joint": "",
@@ -49,7 +49,7 @@ _LEGS = {
     "whole": "runs of which every sample arrived, to their end",
     "joint": "",
     "command off plan (steps)": "largest difference of the commanded from the planned angle at a sample: half a step "
-    "is rounding",
+    "is rounding; up to its backlash while a motor crosses that",
     "at the end (steps)": "largest difference of the step pulses from those planned, at the end of a run",
     "largest (°)": "largest difference of the measured from the planned angle; – without an encoder",
     "RMS (°)": "root mean square of these differences over all samples",

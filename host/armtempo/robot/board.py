@@ -19,11 +19,11 @@ from armtempo.link.board_messages import Hello, Status
 from armtempo.model.arm import Arm
 from armtempo.report.run import Run
 from armtempo.robot import board_state, kept_position
-from armtempo.robot.board_io import BoardIO
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.connection import Connection
 from armtempo.robot.motions import Motions
 from armtempo.robot.motor_test import MotorTest
+from armtempo.robot.outputs import BoardIO
 from armtempo.robot.position import ArmPosition
 from armtempo.robot.programs import Programs
 from armtempo.robot.stop_request import StopRequest

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from armtempo_shared.messages import RESUME
@@ -16,7 +17,7 @@ from armtempo.encoding import encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, move_of
@@ -142,25 +143,35 @@ class Motions:
 
     def run(
         self,
-        motion: Plan | EncodedMotion | Path | str,
+        motion: Plan | SequencePlan | EncodedMotion | Path | str,
         repeat: int = 1,
         out: Path | str = "runs",
         progress: Progress | None = None,
         watcher: Watcher | None = None,
         stop: StopRequest | None = None,
     ) -> Run:
-        """Replay a motion ``repeat`` times, 1 to 99, and record it in a new run folder in ``out``.
+        """Replay a motion ``repeat`` times, 1 to 99, or run a sequence, and record it in a new run folder in ``out``.
 
-        ``motion``: a plan, its file (FILE.json), or the name of a motion on the board. The arm must be homed
-        and at the start of the motion; the arm of a virtual board is moved there. Between repetitions it
-        returns along the same path. The speed is that of the last ``speed`` call. ``progress`` counts seconds
-        of motion; ``watcher`` is called with folder, samples and repetitions. If the run ends early, it
-        raises, and ``last_run`` holds the recording. Raises LinkError if the arm is not homed or not at the
-        start, the board has another motion of this name (``upload`` can replace it), or is set up for another
-        arm.
+        ``motion``: a plan, its file (FILE.json), or the name of a motion or sequence on the board; a sequence
+        takes neither ``repeat`` nor ``progress`` nor ``watcher``. The arm must be homed and at the start; the
+        arm of a virtual board is moved there. Between repetitions it returns along the same path. The speed is
+        that of the last ``speed`` call. ``progress`` counts seconds of motion; ``watcher`` is called with
+        folder, samples and repetitions. If the run ends early, it raises, and ``last_run`` holds the recording.
+        Raises LinkError if the arm is not homed or not at the start, the board has another motion of this name
+        (``upload`` can replace it), or is set up for another arm.
         """
         if not 1 <= repeat <= MOST_REPETITIONS:
             raise InputError(f"repeat: {repeat} is not in the range 1<=x<={MOST_REPETITIONS}", "change it")
+        if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
+            motion = load_plan(motion)
+        if isinstance(motion, SequencePlan) or (isinstance(motion, str) and self._is_sequence(motion)):
+            if repeat != 1 or progress is not None or watcher is not None:
+                raise InputError(
+                    "run: a sequence takes no repeat, progress or watcher",
+                    "leave them out; its steps repeat it, 'run_sequence' takes a watcher of its states",
+                )
+            self.run_sequence(motion, stop=stop, out=out)
+            return Run.load(cast(Path, self._last_folder))
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._board.stoppable(stop) as wanted:
@@ -170,6 +181,10 @@ class Motions:
             for _ in recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen):
                 pass
         return Run.load(folder.path)
+
+    def _is_sequence(self, name: str) -> bool:
+        found = self._board.client.find(stored_name(name))
+        return found is not None and found.sequence
 
     def run_sequence(
         self,

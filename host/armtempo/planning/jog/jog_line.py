@@ -258,7 +258,7 @@ class FollowedLine:
             found.append(np.degrees(angles[list(line.arm.driven_indices)]))
         return np.array(found)
 
-    def stray(self, angle_points_deg: Array, way_points: Array) -> LineDeviation:
+    def stray(self, angle_points_deg: Array, distance_points: Array) -> LineDeviation:
         """Bound of the tool's deviation for splines of the driven joints, (S + 5, J), and of the distance, (S + 5,)."""
         line = self.line
         fixed = line.fixed if line.fixed in (WHOLE, (APPROACH,)) else ()
@@ -266,7 +266,10 @@ class FollowedLine:
         direction = np.zeros(3) if line.about else line.direction
         piece = ToolPiece(line._pose, self.length, direction, np.zeros(3), turn)
         tool = Tool(line.arm, list(range(len(line.arm.driven))), line.start_deg)
-        angles, distances = of_path(angle_points_deg, DEGREE), of_path(way_points[:, None], DEGREE)[:, :, 0]
+        angles, distances = (
+            of_path(angle_points_deg, DEGREE),
+            of_path(distance_points[:, None], DEGREE)[:, :, 0],
+        )
         return proven(angles, distances, tool, ToolPath((piece,)), fixed, LineDeviation(STRAY_MM, STRAY_DEG))
 
 
