@@ -199,9 +199,10 @@ class BacklashDrive(JointDrive):
         left = self._play
         if self._is_crossing:
             left -= self._crossing[crossing.LEFT]
-        self._crossed[self._reversals_in & (_REVERSALS - 1)] = left
+        reversal = self._reversals_in
         if not super()._reverse():
             return False
+        self._crossed[reversal & (_REVERSALS - 1)] = left
         crossing.start_after(self._crossing, left, self.ring.state, self.ring.timer, self.gap_ticks)
         self._begin()
         return True
