@@ -23,6 +23,7 @@ __all__ = [
     "Arm",
     "ArmFrame",
     "ArmPosture",
+    "ArmTool",
     "ArmtempoError",
     "Board",
     "BoardError",
@@ -119,12 +120,12 @@ if TYPE_CHECKING:
     from armtempo.model.sequence import Sequence
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.model.steps import Count, Goto, Hold, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
+    from armtempo.model.tool import ArmTool
     from armtempo.model.tool_pose import Pose
     from armtempo.model.tool_segment import ToolSegment
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.board_port import find_ports
-    from armtempo.report.run import Run
-    from armtempo.report.sequence_reader import SequenceRun
+    from armtempo.report.run import Run, SequenceRun
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
@@ -175,16 +176,16 @@ _HOMES = {
     "armtempo.model.plan": ("Plan",),
     "armtempo.model.sequence": ("Sequence",),
     "armtempo.model.sequence_plan": ("SequencePlan",),
+    "armtempo.model.tool": ("ArmTool",),
     "armtempo.model.tool_pose": ("Pose",),
     "armtempo.model.tool_segment": ("ToolSegment",),
     "armtempo.pipeline": ("compare", "connect", "plan", "plan_sequence", "summary"),
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.board_state": ("BoardState",),
     "armtempo.robot.recording": ("Watcher",),
-    "armtempo.report.run": ("Run",),
+    "armtempo.report.run": ("Run", "SequenceRun"),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
-    "armtempo.report.sequence_reader": ("SequenceRun",),
     "armtempo.splines.bspline": ("Spline",),
     "armtempo.splines.trajectory": ("Trajectory",),
 }

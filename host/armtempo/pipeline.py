@@ -6,7 +6,7 @@
     load     trajectory file -> Plan          model.plan
     run      Plan -> records -> board         records.encode, link, robot.stored_motion; there evaluator, rings, timers
              board -> samples -> run folder   link.follow, report.run_folder
-    report   run folder -> page and figures   report
+    report   run folder -> page and figures   Run.report
 
 Each stage needs only the result of the previous one, and each result can be stored: a plan in a file, a
 motion on the board, a run in its folder.
@@ -25,12 +25,11 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
-from armtempo.report import comparison, sequence_report, text_summary
+from armtempo.report import comparison, text_summary
 from armtempo.report.run import Run
-from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot.connect import connect
 from armtempo.robot.recording import Watcher
 
@@ -40,7 +39,6 @@ __all__ = [
     "load",
     "plan",
     "plan_sequence",
-    "report",
     "run",
     "split",
     "summary",
@@ -95,16 +93,16 @@ def summary(plan: Plan, verbose: bool = False) -> list[str]:
     return text_summary.lines(plan, verbose)
 
 
-def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:
-    """The plan of a trajectory file.
+def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan | SequencePlan:
+    """The plan of a file, of a motion or a sequence.
 
     ``altered``: accept a file that was altered after it had been written. Raises InputError if it is no
-    trajectory file, is damaged or altered, or was planned for another arm than ``arm``, or for one of its frames
+    plan's file, is damaged or altered, or was planned for another arm than ``arm``, or for one of its frames
     that has changed since.
     """
-    found = Plan.load(path, altered)
+    found = load_plan(path, altered)
     if arm is not None:
-        planned_for.check(path, found.arm, found.job.frames, arm)
+        planned_for.check(path, found.arm, found.frames, arm)
     return found
 
 
@@ -121,12 +119,6 @@ def run(
     """
     with connect(port, plan.arm) as board:
         return board.run(plan, repeat, out, progress, watcher)
-
-
-def report(run: Run | SequenceRun) -> Path:
-    """Write report.html (for a motion, also its figures) into the run folder; returns the page. Raises as
-    ``Run.report``."""
-    return sequence_report.write(run.path) if isinstance(run, SequenceRun) else run.report()
 
 
 @checked

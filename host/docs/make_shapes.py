@@ -20,7 +20,7 @@ from armtempo_shared.motion import EVEN_RAMP, RAMP_SHAPE_BIT
 MODULE = Path(__file__).parents[2] / "shared" / "armtempo_shared" / "shapes.py"
 RAMPS = ((0.5, False), (0.5, True), (0.35, True), (0.2, True), (0.1, True))
 """Fraction of the time for each ramp of speed, and whether a third of the ramp has constant acceleration."""
-HEAD = '''"""Shapes of moves from rest to rest: splines of way and time, and their ramps; see ``rest_to_rest.py``.
+HEAD = '''"""Shapes of moves from rest to rest: splines of distance and time, and their ramps; see ``rest_to_rest.py``.
 
 Written by host/docs/make_shapes.py.
 """
@@ -35,8 +35,8 @@ SHAPES = (
 '''
 DESCRIPTION = '''\
 """Little endian, each: 4 I, speed, acceleration and jerk of a move over 1 in time 1, at most, the latter two over
-the fractions of the limits that moves by hand use, and e of a motion record; i, control points of the way, then of the
-time; H, entries of ramps to rest and of others as in a motion record."""
+the fractions of the limits that moves by hand use, and e of a motion record; i, control points of the distance, then of
+the time; H, entries of ramps to rest and of others as in a motion record."""
 '''
 
 
@@ -44,10 +44,10 @@ def law(ramp: float, has_constant: bool) -> Trajectory:
     """The law as a motion over about 1 deg, of one joint."""
     speed = 1.0 / (1.0 - ramp)
     acceleration, jerk = (1.5, 4.5) if has_constant else (2.0, 4.0)
-    limits = move_law.WayLimits(speed, acceleration * speed / ramp, jerk * speed / ramp**2)
+    limits = move_law.MoveLimits(speed, acceleration * speed / ramp, jerk * speed / ramp**2)
     found = move_law.law(1.0, limits)
-    times = found.time_s / found.trajectory("", [found.way]).duration_s
-    return move_law.WayLaw(found.way, times).trajectory("shape", [found.way])
+    times = found.time_s / found.trajectory("", [found.distance]).duration_s
+    return move_law.MoveLaw(found.distance, times).trajectory("shape", [found.distance])
 
 
 def text(motion: Trajectory) -> str:

@@ -3,7 +3,8 @@
 The host makes it from the arm file; the board stores it in its flash. A motion record identifies its arm by this
 record's crc32. Little endian: the header, an entry for each joint, the crc32 of everything before it. The record of an
 arm with outputs or inputs has another version; after its joints are the numbers of outputs and inputs (a byte each) and
-their entries.
+their entries. The record of an arm with backlash has a third version: after those numbers and entries, an entry of the
+backlash for each joint.
 """
 
 import struct
@@ -74,6 +75,15 @@ INPUT = (
     ("active_high", "B"),
     ("debounce_ms", "H"),
 )
+BACKLASH = (
+    ("steps", "H"),  # of the motor, that turn only the motor after a reversal; 0: none
+    ("on_motor", "B"),  # the encoder is on the motor, so that it counts these steps
+    ("spare", "B"),
+    (
+        "pace",
+        "I",
+    ),  # the n-th of them comes 64 * pace * sqrt(n) ticks after the reversal, until half of them are made
+)
 
 
 def _layout(fields: "Fields") -> str:
@@ -85,9 +95,12 @@ _HEAD_SIZE = struct.calcsize(_HEAD_FORMAT)
 _JOINT_SIZE = struct.calcsize(_layout(JOINT))
 _OUTPUT_SIZE = struct.calcsize(_layout(OUTPUT))
 _INPUT_SIZE = struct.calcsize(_layout(INPUT))
+_BACKLASH_SIZE = struct.calcsize(_layout(BACKLASH))
 VERSION = 2
 VERSION_WITH_OUTPUTS = 3
 """Version of a record with outputs or inputs."""
+VERSION_WITH_BACKLASH = 4
+"""Version of a record with a joint with backlash, and perhaps outputs or inputs."""
 _VERSION_AT, _JOINTS_AT = 4, 5
 _LIMITS = ("min_steps", "max_steps", "max_rate", "following_counts", "link_timeout_ms")
 """Fields that do not affect the joints' positions, as FLAG_STOP_ON_LINK_LOSS."""
@@ -102,14 +115,20 @@ def pack(
     joints: "list[dict[str, int]]",
     outputs: "Rows" = (),
     inputs: "Rows" = (),
+    backlash: "Rows" = (),
 ) -> bytes:
-    """An arm record from a dict of the HEAD fields and dicts of the JOINT, OUTPUT and INPUT fields."""
+    """An arm record from a dict of the HEAD fields and dicts of the JOINT, OUTPUT and INPUT fields.
+
+    ``backlash``: dicts of the BACKLASH fields, one for each joint, or none.
+    """
     version = VERSION_WITH_OUTPUTS if outputs or inputs else VERSION
+    if backlash:
+        version = VERSION_WITH_BACKLASH
     data = struct.pack(_HEAD_FORMAT, MAGIC, version, len(joints), *[head[name] for name, _ in HEAD])
     data += _packed(joints, JOINT)
     if version != VERSION:
         data += bytes((len(outputs), len(inputs)))
-        data += _packed(outputs, OUTPUT) + _packed(inputs, INPUT)
+        data += _packed(outputs, OUTPUT) + _packed(inputs, INPUT) + _packed(backlash, BACKLASH)
     return data + struct.pack("<I", crc32(data))
 
 
@@ -138,7 +157,8 @@ def unpack(data: bytes) -> "tuple[dict[str, int], list[dict[str, int]], int]":
         raise ArmRecordError("too short")
     values = struct.unpack_from(_HEAD_FORMAT, data, 0)
     count = values[2]
-    if values[0] != MAGIC or values[1] not in (VERSION, VERSION_WITH_OUTPUTS) or not 1 <= count <= MAX_JOINTS:
+    versions = VERSION, VERSION_WITH_OUTPUTS, VERSION_WITH_BACKLASH
+    if values[0] != MAGIC or values[1] not in versions or not 1 <= count <= MAX_JOINTS:
         raise ArmRecordError("not an arm record of this version")
     if len(data) != _size(data, count):
         raise ArmRecordError("length does not fit the header")
@@ -158,6 +178,19 @@ def unpack_outputs(data: bytes) -> "tuple[list[dict[str, int]], list[dict[str, i
     return _rows(data, at + 2, data[at], OUTPUT), _rows(data, inputs_at, data[at + 1], INPUT)
 
 
+def unpack_backlash(data: bytes) -> "list[dict[str, int]]":
+    """Dicts of the backlash of each joint in a valid arm record; [] if no joint has any."""
+    if data[_VERSION_AT] != VERSION_WITH_BACKLASH:
+        return []
+    joints = data[_JOINTS_AT]
+    return _rows(data, len(data) - 4 - joints * _BACKLASH_SIZE, joints, BACKLASH)
+
+
+def backlash_count(rows: "Rows") -> int:
+    """How many joints have backlash, by ``unpack_backlash``."""
+    return sum([row["steps"] > 0 for row in rows])
+
+
 def _size(data: bytes, joints: int) -> int:
     """Size of the record that begins with ``data``, in bytes; 0 if it is none."""
     size = _HEAD_SIZE + joints * _JOINT_SIZE + 4
@@ -166,6 +199,8 @@ def _size(data: bytes, joints: int) -> int:
     if len(data) < size + 2 or data[size - 4] > MAX_OUTPUTS or data[size - 3] > MAX_INPUTS:
         return 0
     outputs, inputs = data[size - 4], data[size - 3]
+    if data[_VERSION_AT] == VERSION_WITH_BACKLASH:
+        size += joints * _BACKLASH_SIZE
     return size + 2 + outputs * _OUTPUT_SIZE + inputs * _INPUT_SIZE
 
 

@@ -52,23 +52,26 @@ def words(rates: "list[int]") -> int:
     return sum(_parts(rates, SHORT_MS))
 
 
-def object_bytes(joints: int) -> int:
-    """Bytes of heap of the engine's objects: measured, see board/docs/memory.md."""
-    return 1760 + 1184 * joints
+def object_bytes(joints: int, with_backlash: int = 0) -> int:
+    """Bytes of heap of the engine's objects: measured, see board/docs/memory.md.
+
+    ``with_backlash``: how many of the joints have backlash.
+    """
+    return 1760 + 1184 * joints + 1600 * with_backlash
 
 
 LARGEST_BYTES = 4 * LARGEST_WORDS + object_bytes(6)
 """Bytes in which every arm fits."""
 
 
-def needed_bytes(rates: "list[int]") -> int:
+def needed_bytes(rates: "list[int]", with_backlash: int = 0) -> int:
     """Least bytes of heap of the engine with its objects, for joints of these highest step rates."""
-    return 4 * words(rates) + object_bytes(len(rates))
+    return 4 * words(rates) + object_bytes(len(rates), with_backlash)
 
 
-def memory_words(joints: int, free_bytes: int) -> int:
+def memory_words(joints: int, free_bytes: int, with_backlash: int = 0) -> int:
     """Words for an engine's memory in ``free_bytes``, without the objects for ``joints``."""
-    return min(max((free_bytes - object_bytes(joints)) // 4, 0), LARGEST_WORDS)
+    return min(max((free_bytes - object_bytes(joints, with_backlash)) // 4, 0), LARGEST_WORDS)
 
 
 def ahead_bytes(joints: int) -> int:
@@ -92,9 +95,9 @@ def lasting_ms(rates: "list[int]", memory_words: int) -> int:
     return 0
 
 
-def fits(rates: "list[int]", free_bytes: int) -> bool:
+def fits(rates: "list[int]", free_bytes: int, with_backlash: int = 0) -> bool:
     """Whether the engine fits into ``free_bytes``."""
-    return lasting_ms(rates, memory_words(len(rates), free_bytes)) > 0
+    return lasting_ms(rates, memory_words(len(rates), free_bytes, with_backlash)) > 0
 
 
 def _find_place(rates: "list[int]", memory_words: int, lasts_ms: int) -> bool:

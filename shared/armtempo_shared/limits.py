@@ -48,6 +48,11 @@ Measured on the emulated chip at 3 cycles an instruction, with one, two and thre
 MAX_STEP_RATE_SUM = 240_000
 """Highest sum of the step rates of all joints, steps/s. The same."""
 
+MAX_BACKLASH_STEPS = 32_767
+"""Most steps of a motor that cross the play of its gear."""
+MAX_CROSSING_RATE = 10_000
+"""Highest step rate of a joint while it crosses its backlash, steps/s: 120 steps are computed ahead, 12 ms."""
+
 REVERSAL_SLACK_TICKS = 8400
 """How late the board may change DIR, before and after the time at which it should: 100 us."""
 

@@ -1,6 +1,6 @@
 """Moves from rest to rest along a straight line in the joints' steps, in closed form and integers.
 
-A move is one of ``shapes.SHAPES``, times the joints' ways, in the least time that keeps all limits: host and board
+A move is one of ``shapes.SHAPES``, times the joints' distances, in the least time that keeps all limits: host and board
 make the same record.
 """
 
@@ -52,10 +52,10 @@ class Move:
         percent: int = PERCENT,
     ) -> None:
         self._start = start
-        self._ways = [end - begin for begin, end in zip(start, target)]
+        self._distances = [end - begin for begin, end in zip(start, target)]
         self.duration_ticks = 0
         for shape in SHAPES:
-            ticks = _ticks([abs(way) for way in self._ways], limits, rate_sum, shape)
+            ticks = _ticks([abs(distance) for distance in self._distances], limits, rate_sum, shape)
             if not self.duration_ticks or ticks < self.duration_ticks:
                 self.duration_ticks = ticks
                 self._shape = shape
@@ -72,8 +72,8 @@ class Move:
         crc = crc32(head)
         yield head
         bits = STEP_FRACTION_BITS - POINT_BITS
-        for begin, way in zip(self._start, self._ways):
-            data = self._scaled(0, way, bits, begin << STEP_FRACTION_BITS)
+        for begin, distance in zip(self._start, self._distances):
+            data = self._scaled(0, distance, bits, begin << STEP_FRACTION_BITS)
             crc = crc32(data, crc)
             yield data
         data = self._scaled(1, self.duration_ticks, TICK_FRACTION_BITS - POINT_BITS, 0)
@@ -81,7 +81,7 @@ class Move:
         yield struct.pack("<I", crc32(data, crc))
 
     def _scaled(self, row: int, factor: int, bits: int, begin: int) -> bytes:
-        """Control points of the shape's way (row 0) or time (1): times ``factor`` * 2**bits, plus ``begin``."""
+        """Control points of the shape's distance (row 0) or time (1): times ``factor`` * 2**bits, plus ``begin``."""
         points = struct.unpack_from("<%di" % self._count, self._shape, _POINTS_AT + 4 * self._count * row)
         half = 1 << -bits - 1
         return struct.pack(
@@ -111,13 +111,13 @@ def _points(shape: bytes) -> int:
     return (len(shape) - _POINTS_AT - 2 * _ENTRIES) // 8
 
 
-def _ticks(ways: "list[int]", limits: "Sequence[Sequence[int]]", rate_sum: int, shape: bytes) -> int:
-    """The least time of a shape for ways in steps, rounded up."""
+def _ticks(distances: "list[int]", limits: "Sequence[Sequence[int]]", rate_sum: int, shape: bytes) -> int:
+    """The least time of a shape for distances in steps, rounded up."""
     factors = struct.unpack_from(_FACTORS, shape, 0)
-    longest: int = (sum(ways) * factors[0] * TICK_HZ >> FACTOR_BITS) // rate_sum + 1
-    for way, most in zip(ways, limits):
+    longest: int = (sum(distances) * factors[0] * TICK_HZ >> FACTOR_BITS) // rate_sum + 1
+    for distance, most in zip(distances, limits):
         for order in range(3):
-            power = way * factors[order] * int(TICK_HZ ** (order + 1)) // (most[order] << FACTOR_BITS)
+            power = distance * factors[order] * int(TICK_HZ ** (order + 1)) // (most[order] << FACTOR_BITS)
             longest = max(longest, _root(power, order + 1) + 1)
     return longest
 

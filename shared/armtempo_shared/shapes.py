@@ -1,10 +1,10 @@
-"""Shapes of moves from rest to rest: splines of way and time, and their ramps; see ``rest_to_rest.py``.
+"""Shapes of moves from rest to rest: splines of distance and time, and their ramps; see ``rest_to_rest.py``.
 
 Written by host/docs/make_shapes.py.
 """
 
 POINT_BITS = 30
-"""Fraction bits of control points, of a way from 0 to 1 and of a time from 0 to 1."""
+"""Fraction bits of control points, of a distance from 0 to 1 and of a time from 0 to 1."""
 FACTOR_BITS = 10
 """Fraction bits of the largest speed, acceleration and jerk."""
 RAMP_BITS = 10
@@ -98,5 +98,5 @@ SHAPES = (
     b"\x00\x7b\x00\x6d\x00\x55\x00\x3a\x00\x1e\x00\x0b\x00",
 )
 """Little endian, each: 4 I, speed, acceleration and jerk of a move over 1 in time 1, at most, the latter two over
-the fractions of the limits that moves by hand use, and e of a motion record; i, control points of the way, then of the
-time; H, entries of ramps to rest and of others as in a motion record."""
+the fractions of the limits that moves by hand use, and e of a motion record; i, control points of the distance, then of
+the time; H, entries of ramps to rest and of others as in a motion record."""

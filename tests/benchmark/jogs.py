@@ -20,7 +20,7 @@ from armtempo.model.arm import Arm
 from armtempo.planning import brake_time, move_law, planner
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
-from armtempo.planning.move_law import WayLimits
+from armtempo.planning.move_law import MoveLimits
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 TIMES_S = (0.1, 0.2, 0.5, 1.0, 2.0)
@@ -67,7 +67,7 @@ def compare(name: str, arm: Arm) -> None:
         for percent in PERCENTS:
             limits = limits_of(arm, joint, percent / 100)
             law = move_law.law(LONG_DEG, move_law.of_joints([driven.limits], [1.0], percent / 100))
-            spline = JointSpline(move_law.DEGREE, 1, law.way, law.time_s)
+            spline = JointSpline(move_law.DEGREE, 1, law.distance, law.time_s)
             ways.append(spline(np.array(TIMES_S)) / held_deg(limits))
             brakes = brake_time.of_motion(Trajectory(name, (spline,), True), [driven.limits])
             for time_s in TIMES_S:
@@ -75,7 +75,7 @@ def compare(name: str, arm: Arm) -> None:
                 rests.append(float(brakes.rest_s(time_s)) / shortest_s)
             for step in STEPS_DEG:
                 found = move_law.law(step, move_law.of_joints([driven.limits], [1.0], percent / 100))
-                last_s = JointSpline(move_law.DEGREE, 1, found.way, found.time_s).duration_s
+                last_s = JointSpline(move_law.DEGREE, 1, found.distance, found.time_s).duration_s
                 steps.append(last_s / max(step_s(limits, step), move_law.SHORTEST_S))
     low, rest = np.min(ways, axis=0), np.array(rests)
     print(f"{name}: way over ruckig's at least {', '.join(f'{ratio:.3f}' for ratio in low)};", end=" ")
@@ -115,17 +115,17 @@ def lines(arm: Arm) -> None:
             )
 
 
-def limits_of(arm: Arm, joint: int, speed: float) -> WayLimits:
+def limits_of(arm: Arm, joint: int, speed: float) -> MoveLimits:
     """The limits of a jog, without what its record asks for."""
     most = arm.driven[joint].limits
-    return WayLimits(
+    return MoveLimits(
         speed * most.speed_deg_s,
         move_law.ACCELERATION * most.acceleration_deg_s2,
         move_law.JERK * most.jerk_deg_s3,
     )
 
 
-def _input(limits: WayLimits) -> ruckig.InputParameter:
+def _input(limits: MoveLimits) -> ruckig.InputParameter:
     given = ruckig.InputParameter(1)
     given.max_velocity, given.max_acceleration, given.max_jerk = (
         [limits.speed],
@@ -141,7 +141,7 @@ def _solved(given: ruckig.InputParameter) -> ruckig.Trajectory:
     return found
 
 
-def held_deg(limits: WayLimits) -> np.ndarray:
+def held_deg(limits: MoveLimits) -> np.ndarray:
     """Ruckig's way after TIMES_S from rest to the speed."""
     given = _input(limits)
     given.control_interface = ruckig.ControlInterface.Velocity
@@ -150,7 +150,7 @@ def held_deg(limits: WayLimits) -> np.ndarray:
     return np.array([found.at_time(time_s)[0][0] for time_s in TIMES_S])
 
 
-def rest_s(limits: WayLimits, speed: float, acceleration: float) -> float:
+def rest_s(limits: MoveLimits, speed: float, acceleration: float) -> float:
     """Ruckig's shortest time to rest."""
     given = _input(limits)
     given.control_interface = ruckig.ControlInterface.Velocity
@@ -158,7 +158,7 @@ def rest_s(limits: WayLimits, speed: float, acceleration: float) -> float:
     return float(_solved(given).duration)
 
 
-def step_s(limits: WayLimits, step: float) -> float:
+def step_s(limits: MoveLimits, step: float) -> float:
     """Ruckig's time for a step."""
     given = _input(limits)
     given.target_position = [step]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from array import array
 from dataclasses import dataclass, field
@@ -193,6 +194,13 @@ def test_outputs_stand_still_within_500_instructions() -> None:
     for line in counted.values():
         assert line["still"] <= 500
         assert line["still"] < line["whole"]
+
+
+@pytest.mark.parametrize("value", [0, 1, 2, 15, 1000, 16_383])
+def test_the_root_of_a_step_of_the_play(value: int) -> None:
+    machine = Machine(BOARD / "motion" / "crossing.py")
+    assert machine.run("root", value) == math.isqrt(value << 12)
+    assert machine.count <= 660
 
 
 def test_arming_a_channel(machine: Machine) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from armtempo_shared import engine_memory
 
 from tests import interpreters, scripted
 
 CASES = Path(__file__).parent / "scripts" / "cases"
 SCRIPTS = [
     CASES / f"{name}.py"
-    for name in ("engine_pulses", "engine_faults", "engine_override", "rings", "encoders")
+    for name in ("engine_pulses", "engine_faults", "engine_override", "engine_backlash", "rings", "encoders")
 ]
 QUICKEST = "micropython" if "micropython" in interpreters.AVAILABLE else "cpython"
 
@@ -38,12 +39,15 @@ def test_more_changes_of_speed() -> None:
 def test_nothing_is_allocated_while_a_motion_runs(name: str) -> None:
     """Whole motions with the heap locked; what an engine keeps, in bytes on the 32-bit interpreter."""
     output = interpreters.run(name, CASES / "no_allocation.py", heap=scripted.HEAP[name]).splitlines()
-    three, six = map(int, output[0].split())
+    three, six, with_backlash = map(int, output[0].split())
     if name == "micropython-arm":
         assert three < 22_000, three
         assert six < 42_000, six
+        assert three <= engine_memory.object_bytes(3)
+        assert with_backlash <= engine_memory.object_bytes(3, 1)
     assert output[1].startswith("13 [3000, 700, 2]")
-    assert len(output) == 3
+    assert output[3].startswith("13 [3000, 700, 2]")
+    assert len(output) == 4
 
 
 # the memory for engines, on every interpreter

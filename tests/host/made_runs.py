@@ -1,4 +1,5 @@
-"""Run folders as the recorder writes them, made from a plan with an ideal or a scattered encoder."""
+"""Run folders as the recorder writes them, of a motion or a sequence, made from a plan with an ideal or a scattered
+encoder."""
 
 from __future__ import annotations
 
@@ -8,15 +9,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.encoding import encoded_motion
-from armtempo.link.board_messages import Positions, Sample
+from armtempo.encoding import encoded_motion, encoded_sequence
+from armtempo.link.board_messages import Positions, RowBegun, Sample, SequenceState
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
-from armtempo.planning import planner
+from armtempo.model.posture import ArmPosture
+from armtempo.model.sequence import Sequence
+from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.steps import Count, Goto, Repeat
+from armtempo.planning import planner, sequence_planner
 from armtempo.report import arm_picture, drawing, plots, run_folder
+from armtempo.report.run_folder import RunRow
+from armtempo.splines.trajectory import Trajectory
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
+from armtempo_shared.sequence import COUNT, MOVE
 
 
 @cache
@@ -71,31 +79,96 @@ def make(
     rng = np.random.default_rng(seed)
     path.mkdir(parents=True)
     folder = run_folder.RunFolder(path, made.job.name, run_folder.scales(made.arm), {"port": "sim"})
-    folder.write_motion(shipped_record() if plan is None else encoded_motion.of_plan(made).data)
+    folder.write_legs([shipped_record() if plan is None else encoded_motion.of_plan(made).data])
     if on_board:
         arm_json.save(made.arm, path / run_folder.ARM)
     else:
         made.save(path / run_folder.TRAJECTORY)
     for number in range(repetitions):
         with folder.begin_repetition() as file:
-            for sample in _samples(made, scatter_deg, rng):
+            for sample in _samples(made.arm, made.trajectory, scatter_deg, rng):
                 if number or sample.index not in drop:
                     file.append(sample)
             file.repetition.end(run_folder.COMPLETE, "", sample.ticks, sample.positions, ())
     return path
 
 
-def _samples(made: Plan, scatter_deg: float, rng: np.random.Generator) -> list[Sample]:
-    scales = run_folder.scales(made.arm)
-    end = round(made.trajectory.duration_s * TICK_HZ)
+@cache
+def small_sequence() -> SequencePlan:
+    """There and back without end, each pass counted."""
+    steps = (Goto((3.0, -58.0, 41.0)), Goto("home"), Count("parts"))
+    arm = Arm.paper()
+    start = ArmPosture("home", tuple(arm.home_deg))
+    return sequence_planner.plan(arm, Sequence("pick", (Repeat(steps),), start))
+
+
+def make_sequence(
+    path: Path,
+    cycles: int = 3,
+    state: str = "finished",
+    code: str = "",
+    scatter_deg: float = 0.0,
+    steps_off: int = 0,
+    lost_rows: tuple[int, ...] = (),
+    drop: tuple[int, ...] = (),
+    blind: bool = False,
+) -> Path:
+    """The run folder of ``small_sequence``, which ended in its third step; ``lost_rows``: counted from 1.
+
+    ``steps_off``: of joint 1 at the end of each motion; ``drop``: samples of the first motion; ``blind``: joint 1
+    has no encoder.
+    """
+    plan = small_sequence()
+    scales = list(run_folder.scales(plan.arm))
+    if blind:
+        scales[0] = replace(scales[0], counts_per_deg=0.0)
+    path.mkdir(parents=True)
+    rows = tuple(RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words) for row in plan.rows)
+    names = tuple(f"pick-{number}" for number in range(1, len(plan.legs) + 1))
+    folder = run_folder.RunFolder(path, "pick", tuple(scales), {"port": "sim"}, legs=names, rows=rows)
+    folder.write_legs(motion.data for motion in encoded_sequence.of_plan(plan).motions)
+    plan.save(path / run_folder.SEQUENCE)
+    passes = [0, *(list(range(1, len(rows))) * cycles)]
+    rng = np.random.default_rng(1)
+    with folder.begin_repetition(with_rows=True) as file:
+        run = 0
+        for passed, number in enumerate(passes, 1):
+            row, cycle = plan.rows[number], (passed - 2) // (len(rows) - 1)
+            run += row.op == MOVE
+            if passed not in lost_rows:
+                value = cycle + 1 if row.op == COUNT else 0
+                file.begin_row(RowBegun(passed, run, number, row.step, max(cycle, 0), value), 0.5 * passed)
+            if row.op == MOVE:
+                for sample in _samples(plan.arm, plan.legs[row.number], scatter_deg, rng, run, steps_off):
+                    if run > 1 or sample.index not in drop:
+                        file.append(sample, None if passed in lost_rows else number)
+        end = SequenceState(state, 0, 4, 0, cycles, "pick")
+        file.repetition.end_rows(end, code, {"parts": cycles}, 0.5 * len(passes))
+    return path
+
+
+def _samples(
+    arm: Arm,
+    trajectory: Trajectory,
+    scatter_deg: float,
+    rng: np.random.Generator,
+    run: int = 1,
+    steps_off: int = 0,
+) -> list[Sample]:
+    """The samples of a motion, ``steps_off`` from the last step of joint 1."""
+    scales = run_folder.scales(arm)
+    end = round(trajectory.duration_s * TICK_HZ)
     ticks = np.append(np.arange(0, end, SAMPLE_TICKS), end)
-    angles = made.trajectory(ticks / TICK_HZ)
+    angles = trajectory(ticks / TICK_HZ)
     seen = angles + rng.normal(scale=scatter_deg, size=angles.shape)
-    motors = made.arm.transmission.matrix
+    motors = arm.transmission.matrix
     steps = np.rint(angles @ motors.T * [scale.steps_per_deg for scale in scales]).astype(int).tolist()
     counts = np.rint(seen @ motors.T * [scale.counts_per_deg for scale in scales]).astype(int).tolist()
+    steps[-1][0] += steps_off
     rows = enumerate(zip(ticks.tolist(), steps, counts, strict=True))
     return [
-        Sample(run=1, index=n, ticks=t, path_ticks=t, flags=0, positions=Positions(tuple(step), tuple(count)))
+        Sample(
+            run=run, index=n, ticks=t, path_ticks=t, flags=0, positions=Positions(tuple(step), tuple(count))
+        )
         for n, (t, step, count) in rows
     ]

@@ -18,6 +18,7 @@ from armtempo.kinematics.chain import chains_mm, outline_mm
 from armtempo.link.program_version import own_crc
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
+from armtempo.model.frame import ArmFrame
 from armtempo.model.parts import JointModel
 from armtempo.ports.board_port import Port
 from armtempo.robot.board_state import BoardState
@@ -284,14 +285,18 @@ def test_the_outline_goes_through_the_frames() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped.files())
-def test_the_picture_shows_home_and_every_driven_joint(name: str) -> None:
+def test_the_picture_shows_home_every_driven_joint_and_frames(name: str) -> None:
     from armtempo.report.arm_picture import arm_picture
 
-    arm = Arm.load(name)
+    there = ((1.0, 0.0, 0.0, 90.0), (0.0, 1.0, 0.0, 20.0), (0.0, 0.0, 1.0, 5.0), (0.0, 0.0, 0.0, 1.0))
+    arm = replace(Arm.load(name), frames=(ArmFrame("tray", there),))
     figure = arm_picture(arm)
     titles = [axis.get_title() for axis in figure.axes if axis.axison]
     assert titles[:2] == ["home, from the side", "home, from above"]
     assert [title.split(":")[0] for title in titles[2:]] == [joint.name for joint in arm.driven]
+    named = [{text.get_text(): text.xy for text in axis.texts}.get("tray") for axis in figure.axes[:3]]
+    assert named[1:] == [(90.0, 20.0), None]
+    assert named[0] in ((90.0, 5.0), (20.0, 5.0)), "as the arm is seen from the side"
 
 
 @pytest.mark.slow

@@ -107,7 +107,7 @@ def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     found = run_reader.load(Path("runs/small-001"))
     assert len(found.repetitions[0].index) == 12
     assert found.trajectory_path is not None
-    assert (Path("runs/small-001") / "motion.bin").read_bytes()[:4] == b"ATM4"
+    assert (Path("runs/small-001") / "leg-01.bin").read_bytes()[:4] == b"ATM4"
 
 
 @pytest.mark.slow

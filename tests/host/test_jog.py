@@ -15,7 +15,7 @@ from armtempo.model.arm import Arm
 from armtempo.planning import brake_time, move_law
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
-from armtempo.planning.move_law import WayLimits
+from armtempo.planning.move_law import MoveLimits
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared.engine_memory import ONCE_BYTES
@@ -33,21 +33,21 @@ def test_the_law_keeps_its_limits_and_is_nearly_the_fastest() -> None:
     print("seed", seed)
     rng = random.Random(seed)
     for _ in range(100):
-        limits = WayLimits(*(10 ** rng.uniform(-1, 3) for _ in range(3)))
+        limits = MoveLimits(*(10 ** rng.uniform(-1, 3) for _ in range(3)))
         length = 10 ** rng.uniform(-3, 3)
         law = move_law.law(length, limits, rng.choice([INF, length / 10]))
-        way = JointSpline(move_law.DEGREE, 1, law.way, law.time_s)
+        spline = JointSpline(move_law.DEGREE, 1, law.distance, law.time_s)
         assert np.all(np.diff(law.time_s) > 0)
-        assert way(0.0) == pytest.approx(0.0, abs=1e-9 * length)
-        assert way(way.duration_s) == pytest.approx(length)
-        reached = extremes.of_joint(way)
+        assert spline(0.0) == pytest.approx(0.0, abs=1e-9 * length)
+        assert spline(spline.duration_s) == pytest.approx(length)
+        reached = extremes.of_joint(spline)
         for value, most in zip(reached.values, (limits.speed, limits.acceleration, limits.jerk), strict=True):
             assert value <= most * (1 + 1e-6)
         for order in (1, 2):
-            assert way(0.0, order) == pytest.approx(0.0, abs=1e-6 * reached.values[order - 1])
+            assert spline(0.0, order) == pytest.approx(0.0, abs=1e-6 * reached.values[order - 1])
         peak = min(limits.peak(length), limits.speed)
         optimum_s = 2.0 * limits.ramp_s(peak) + max(0.0, length - peak * limits.ramp_s(peak)) / peak
-        assert way.duration_s <= max(move_law.SHORTEST_S * (1 + 1e-9), 1.15 * optimum_s)
+        assert spline.duration_s <= max(move_law.SHORTEST_S * (1 + 1e-9), 1.15 * optimum_s)
 
 
 TIMES_S = (0.1, 0.2, 0.5, 1.0, 2.0)
@@ -115,7 +115,7 @@ TIMES_S at the limits of a jog, by ruckig's velocity interface (``python -m test
 def held(arm: Arm, joint: int, speed: float) -> Array:
     """Way of a held jog after TIMES_S, degrees, far from its end."""
     found = move_law.law(3000.0, move_law.of_joints([arm.driven[joint].limits], [1.0], speed))
-    return JointSpline(move_law.DEGREE, 1, found.way, found.time_s)(np.array(TIMES_S))
+    return JointSpline(move_law.DEGREE, 1, found.distance, found.time_s)(np.array(TIMES_S))
 
 
 @pytest.mark.parametrize("name", OPTIMUM_DEG)
@@ -135,7 +135,7 @@ def test_a_held_jog_goes_never_less_far_at_a_higher_speed(name: str) -> None:
         assert np.diff(ways, axis=0).min() >= -1e-9
 
 
-def rest_s(limits: WayLimits, speed: float, acceleration: float) -> float:
+def rest_s(limits: MoveLimits, speed: float, acceleration: float) -> float:
     """The shortest time to rest from a speed that still rises."""
     most = speed + 0.5 * acceleration**2 / limits.jerk
     return acceleration / limits.jerk + limits.ramp_s(most)
@@ -149,7 +149,7 @@ def test_a_released_jog_is_soon_at_rest(name: str) -> None:
     for percent in (1, 10, 100):
         limits = move_law.of_joints([driven], [1.0], percent / 100)
         law = move_law.law(400.0, limits)
-        spline = JointSpline(move_law.DEGREE, 1, law.way, law.time_s)
+        spline = JointSpline(move_law.DEGREE, 1, law.distance, law.time_s)
         brakes = brake_time.of_motion(Trajectory(name, (spline,), True), [driven])
         times_s = np.append(limits.ramp_s(limits.speed) * np.linspace(0.1, 0.9, 9), 0.4 * spline.duration_s)
         for time_s in times_s:

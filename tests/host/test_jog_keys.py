@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections import deque
+from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from armtempo.cli.jog_screen import JogChoice, JogScreen, _StopKeys
 from armtempo.cli.keys import INTERRUPT, WindowsKeys
 from armtempo.model.arm import Arm
+from armtempo.model.frame import ArmFrame
 
 NAMES = ["waist", "shoulder"]
 
@@ -47,6 +50,23 @@ def test_the_axis_has_the_librarys_name() -> None:
     assert choice.tool_axis == "y"
     choice.press("f", 2)
     assert choice.tool_axis == "tool-y"
+    choice.press("f", 2)
+    assert choice.tool_axis == "y"
+
+
+def test_the_frames_of_the_arm_are_among_those_to_choose_from() -> None:
+    here = tuple(map(tuple, np.eye(4).tolist()))
+    board = Jogged()
+    board.arm = replace(board.arm, frames=(ArmFrame("tray", here),))
+    choice = JogScreen(cast(Any, board), Typed()).choice
+    choice.press("z", 3)
+    named = []
+    for _ in range(4):
+        named.append(choice.tool_axis)
+        choice.press("f", 3)
+    assert named == ["z", "tool-z", "tray-z", "z"]
+    choice.press("f", 3)
+    assert choice.describe(NAMES) == "tool along tray's z, step 1 mm, 25 %"
 
 
 class Typed:

@@ -233,6 +233,9 @@ def test_an_arm_and_a_sequence_are_made_in_code() -> None:
     assert [row.words for row in planned.rows if row.words.startswith("output")] == 2 * [
         "output gripper closed"
     ]
+    record = encoded_sequence.of_plan(planned)  # the board takes no row without a step
+    assert record.plan.rows[-1].step == 6
+    assert [step.step for step in sequence.steps] == [1, 6]
     with pytest.raises(armtempo.InputError, match="no output 'griper'"):
         armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.SetOutput("griper", 1),)))
     with pytest.raises(armtempo.InputError, match="microsteps is 0; give 1 to 256"):

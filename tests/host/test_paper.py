@@ -124,7 +124,7 @@ def drawn() -> motions.Plans:
 def series(folder: Path, scatter_deg: dict[str, float]) -> list[Series]:
     """Three runs of the quintic motion with more or less noise."""
     return [
-        Series(name, evaluate(made_runs.make(folder / name, 2, scatter)))
+        Series(name, evaluate(made_runs.make(folder / name, 2, scatter)).legs[0])
         for name, scatter in scatter_deg.items()
     ]
 

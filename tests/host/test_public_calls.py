@@ -14,8 +14,8 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.encoding import encoded_motion
-from armtempo.robot.board_io import BoardIO
 from armtempo.robot.motions import Motions
+from armtempo.robot.outputs import BoardIO
 from armtempo.robot.position import ArmPosition
 from armtempo.robot.store import BoardStore
 

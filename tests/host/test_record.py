@@ -139,9 +139,9 @@ def test_full_disk_is_said_and_what_came_before_is_kept(tmp_path: Path) -> None:
         run.begin_repetition() as file,
     ):
         file.append(sample(0))
-        file._rows._file.close()
-        file._rows._file = full.open("w", encoding="utf-8", newline="")
-        file._rows._csv = csv.writer(file._rows._file)
+        file._samples._file.close()
+        file._samples._file = full.open("w", encoding="utf-8", newline="")
+        file._samples._csv = csv.writer(file._samples._file)
         file.append(sample(1))
     found = run_reader.load(run.path).repetitions[0]
     assert (found.state, found.index.tolist()) == (run_folder.BROKEN, [0])
@@ -158,7 +158,7 @@ def test_a_folder_that_the_disk_has_no_room_for_is_not_left_behind(
         with monkeypatch.context() as change:
             change.setattr(place, name, no_space)
             with pytest.raises(ArmtempoError, match="cannot be written: No space"):
-                recording.new_run(tmp_path / "runs", motion, "port", board)
+                recording.new_run(tmp_path / "runs", recording.of_motion(motion), "port", board)
         assert list((tmp_path / "runs").iterdir()) == []
 
 

@@ -21,7 +21,7 @@ from armtempo.model.plan import Plan
 from armtempo.planning import path_deviation
 from armtempo.report import comparison, drawing, plots, run_report, verdict
 from armtempo.report.evaluation import evaluate
-from armtempo.report.run_folder import MOTION
+from armtempo.report.run_folder import leg_file
 from click.testing import CliRunner
 
 from tests import browser
@@ -30,6 +30,7 @@ from tests.host import made_runs
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("report")]
 
 FIGURES = ("tracking", "errors", "convergence", "postures")
+LEG = leg_file(1)
 PARTS = 8
 """The first two have a part for each joint."""
 
@@ -74,7 +75,7 @@ def test_figures_of_several_threads_are_drawn_one_at_a_time() -> None:
 
 
 def test_labels_of_tiny_errors_stay_within_their_figure(folder: Path) -> None:
-    found = evaluate(folder)
+    (found,) = evaluate(folder).legs
     curves = found.curves
     off = 1e-4 * np.sin(np.arange(curves.mean.shape[1]))[:, None]
     figure = plots.errors(
@@ -109,7 +110,7 @@ def test_a_repetition_that_is_missing_does_not_hide_the_others(tmp_path: Path) -
     (path / "samples-03.csv").write_text((path / "samples-03.csv").read_text()[:900])
     found = evaluate(path)
     assert any("samples-02.csv" in text and "missing" in text for text in found.complaints)
-    assert len(found.curves.each) == 2
+    assert len(found.legs[0].curves.each) == 2
 
 
 def test_a_reset_in_the_middle_is_said(tmp_path: Path) -> None:
@@ -147,7 +148,7 @@ def test_a_cell_beyond_reason_makes_the_file_damaged(tmp_path: Path, cell: int, 
     path.write_text("\n".join(map(",".join, lines)) + "\n")
     found = evaluate(path.parent)
     assert found.complaints[0].startswith("samples-01.csv: damaged (")
-    assert len(found.curves.each) == 1
+    assert len(found.legs[0].curves.each) == 1
 
 
 def words(page: Path) -> str:
@@ -166,7 +167,7 @@ def row(page: Path, *starts: str) -> list[str]:
 
 def legends(path: Path) -> list[str]:
     """What each joint's curves are called."""
-    found = evaluate(path)
+    (found,) = evaluate(path).legs
     drawn = plots.tracking(found.curves, found.trajectory, found.limits, found.names)
     return [axis.get_legend().get_texts()[0].get_text() for axis in drawn.axes[: len(found.names)]]
 
@@ -204,15 +205,16 @@ def test_an_arm_without_encoders_gets_a_report_of_what_is_known(tmp_path: Path) 
     ]
     assert "the board made every step pulse of the motion" in text
     assert "the commanded motion keeps the limits of speed and acceleration" in text
-    found = evaluate(path)
+    whole = evaluate(path)
+    (found,) = whole.legs
     np.testing.assert_allclose(found.curves.mean[0], found.curves.theory[0], atol=0.015)  # half a step
     slower = [Limits(20.0, *limit.values[1:]) for limit in found.limits]
     arm = replace(found.arm, joints=tuple(limited(found.arm.joints, slower)))
-    beyond = verdict.of(replace(found, arm=arm)).line
+    beyond = verdict.of(replace(whole, legs=(replace(found, arm=arm),))).line
     assert beyond.startswith(
         "Not OK: the commanded motion exceeds the speed or acceleration limit of joint 1, "
     )
-    assert verdict.of(found).summary == "OK in what was measured"
+    assert verdict.of(whole).summary == "OK in what was measured"
 
 
 def limited(joints: Sequence[Joint], limits: Sequence[Limits]) -> Iterator[Joint]:
@@ -234,7 +236,7 @@ def test_a_motion_that_only_the_board_had_is_reported(tmp_path: Path, blind: tup
     assert "it was on the board, and is read back from its record" in text
     assert "armtempo run feed --repeat 3" in text
     assert page.read_text().count("<figure") == len(FIGURES) - 1  # all but the search
-    found, whole = evaluate(path), plan.trajectory
+    found, whole = evaluate(path).legs[0], plan.trajectory
     times = np.linspace(0.0, whole.duration_s, 99)
     np.testing.assert_allclose(found.trajectory(times), whole(times), atol=1e-6)
     assert found.limits == [joint.limits for joint in plan.arm.driven]
@@ -245,7 +247,7 @@ def test_of_a_folder_without_an_arm_the_limits_are_not_known(tmp_path: Path) -> 
     path = made_runs.make(tmp_path / "run", on_board=True)
     (path / "arm.json").write_text("{")
     found = evaluate(path)
-    assert found.arm is None
+    assert found.legs[0].arm is None
     assert "arm.json: cannot be read" in found.complaints[0]
     (path / "arm.json").unlink()
     text = words(run_report.write(path))
@@ -311,13 +313,13 @@ def test_every_column_is_explained(folder: Path) -> None:
         (lambda path: (path / "run.json").unlink(), "not a run folder"),
         (lambda path: (path / "run.json").write_text("{"), "damaged"),
         (
-            lambda path: [(path / name).unlink() for name in ("trajectory.json", MOTION)],
+            lambda path: [(path / name).unlink() for name in ("trajectory.json", LEG)],
             "the planned motion is not",
         ),
-        (lambda path: [(path / "trajectory.json").unlink(), (path / MOTION).write_bytes(b"x")], MOTION),
+        (lambda path: [(path / "trajectory.json").unlink(), (path / LEG).write_bytes(b"x")], LEG),
         (lambda path: describe(path, name=None), "'name' is missing"),
         (lambda path: describe(path, started=None), "'started' is missing"),
-        (lambda path: describe(path, joints=[]), "run.json lists 0 joints, trajectory.json has 3"),
+        (lambda path: describe(path, joints=[]), "run.json lists 0 joints, 'feed' has 3"),
         (lambda path: describe(path, joints=[{"name": "a"}]), "'steps_per_deg' is missing"),
         (lambda path: [file.write_text("") for file in path.glob("samples-*")], "no sample"),
     ],

@@ -37,8 +37,9 @@ def samples(delay_s: float = 0.0, seed: int | None = None, resolution: float = 0
         angles = angles + np.random.default_rng(seed).normal(scale=0.05, size=angles.shape)
     if resolution:
         angles = np.rint(angles / resolution) * resolution
+    nothing, index = np.zeros(angles.shape, int), np.arange(len(times))
     return RepetitionData(
-        "x", "complete", np.arange(len(times)), times, times, np.zeros(angles.shape, int), PLAN(times), angles
+        "x", "complete", index, times, times, nothing, PLAN(times), angles, 0 * index, 0 * index
     )
 
 

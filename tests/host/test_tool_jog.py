@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
+from armtempo.model.frame import ArmFrame
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_line import FollowedLine
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.splines.trajectory import Trajectory
+from scipy.spatial.transform import Rotation
 
 from tests.host.jogs import AR4, ELBOW_DEG, PAPER, check_limits, on_steps
 
@@ -22,15 +25,26 @@ INF = math.inf
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("axis", "by"),
-    [("x", -INF), ("y", 5.0), ("z", -0.1), ("tool-x", 5.0), ("tool-y", -0.1), ("tool-z", -INF)],
+    [
+        ("x", -INF),
+        ("y", 5.0),
+        ("z", -0.1),
+        ("tool-x", 5.0),
+        ("tool-y", -0.1),
+        ("tool-z", -INF),
+        ("in-tray-y", 8.0),
+    ],
 )
 def test_the_tool_moves_along_a_line_and_keeps_its_orientation(axis: str, by: float) -> None:
     here = on_steps(AR4, ELBOW_DEG)
-    motion = jog_motion.plan("x", AR4, here, JogMove(by, axis=axis))
+    turn = Rotation.from_euler("xyz", [20, -30, 50], degrees=True)
+    tray = np.vstack([np.column_stack([turn.as_matrix(), [300, 20, 10]]), [0, 0, 0, 1]])
+    arm = replace(AR4, frames=(ArmFrame("in-tray", tuple(map(tuple, tray.tolist()))),))
+    motion = jog_motion.plan("x", arm, here, JogMove(by, axis=axis))
     check_limits(motion, AR4, jog_motion.SPEED)
     start = forward(AR4, here)
     unit = np.eye(3)["xyz".index(axis[-1])] * math.copysign(1, by)
-    direction = start[:3, :3] @ unit if axis.startswith("tool") else unit
+    direction = {"tool": start[:3, :3], "in-tray": tray[:3, :3]}.get(axis[:-2], np.eye(3)) @ unit
     poses = forward(AR4, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 500)))
     gaps = poses[:, :3, 3] - start[:3, 3]
     along = gaps @ direction

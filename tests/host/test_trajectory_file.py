@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
-from armtempo.model import plan as plan_file
+from armtempo.model import plan_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -89,7 +89,7 @@ def edited(path: Path, edit: Callable[[Any], None]) -> Path:
     content = json.loads(path.read_text(encoding="utf-8"))
     edit(content)
     if "plan" in content and "sha256" in content:
-        content["sha256"] = plan_file._checksum(content["plan"])
+        content["sha256"] = plan_file.checksum(content["plan"])
     path.write_text(json.dumps(content), encoding="utf-8")
     return path
 

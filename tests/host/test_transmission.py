@@ -374,7 +374,8 @@ def test_a_report_sees_the_joints(on_board: bool, tmp_path: Path, monkeypatch: p
         np.multiply([40.0, -80.0, -80.0], per_deg), abs=1
     )
     found = evaluation.evaluate(folder)
-    assert np.max(np.abs(found.curves.each[:, 0] - found.curves.theory[0])) < 0.1
+    curves = found.legs[0].curves
+    assert np.max(np.abs(curves.each[:, 0] - curves.theory[0])) < 0.1
     judged = verdict.of(found)
     assert "the board made every step pulse of the motion" in str(judged)
     assert run_report.write(folder).is_file()

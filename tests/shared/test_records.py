@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from armtempo.model import arm_json, sequence_plan
-from armtempo.model import plan as plan_file
+from armtempo.model import arm_json, plan, sequence_plan
 from armtempo.ports import claim_file
-from armtempo.report import run_folder, sequence_folder
+from armtempo.report import run_folder
 from armtempo_shared import (
     armrecord,
     codes,
@@ -82,6 +81,21 @@ def test_round_trip_with_outputs_and_inputs(outputs: int, inputs: int) -> None:
     data = armrecord.pack(head, rows, *wired(outputs, inputs))
     assert armrecord.unpack(data)[:2] == (head, rows)
     assert armrecord.unpack_outputs(data) == wired(outputs, inputs)
+
+
+@pytest.mark.parametrize(("outputs", "inputs"), [(0, 0), (3, 2)])
+def test_round_trip_with_backlash(outputs: int, inputs: int) -> None:
+    head, rows = made(3)
+    others = wired(outputs, inputs)
+    backlash = [{"steps": steps, "on_motor": 1, "spare": 0, "pace": 70_000 * steps} for steps in (0, 40, 5)]
+    data = armrecord.pack(head, rows, *others, backlash)
+    assert armrecord.unpack(data)[:2] == (head, rows)
+    assert armrecord.unpack_outputs(data) == others
+    assert armrecord.unpack_backlash(data) == backlash
+    assert armrecord.backlash_count(backlash) == 2
+    assert armrecord.unpack_backlash(armrecord.pack(head, rows, *others)) == []
+    with pytest.raises(armrecord.ArmRecordError, match="length"):
+        armrecord.unpack(data[:-12] + data[-4:])
 
 
 def test_an_arm_without_has_the_bytes_that_it_always_had() -> None:
@@ -283,10 +297,9 @@ def test_a_motions_name_is_text() -> None:
 def test_versions_are_those_of_files_that_exist() -> None:
     versions = {
         "arm": arm_json.VERSION,
-        "trajectory": plan_file.VERSION,
-        "sequence": sequence_plan.VERSION,
+        "trajectory": plan.FILE.versions[-1],
+        "sequence": sequence_plan.FILE.versions[-1],
         "run": run_folder.VERSION,
-        "sequence run": sequence_folder.VERSION,
         "claim": claim_file.VERSION,
         "arm record": armrecord.VERSION,
         "protocol": messages.PROTOCOL_VERSION,
@@ -295,8 +308,7 @@ def test_versions_are_those_of_files_that_exist() -> None:
         "arm": 1,
         "trajectory": 2,
         "sequence": 2,
-        "run": 1,
-        "sequence run": 1,
+        "run": 2,
         "claim": 1,
         "arm record": 2,
         "protocol": 7,

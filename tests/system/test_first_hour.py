@@ -17,7 +17,7 @@ import pytest
 from armtempo.cli.help import TOPICS
 from armtempo.model.plan import Plan
 from armtempo.report import run_reader, run_report
-from armtempo.report.run_folder import MOTION
+from armtempo.report.run_folder import leg_file
 from armtempo.simulator import LaunchOptions, launch
 
 from tests import interpreters
@@ -208,7 +208,7 @@ def test_it_leaves_a_whole_run_folder_and_its_report(demo: tuple[Ended, Path]) -
     assert done.exit_code == 0, done.errors
     assert done.errors == "port sim: a virtual board, which ends with this command\n"
     assert [one.state for one in run_reader.load(folder).repetitions] == ["complete"]
-    assert (folder / MOTION).stat().st_size > 0
+    assert (folder / leg_file(1)).stat().st_size > 0
     assert Plan.load(folder / "trajectory.json").job.name == "feed"
     assert "samples-01.csv: complete, 6.795 s, 69 samples" in done.output
     assert f"report: {Path('runs') / folder.name / run_report.PAGE}" in done.output

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import armtempo
@@ -110,6 +111,18 @@ def test_the_same_from_python() -> None:
             board.jog(joint=1, by_mm=5)
         for _ in range(2):  # the second time it is there
             assert board.jog_to(2, before[1] + 3.0)[1] == pytest.approx(before[1] + 3.0, abs=0.02)
+        board.jog_to(2, before[1])
+        tray = armtempo.Pose.of_angles([50, 200, 100], {"roll": 5, "pitch": -10, "yaw": 90})
+        board.configure(replace(PAPER, frames=(armtempo.ArmFrame("tray", tray.matrix),)))
+        here = armtempo.forward(PAPER, board.posture_deg())[:3, 3]
+        axes = board.arm.frame("tray")
+        local = axes[:3, :3].T @ (here - axes[:3, 3]) + [0, 4, -3]
+        board.goto(board.arm.in_base(armtempo.Pose.of_angles(local, {}), "tray"))
+        there = armtempo.forward(PAPER, board.posture_deg())[:3, 3]
+        assert there - here == pytest.approx(axes[:3, :3] @ [0, 4, -3], abs=0.4)
+        board.jog(axis="tray-x", by_mm=5)
+        gone = armtempo.forward(PAPER, board.posture_deg())[:3, 3] - there
+        assert gone == pytest.approx(5 * axes[:3, 0], abs=0.4)
         board.jog_to(2, before[1])
         with pytest.raises(InputError, match="drives no joint 9"):
             board.jog_to(9, 5.0)

@@ -380,7 +380,8 @@ def test_backlash_by_the_encoder_of_the_joint(tmp_path: Path, monkeypatch: pytes
     assert lines["joint 1: encoder"].verdict is Level.GOOD
     said = lines["joint 1: backlash"].measured.split("°")[0]
     assert float(said) == pytest.approx(0.3, abs=0.03)
-    assert found.data["arm_file"] == [f"joint 1: model: backlash_deg = {said} or so, for the virtual arm"]
+    (line,) = found.data["arm_file"]
+    assert line.startswith(f"joint 1: motor: backlash_deg = {said} or so, ")
 
 
 @pytest.mark.parametrize(
@@ -400,6 +401,28 @@ def test_what_a_reversal_shows(reversed_: int, further: int, said: str, verdict:
     assert (line.verdict if line else None) is verdict
     assert (line.measured if line else "").startswith(said)
     assert bool(lines) == ("within" in said)
+
+
+@pytest.mark.parametrize(
+    ("reversed_", "said", "line"),
+    [
+        (6, "none that its encoder shows beside the 0.2° that its motor crosses", ""),
+        (
+            3,
+            "0.47° within 0.18°, of the joint against its motor, which crosses 0.2°",
+            "motor: backlash_deg = 0.47",
+        ),
+        (9, "0° within 0.18°", "motor: backlash_deg = 0 or so"),
+    ],
+)
+def test_what_a_reversal_shows_of_a_motor_that_crosses_backlash(reversed_: int, said: str, line: str) -> None:
+    joint = _encoder(commandline.ARM.driven[0], counts_per_rev=4000)
+    joint = replace(joint, motor=replace(joint.motor, backlash_deg=0.2))
+    moves = motor_test.Moved(-18, reversed_), motor_test.Moved(-18, 6)
+    found, lines = motor_test.judge_backlash(joint, *moves)
+    assert found is not None
+    assert found.measured.startswith(said)
+    assert [entry.startswith(line) for entry in lines] == [True] * bool(line)
 
 
 def test_a_coupled_joint_that_turns_the_other_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,12 +9,12 @@ from pathlib import Path
 import armtempo
 import numpy as np
 import pytest
-from armtempo.basics.errors import BoardError, LinkError, RunFolderError
+from armtempo.basics.errors import BoardError, LinkError
 from armtempo.cli import state
 from armtempo.link.board_messages import SequenceState
 from armtempo.link.session import OnLoss
-from armtempo.report import sequence_report
-from armtempo.report.sequence_report import results
+from armtempo.report import verdict
+from armtempo.report.evaluation import evaluate
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 
@@ -175,30 +175,33 @@ def test_every_row_and_sample_is_recorded(tmp_path: Path) -> None:
         board.home(ARM)
         board.run_sequence(plan, out=tmp_path / "runs")
         by_file = board.last_sequence
-        board.run_sequence("small", out=tmp_path / "runs")
-        by_name = board.last_sequence
+        by_name = board.run("small", out=tmp_path / "runs")
     assert by_file
-    assert by_name
     for found in (by_file, by_name):
         assert found.state == "finished"
-        assert found.meta["ended"]["counters"] == {"parts": 3}
+        assert found.entries[0].ended["counters"] == {"parts": 3}
         passed = 1 + 3 * ROWS_OF_A_CYCLE
         assert [row.passed for row in found.rows] == list(range(1, passed + 1))
         assert found.rows_lost == 0
         assert [row.value for row in found.rows if row.words == "count parts"] == [1, 2, 3]
-        assert np.all(found.row >= 0)
-        assert {found.motion_of(row) for row in found.row} == set(range(1, LEGS + 1))
-        legs = results(found)
-        assert [(leg.number, leg.runs, leg.whole) for leg in legs] == [(n, 3, 3) for n in range(1, LEGS + 1)]
-        assert max(leg.end_off_steps.max() for leg in legs) <= 0.51
-        assert max(leg.command_off_steps.max() for leg in legs) < 2.5
+        assert np.all(found.samples.row >= 0)
+        assert {found.leg_of(row) for row in found.samples.row} == set(range(1, LEGS + 1))
+        told = evaluate(found.path)
+        whole = [(leg.number, len(leg.repetitions), leg.whole) for leg in told.legs]
+        assert whole == [(n, 3, 3) for n in range(1, LEGS + 1)]
+        planned_deg = [one.trajectory(run.path_s) for one in told.legs for run in one.repetitions]
+        commanded_deg = [run.commanded_deg for one in told.legs for run in one.repetitions]
+        off_deg = np.abs(np.concatenate(commanded_deg) - np.concatenate(planned_deg)).max(axis=0)
+        assert np.all(off_deg * [joint.steps_per_deg for joint in ARM.driven] < 2.5)
+        made = f"the board made every step pulse of {3 * LEGS} whole motions"
+        assert made in str(verdict.of(told))
     assert by_file.rows[1].words == "goto pick"
     assert by_name.rows[1].words == "run small-1"
-    told = sequence_report.verdict(by_file, results(by_file))
-    assert told.state != sequence_report.BAD, told.line
-    page = sequence_report.write(by_file.path).read_text()
-    assert "rows.csv" in page
-    assert "samples.csv" in page
+    judged = verdict.of(evaluate(by_file.path))
+    assert judged.state != verdict.BAD, judged.line
+    page = by_file.report().read_text()
+    assert "rows-01.csv" in page
+    assert "samples-01.csv" in page
     assert "finished after 3 whole cycles" in page
     assert "goto pick" in page
 
@@ -243,11 +246,11 @@ def test_after_a_power_failure_the_folder_says_where_it_stood(tmp_path: Path) ->
     assert found.last.cycle >= 2
     assert found.last.step >= states[-1].step - 1
     assert [row.passed for row in found.rows] == list(range(1, len(found.rows) + 1))
-    told = sequence_report.verdict(found, results(found))
-    assert told.state == sequence_report.BAD
+    told = verdict.of(evaluate(found.path))
+    assert told.state == verdict.BAD
     assert "step" in told.line
     assert "of cycle 3" in told.line
-    with (found.path / "rows.csv").open("a") as file:
+    with (found.path / "rows-01.csv").open("a") as file:
         file.write("99,1")  # cut in the midst of a line
     assert armtempo.SequenceRun.load(found.path).rows == found.rows
 
@@ -276,5 +279,4 @@ def test_recorded_from_the_command_line(tmp_path: Path) -> None:
     assert told["folder"].endswith("small-002")
     assert said("report", report).startswith(f"wrote {report}/report.html")
     assert (tmp_path / report / "report.html").is_file()
-    with pytest.raises(RunFolderError, match="is the run of a sequence"):
-        armtempo.Run.load(tmp_path / report)
+    assert armtempo.Run.load(tmp_path / report).complete

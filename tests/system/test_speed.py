@@ -10,7 +10,8 @@ import pytest
 from armtempo.basics.errors import BoardError, InputError
 from armtempo.link.board_messages import Sample
 from armtempo.planning import brake_time, ramp_excess
-from armtempo.report import replayed, run_report
+from armtempo.report import replayed
+from armtempo.report.evaluation import evaluate
 from armtempo.report.run import Run
 from armtempo.robot.recording import Watcher
 from armtempo.simulator import LaunchOptions, launch
@@ -49,10 +50,11 @@ def test_half_the_speed_takes_twice_the_time_on_the_same_path(plan: armtempo.Pla
     first = run.samples[run.samples["repetition"] == 1]
     np.testing.assert_allclose(first["path_s"], first["time_s"] / 2, atol=1e-6)
     assert first["time_s"][-1] == pytest.approx(2 * plan.total_s, abs=1e-4)
-    evaluation = run_report.evaluate(run.path)
-    assert [text for text in evaluation.complaints if "ran at 50 % of the planned speed" in text]
-    assert np.nanmax(np.abs(evaluation.curves.mean[0] - evaluation.curves.theory[0])) < 0.5
-    speed = np.abs(evaluation.curves.theory[1]).max(axis=0)
+    found = evaluate(run.path)
+    assert [text for text in found.complaints if "ran at 50 % of the planned speed" in text]
+    curves = found.legs[0].curves
+    assert np.nanmax(np.abs(curves.mean[0] - curves.theory[0])) < 0.5
+    speed = np.abs(curves.theory[1]).max(axis=0)
     planned = np.abs(plan.trajectory(np.linspace(0, plan.total_s, 200), 1)).max(axis=0)
     np.testing.assert_allclose(speed, planned / 2, rtol=0.05)
 

@@ -22,7 +22,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, JointModel
 from armtempo.planning import planner, point_to_point
-from armtempo.robot import arm_state, goto, homing, stored_motion
+from armtempo.planning.jog.jog_motion import move_of
+from armtempo.robot import arm_state, goto, homing, jog, stored_motion
 from armtempo.robot.stop_request import StopRequest
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
@@ -127,6 +128,40 @@ def test_a_fault_ends_the_run_by_its_name(fault: InjectedFault, ends: str, joint
         assert status.known == 7
     if ends == "internal":
         assert "injected crash" in end.notices[0]
+
+
+@pytest.mark.parametrize(
+    ("compensated_deg", "lost_deg"), [(0.5, 0.0), pytest.param(0.0, 0.5, marks=pytest.mark.long)]
+)
+def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float) -> None:
+    """There and back, by an encoder on the joint: it stands as far from its command after both, and after a jog that
+    is shorter than the backlash."""
+    plain = commandline.ARM.joints[0]
+    assert plain.encoder is not None
+    assert plain.motor is not None
+    arm = first_joint(
+        commandline.ARM,
+        encoder=replace(plain.encoder, counts_per_rev=FINE_COUNTS),
+        motor=replace(plain.motor, backlash_deg=compensated_deg),
+        model=replace(plain.model, backlash_deg=0.5, scatter_deg=0.0),
+    )
+    places = np.array(arm.home_deg), TARGET_DEG
+    off_deg = []
+    with launch(LaunchOptions(arm=arm)) as process, open_board(process.port) as board, StopRequest() as stop:
+        arm_state.configure(board, arm, replace=True)
+        arm_state.home(board, arm)
+        for here, there in (places, places[::-1]):
+            record = encode.motion_record(point_to_point.straight("move", here, there, arm), arm)
+            end = stored_motion.replay(board, stored_motion.store(board, "move", record, replace=True), stop)
+            assert not end.fault
+            positions = board.status().positions
+            assert abs(positions.commanded_steps[0] - there[0] * arm.driven[0].steps_per_deg) <= 0.5
+            off_deg.append(positions.counts[0] * 360 / FINE_COUNTS - there[0])
+        jog.step(board, arm, move_of(arm, "joint 1", None, 0.2, None), 1.0, stop)
+        moved_deg = board.status().positions.counts[0] * 360 / FINE_COUNTS - places[0][0] - off_deg[1]
+    near_deg = 2.0 / arm.driven[0].steps_per_deg
+    assert off_deg[1] - off_deg[0] == pytest.approx(lost_deg, abs=near_deg)
+    assert moved_deg == pytest.approx(0.0 if lost_deg else 0.2, abs=near_deg)
 
 
 @pytest.mark.parametrize("at_s", [0.0, 0.41, 0.77])

@@ -81,7 +81,7 @@ def _checked(board: "Board", data: bytes) -> "Record":
 
 
 def _take(board: "Board", record: "Record") -> None:
-    head, joints, crc, outputs, inputs = record
+    head, joints, crc, outputs, inputs, backlash = record
     if crc == board.arm_crc:
         return
     all_but_limits, stops = _facts(record)
@@ -90,8 +90,8 @@ def _take(board: "Board", record: "Record") -> None:
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
     _drop_engine(board)
-    memory_shares.resize(board.engine_memory, len(joints))
-    board.make_engine(head, joints)
+    memory_shares.resize(board.engine_memory, len(joints), armrecord.backlash_count(backlash))
+    board.make_engine(head, joints, backlash)
     board.all_but_limits = all_but_limits
     if known:
         board.engine.home(known, steps)
@@ -108,7 +108,7 @@ def _take(board: "Board", record: "Record") -> None:
 
 def _facts(record: "Record") -> "tuple[int, int]":
     """The record's identity of the arm, and whether it stops if the host is silent."""
-    head, joints, _, _, _ = record
+    head, joints, _, _, _, _ = record
     return armrecord.without_limits(head, joints), head["flags"] & armrecord.FLAG_STOP_ON_LINK_LOSS
 
 

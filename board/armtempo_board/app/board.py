@@ -79,10 +79,12 @@ class Board:
         """Drop the store; keep the files of an upload in progress."""
         self._store = None
 
-    def make_engine(self, head: "dict[str, int]", joints: "list[dict[str, int]]") -> None:
-        """For an arm, as ``armrecord.unpack`` gives it."""
+    def make_engine(
+        self, head: "dict[str, int]", joints: "list[dict[str, int]]", backlash: "list[dict[str, int]]"
+    ) -> None:
+        """For an arm, as ``armrecord.unpack`` and ``unpack_backlash`` give it."""
         gc.collect()
-        self.engine = Engine(EngineParts(head, joints, self.engine_memory))
+        self.engine = Engine(EngineParts(head, joints, self.engine_memory, backlash))
 
     def checked(self, motion: "MotionHead", crc: "int | None") -> "MotionHead":
         """The motion; raises Refused if it is another than expected (``crc``), or not for this arm."""

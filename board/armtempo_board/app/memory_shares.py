@@ -32,12 +32,13 @@ def for_engine() -> "EngineMemory":
     return made
 
 
-def resize(made: "EngineMemory", joints: int) -> None:
+def resize(made: "EngineMemory", joints: int, with_backlash: int = 0) -> None:
     """Make the memory for an engine of ``joints`` joints, whose objects need part of it; it must be unused.
 
+    ``with_backlash``: how many of them have backlash.
     If the heap no longer has blocks large enough, the engine gets less memory until the next start.
     """
-    words = engine_memory.memory_words(joints, made.size)
+    words = engine_memory.memory_words(joints, made.size, with_backlash)
     while made.memory.size != words:
         try:
             made.make_memory(words)

@@ -1,7 +1,7 @@
 """Checks an arm record before the present one is released."""
 
 from armtempo_shared import armrecord, codes, engine_memory
-from armtempo_shared.limits import MAX_ENCODERS
+from armtempo_shared.limits import MAX_BACKLASH_STEPS, MAX_ENCODERS
 from armtempo_shared.messages import NO_JOINT
 from micropython import const
 
@@ -10,15 +10,16 @@ from armtempo_board.errors import Refused
 from armtempo_board.hardware import pins
 
 _LAST_TIMER = const(14)
+_LONGEST_SQUARE = 1 << 44  # (2**28.5 ticks, 4.5 s, / 64)**2 / 2: the time to cross it is a small integer
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     Rows = list[dict[str, int]]
-    Record = tuple[dict[str, int], Rows, int, Rows, Rows]
+    Record = tuple[dict[str, int], Rows, int, Rows, Rows, Rows]
 
 
 def checked(data: bytes, free_bytes: int) -> "Record":
-    """(head, joints, crc32, outputs, inputs) of an arm record, as ``armrecord`` unpacks them.
+    """(head, joints, crc32, outputs, inputs, backlash) of an arm record, as ``armrecord`` unpacks them.
 
     ``free_bytes``: available for an engine. Raises Refused: BAD_RECORD if it is damaged, of another version,
     or names something that the board does not have; PIN_TAKEN if the pin or timer of an output, input or
@@ -37,10 +38,16 @@ def checked(data: bytes, free_bytes: int) -> "Record":
     if (outputs or inputs) and not features.OUTPUTS:
         raise Refused(codes.NEEDS_FIRMWARE)
     _check_pins(head, joints, outputs, inputs)
+    backlash = armrecord.unpack_backlash(data)
+    for number, row in enumerate(backlash):
+        if row["steps"] > MAX_BACKLASH_STEPS or row["steps"] * row["pace"] ** 2 > _LONGEST_SQUARE:
+            raise Refused(codes.BAD_RECORD, number)
     rates = [row["max_rate"] for row in joints]
-    if not engine_memory.fits(rates, free_bytes):
-        raise Refused(codes.NO_ENGINE_MEMORY, NO_JOINT, engine_memory.needed_bytes(rates))
-    return head, joints, crc, outputs, inputs
+    with_backlash = armrecord.backlash_count(backlash)
+    if not engine_memory.fits(rates, free_bytes, with_backlash):
+        needed = engine_memory.needed_bytes(rates, with_backlash)
+        raise Refused(codes.NO_ENGINE_MEMORY, NO_JOINT, needed)
+    return head, joints, crc, outputs, inputs, backlash
 
 
 def _is_fit(row: "dict[str, int]") -> bool:

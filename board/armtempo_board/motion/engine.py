@@ -86,7 +86,7 @@ class Engine:
         """Set the positions of the joints in ``mask`` to ``steps`` (an entry for every joint)."""
         for number, joint in enumerate(self.drives):
             if mask >> number & 1:
-                joint.declare(steps[number])
+                joint.declare(steps[number], self.known >> number & 1)
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
         self.known |= mask
 
@@ -295,7 +295,7 @@ class Engine:
             return
         encoder = self._encoders[number]
         encoder.update()
-        if self._following[number].is_exceeded(joint.position(matches), encoder.counts):
+        if self._following[number].is_exceeded(joint.position(matches), encoder.counts - joint.extra_counts):
             self.known &= ~(1 << number)
             self._fail(codes.FOLLOWING, number)
 

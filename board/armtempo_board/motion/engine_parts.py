@@ -13,6 +13,13 @@ from armtempo_board.motion.joint_drive import JointDrive
 from armtempo_board.motion.rate_control import RateControl
 from armtempo_board.motion.readings import Readings
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from armtempo_board.hardware.sampler import Sampler
+    from armtempo_board.memory import Memory
+
+    Rows = list[dict[str, int]] | tuple[()]
+
 _PULSE_SPARE_US = const(5)
 _TICKS_PER_US = const(84)
 # fields of a joint's row in the arm record that are needed later
@@ -27,10 +34,15 @@ class EngineParts:
     """``head`` and ``joints``: from ``armrecord.unpack``. Nothing moves, drivers are off.
 
     ``engine_memory``: memory taken over from the engine before; raises MemoryError if it is too small.
+    ``backlash``: from ``armrecord.unpack_backlash``.
     """
 
     def __init__(
-        self, head: "dict[str, int]", joints: "list[dict[str, int]]", engine_memory: EngineMemory
+        self,
+        head: "dict[str, int]",
+        joints: "list[dict[str, int]]",
+        engine_memory: EngineMemory,
+        backlash: "Rows" = (),
     ) -> None:
         self.feeder = engine_memory.feeder
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
@@ -44,12 +56,14 @@ class EngineParts:
         rings = engine_memory.rings([row["max_rate"] for row in joints])
         arm = head, joints
         self.drives = [
-            JointDrive(n, arm, self.sampler, ring, engine_memory.memory) for n, ring in enumerate(rings)
+            _drive(n, arm, self.sampler, ring, engine_memory.memory, backlash) for n, ring in enumerate(rings)
         ]
         self.encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
         self.clock = MotionClock()
         self.rates = RateControl(self.clock, len(joints))
+        for drive in self.drives if backlash else ():
+            drive.rates = self.rates  # type: ignore[attr-defined]
         self.readings = Readings(self.sampler, self.clock, self.drives, self.encoders, slots)
         self.following = [FollowingError(row) for row in joints]
         self.inputs = Inputs(head, joints, self.sampler)
@@ -57,3 +71,18 @@ class EngineParts:
         registers.apply(registers.PRIORITIES)
         self.limits = [{name: row[name] for name in _LIMITS} for row in joints]
         self.pulse_us = head["pulse_ticks"] // _TICKS_PER_US + _PULSE_SPARE_US
+
+
+def _drive(
+    number: int,
+    arm: "tuple[dict[str, int], list[dict[str, int]]]",
+    sampler: "Sampler",
+    ring: "memoryview",
+    memory: "Memory",
+    backlash: "Rows",
+) -> JointDrive:
+    if not backlash or not backlash[number]["steps"]:
+        return JointDrive(number, arm, sampler, ring, memory)
+    from armtempo_board.motion.backlash_drive import BacklashDrive  # here, as few arms need its memory
+
+    return BacklashDrive(number, arm, sampler, ring, memory, backlash[number])

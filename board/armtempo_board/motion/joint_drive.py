@@ -42,6 +42,9 @@ class JointDrive:
     computed, 29 ms with one joint, 50 ms with six.
     """
 
+    extra_counts = 0
+    """What the encoder has counted of steps that are not of the position (backlash_drive.py)."""
+
     def __init__(
         self,
         number: int,
@@ -221,6 +224,6 @@ class JointDrive:
         self.generator.close()
         self.ring.stop()
 
-    def declare(self, steps: int) -> None:
-        """Set the position to ``steps``; nothing moves."""
+    def declare(self, steps: int, was_known: int) -> None:
+        """Set the position to ``steps``; nothing moves. ``was_known``: it was known before."""
         self._base = steps

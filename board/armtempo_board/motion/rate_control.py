@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _LOOP_KITICKS = const(2048)
 _JOINT_KITICKS = const(341)
 
+_LATE_KITICKS = const(82)  # 1 ms
 _PERMILLE = const(1000)
 
 
@@ -58,6 +59,12 @@ class RateControl:
             self.waits = False
             self._end_at(self.override.steady_ticks())
         return True
+
+    def last_until(self, kiticks: int) -> None:
+        """The motion lasts until then at least, as its last steps come later than planned."""
+        if kiticks > self._end_kiticks:
+            self._end_at((kiticks + _LATE_KITICKS) << 10)
+            self.end_moves = True
 
     def stands(self) -> bool:
         """Whether the motion's own time stops at the end of the last ramp."""

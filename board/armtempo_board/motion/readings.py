@@ -88,7 +88,7 @@ class Readings:
             encoder = self._encoders[number]
             encoder.take(raw[at + self._slots[number]])
             words[commanded + number] = joint.position(raw[at + isr.RAW_MATCHES + number])
-            words[counts + number] = encoder.counts
+            words[counts + number] = encoder.counts - joint.extra_counts
 
     def end(self, ticks: int) -> None:
         """The motion has ended at ``ticks``: note the end times, and release its override."""
@@ -131,7 +131,7 @@ class Readings:
             encoder = self._encoders[number]
             buffer[COMMANDED + number] = self.commanded(number)
             encoder.update()
-            buffer[COMMANDED + count + number] = encoder.counts
+            buffer[COMMANDED + count + number] = encoder.counts - self._joints[number].extra_counts
 
 
 def _put_ticks(sample: "array[int]", ticks: int) -> None:

@@ -104,6 +104,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "jog",
             "jog --joint 2 --by -5",
             "jog --axis z --by 10 --speed 50",
+            "jog --frame tray --axis x --by 5",
         ),
         "teach": Entry(
             "teach:teach",
@@ -111,6 +112,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "teach points.toml",
             "teach --posture above_tray",
             "teach frame tray",
+            "teach tool gripper",
         ),
         "run": Entry(
             "run:run",

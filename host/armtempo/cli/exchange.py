@@ -15,6 +15,7 @@ from armtempo.model import mesh_files, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import BASE
 from armtempo.model.via_table import ImportedPath
 from armtempo.new_arm import arm_text, urdf_meshes
 from armtempo.new_arm import urdf_fitting as fitting
@@ -30,6 +31,7 @@ from armtempo.new_arm import urdf_reader as reader
     default=None,
     help="Unit of angles whose column does not name one. Default: degrees, unless that is doubtful.",
 )
+@options.frame
 @click.option(
     "--tolerance-deg",
     type=float,
@@ -53,6 +55,7 @@ def import_table(
     table: Path,
     arm_path: Path | None,
     name: str | None,
+    frame: str,
     radians: bool | None,
     tolerance_deg: float | None,
     own_timing: bool,
@@ -73,12 +76,16 @@ def import_table(
     target = output or Path(f"{title}.json" if own_timing else f"{title}.toml")
     check_not_input(target, (table, arm.source))
     if own_timing:
+        if frame != BASE:
+            raise InputError("--own-timing is for angles, which are in no frame", "leave --frame out")
         plan = resolve.as_recorded(table, arm, title, radians, tolerance_deg)
         plan.save(target, force)
         _show_timed(plan, target, as_json)
         return
     found = via_table.read(table, arm, radians, tolerance_deg)
-    text = via_table.job_text(title, found)
+    if frame != BASE and not found.poses:
+        raise InputError(f"{table}: has angles, which are in no frame", "leave --frame out")
+    text = via_table.job_text(title, found, frame)
     Job.of_table(toml_table.parse(text, str(table)), arm)
     check_replaceable(target, text, force)
     replace_text(target, text)

@@ -13,6 +13,9 @@ from armtempo.cli.jog_screen import KEYS, SPEEDS, JogScreen
 from armtempo.cli.keys import Keys
 from armtempo.cli.options import BoardOptions
 from armtempo.model.arm import Arm
+from armtempo.model.frame import TOOL
+from armtempo.model.tool_pose import BASE
+from armtempo.planning.jog.jog_line import axis_of
 from armtempo.ports.names import is_sim
 from armtempo.robot.board import Board
 
@@ -25,6 +28,11 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
 )
 @click.option("--axis", type=_AXES, help="Move the tool along this axis by --by mm.")
 @click.option("--about", type=_AXES, help="Turn the tool about this axis by --by degrees.")
+@click.option(
+    "--frame",
+    metavar="NAME",
+    help="Frame whose axes are meant: one of the arm file, or 'tool'.  [default: base]",
+)
 @click.option("--by", type=float, metavar="NUMBER", help="Distance: degrees or mm.")
 @click.option("--to", type=float, metavar="DEG", help="With --joint, the angle to move to, instead of --by.")
 @click.option(
@@ -34,6 +42,7 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
     show_default=True,
     help="Percent of the speed limits.",
 )
+@options.tool
 @options.holds
 @options.gamepad
 @options.board(options.arm_of_board, options.replace_arm)
@@ -41,9 +50,11 @@ def jog(
     joint: str | None,
     axis: str | None,
     about: str | None,
+    frame: str | None,
     by: float | None,
     to: float | None,
     speed: float,
+    tool: str | None,
     holds: str | None,
     gamepad: bool,
     given: BoardOptions,
@@ -51,23 +62,31 @@ def jog(
     """Jog: move a joint or the tool by a step or while a key is held, within the ranges.
 
     Without --joint, --axis and --about, keys move the arm, and one line shows the position. With one of them
-    and --by, the arm moves once. Axes are those of the base, or of the tool at its present orientation
-    (tool-x, …). The arm must be homed. Ctrl-C brakes.
+    and --by, the arm moves once. Axes are those of the base, of the tool at its present orientation (tool-x, …)
+    or of a --frame of the arm file. The arm must be homed. Ctrl-C brakes.
     """
     if to is not None and (joint is None or by is not None):
         raise InputError("--to needs --joint, without --by", "for example --joint 2 --to 30")
     moves = _one_move(joint, axis, about, by if to is None else to, gamepad, given.as_json)
+    chosen = axis or about
+    if frame is not None and (joint is not None or "-" in (chosen or "")):
+        raise InputError("--frame says whose x, y or z is meant", "for example --frame tray --axis x --by 10")
     arm = resolve.named_arm(given.arm_path)
+    if arm is not None:  # a wrong name is reported before a port is opened
+        arm.with_tool(tool).frame(BASE if frame in (None, TOOL) else frame)
     with resolve.board(given, arm) as board:
-        prepare(board, resolve.arm_of_board(board, arm).holding(holds), given.replace_arm)
+        prepare(board, resolve.arm_of_board(board, arm).with_tool(tool).holding(holds), given.replace_arm)
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
-                screen(board, pressed, speed).loop()
+                made = screen(board, pressed, speed)
+                made.choice.frame = frame or BASE
+                made.loop()
         elif joint is not None and to is not None:
             board.jog_to(joint, to, speed / 100)
         else:
             along = by if axis else None
-            board.jog(joint, None if axis else by, axis or about, along, speed / 100)
+            named = axis_of(frame, chosen) if frame and chosen else chosen
+            board.jog(joint, None if axis else by, named, along, speed / 100)
         early = board.last_jog_ends
         if not (early and given.as_json):
             posture.print_position(board, given.as_json)

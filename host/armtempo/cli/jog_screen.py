@@ -14,7 +14,10 @@ import click
 from armtempo.basics.errors import ArmtempoError, BoardError, InputError, LinkError, PlanError
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.kinematics.of_arm import forward
+from armtempo.model.frame import TOOL
 from armtempo.model.pose import to_rpy_deg
+from armtempo.model.tool_pose import BASE
+from armtempo.planning.jog.jog_line import axis_of
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped, StopRequest
 
@@ -34,7 +37,7 @@ _CLEAR_LINE = "\r\x1b[K"
 
 KEYS = f"""\
   1 2 3 ...    a joint                        x y z   the tool along an axis, X Y Z about it
-  + -, arrows  move                           f       axes of the base, or of the tool
+  + -, arrows  move                           f       axes of the base, the tool, or a frame
   s            steps of 0.1, 1, 10 (deg, mm)  h       steps, or moving while + or - is held down
   < >          slower, faster                 space   stop
   c            clear a fault                  q       end, with the arm at rest; ? help
@@ -49,8 +52,10 @@ class JogChoice:
     """Number, from 1; None: the tool."""
     axis: str = "x"
     about: bool = False
-    in_tool: bool = False
-    """Axes of the tool, not of the base."""
+    frames: tuple[str, ...] = (BASE, TOOL)
+    """Frames to choose from."""
+    frame: str = BASE
+    """The one whose axes are meant."""
     step: int = 1
     """Index into STEPS."""
     held: bool = False
@@ -59,7 +64,7 @@ class JogChoice:
     @property
     def tool_axis(self) -> str | None:
         """The axis as ``Board.jog`` takes it; None if a joint moves."""
-        return None if self.joint is not None else f"tool-{self.axis}" if self.in_tool else self.axis
+        return None if self.joint is not None else axis_of(self.frame, self.axis)
 
     def press(self, key: str, joints: int) -> bool:
         """Handle a key that selects something; False if it is another key."""
@@ -68,7 +73,7 @@ class JogChoice:
         elif key in "xyzXYZ":
             self.joint, self.axis, self.about = None, key.lower(), key.isupper()
         elif key == "f":
-            self.in_tool = not self.in_tool
+            self.frame = self.frames[(self.frames.index(self.frame) + 1) % len(self.frames)]
         elif key == "s":
             self.step, self.held = (self.step + 1) % len(STEPS), False
         elif key == "h":
@@ -84,7 +89,7 @@ class JogChoice:
         if self.joint is not None:
             what, unit = names[self.joint - 1], "°"
         else:
-            frame = "tool's " if self.in_tool else ""
+            frame = "" if self.frame == BASE else f"{self.frame}'s "
             what = f"tool {'about' if self.about else 'along'} {frame}{self.axis}"
             unit = "°" if self.about else " mm"
         how = "held" if self.held else f"step {STEPS[self.step]:g}{unit}"
@@ -103,8 +108,8 @@ class JogScreen:
     ) -> None:
         if board.arm is None:
             raise InputError("no arm is set", "set it with home(arm) or configure(arm)")
-        self.choice = JogChoice()
         self._arm = board.arm
+        self.choice = JogChoice(frames=(BASE, TOOL, *(frame.name for frame in self._arm.frames)))
         self._board = board
         self._keys = keys
         self._more = more or {}

@@ -22,7 +22,7 @@ from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
-from armtempo.model.sequence_plan import SequencePlan, is_sequence_plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.model.tool_pose import BASE
 from armtempo.planning import point_to_point, via_points
 from armtempo.robot.board import Board
@@ -34,6 +34,7 @@ from armtempo.robot.stop_request import Stopped
 @typed_pose.options
 @options.frame
 @click.option("--line", is_flag=True, help="Move the tool in a straight line, turning evenly.")
+@options.tool
 @options.holds
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
@@ -41,6 +42,7 @@ def goto(
     where: tuple[str, ...],
     frame: str,
     line: bool,
+    tool: str | None,
     holds: str | None,
     job_path: Path | None,
     given: BoardOptions,
@@ -67,10 +69,10 @@ def goto(
         )
     wanted = NamedPosture.of(where[0], given.arm_path, given.altered) if where else None
     named = wanted.arm if wanted else resolve.named_arm(given.arm_path)
-    if named is not None:
-        named.frame(frame)  # a wrong name is reported before a port is opened
+    if named is not None:  # a wrong name is reported before a port is opened
+        named.with_tool(tool).frame(frame)
     with resolve.board(given, named) as board:
-        arm = resolve.arm_of_board(board, named).holding(holds)
+        arm = resolve.arm_of_board(board, named).with_tool(tool).holding(holds)
         target = wanted.angles_deg(arm, job_path) if wanted else arm.in_base(typed.pose, frame)
         board.configure(arm, replace=given.replace_arm)
         try:
@@ -138,17 +140,13 @@ class NamedPosture:
 
     text: str
     arm: Arm | None
-    """The arm that is set, else the arm of the trajectory file; None: the arm that the board is set up for."""
-    plan: Plan | None
-    """Of the trajectory file."""
-    sequence: SequencePlan | None = None
+    """The arm that is set, else the arm of the plan; None: the arm that the board is set up for."""
+    plan: Plan | SequencePlan | None
+    """Of the file."""
 
     @classmethod
     def of(cls, text: str, arm_path: Path | None, altered: bool) -> NamedPosture:
-        """The posture of ``text``; raises InputError if its trajectory file or the arm cannot be read."""
-        if text.endswith(".json") and is_sequence_plan(Path(text)):
-            sequence = resolve.load_sequence_plan(Path(text), arm_path)
-            return cls(text, sequence.arm, None, sequence)
+        """The posture of ``text``; raises InputError if its file or the arm cannot be read."""
         if text.endswith(".json") or via_table.is_recording(Path(text)):
             plan = resolve.load_plan(Path(text), arm_path, altered)
             return cls(text, plan.arm, plan)
@@ -161,10 +159,9 @@ class NamedPosture:
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
         """Angles in degrees (J,); raises InputError if the text is not a posture or does not fit the arm."""
-        if self.sequence is not None:
-            return point_to_point.posture(self.sequence.start_deg or arm.home_deg, arm)
         if self.plan is not None:
-            return self.plan.trajectory(0.0)
+            start_deg = arm.home_deg if self.plan.start_deg is None else self.plan.start_deg
+            return point_to_point.posture(start_deg, arm)
         if not name_problem(self.text):
             return via_points.posture_deg(arm, arm.posture(self.text))
         if self.text == HOME:

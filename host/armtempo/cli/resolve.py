@@ -155,8 +155,9 @@ def is_file(what: str) -> bool:
     )
 
 
-def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan:
-    """The plan of a trajectory file, or one on the times of a recording; InputError if the arm does not fit."""
+def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan | SequencePlan:
+    """The plan of a file, of a motion or a sequence, or one on the times of a recording; InputError if an arm is set
+    and does not fit."""
     from armtempo import pipeline
 
     if via_table.is_recording(path):
@@ -176,20 +177,6 @@ def as_recorded(
     found = via_table.recorded(path, arm, radians)
     tolerance = recorded.TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
     return recorded.plan(arm, name, found.times_s, found.angles_deg, tolerance, found.notes)
-
-
-def load_sequence_plan(path: Path, arm_path: Path | None, name: str | None = None) -> SequencePlan:
-    """A planned sequence; raises InputError if an arm is set and it does not fit, or if ``name`` is given."""
-    from armtempo.encoding import planned_for
-    from armtempo.model.sequence_plan import SequencePlan
-
-    if name is not None:
-        raise InputError("--name: the name of a sequence is in its file", "change it there and plan it again")
-    found = SequencePlan.load(path)
-    named = named_arm(arm_path)
-    if named is not None:
-        planned_for.check(path, found.arm, found.frames, named)
-    return found
 
 
 # board

@@ -12,7 +12,7 @@ from armtempo.cli.options import BoardOptions
 from armtempo.cli.run_progress import RunProgress, repetition_line
 from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import is_sequence_plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.report import text_summary
 from armtempo.report.run import Run
 from armtempo.robot.board import Board
@@ -34,33 +34,26 @@ def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, g
     path. Ctrl-C, or 'armtempo stop' in another terminal, brakes; 'armtempo speed', 'pause' and 'resume' work
     there too.
     """
-    if resolve.is_file(what) and is_sequence_plan(Path(what)):
-        _refuse_repeat(repeat)
-        sequence = resolve.load_sequence_plan(Path(what), given.arm_path)
-        with resolve.board(given, sequence.arm) as board:
-            board.configure(sequence.arm, replace=given.replace_arm)
-            results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(sequence.arm)}")
-            board.speed(percent / 100)
-            sequences.run_and_report(board, sequence, force, resolve.runs(out), given.as_json)
-        return
     plan = resolve.load_plan(Path(what), given.arm_path, given.altered) if resolve.is_file(what) else None
+    if isinstance(plan, SequencePlan):
+        _refuse_repeat(repeat)
     named = plan.arm if plan else resolve.named_arm(given.arm_path)
     with resolve.board(given, named) as board:
         arm = resolve.arm_of_board(board, named)
         board.configure(arm, replace=given.replace_arm)
         results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(arm)}")
-        motion = board.upload(plan, replace=force) if plan else what
+        motion = board.upload(plan, replace=force) if isinstance(plan, Plan) else what
         board.speed(percent / 100)
-        stored = board.client.find(motion) if isinstance(motion, str) else None
-        if isinstance(motion, str) and stored and stored.program:
+        stored = board.client.find(what) if plan is None else None
+        if isinstance(plan, SequencePlan) or (stored and stored.sequence):
             _refuse_repeat(repeat)
-            programs.run_and_report(board, motion, given.as_json)
-            return
-        if isinstance(motion, str) and stored and stored.sequence:
+            sequence = plan if isinstance(plan, SequencePlan) else what
+            sequences.run_and_report(board, sequence, force, resolve.runs(out), given.as_json)
+        elif stored and stored.program:
             _refuse_repeat(repeat)
-            sequences.run_and_report(board, motion, False, resolve.runs(out), given.as_json)
-            return
-        run_and_report(board, motion, repeat, resolve.runs(out), given.as_json)
+            programs.run_and_report(board, what, given.as_json)
+        else:
+            run_and_report(board, motion, repeat, resolve.runs(out), given.as_json)
 
 
 def _refuse_repeat(repeat: int) -> None:
@@ -107,6 +100,10 @@ def fetch(what: str | None, out: Path | None, given: BoardOptions) -> None:
     named = plan.arm if plan else resolve.named_arm(given.arm_path)
     with resolve.board(given, named) as board:
         board.configure(resolve.arm_of_board(board, named))
+        if isinstance(plan, SequencePlan):
+            raise InputError(
+                f"{what}: the samples of a sequence are not kept", "record it with 'armtempo run'"
+            )
         run = board.fetch(plan or what, resolve.runs(out))
         lines = [f"{run.name}: {run.path}", repetition_line(run.entries[-1])]
         results.show(given.as_json, run.to_json(), lines)

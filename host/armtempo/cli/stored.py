@@ -18,7 +18,7 @@ from armtempo.encoding import encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
-from armtempo.model.sequence_plan import is_sequence_plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.robot.board import Board
 from armtempo.robot.board_state import record_crc
 
@@ -39,25 +39,26 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
             raise InputError(f"--name {name}: a program has the name of its file", "rename the file")
         programs.upload_and_report(file, as_default, force, given)
         return
-    if is_sequence_plan(file):
-        plan = resolve.load_sequence_plan(file, given.arm_path, name)
-        with resolve.board(given, plan.arm) as board:
-            board.configure(plan.arm, replace=given.replace_arm)
-            with ProgressBar("uploading") as progress:
-                board.upload_sequence(plan, as_default, progress, force)
-            virtual = board.info.virtual
-        values = {"name": plan.name, "sequence": True, "motions": len(plan.legs), "virtual": virtual}
-        results.show(given.as_json, values, [f"{plan.name}: sequence and {len(plan.legs)} motions stored"])
-        return
-    motion = encoded_motion.of_plan(resolve.load_plan(file, given.arm_path, given.altered), name)
+    plan = resolve.load_plan(file, given.arm_path, given.altered)
+    sequence = isinstance(plan, SequencePlan)
+    if sequence and name is not None:
+        raise InputError("--name: the name of a sequence is in its file", "change it there and plan it again")
+    motion = plan if isinstance(plan, SequencePlan) else encoded_motion.of_plan(plan, name)
     with resolve.board(given, motion.arm) as board:
         board.configure(motion.arm, replace=given.replace_arm)
         with ProgressBar("uploading") as progress:
-            board.upload(motion, default=as_default, progress=progress, replace=force)
+            if isinstance(motion, SequencePlan):
+                board.upload_sequence(motion, as_default, progress, force)
+            else:
+                board.upload(motion, default=as_default, progress=progress, replace=force)
         virtual = board.info.virtual
-        where = " on a virtual board" if virtual else ""
-    values = {"name": motion.name, "sequence": False, "size_bytes": len(motion.data), "virtual": virtual}
-    results.show(given.as_json, values, [f"{motion.name}: {len(motion.data)} bytes stored{where}"])
+    if isinstance(motion, SequencePlan):
+        size, stored = {"motions": len(motion.legs)}, f"sequence and {len(motion.legs)} motions stored"
+    else:
+        size, stored = {"size_bytes": len(motion.data)}, f"{len(motion.data)} bytes stored"
+    where = " on a virtual board" if virtual else ""
+    values = {"name": motion.name, "sequence": sequence, **size, "virtual": virtual}
+    results.show(given.as_json, values, [f"{motion.name}: {stored}{where}"])
 
 
 @click.command("list")

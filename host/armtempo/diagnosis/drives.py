@@ -35,7 +35,7 @@ def motor_rpm(joint: DrivenJoint) -> float:
 def findings(arm: Arm) -> list[Finding]:
     """Findings about the drives of all driven joints, and about their sum."""
     found = [finding for joint in arm.motors for finding in _of(joint)]
-    found += _exceeded(arm)
+    found += _exceeded(arm) + _backlash(arm)
     rates = sum(top_rate_steps_s(joint) for joint in arm.motors)
     if rates > MAX_STEP_RATE_SUM:
         found.append(
@@ -71,6 +71,21 @@ def _exceeded(arm: Arm) -> list[Finding]:
             f"lower {bound.key} to that, or use fewer microsteps",
         )
         for joint, bound in drive_limits.exceeded(arm.table_joints, arm.coupling, arm.driver)
+    ]
+
+
+def _backlash(arm: Arm) -> list[Finding]:
+    """What the crossing of backlash leaves for motions."""
+    return [
+        note(
+            joint.name,
+            f"backlash_deg = {crossing.play_deg:g} takes {crossing.duration_s:.2g} s to cross, with "
+            f"{crossing.acceleration_deg_s2:.3g} deg/s2 and up to {crossing.speed_deg_s:.3g} deg/s of its motor; "
+            "motions keep to the rest",
+            "nothing to do; set it to what 'armtempo selftest --with-motors' measures",
+        )
+        for joint, crossing in zip(arm.driven, arm.crossings, strict=True)
+        if crossing
     ]
 
 

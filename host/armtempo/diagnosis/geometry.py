@@ -33,7 +33,7 @@ def findings(arm: Arm) -> list[Finding]:
     """Findings about the table, the home posture and the ends of the ranges."""
     if Geometry.of(arm).reach == 0.0 and not any(joint.d_mm for joint in arm.joints):
         return [error("geometry", "all lengths are 0", "give d_mm and a_mm of the joints, in mm")]
-    return [*_home(arm), *_ends(arm), *_wide(arm)]
+    return [*_home(arm), *_ends(arm), *_wide(arm), *_frames(arm)]
 
 
 def ends(arm: Arm) -> Iterator[End]:
@@ -58,6 +58,20 @@ def _home(arm: Arm) -> list[Finding]:
         found.append(
             warning("geometry", text, "look at the picture (--picture); check home_deg and the table's signs")
         )
+    return found
+
+
+def _frames(arm: Arm) -> list[Finding]:
+    """Frames whose origin the tool cannot come to."""
+    reach_mm = Geometry.of(arm).reach + abs(arm.joints[0].d_mm)
+    found = []
+    for each in arm.frames:
+        away_mm = float(np.linalg.norm(arm.frame(each.name)[:3, 3]))
+        if away_mm > reach_mm:
+            text = f"its origin is {away_mm:.0f} mm from the base, but all links together are {reach_mm:.0f} mm long"
+            found.append(
+                note(f"frame {each.name}", text, "check its position_mm, and the frame that it is in")
+            )
     return found
 
 

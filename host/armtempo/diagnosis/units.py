@@ -9,6 +9,7 @@ from armtempo.basics.arrays import Array
 from armtempo.diagnosis.finding import Finding, warning
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Joint
+from armtempo.model.tool_pose import BASE
 
 _SHORT_MM, _TINY_MM = 2.0, 0.02
 """A value between these may be in metres: 2 m is a large robot, 20 mm a small offset."""
@@ -22,7 +23,7 @@ _TWISTS = [math.pi * part / 12 for part in range(1, 25)]
 
 def findings(arm: Arm) -> list[Finding]:
     """Lengths that may be in metres, angles that may be in radians."""
-    return [*_lengths(arm), *_twists(arm), *_ranges(arm)]
+    return [*_lengths(arm), *_twists(arm), *_ranges(arm), *_frames(arm)]
 
 
 def position_finding(name: str, position_mm: Array, reach_mm: float) -> Finding | None:
@@ -49,6 +50,19 @@ def _lengths(arm: Arm) -> Iterator[Finding]:
                     f"{key} = {value:g}: is it in metres?",
                     f"if so, write {key} = {1000 * value:g}",
                 )
+
+
+def _frames(arm: Arm) -> Iterator[Finding]:
+    for frame in arm.frames:
+        position = [row[3] for row in frame.matrix[:3]]
+        away_mm = math.dist(position, (0.0, 0.0, 0.0))
+        if 0.0 < away_mm < _SHORT_MM:
+            of = "the base" if frame.frame == BASE else f"frame {frame.frame!r}"
+            yield warning(
+                f"frame {frame.name}",
+                f"its origin is {away_mm:.3g} mm from that of {of}: is it in metres?",
+                f"if so, write position_mm = [{', '.join(f'{1000 * value:g}' for value in position)}]",
+            )
 
 
 def _twists(arm: Arm) -> Iterator[Finding]:

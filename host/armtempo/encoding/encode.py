@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from binascii import crc32
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from armtempo.basics.errors import InputError
 from armtempo.model import pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.boards import TimerOutput, pin_number
+from armtempo.model.drive_limits import Crossing
 from armtempo.model.outputs import SERVO, Output
 from armtempo.model.parts import DrivenJoint
 from armtempo.model.pin_use import Period
@@ -26,12 +28,13 @@ from armtempo.splines.trajectory import Trajectory
 
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
 """Fields of a joint that do not affect its position in steps."""
+_LONGEST_CROSSING_S = 2.0
 _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 
 def arm_record(arm: Arm) -> bytes:
     """The arm record (layout: ``armtempo_shared.armrecord``); raises InputError if a value does not fit the board."""
-    return armrecord.pack(_head(arm), motor_rows(arm), outputs(arm), inputs(arm))
+    return armrecord.pack(_head(arm), motor_rows(arm), outputs(arm), inputs(arm), backlash(arm))
 
 
 def motor_rows(arm: Arm) -> list[dict[str, Any]]:
@@ -41,7 +44,7 @@ def motor_rows(arm: Arm) -> list[dict[str, Any]]:
 
 def step_rates(arm: Arm) -> list[int]:
     """The highest step rates of the motors in the arm record, steps/s."""
-    return [_max_rate(motor) for motor in arm.motors]
+    return [_max_rate(arm, number) for number in range(len(arm.motors))]
 
 
 def move_limits(arm: Arm) -> list[list[int]]:
@@ -129,13 +132,15 @@ def _head(arm: Arm) -> dict[str, Any]:
 
 
 def _identity(arm: Arm) -> int:
-    """A hash of everything that maps joint angles to the arm's position: all except names, limits and models."""
+    """A hash of everything that maps joint angles to the arm's position: all except names, limits, backlash, models."""
     joints = [_as_floats(joint) for joint in arm.joints]
     for joint in joints:
         for name in _NOT_IDENTITY:
             joint.pop(name, None)
         if joint["encoder"]:
             del joint["encoder"]["following_error_deg"]
+        if joint["motor"]:
+            del joint["motor"]["backlash_deg"]
     facts = [joints, _as_floats(arm.coupling)] if arm.coupling else joints
     text = json.dumps(facts, sort_keys=True)
     return crc32(text.encode())
@@ -178,7 +183,7 @@ def _motor(arm: Arm, number: int) -> dict[str, Any]:
         "counts_den": per_step.denominator,
         "min_steps": low,
         "max_steps": high,
-        "max_rate": _max_rate(joint),
+        "max_rate": _max_rate(arm, number),
         "following_counts": round(following),
         "limit_low": _switch(switches.low if forward else switches.high),
         "limit_high": _switch(switches.high if forward else switches.low),
@@ -193,12 +198,49 @@ def _switch(where: int | str | None) -> int:
     return where - 1 if isinstance(where, int) else armrecord.POLLED + pin_number(where)
 
 
-def _max_rate(motor: DrivenJoint) -> int:
-    """The motor's speed limit in steps/s, with a margin for rounding.
+def backlash(arm: Arm) -> list[dict[str, Any]]:
+    """Rows of ``armrecord.BACKLASH`` of all motors; none if no motor has a step of it.
+
+    Raises InputError if the board cannot cross one.
+    """
+    rows = [_backlash(motor, crossing) for motor, crossing in zip(arm.motors, arm.crossings, strict=True)]
+    return rows if armrecord.backlash_count(rows) else []
+
+
+def _backlash(motor: DrivenJoint, crossing: Crossing | None) -> dict[str, Any]:
+    steps = round(crossing.play_deg * motor.steps_per_deg) if crossing else 0
+    if not crossing or not steps:
+        return {"steps": 0, "on_motor": 0, "spare": 0, "pace": 0}
+    _check_crossing(motor, crossing, steps)
+    pace = math.sqrt(2.0 / (crossing.acceleration_deg_s2 * motor.steps_per_deg)) * limits.TICK_HZ / 64
+    on_motor = motor.encoder is not None and motor.encoder.on == "motor"
+    return {"steps": steps, "on_motor": int(on_motor), "spare": 0, "pace": math.ceil(pace)}
+
+
+def _check_crossing(motor: DrivenJoint, crossing: Crossing, steps: int) -> None:
+    what = f"{motor.name}: backlash_deg = {crossing.play_deg:g}"
+    if crossing.duration_s > _LONGEST_CROSSING_S:
+        raise InputError(
+            f"{what}: to cross it takes {crossing.duration_s:.2g} s at its limits, more than {_LONGEST_CROSSING_S:g} s",
+            "check the unit, and the joint's limits",
+        )
+    gained = motor.limits.acceleration_deg_s2 * crossing.duration_s
+    rate = (min(motor.limits.speed_deg_s, gained) + crossing.speed_deg_s) * motor.steps_per_deg
+    if rate > limits.MAX_CROSSING_RATE or steps > limits.MAX_BACKLASH_STEPS:
+        raise InputError(
+            f"{what} is {steps} steps, and until they are made the motor reaches {rate:.0f} steps/s; the board makes "
+            f"at most {limits.MAX_BACKLASH_STEPS} and {limits.MAX_CROSSING_RATE} steps/s",
+            "use fewer microsteps, or lower acceleration_deg_s2",
+        )
+
+
+def _max_rate(arm: Arm, number: int) -> int:
+    """A motor's speed limit in steps/s, with a margin for rounding.
 
     Raises InputError if the board cannot step that fast.
     """
-    rate = motor.limits.speed_deg_s * motor.steps_per_deg
+    motor, crossing = arm.motors[number], arm.crossings[number]
+    rate = (motor.limits.speed_deg_s + (crossing.speed_deg_s if crossing else 0.0)) * motor.steps_per_deg
     if rate > limits.MAX_STEP_RATE:
         raise InputError(
             (

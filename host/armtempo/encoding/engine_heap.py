@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armtempo_shared import engine_memory, limits
+from armtempo_shared import armrecord, engine_memory, limits
 
 from armtempo.basics.errors import InputError
 from armtempo.encoding import encode
@@ -20,13 +20,13 @@ class EngineHeap:
 
     size: int
 
-    def holds(self, rates: list[int]) -> bool:
-        """Whether an engine for joints of these highest step rates (steps/s) fits."""
-        return engine_memory.fits(rates, self.size)
+    def holds(self, rates: list[int], with_backlash: int = 0) -> bool:
+        """Whether an engine for joints of these highest step rates (steps/s) fits, some ``with_backlash``."""
+        return engine_memory.fits(rates, self.size, with_backlash)
 
     def holds_arm(self, arm: Arm) -> bool:
         """Whether the engine for an arm fits."""
-        return self.holds(encode.step_rates(arm))
+        return self.holds(encode.step_rates(arm), _with_backlash(arm))
 
     def describe(self) -> str:
         """Describe what fits: bytes, joints, steps/s."""
@@ -59,7 +59,7 @@ def check(arm: Arm, heap: EngineHeap) -> None:
         return
     rates = encode.step_rates(arm)
     raise InputError(
-        f"arm {arm.name!r} needs {engine_memory.needed_bytes(rates)} bytes for its engine; the board has {heap.size}",
+        f"arm {arm.name!r} needs {_needed_bytes(arm)} bytes for its engine; the board has {heap.size}",
         f"lower its top speeds (its joints step up to {', '.join(map(str, rates))} steps/s; slower ones have "
         f"smaller rings), drive fewer joints{_or_firmware(arm)}",
     )
@@ -68,8 +68,7 @@ def check(arm: Arm, heap: EngineHeap) -> None:
 def of_arm(arm: Arm, heap: EngineHeap | None = None) -> str:
     """One line: the memory that an arm needs, and whether the board has it (without ``heap``: which boards
     have it)."""
-    rates = encode.step_rates(arm)
-    needs = f"memory on the board: {engine_memory.needed_bytes(rates)} bytes for {len(rates)} joints"
+    needs = f"memory on the board: {_needed_bytes(arm)} bytes for {len(arm.motors)} joints"
     if heap is not None:
         return f"{needs} of {heap.size}" if heap.holds_arm(arm) else f"{needs}, too much{_or_firmware(arm)}"
     if CORE.holds_arm(arm):
@@ -77,6 +76,15 @@ def of_arm(arm: Arm, heap: EngineHeap | None = None) -> str:
     if IN_FIRMWARE.holds_arm(arm):
         return f"{needs}: fits only with the program in the firmware ({_BUILD})"
     return f"{needs}: too much for an STM32F407"
+
+
+def _needed_bytes(arm: Arm) -> int:
+    return engine_memory.needed_bytes(encode.step_rates(arm), _with_backlash(arm))
+
+
+def _with_backlash(arm: Arm) -> int:
+    """How many joints have backlash."""
+    return armrecord.backlash_count(encode.backlash(arm))
 
 
 def of_board(heap: EngineHeap) -> list[str]:

@@ -1,11 +1,16 @@
-"""What a joint's driver and encoder allow, beside the limits of its table: motions keep to the smaller of both."""
+"""What a joint's driver and encoder allow, beside the limits of its table: motions keep to the smaller of both.
+
+A motor with backlash has part of its speed and acceleration for that.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
 from armtempo_shared.limits import MAX_STEP_RATE, REVERSAL_SLACK_TICKS, TICK_HZ
 
 from armtempo.model.parts import Driver, Encoder, Joint, Limits, Motor
@@ -13,6 +18,8 @@ from armtempo.model.transmission import Matrix
 
 MOST_COUNTS_S = 1e6
 """Largest rate of an encoder: fewer than 32 768 counts between two readings (board/docs/hardware.md)."""
+CROSSING_SHARE = 0.25
+"""Most of a motor's speed and acceleration that it uses to cross its backlash."""
 _REVERSAL_STEPS = 0.16 * 0.99
 """Largest acceleration times the square of the time between opposite steps, of which the board allows 0.16."""
 _SLACK_US = 1e6 * REVERSAL_SLACK_TICKS / TICK_HZ
@@ -54,8 +61,71 @@ def bounds(motor: Motor, encoder: Encoder | None, driver: Driver) -> list[Bound]
     return found
 
 
+class Crossing(NamedTuple):
+    """How a motor crosses its backlash: behind its gear, beside the motion of its joint."""
+
+    play_deg: float
+    speed_deg_s: float
+    """Reached in the middle of the play."""
+    acceleration_deg_s2: float
+    """It speeds up with this in the first half of the play, and slows down with it in the second."""
+    speed_share: float
+    """Of the motor's largest speed,"""
+    acceleration_share: float
+    """and of its largest acceleration."""
+
+    @property
+    def duration_s(self) -> float:
+        """From the reversal until the play is crossed."""
+        return 2.0 * math.sqrt(self.play_deg / self.acceleration_deg_s2)
+
+
+def crossings(joints: Sequence[Joint], coupling: Matrix, driver: Driver) -> list[Crossing | None]:
+    """How each motor of the driven joints crosses its backlash; None without."""
+    limits = np.array([of_joint.values for of_joint in _of_hardware(joints, coupling, driver)])
+    found: list[Crossing | None] = []
+    for row, joint in zip(_rows(joints, coupling), joints, strict=True):
+        assert joint.motor is not None
+        play = joint.motor.backlash_deg
+        speed, most, _ = (np.abs(row) @ limits).tolist()
+        acceleration = min(CROSSING_SHARE * most, (CROSSING_SHARE * speed) ** 2 / play) if play else 0.0
+        extra = math.sqrt(acceleration * play)
+        found.append(
+            Crossing(play, extra, acceleration, extra / speed, acceleration / most) if play else None
+        )
+    return found
+
+
 def kept(joints: Sequence[Joint], coupling: Matrix, driver: Driver) -> list[Limits]:
-    """The limits that motions of the driven joints keep."""
+    """The limits that motions of the driven joints keep.
+
+    Those of the tables or of the hardware, less what the motors that turn a joint need to cross their backlash.
+    """
+    limits = _of_hardware(joints, coupling, driver)
+    rows = _rows(joints, coupling)
+    for number, of_joint in enumerate(limits):
+        turning = [
+            crossing
+            for row, crossing in zip(rows, crossings(joints, coupling, driver), strict=True)
+            if crossing and row[number]
+        ]
+        if turning:
+            limits[number] = replace(
+                of_joint,
+                speed_deg_s=of_joint.speed_deg_s * (1.0 - max(one.speed_share for one in turning)),
+                acceleration_deg_s2=of_joint.acceleration_deg_s2
+                * (1.0 - max(one.acceleration_share for one in turning)),
+            )
+    return limits
+
+
+def _rows(joints: Sequence[Joint], coupling: Matrix) -> Matrix:
+    """Of the motors: how each turns with the joints."""
+    return coupling or tuple(tuple(row) for row in np.eye(len(joints)).tolist())
+
+
+def _of_hardware(joints: Sequence[Joint], coupling: Matrix, driver: Driver) -> list[Limits]:
+    """The limits of the tables, or what driver and encoder allow, if that is less."""
     found = []
     for joint, bounds_of_joint in zip(joints, _of_joints(joints, coupling, driver), strict=True):
         limits = joint.limits

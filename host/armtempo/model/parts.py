@@ -58,6 +58,15 @@ class Motor:
     direction: int = field(default=1, metadata=key("-1 inverts DIR", choices=(1, -1)))
     curve_rpm_nm: Curve = field(default=(), metadata=json_codec.ADDED)
     """(Shaft speed, torque) pairs; empty: not known."""
+    backlash_deg: float = field(
+        default=0.0,
+        metadata={
+            **key(
+                "play of its gear, at the joint, that the motor crosses at each reversal; 0: none", 0.0, 10.0
+            ),
+            **json_codec.ADDED,
+        },
+    )
 
     def __post_init__(self) -> None:
         """Raise InputError for values that no motor has."""
@@ -227,7 +236,7 @@ class DrivenJoint:
     range_deg: tuple[float, float]
     home_deg: float
     limits: Limits
-    """Those of the table, or what the driver and the encoder allow, if that is less (drive_limits.py)."""
+    """Those of the table, or what the driver, the encoder and its backlash leave, if that is less (drive_limits.py)."""
     motor: Motor
     encoder: Encoder | None
     switches: LimitSwitches

@@ -6,9 +6,6 @@ sha256 of the plan, independent of white space; files of version 1 have none.
 
 from __future__ import annotations
 
-import hashlib
-import json
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,23 +14,25 @@ from typing import Any
 import numpy as np
 from armtempo_shared.basis import BASIS
 
-from armtempo.basics import json_codec, json_text
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import check_replaceable, os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_json, exchange
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, Job
+from armtempo.model.plan_file import PlanFile
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
-FORMAT = "armtempo trajectory"
-VERSION = 2
-_RUN = "run.json"
-"""File next to the trajectory file in a run folder."""
-RULE = "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name"
-LOG = logging.getLogger("armtempo")
+FILE = PlanFile(
+    "armtempo trajectory",
+    "plan",
+    "a trajectory file",
+    "armtempo plan",
+    "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name",
+    (1, 2),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +89,21 @@ class Plan:
         return f"<Plan {self.job.name!r} for {self.arm.name!r}: {len(self.via_deg)} via points, {self.total_s:.3f} s>"
 
     @property
+    def name(self) -> str:
+        """The job's name."""
+        return self.job.name
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Names of the frames that the job's poses are in."""
+        return self.job.frames
+
+    @property
+    def start_deg(self) -> Array:
+        """Start posture, degrees (J,)."""
+        return self.trajectory(0.0)
+
+    @property
     def holding(self) -> Arm:
         """The arm with what it holds in this motion."""
         return self.arm.holding(self.job.holds)
@@ -105,13 +119,15 @@ class Plan:
         Replaces only a file of the same job for the same arm (by name) that was not altered; ``force``: any
         file. Raises InputError if it may not be replaced, or cannot be written.
         """
-        self.check_replaceable(path, force)
-        replace_text(Path(path), _text(self))
+        FILE.save(path, self, force, self._is_same)
 
     def check_replaceable(self, path: Path | str, force: bool = False) -> None:
         """Raise InputError if ``save`` would not replace a file that exists; nothing is written."""
-        target = Path(path)
-        check_replaceable(target, _text(self), force or _is_earlier(target, self), RULE)
+        FILE.check_replaceable(path, self, force, self._is_same)
+
+    def _is_same(self, content: Any) -> bool:
+        """Whether the content of a file is a plan of the same job and arm, by their names."""
+        return (content["job"]["name"], content["arm"]["name"]) == (self.name, self.arm.name)
 
     def to_csv(self, rate_hz: float = 100.0) -> str:
         """Angle, speed, acceleration and jerk of each driven joint as CSV, ``rate_hz`` lines a second."""
@@ -129,82 +145,9 @@ class Plan:
         that is missing, incomplete, altered, of another format or version, or has an unknown key, value or
         shape.
         """
-        content = _read(path)
-        if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise InputError(f"{path}: is not a trajectory file", "make one with: armtempo plan")
-        version = content.get("version")
-        if version not in (1, VERSION):
-            raise InputError(
-                f"{path}: has version {version!r}, this program reads versions 1 and {VERSION}",
-                "plan it again",
-            )
-        expected = {"format", "version", "plan"} | ({"sha256"} if version == VERSION else set())
-        if content.keys() != expected:
-            raise InputError(
-                f"{path}: unknown or missing key besides {', '.join(sorted(expected))}", "plan it again"
-            )
-        _check_unaltered(content, path, altered)
-        plan: Plan = json_codec.decode(cls, content["plan"], f"{path}: plan")
+        plan: Plan = json_codec.decode(cls, FILE.read(path, altered), f"{path}: plan")
         _check(plan, path)
         return plan
-
-
-def _text(plan: Plan) -> str:
-    content = json_codec.encode(plan)
-    whole = {"format": FORMAT, "version": VERSION, "sha256": _checksum(content), "plan": content}
-    return json.dumps(whole, indent=1, allow_nan=False) + "\n"
-
-
-def _checksum(content: Any) -> str:
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _check_unaltered(content: dict[str, Any], path: Path | str, altered: bool) -> None:
-    if content["version"] == 1:
-        LOG.warning(
-            f"{path} was written before trajectory files had a checksum: whether it was altered is not known"
-        )
-    elif content["sha256"] != _checksum(content["plan"]):
-        if not altered:
-            raise InputError(
-                f"{path} was altered after it had been written: its checksum does not fit", _cure(path)
-            )
-        LOG.warning(f"{path} was altered after it had been written; accepted with --altered")
-
-
-def _cure(path: Path | str) -> str:
-    if (Path(path).parent / _RUN).exists():
-        return "it no longer says what was run: bring the original back, or move it out of the run folder"
-    return "plan it again; or, if you know what was altered, take it with --altered"
-
-
-def _is_earlier(path: Path, plan: Plan) -> bool:
-    """Whether the file is an unaltered plan of the same job and arm, by their names."""
-    try:
-        content = _read(path)
-        before = content["plan"]
-        names = before["job"]["name"], before["arm"]["name"]
-        unaltered = content["version"] == 1 or content["sha256"] == _checksum(before)
-    except (InputError, LookupError, TypeError):
-        return False
-    return bool(names == (plan.job.name, plan.arm.name) and unaltered and content.get("format") == FORMAT)
-
-
-def _read(path: Path | str) -> Any:
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: no such file",
-            f"check the path, or make it with: armtempo plan -o {path}",
-        ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {os_reason(error)}", "check its permissions") from None
-    try:
-        return json_text.loads(text)
-    except ValueError as error:
-        raise InputError(f"{path}: damaged or cut: {error}", "plan it again or copy it again") from None
 
 
 def _check(plan: Plan, path: Path | str) -> None:

@@ -45,12 +45,15 @@ def checked(matrix: ArrayLike, what: str = "the pose") -> Array:
 
     A rounded rotation is replaced by the nearest one (by singular value decomposition).
     """
-    pose = np.array(matrix, dtype=np.float64)
+    try:
+        pose = np.array(matrix, dtype=np.float64)
+    except ValueError:  # rows of different lengths
+        pose = np.empty(0)
     if pose.shape == (3, 4):
         pose = np.vstack((pose, (0.0, 0.0, 0.0, 1.0)))
     if pose.shape != (4, 4):
         raise InputError(
-            f"{what}: a matrix of shape {pose.shape} is not a pose",
+            f"{what}: what is given is not the matrix of a pose",
             "give 4 rows of 4 numbers, or the first 3 of them",
         )
     if not np.all(np.abs(pose) <= LARGEST):

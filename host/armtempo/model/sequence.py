@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
 from armtempo.model import tool_segment
 from armtempo.model.arm import Arm, read_posture
-from armtempo.model.job import Job, held, is_name, name_of, read_angles
+from armtempo.model.job import Job, held, is_name, name_of, read_angles, tool_named
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.steps import (
@@ -58,10 +59,12 @@ class Sequence:
     start: ArmPosture | None = None
     """Start posture; None: the target of its first motion."""
     source: str = ""
+    tool: str = ""
+    """The tool of the arm on it in all motions whose job names none; "": the arm's as it is."""
 
     def __post_init__(self) -> None:
         """Raise InputError for a name that is invalid on the board."""
-        object.__setattr__(self, "steps", tuple(self.steps))
+        object.__setattr__(self, "steps", _numbered(self.steps, count(1)))
         if not is_name(self.name, LONGEST_NAME):
             raise InputError(
                 f"sequence {self.name!r}: not a valid name on the board",
@@ -88,8 +91,21 @@ class Sequence:
         reader = _Reader(arm, Path(top.file), _postures(top, arm))
         start = reader.posture(top, "start") if top.has("start") else None
         steps = reader.steps(top)
+        tool = tool_named(top, arm)
         top.done()
-        return cls(name, steps, start, top.file)
+        return cls(name, steps, start, top.file, tool)
+
+
+def _numbered(steps: Iterable[Step], numbers: Iterator[int]) -> tuple[Step, ...]:
+    """The steps with numbers as in a file, where those made in code have none; the end of a repeat counts too."""
+    found: list[Step] = []
+    for step in steps:
+        number = next(numbers)
+        if isinstance(step, Repeat):
+            step = replace(step, steps=_numbered(step.steps, numbers))
+            next(numbers)
+        found.append(step if step.step else replace(step, step=number))
+    return tuple(found)
 
 
 def arm_named(path: Path | str) -> Path | None:

@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from armtempo_shared import sequence as record
 from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
-from armtempo.basics import json_codec, json_text
+from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
-from armtempo.basics.atomic_file import check_replaceable, os_reason, replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.model.plan_file import AGAIN, PlanFile
 from armtempo.splines.trajectory import Trajectory
 
-FORMAT = "armtempo sequence"
-VERSION = 2
 PAUSE_S = 0.015
 """Approximate time from the end of a motion to the start of the next, if the board prepares motions
 (host/docs/sequences.md)."""
-_AGAIN = "plan it again"
-_RULE = "a sequence's plan is replaced by one of a sequence of the same name"
+FILE = PlanFile(
+    "armtempo sequence",
+    "sequence",
+    "a planned sequence",
+    "armtempo plan SEQUENCE.toml",
+    "a sequence's plan is replaced by one of a sequence of the same name",
+    (2,),
+)
 
 
 @dataclass(frozen=True)
@@ -146,42 +148,25 @@ class SequencePlan:
         Replaces only a plan of a sequence of this name; ``force``: any file. Raises InputError if it may not
         be replaced, or cannot be written.
         """
-        content = json_codec.encode(self)
-        whole = {"format": FORMAT, "version": VERSION, "sha256": _checksum(content), "sequence": content}
-        text = json.dumps(whole, indent=1, allow_nan=False) + "\n"
-        target = Path(path)
-        check_replaceable(target, text, force or _name_in(target) == self.name, _RULE)
-        replace_text(target, text)
+        FILE.save(path, self, force, lambda content: bool(content["name"] == self.name))
 
     @classmethod
-    def load(cls, path: Path | str) -> SequencePlan:
-        """The plan of a file written by ``save``; raises InputError if it is invalid, damaged or altered."""
-        content = _read(path)
-        if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise InputError(
-                f"{path}: is not a planned sequence", "make one with: armtempo plan SEQUENCE.toml"
-            )
-        if content.get("version") != VERSION:
-            raise InputError(
-                f"{path}: has version {content.get('version')!r}, this program reads {VERSION}", _AGAIN
-            )
-        if content.keys() != {"format", "version", "sha256", "sequence"}:
-            raise InputError(f"{path}: unknown or missing key", _AGAIN)
-        if content["sha256"] != _checksum(content["sequence"]):
-            raise InputError(
-                f"{path} was altered after it had been written: its checksum does not fit", _AGAIN
-            )
-        plan: SequencePlan = json_codec.decode(cls, content["sequence"], f"{path}: sequence")
-        arm_json.check(plan.arm, f"{path}: arm", _AGAIN)
+    def load(cls, path: Path | str, altered: bool = False) -> SequencePlan:
+        """The plan of a file written by ``save``; raises InputError if it is invalid, damaged or altered.
+
+        ``altered``: accept a file that was altered after it had been written.
+        """
+        plan: SequencePlan = json_codec.decode(cls, FILE.read(path, altered), f"{path}: sequence")
+        arm_json.check(plan.arm, f"{path}: arm", AGAIN)
         there = {MOVE: len(plan.legs), COUNT: len(plan.counters)}
         if any(not 0 <= row.number < there.get(row.op, row.number + 1) for row in plan.rows):
-            raise InputError(f"{path}: a row names a motion or counter that does not exist", _AGAIN)
+            raise InputError(f"{path}: a row names a motion or counter that does not exist", AGAIN)
         return plan
 
 
-def is_sequence_plan(path: Path) -> bool:
-    """Whether a file is a planned sequence; False if it cannot be read."""
-    return bool(_name_in(path))
+def load_plan(path: Path | str, altered: bool = False) -> Plan | SequencePlan:
+    """The plan of a file, of a motion or a sequence; raises as ``Plan.load``."""
+    return (SequencePlan if FILE.is_at(Path(path)) else Plan).load(path, altered)
 
 
 def rows_of(plan: SequencePlan) -> list[tuple[int, ...]]:
@@ -201,28 +186,3 @@ def check_size(rows: int, legs: int, counters: int, where: str) -> None:
             f"{where}: {rows} rows and {legs} motions; the board takes {record.MAX_ROWS} and {record.MAX_MOTIONS}",
             "use repeat, or split it into two sequences",
         )
-
-
-def _checksum(content: Any) -> str:
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _name_in(path: Path) -> str:
-    try:
-        content = _read(path)
-        found = content["sequence"]["name"] if content["format"] == FORMAT else ""
-    except (InputError, LookupError, TypeError):
-        return ""
-    return str(found)
-
-
-def _read(path: Path | str) -> Any:
-    try:
-        return json_text.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{path}: cannot be read: {os_reason(error)}", "check the path and its permissions"
-        ) from None
-    except ValueError as error:
-        raise InputError(f"{path}: damaged or cut: {error}", _AGAIN) from None

@@ -17,11 +17,11 @@ from armtempo.model.tool_pose import BASE
 POINTS = ("the origin", "a point on the x axis", "a point on the side of y")
 LEAST_TIMES = 100.0
 """The second point is at least this many times as far from the origin, and the third from the x axis, as half a step of
-each joint moves the tool: the axes are then right within 1.2 degrees."""
+each joint moves the tool: the axes are then right within 1.7 degrees, if the third is beside the first two."""
 LEAST_ANGLE_DEG = 10.0
 """Between the directions to the second and the third point, and from the opposite direction."""
-MOST_LEAN_DEG = 10.0
-"""A frame that leans by more is not made level."""
+MOST_TILT_DEG = 10.0
+"""A frame that is tilted by more is not made level."""
 _SMALLEST_MM = 0.1
 """Smaller distances are refused whatever the steps are: the file has positions to 0.001 mm."""
 _PLACES_MM, _PLACES_DEG = 3, 4
@@ -37,22 +37,22 @@ class ThreePoints:
     """Distances of the second and the third point from the origin."""
     angle_deg: float
     """Between the directions to them."""
-    lean_deg: float
+    tilt_deg: float
     """Between the plane of the points and the base's."""
-    open_deg: float
+    axes_error_deg: float
     """By how much half a step of each joint may turn the axes."""
 
 
-def of_points(points_mm: Array, known_mm: float, level: bool = False) -> ThreePoints:
+def of_points(points_mm: Array, step_error_mm: float, level: bool = False) -> ThreePoints:
     """The frame through three points of the tool in the base, (3, 3): POINTS in this order.
 
-    ``known_mm``: by how much half a step of each joint moves the tool. ``level``: make its z axis parallel to the
+    ``step_error_mm``: by how much half a step of each joint moves the tool. ``level``: make its z axis parallel to the
     base's. Raises InputError for points that are too near to each other, or almost on a line.
     """
-    check_apart(points_mm, known_mm)
+    check_apart(points_mm, step_error_mm)
     origin = points_mm[0]
     along, aside = points_mm[1] - origin, points_mm[2] - origin
-    least_mm = _least_mm(known_mm)
+    least_mm = _least_mm(step_error_mm)
     apart_mm = float(np.linalg.norm(along)), float(np.linalg.norm(aside))
     x = along / apart_mm[0]
     across = aside - (aside @ x) * x
@@ -65,36 +65,46 @@ def of_points(points_mm: Array, known_mm: float, level: bool = False) -> ThreePo
             f"take one that is at least {least_mm:.3g} mm and {LEAST_ANGLE_DEG:g} degrees beside it",
         )
     z = np.cross(x, across / across_mm)
-    lean_deg = float(np.degrees(np.arccos(np.clip(abs(z[2]), 0.0, 1.0))))
+    tilt_deg = float(np.degrees(np.arccos(np.clip(abs(z[2]), 0.0, 1.0))))
     if level:
-        x, z = _level(x, z, lean_deg)
+        x, z = _level(x, z, tilt_deg)
     matrix = np.eye(4)
     matrix[:3, :3] = np.column_stack((x, np.cross(z, x), z))
     matrix[:3, 3] = origin
-    open_deg = float(np.degrees(2.0 * known_mm / min(apart_mm[0], across_mm)))
-    return ThreePoints(pose.checked(matrix), apart_mm, angle_deg, lean_deg, open_deg)
+    error_deg = np.degrees(step_error_mm * _turn_per_mm(apart_mm[0], float(aside @ x), across_mm))
+    return ThreePoints(pose.checked(matrix), apart_mm, angle_deg, tilt_deg, float(error_deg))
 
 
-def check_apart(points_mm: Array, known_mm: float) -> None:
-    """InputError if one of the points (N, 3) is too near to the first; ``known_mm`` as in ``of_points``."""
+def _turn_per_mm(length_mm: float, along_mm: float, across_mm: float) -> float:
+    """Rad by which the axes may turn for each mm by which each of the points may be elsewhere, to first order.
+
+    The x axis turns by the errors of its two points over its length. About it the plane turns by the error of the third
+    point, and that of the x axis beside it, which grows beyond its ends, over their distance.
+    """
+    beside = abs(1.0 - along_mm / length_mm) + abs(along_mm / length_mm)
+    return float(np.hypot(2.0 / length_mm, (1.0 + beside) / across_mm))
+
+
+def check_apart(points_mm: Array, step_error_mm: float) -> None:
+    """InputError if one of the points (N, 3) is too near to the first; ``step_error_mm`` as in ``of_points``."""
     for number, distance_mm in enumerate(np.linalg.norm(points_mm[1:] - points_mm[0], axis=1), 1):
-        if distance_mm < _least_mm(known_mm):
+        if distance_mm < _least_mm(step_error_mm):
             raise InputError(
                 f"{POINTS[number]} is {distance_mm:.3g} mm from the origin, too near for the steps of this arm",
-                f"take it at least {_least_mm(known_mm):.3g} mm away",
+                f"take it at least {_least_mm(step_error_mm):.3g} mm away",
             )
 
 
-def _least_mm(known_mm: float) -> float:
-    return max(LEAST_TIMES * known_mm, _SMALLEST_MM)
+def _least_mm(step_error_mm: float) -> float:
+    return max(LEAST_TIMES * step_error_mm, _SMALLEST_MM)
 
 
-def _level(x: Array, z: Array, lean_deg: float) -> tuple[Array, Array]:
+def _level(x: Array, z: Array, tilt_deg: float) -> tuple[Array, Array]:
     """The x axis in the horizontal plane, and the vertical z axis, nearest to these."""
-    if lean_deg > MOST_LEAN_DEG:
+    if tilt_deg > MOST_TILT_DEG:
         raise InputError(
-            f"the points lie in a plane that leans by {lean_deg:.3g} degrees, which is not made level",
-            f"take points on a level plane (within {MOST_LEAN_DEG:g} degrees), or leave --level out",
+            f"the points lie in a plane that is tilted by {tilt_deg:.3g} degrees, which is not made level",
+            f"take points on a level plane (within {MOST_TILT_DEG:g} degrees), or leave --level out",
         )
     flat = np.array([x[0], x[1], 0.0])
     return flat / np.linalg.norm(flat), np.array([0.0, 0.0, np.copysign(1.0, z[2])])

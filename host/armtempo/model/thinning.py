@@ -298,11 +298,11 @@ def _cut_off(places: Array, met: Array, path: Array) -> float:
     if not points.size:
         return 0.0
     chord = np.clip(np.searchsorted(places, points, side="right") - 1, 0, len(places) - 2)
-    starts, ways = met[chord], met[chord + 1] - met[chord]
-    squares = np.maximum(np.sum(ways**2, axis=1), 1e-300)
-    part = np.clip(np.sum((path[points] - starts) * ways, axis=1) / squares, 0.0, 1.0)
+    starts, chords = met[chord], met[chord + 1] - met[chord]
+    squares = np.maximum(np.sum(chords**2, axis=1), 1e-300)
+    part = np.clip(np.sum((path[points] - starts) * chords, axis=1) / squares, 0.0, 1.0)
     part = _rising(chord, part)
-    return float(np.abs(path[points] - starts - part[:, None] * ways).max())
+    return float(np.abs(path[points] - starts - part[:, None] * chords).max())
 
 
 def _rising(chord: NDArray[np.intp], part: Array) -> Array:

@@ -17,7 +17,7 @@ from armtempo.model import joint_trajectory, ros_bag, table_header, thinning
 from armtempo.model.arm import Arm
 from armtempo.model.joint_trajectory import Recorded
 from armtempo.model.table_header import Column, Header
-from armtempo.model.tool_pose import WHOLE
+from armtempo.model.tool_pose import BASE, WHOLE
 
 TOLERANCE_DEG = 0.1
 """Default tolerance for thinning a sampled motion."""
@@ -152,13 +152,14 @@ def _thinned(
     )
 
 
-def job_text(name: str, path: ImportedPath) -> str:
-    """The text of a job file through these via points, with default settings.
+def job_text(name: str, path: ImportedPath, frame: str = BASE) -> str:
+    """The text of a job file through these via points, with default settings; ``frame``: that of poses.
 
     A thinned path is the spline through its points, with shared timing, as its joints pass them together.
     """
     timing = "" if path.thinned_to_deg is None else 'path = "through"\ntiming = "shared"\n'
-    head = f"name = {json.dumps(name)}\n{timing}"
+    placed = "" if frame == BASE else f"frame = {json.dumps(frame)}\n"
+    head = f"name = {json.dumps(name)}\n{placed}{timing}"
     if path.poses:
         return head + "".join(
             "\n[[via]]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in pose.items())

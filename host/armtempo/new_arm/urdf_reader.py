@@ -24,7 +24,7 @@ MM = 1000.0
 """Millimetres in the URDF's unit, the metre."""
 
 DOUBTFUL_DEG = 720.0
-"""Ranges beyond this, either way, were probably written in degrees."""
+"""Ranges beyond this, in either direction, were probably written in degrees."""
 
 CONTINUOUS_DEG = (-180.0, 180.0)
 """Range of a continuous joint, which has none in a URDF."""
@@ -219,10 +219,10 @@ def _refuse_wheels(path: Path, moving: list[Any]) -> None:
         )
 
 
-def _reasons(way: Sequence[Any]) -> Iterator[tuple[Any, str]]:
+def _reasons(chain: Sequence[Any]) -> Iterator[tuple[Any, str]]:
     """The joints of a chain, and why each does not fit; empty if it does."""
     before = None
-    for joint in way:
+    for joint in chain:
         yield joint, _reason(joint, before)
         before = before if joint.type == "fixed" else joint
 
@@ -300,15 +300,15 @@ def _tip(path: Path, joints: Sequence[Any], first: str) -> str:
     below = [*_below(joints, first)]
     fingers = _fingers(joints)
     flanges = {
-        way[-1].parent
-        for way in below
-        if [joint.name for joint in way if joint.name in fingers] == [way[-1].name]
+        chain[-1].parent
+        for chain in below
+        if [joint.name for joint in chain if joint.name in fingers] == [chain[-1].name]
     }
     candidates = [*_candidates(below)]
     if len(flanges) == 1 and flanges & {candidate.link for candidate in candidates}:
         return str(flanges.pop())
     parents = {joint.parent for joint in joints}
-    ends = [way[-1].child for way in below if way[-1].child not in parents]
+    ends = [chain[-1].child for chain in below if chain[-1].child not in parents]
     if len(ends) == 1:
         return str(ends[0])
     candidates.sort(key=lambda candidate: (-len(candidate.turning), candidate.joints))
@@ -316,19 +316,19 @@ def _tip(path: Path, joints: Sequence[Any], first: str) -> str:
     more = f", and {len(candidates) - _MOST} more" if len(candidates) > _MOST else ""
     raise InputError(
         f"{path}: which link of the robot is the tool is not clear",
-        f"choose with --tip, the joints that turn on the way in brackets: {', '.join(words) or 'none'}{more}",
+        f"choose with --tip, the joints that turn on its chain in brackets: {', '.join(words) or 'none'}{more}",
     )
 
 
 def _below(joints: Sequence[Any], first: str) -> Iterator[list[Any]]:
-    """The way to each link below ``first``, in the order of the file."""
+    """The chain to each link below ``first``, in the order of the file."""
     above = {joint.child: joint for joint in joints}
     for joint in joints:
-        way = [joint]
-        while way[0].parent != first and way[0].parent in above and len(way) <= len(above):
-            way.insert(0, above[way[0].parent])
-        if way[0].parent == first:
-            yield way
+        chain = [joint]
+        while chain[0].parent != first and chain[0].parent in above and len(chain) <= len(above):
+            chain.insert(0, above[chain[0].parent])
+        if chain[0].parent == first:
+            yield chain
 
 
 def _fingers(joints: Sequence[Any]) -> set[str]:
@@ -359,9 +359,9 @@ def _before(joint: Any, above: Mapping[str, Any]) -> list[Any]:
     return found
 
 
-def _candidates(ways: Sequence[list[Any]]) -> Iterator[_Candidate]:
-    """Links on whose way something turns, and nothing is there that an arm file cannot describe."""
-    for way in ways:
-        turning = tuple(joint.name for joint in way if joint.type != "fixed")
-        if turning and not any(reason for _, reason in _reasons(way)):
-            yield _Candidate(way[-1].child, turning, len(way))
+def _candidates(chains: Sequence[list[Any]]) -> Iterator[_Candidate]:
+    """Links on whose chain something turns, and nothing is there that an arm file cannot describe."""
+    for chain in chains:
+        turning = tuple(joint.name for joint in chain if joint.type != "fixed")
+        if turning and not any(reason for _, reason in _reasons(chain)):
+            yield _Candidate(chain[-1].child, turning, len(chain))

@@ -65,7 +65,7 @@ class FileRow:
         def answered(press: Press) -> None:
             self.change(lambda: call(str(name.value or "").strip()), press)
 
-        with self._page.ask("", text, answered).place:
+        with self._page.ask("", text.rstrip("…"), answered).place:
             name = ui.input(words.NEW_NAME).props("dense outlined")
 
     def look(self) -> None:

@@ -70,9 +70,7 @@ def _header(page: PanelPage) -> None:
         )
         stop.classes("armtempo-stop").props("no-caps").tooltip(words.STOP_HINT)
         freeze = ui.button(words.FREEZE, icon="ac_unit", on_click=lambda: _aside(operator.freeze))
-        freeze.classes("armtempo-freeze").props('no-caps outline id="armtempo-freeze"').tooltip(
-            words.FREEZE_HINT
-        )
+        freeze.classes("armtempo-freeze").props("no-caps outline").tooltip(words.FREEZE_HINT)
         with ui.element("div").classes("armtempo-title"):
             ui.label(f"{words.TITLE} · {words.plain(operator.arm.name)}").classes("armtempo-name-of-arm")
             ui.label("").props('id="armtempo-state" role="status"')

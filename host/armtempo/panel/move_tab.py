@@ -15,11 +15,14 @@ from nicegui import ui
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
-from armtempo.model.pose import to_rpy_deg
+from armtempo.model.frame import TOOL
+from armtempo.model.pose import checked, from_rpy, to_rpy_deg
+from armtempo.model.tool_pose import BASE
 from armtempo.panel import arm_scene, floor, homing, teaching, words
 from armtempo.panel.hold import SHOWN_S
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import PanelPage, named
+from armtempo.planning.jog.jog_line import axis_of
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.robot.goto import MovePace, Where, posture_deg
 
@@ -33,8 +36,9 @@ _THERE_DEG = 0.1
 """An arm that is this close to a target has arrived."""
 STEPS = {HOLD: words.HOLD, 0.1: "0.1", 1.0: "1", 10.0: "10"}
 """Lengths of a jog, in mm and degrees."""
-_TOOL = "tool-"
-FRAMES = {"joints": words.JOINTS, "": words.BASE_FRAME, _TOOL: words.TOOL_FRAME}
+JOINTS = ""
+"""No frame may have this name."""
+FRAMES = {JOINTS: words.JOINTS, BASE: words.BASE_FRAME, TOOL: words.TOOL_FRAME}
 
 
 class MoveTab:
@@ -69,24 +73,26 @@ class MoveTab:
     def _jogs(self) -> None:
         page = self._page
         with ui.row().classes("armtempo-choices"):
-            frames = ui.toggle(FRAMES, value="joints")
+            own = {frame.name: words.plain(frame.name) for frame in page.operator.arm.frames}
+            frames = ui.toggle({**FRAMES, **own}, value=JOINTS)
             named(frames.props("dense no-caps unelevated"), words.FRAME)
             steps = ui.toggle(STEPS, value=HOLD, on_change=lambda event: setattr(self, "_step", event.value))
             named(steps.props("dense no-caps unelevated"), words.STEP_OF_JOG)
-        with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value="joints"):
+        with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value=JOINTS):
             for number, joint in enumerate(page.operator.arm.driven):
                 low, high = joint.range_deg
                 with ui.element("div").classes("armtempo-jog"):
                     self._pair(joint.name, JogMove(math.inf, joint=number))
                     ui.label("").classes("armtempo-number").props(f'id="armtempo-angle-{number + 1}"')
                     ui.label(f"{low:g}° … {high:g}°").classes("armtempo-note")
-        for frame in ("", _TOOL):
+        for frame in (BASE, TOOL, *own):
             with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value=frame):
                 for axis in AXES:
                     with ui.element("div").classes("armtempo-jog"):
-                        name = f"{words.OWN} {axis}" if frame else axis
-                        self._pair(name, JogMove(math.inf, axis=frame + axis))
-                        self._pair(f"⟳ {name}", JogMove(math.inf, axis=frame + axis, about=True))
+                        name = {BASE: axis, TOOL: f"{words.OWN} {axis}"}.get(frame, f"{frame} {axis}")
+                        move = JogMove(math.inf, axis=axis_of(frame, axis))
+                        self._pair(name, move)
+                        self._pair(f"⟳ {name}", replace(move, about=True))
         with ui.element("div").classes("armtempo-slide"):
             ui.label(words.SPEED_OF_JOG).classes("text-caption")
             slider = ui.slider(min=1, max=100, value=page.jog_percent)
@@ -153,6 +159,9 @@ class MoveTab:
                 ]
             with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="pose"):
                 self._pose = {name: _number(name, 0.0) for name in words.POSE_FIELDS}
+                names = {BASE: words.IN_BASE} | {each.name: words.plain(each.name) for each in arm.frames}
+                self._frame = ui.select(names, value=BASE).props("dense outlined")
+                named(self._frame, words.FRAME_OF_POSE).set_visibility(bool(arm.frames))
                 if len(arm.driven) < len(words.POSE_FIELDS):
                     ui.label(words.FEW_JOINTS.format(joints=len(arm.driven))).classes("armtempo-note")
             with ui.row():
@@ -203,14 +212,17 @@ class MoveTab:
             return np.array([_value(field) for field in self._angles])
         position = [_value(self._pose[name]) for name in words.POSE_FIELDS[:3]]
         turns = [_value(self._pose[name]) for name in words.POSE_FIELDS[3:]]
-        return teaching.nearest(self._operator.arm, position, turns, self._operator.live.angles_deg)
+        arm = self._operator.arm
+        wanted = checked(arm.frame(str(self._frame.value)) @ from_rpy(position, turns))
+        return teaching.nearest(arm, wanted, self._operator.live.angles_deg)
 
     def _take_present(self) -> None:
         """Fill the fields with where the arm is."""
         angles = self._operator.live.angles_deg
         for field, angle in zip(self._angles, angles, strict=True):
             field.set_value(round(float(angle), 3))
-        pose = forward(self._operator.arm, angles)
+        arm = self._operator.arm
+        pose = np.linalg.inv(arm.frame(str(self._frame.value))) @ forward(arm, angles)
         values = [*pose[:3, 3], *to_rpy_deg(pose)]
         for field, value in zip(self._pose.values(), values, strict=True):
             field.set_value(round(float(value), 2) + 0.0)

@@ -199,7 +199,8 @@ window.armtempo = {
     const typing = event.target.matches("textarea, input[type=text]:not([readonly])");
     if (event.key === "Escape" || (event.key === " " && !typing)) {
       event.preventDefault();
-      if (event.key === " ") event.stopPropagation(); // Escape closes dialogs besides
+      if (event.key === " ") event.stopPropagation();
+      else document.querySelector(".q-dialog .armtempo-cancel")?.click(); // a question is answered with no
       if (!event.repeat) emitEvent("armtempo-stop");
     } else if (event.key === "Enter" && !event.repeat) this.press(event);
   },

@@ -182,7 +182,7 @@ class PanelPage:
             place = ui.column()
             with ui.row():
                 yes = ui.button(text).props("no-caps")
-                ui.button(words.CANCEL, on_click=asked.close).props("flat no-caps")
+                ui.button(words.CANCEL, on_click=asked.close).props("flat no-caps").classes("armtempo-cancel")
 
         def answered(press: Press, _: object) -> object:
             found = call(press)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from threading import Lock
-from typing import Any
 
 from armtempo import pipeline
 from armtempo.basics.errors import RunFolderError
 from armtempo.panel import words
-from armtempo.report.run import Run
+from armtempo.report import run_reader, run_report
 from armtempo.report.run_folder import META
-from armtempo.report.sequence_folder import FORMAT as SEQUENCE_FORMAT
-from armtempo.report.sequence_reader import SequenceRun
 
 REPORT_PAGE = "report.html"
 _known: dict[Path, tuple[int, PastRun]] = {}
@@ -50,18 +46,15 @@ def _read(file: Path, changed_ns: int) -> PastRun:
 
 def _row(file: Path) -> PastRun:
     try:
-        meta: Any = json.loads(file.read_text(encoding="utf-8"))
+        meta = run_reader.description(file.parent)
         date = datetime.fromisoformat(meta["started"]).astimezone().strftime("%Y-%m-%d %H:%M")
-        if meta.get("format") == SEQUENCE_FORMAT:
-            return PastRun(file.parent, date, "", str(meta["state"]))
-        made = meta["repetitions"]
-        whole_s = sum(float(one["duration_s"]) for one in made)
-        ending = next(
-            (one["fault"] or one["state"] for one in made if one["state"] != "complete"), "complete"
-        )
-        return PastRun(file.parent, date, f"{whole_s:.1f} s", str(ending))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        entries = [run_reader.entry(values) for values in meta["repetitions"]]
+    except (RunFolderError, LookupError, ValueError, TypeError):
         return PastRun(file.parent, "", "", words.UNREADABLE)
+    whole_s = sum(entry.duration_s for entry in entries)
+    cut = [entry for entry in entries if not entry.complete]
+    ending = next((entry.fault or entry.state for entry in (*cut, *entries)), "")
+    return PastRun(file.parent, date, f"{whole_s:.1f} s" if whole_s else "", ending)
 
 
 def report(runs: Path, name: str) -> bytes:
@@ -73,7 +66,7 @@ def report(runs: Path, name: str) -> bytes:
         (folder,) = _folders(runs, [name])
         page, changed_ns = folder / REPORT_PAGE, (folder / META).stat().st_mtime_ns
         if not page.is_file() or page.stat().st_mtime_ns < changed_ns:
-            _write_report(folder)
+            run_report.write(folder)
             os.utime(page, ns=(changed_ns, changed_ns))  # older than a run that was written again meanwhile
         return page.read_bytes()
 
@@ -89,12 +82,3 @@ def _folders(runs: Path, names: Sequence[str]) -> list[Path]:
     if missing := [name for name in names if name not in there]:
         raise RunFolderError(f"there is no run {missing[0]!r}", "choose one of the list")
     return [there[name] for name in names]
-
-
-def _write_report(folder: Path) -> None:
-    try:
-        meta: Any = json.loads((folder / META).read_text(encoding="utf-8"))
-        is_sequence = meta["format"] == SEQUENCE_FORMAT
-    except (OSError, ValueError, KeyError, TypeError):
-        raise RunFolderError(f"{folder.name}: its {META} cannot be read", "restore it from a copy") from None
-    pipeline.report(SequenceRun.load(folder) if is_sequence else Run.load(folder))

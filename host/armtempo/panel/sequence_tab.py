@@ -46,6 +46,7 @@ class SequenceTab:
         self._rows: list[ui.row] = []
         self._times: list[ui.label] = []
         self._timed: SequencePlan | None = None
+        self._planning = False
         self._file = FileRow(page, self._editor, words.SEQUENCE_FILE)
         with ui.row():
             for text, call, needs, look in (
@@ -71,6 +72,8 @@ class SequenceTab:
         return self._editor.file, [kind_of(step) for step in self._editor.steps], self._editor.depths
 
     def _why_not(self) -> str:
+        if self._planning:
+            return words.BUSY.format(what=words.PLAN)
         return "" if self._editor.is_open else words.NO_SEQUENCE_OPEN
 
     def _why_no_play(self) -> str:
@@ -184,10 +187,19 @@ class SequenceTab:
         return self._make_plan()
 
     async def _make_plan(self) -> None:
+        self._show_planning(True)
         try:
             await run.io_bound(self._planned)
         except ArmtempoError as error:
             ui.notify(words.of_error(error), type="negative", multi_line=True, timeout=8000)
+        finally:
+            self._show_planning(False)
+
+    def _show_planning(self, planning: bool) -> None:
+        self._planning = planning
+        self._total.set_text(words.PLANNING if planning else "")
+        self._timed = None  # what is shown is written over
+        self._page.refresh()
 
     async def _play(self) -> None:
         """Play every motion on the model, each once."""
@@ -213,7 +225,7 @@ class SequenceTab:
                 board.run_sequence(plan, operator.live.take_sequence, replace=True, out=operator.runs)
             )
             if (recorded := board.last_sequence) is not None:
-                pipeline.report(recorded)
+                recorded.report()
 
         self._page.do(press, words.RUN, run_it)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import taught
 from armtempo.model.arm import Arm
-from armtempo.model.pose import from_rpy
+from armtempo.model.pose import to_rpy_deg
 from armtempo.model.posture import name_problem
 from armtempo.model.tool_pose import Pose
 from armtempo.panel import words
@@ -30,18 +30,17 @@ if TYPE_CHECKING:
 _LOOK_S = 0.05
 
 
-def nearest(arm: Arm, position_mm: Sequence[float], rpy_deg: Sequence[float], here_deg: Array) -> Array:
-    """The angles, (J,), nearest to ``here_deg`` (J,) that bring the tool to a pose.
+def nearest(arm: Arm, wanted: Array, here_deg: Array) -> Array:
+    """The angles, (J,), nearest to ``here_deg`` (J,) that bring the tool to a pose in the base, (4, 4).
 
     Of the orientation an arm with less than six joints takes what it can: its direction, its pitch, nothing. Raises
     PlanError if no posture reaches it.
     """
-    roll, pitch, yaw = rpy_deg
-    direction = from_rpy(position_mm, rpy_deg)[:3, 2].tolist()
+    position_mm = wanted[:3, 3].tolist()
     pose = {
-        6: lambda: Pose.of_angles(position_mm, {"roll": roll, "pitch": pitch, "yaw": yaw}),
-        5: lambda: Pose.of_approach(position_mm, direction),
-        4: lambda: Pose.of_angles(position_mm, {"pitch": pitch}),
+        6: lambda: Pose.of_matrix(wanted),
+        5: lambda: Pose.of_approach(position_mm, wanted[:3, 2].tolist()),
+        4: lambda: Pose.of_angles(position_mm, {"pitch": to_rpy_deg(wanted).pitch_deg}),
     }.get(len(arm.driven), lambda: Pose.of_angles(position_mm, {}))()
     return via_points.nearest(arm, pose, here_deg.tolist())
 

@@ -56,6 +56,7 @@ VIEWS = {"side": "Side", "top": "Top", "free": "Free", "follow": "Follow"}
 JOINTS, OUTPUTS, INPUTS = "Joints", "Outputs", "Inputs"
 OWN = "own"
 FRAME, BASE_FRAME, TOOL_FRAME = "What is jogged", "Tool, base frame", "Tool, own frame"
+FRAME_OF_POSE, IN_BASE = "Frame of the pose", "in the base"
 STEP_OF_JOG, HOLD = "Length of a jog, mm or degrees", "While held"
 SPEED_OF_JOG = "Speed of jogs and targets"
 JOG_STEP = "step"
@@ -109,6 +110,7 @@ OPTIONS = {
     "acceleration_mm_s2": "Tool acceleration, mm/s²",
     "holds": "Tool holds",
     "frame": "Frame",
+    "tool": "Tool",
 }
 VIA_KEYS = {
     "line": "Straight line to it",
@@ -195,6 +197,7 @@ STEP_KEYS = {
     "on_timeout": "then",
 }
 ADD_HERE = "Add where the arm is"
+PLANNING = "Planning…"
 TOTAL_TIME, CYCLE_TIME = "{time:.2f} s in all, without waits for inputs", "{time:.2f} s a cycle"
 
 STATE_KEYS = {

@@ -16,7 +16,7 @@ from armtempo.paper import motions, printed
 from armtempo.paper.printed import DIFFERS, SAME, Claim
 from armtempo.ports.names import SIM
 from armtempo.report import analysis, peaks
-from armtempo.report.evaluation import Evaluation, evaluate
+from armtempo.report.evaluation import LegEvaluation, evaluate
 from armtempo.robot.connect import connect
 from armtempo.robot.stop_request import StopRequest
 from armtempo.splines import extremes
@@ -34,7 +34,7 @@ class Series:
     """One motion, replayed and analysed."""
 
     name: str
-    found: Evaluation
+    found: LegEvaluation
 
 
 def run(made: motions.Plans, folder: Path, quick: bool, progress: Progress | None) -> list[Series]:
@@ -59,7 +59,7 @@ def run(made: motions.Plans, folder: Path, quick: bool, progress: Progress | Non
                     progress(sum(shares.values()), len(plans))
         for replay in filter(_failed, replays.values()):
             replay.result()
-    return [Series(name, evaluate(replay.result())) for name, replay in replays.items()]
+    return [Series(name, evaluate(replay.result()).legs[0]) for name, replay in replays.items()]
 
 
 def claims(series: list[Series]) -> list[Claim]:
@@ -95,7 +95,7 @@ def _failed(replay: Future[Path]) -> bool:
     return replay.done() and not isinstance(replay.exception(), KeyboardInterrupt | None)
 
 
-def _coincide(found: Evaluation) -> list[Claim]:
+def _coincide(found: LegEvaluation) -> list[Claim]:
     """ "The angle curves almost coincide": within the rounding of the encoder and the lag of the motor."""
     rows = analysis.deviations(found.curves)[0]
     return [
@@ -110,7 +110,7 @@ def _coincide(found: Evaluation) -> list[Claim]:
     ]
 
 
-def _limits_kept(found: Evaluation) -> list[Claim]:
+def _limits_kept(found: LegEvaluation) -> list[Claim]:
     claims = []
     for name, checks in zip(found.names, found.limit_checks, strict=True):
         for quantity, check in zip(("speed", "acceleration"), checks, strict=True):
@@ -128,7 +128,7 @@ def _limits_kept(found: Evaluation) -> list[Claim]:
     return claims
 
 
-def _unoptimised_peaks(found: Evaluation) -> list[Claim]:
+def _unoptimised_peaks(found: LegEvaluation) -> list[Claim]:
     """Joint 1 before optimisation: the peaks of section 2.3, as measured."""
     checks = found.limit_checks[0]
     claims = []
@@ -143,7 +143,7 @@ def _unoptimised_peaks(found: Evaluation) -> list[Claim]:
     return claims
 
 
-def _rougher_ends(quintic: Evaluation, cubic: Evaluation) -> list[Claim]:
+def _rougher_ends(quintic: LegEvaluation, cubic: LegEvaluation) -> list[Claim]:
     """Joint 1 at start and end: deviation of speed and acceleration, cubic compared with quintic."""
     claims = []
     for order, unit, said in (
@@ -157,7 +157,7 @@ def _rougher_ends(quintic: Evaluation, cubic: Evaluation) -> list[Claim]:
     return claims
 
 
-def _end_error(found: Evaluation, order: int) -> float:
+def _end_error(found: LegEvaluation, order: int) -> float:
     """RMS deviation of joint 1's mean curve from ``Curves.shown`` near start and end."""
     end = found.trajectory.joints[0].duration_s
     times = found.curves.times_s

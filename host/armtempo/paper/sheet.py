@@ -51,7 +51,7 @@ def _extent(searched: Sequence[Row], series: Sequence[Series]) -> list[tuple[str
     return [
         ("populations searched with", populations),
         ("seeds for each", min(row.seeds for row in searched)),
-        ("replays of each motion", min(len(one.found.run.repetitions) for one in series)),
+        ("replays of each motion", min(len(one.found.repetitions) for one in series)),
     ]
 
 
@@ -80,9 +80,7 @@ def _figures(
     ]
     by_name = {one.name: one.found for one in series}
     for number, name in (("11", QUINTIC), ("12", CUBIC)):
-        caption = (
-            f"Fig. {number}: {name}, mean of {len(by_name[name].run.repetitions)} replays against theory."
-        )
+        caption = f"Fig. {number}: {name}, mean of {len(by_name[name].repetitions)} replays against theory."
         drawn.append((f"fig{number}", run_report.figures(by_name[name])["tracking"][0], caption))
     return drawn
 

@@ -310,9 +310,14 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
 
 
 def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
-    """Sum of the highest step rates of all motors, steps/s; of coupled joints, as if they were fastest together."""
+    """Sum of the highest step rates of all motors, steps/s; of coupled joints, as if they were fastest together, and
+    with the crossing of backlash."""
     speeds: list[float] = arm.transmission.largest_motors_deg([most.speed_deg_s for most in reached]).tolist()
-    return sum(speed * joint.motor.steps_per_deg for speed, joint in zip(speeds, arm.driven, strict=True))
+    extra = [crossing.speed_deg_s if crossing else 0.0 for crossing in arm.crossings]
+    return sum(
+        (speed + more) * joint.motor.steps_per_deg
+        for speed, more, joint in zip(speeds, extra, arm.driven, strict=True)
+    )
 
 
 def format_rate(rates: float) -> str:

@@ -1,12 +1,12 @@
 """The time law of every move by hand: from rest to rest as fast as speed, acceleration and jerk allow.
 
 Way s(u) and time t(u) are uniform quintic B-splines. While the differences h of the time's control points are equal,
-t = h u, and the differences of the way's, over h, are the control points of the speed: those of a "double S", the
+t = h u, and the differences of the distance's, over h, are the control points of the speed: those of a "double S", the
 fastest speed f(t) under the limits, minus a constant c with which the speed begins at 0. Their first and second
 differences, over h and h², are the control points of acceleration and jerk. As f keeps the limits, so do they, and
 the splines between them. Where f'' is constant over five of them, the speed is f itself.
 
-A higher limit of the speed never makes the way shorter: f never falls with it, and h is the same, or, where f does
+A higher limit of the speed never makes the distance shorter: f never falls with it, and h is the same, or, where f does
 not reach the acceleration, f is the same function of t / h. At constant speed intervals may be of any length, as
 s' / t' is then the ratio of the differences.
 """
@@ -49,8 +49,8 @@ _ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class WayLimits:
-    """Largest magnitudes along the way, in its unit (deg or mm) and seconds."""
+class MoveLimits:
+    """Largest magnitudes along the path, in its unit (deg or mm) and seconds."""
 
     speed: float
     acceleration: float
@@ -75,7 +75,7 @@ class WayLimits:
         return 0.5 * self.acceleration * (math.sqrt(full**2 + 4.0 * length / self.acceleration) - full)
 
     def step_s(self, speed: float, longest: float) -> float:
-        """The interval h for a ramp to ``speed``; the way in it is not longer than ``longest``."""
+        """The interval h for a ramp to ``speed``; the distance in it is not longer than ``longest``."""
         fastest = max(self.fastest, self.speed)
         count = _PER_RAMP * self.phase_s(fastest) / self.ramp_s(fastest)
         return min(self.phase_s(speed) / min(max(count, _LEAST_PER_PHASE), _MOST_PER_PHASE), longest / speed)
@@ -95,8 +95,8 @@ class WayLimits:
         return np.asarray(self.jerk * (0.5 * gained + phase_s * between))
 
 
-def of_joints(limits: Sequence[Limits], gains: Sequence[float], speed: float) -> WayLimits:
-    """Limits of a way with joints that turn by ``gains`` (J,) > 0 degrees per unit of it.
+def of_joints(limits: Sequence[Limits], gains: Sequence[float], speed: float) -> MoveLimits:
+    """Limits of a path with joints that turn by ``gains`` (J,) > 0 degrees per unit of it.
 
     At the fraction ``speed`` of the joints' speeds. The jerk is so small that the fastest ramp has no more steps than
     its record.
@@ -104,14 +104,14 @@ def of_joints(limits: Sequence[Limits], gains: Sequence[float], speed: float) ->
     rows = [np.array(limit.values) / gain for limit, gain in zip(limits, gains, strict=True)]
     fastest, acceleration, jerk = np.min(rows, axis=0) * (1.0, ACCELERATION, JERK)
     jerk = min(jerk, (_PER_RAMP / _LEAST_PER_PHASE - 1.0) * acceleration**2 / fastest)
-    return WayLimits(float(speed * fastest), float(acceleration), float(jerk), float(fastest))
+    return MoveLimits(float(speed * fastest), float(acceleration), float(jerk), float(fastest))
 
 
 @dataclass(frozen=True, eq=False)
-class WayLaw:
-    """Control points of the way (from 0 to its length) and of the time, both (n + DEGREE,)."""
+class MoveLaw:
+    """Control points of the distance (from 0 to its length) and of the time, both (n + DEGREE,)."""
 
-    way: Array
+    distance: Array
     time_s: Array
 
     def trajectory(self, name: str, angle_points_deg: Sequence[Array]) -> Trajectory:
@@ -122,13 +122,13 @@ class WayLaw:
 
     @property
     def at_knots(self) -> Array:
-        """The way at the ends of the segments, (n + 1,)."""
-        points = np.lib.stride_tricks.sliding_window_view(self.way, DEGREE)
+        """The distance at the ends of the segments, (n + 1,)."""
+        points = np.lib.stride_tricks.sliding_window_view(self.distance, DEGREE)
         return np.asarray(points @ bspline.basis(DEGREE)[0, :-1])
 
 
-def law(length: float, limits: WayLimits, longest: float = math.inf) -> WayLaw:
-    """The law for a way of ``length`` > 0; in no interval the way is longer than ``longest``."""
+def law(length: float, limits: MoveLimits, longest: float = math.inf) -> MoveLaw:
+    """The law for a path of ``length`` > 0; in no interval the distance is longer than ``longest``."""
     h = limits.step_s(limits.speed, longest)
     lift = limits.lift(h, limits.speed)
     ramp_s = limits.ramp_s(limits.speed + lift)
@@ -136,33 +136,33 @@ def law(length: float, limits: WayLimits, longest: float = math.inf) -> WayLaw:
         speeds, steps_s = _with_cruise(length, limits, h, longest)
     else:
         speeds, steps_s = _in_equal_steps(length, limits, longest)
-    way = np.append(0.0, (speeds * steps_s).cumsum())
+    distance = np.append(0.0, (speeds * steps_s).cumsum())
     times = np.append(0.0, steps_s.cumsum())
     weights = bspline.basis(DEGREE)[0, :-1]
-    way -= weights @ way[:DEGREE]
+    distance -= weights @ distance[:DEGREE]
     times -= weights @ times[:DEGREE]
-    # The sums are not exactly the integral, so the way is scaled, and the time as far as the limits need it
-    scale = length / float(weights @ way[-DEGREE:])
+    # The sums are not exactly the integral, so the distance is scaled, and the time as far as the limits need it
+    scale = length / float(weights @ distance[-DEGREE:])
     slower = max(1.0, scale, scale * float(speeds.max()) / limits.speed)
     slower = max(slower, SHORTEST_S / float(weights @ times[-DEGREE:]))
-    return WayLaw(way * scale, times * slower)
+    return MoveLaw(distance * scale, times * slower)
 
 
-def _with_cruise(length: float, limits: WayLimits, h: float, longest: float) -> tuple[Array, Array]:
+def _with_cruise(length: float, limits: MoveLimits, h: float, longest: float) -> tuple[Array, Array]:
     """Control points of the speed, and the intervals, of a law with constant speed in the middle."""
     top = limits.speed + limits.lift(h, limits.speed)
     count = math.ceil(limits.ramp_s(top) / h) + DEGREE + 1
     rise = limits.rise(h * np.abs(np.arange(count) + _FIRST), top)
     rise -= limits.lift(h, top)
     weights = bspline.basis(DEGREE)[0, :-1]
-    ways = np.append(0.0, (h * rise).cumsum())
-    ramp = float(ways[-1] - weights @ ways[:DEGREE])
+    distances = np.append(0.0, (h * rise).cumsum())
+    ramp = float(distances[-1] - weights @ distances[:DEGREE])
     middle_s = _intervals((length - 2.0 * ramp) / float(rise[-1]), h, min(_LONGEST_S, longest / limits.speed))
     steps_s = np.array([*[h] * count, *middle_s, *[h] * count])
     return np.concatenate([rise, np.full(len(middle_s), rise[-1]), rise[::-1]]), steps_s
 
 
-def _in_equal_steps(length: float, limits: WayLimits, longest: float) -> tuple[Array, Array]:
+def _in_equal_steps(length: float, limits: MoveLimits, longest: float) -> tuple[Array, Array]:
     """Control points of the speed, and the intervals, of a law with little or no constant speed."""
     top, lift = limits.peak(length), 0.0
     for _ in range(_ROUNDS):

@@ -27,7 +27,7 @@ def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, spee
     limits = move_law.of_joints([joint.limits for joint in arm.driven], gains, speed)
     law = move_law.law(longest, limits)
     return law.trajectory(
-        name, [here + (to - here) / longest * law.way for here, to in zip(start, end, strict=True)]
+        name, [here + (to - here) / longest * law.distance for here, to in zip(start, end, strict=True)]
     )
 
 

@@ -146,13 +146,13 @@ class Ramps:
         table = _ramp(phases)
         if len(shapes) and np.all(shapes == shapes[0]):
             shapes = shapes[:1]
-        place, rise, slope, bend, way, whole = (part.take(shapes, axis=1)[:, None] for part in table)
+        place, rise, slope, bend, distance, whole = (part.take(shapes, axis=1)[:, None] for part in table)
         begin, length = starts_s.astype(np.float32), length_s.astype(np.float32)
         before, after = np.array(rates, np.float32).T[:, :, None]  # the axes: phases, rates, starts
         least, change = np.minimum(before, after), after - before
         size = np.abs(change)
         rate = least + size * rise
-        passed = least * place + size * way
+        passed = least * place + size * distance
         np.copyto(passed, least + size * whole - passed, where=change < 0.0)
         share = self._places(begin + length * passed)
         whole_places = np.floor(share)
@@ -182,11 +182,11 @@ def _essential(trajectory: Trajectory, limits: Array) -> tuple[list[JointSpline]
     spans: list[float] = []
     most: list[Array] = []
     for spline, limit in zip(trajectory.joints, limits, strict=True):
-        way = spline.angle_points_deg - spline.angle_points_deg[0]
-        span = float(np.max(np.abs(way)))
+        distance = spline.angle_points_deg - spline.angle_points_deg[0]
+        span = float(np.max(np.abs(distance)))
         if span == 0.0:
             continue
-        unit = way / way[np.argmax(np.abs(way))]
+        unit = distance / distance[np.argmax(np.abs(distance))]
         for number, known in enumerate(units):
             axis = kept[number].time_points_s
             alike = known.shape == unit.shape and np.abs(unit - known).max() <= _ALIKE
@@ -234,7 +234,7 @@ def _ramp(phases: int) -> tuple[Single, ...]:
     late = 3 * (1 - whole) - first - second
     slopes = (0.0 * first, 2 * (1 - late) / second, 2 * late / (1 - first), 0.0 * first)
     at = np.linspace(0.0, 1.0, phases)
-    rise = way = start = 0.0 * first
+    rise = distance = start = 0.0 * first
     pieces = []
     for width, before, after in zip(
         (first, second - first, 1 - second), slopes[:-1], slopes[1:], strict=True
@@ -246,10 +246,10 @@ def _ramp(phases: int) -> tuple[Single, ...]:
                 rise + at * (gain + at * bend / 2),
                 before + at * (after - before),
                 (after - before) / width + 0.0 * at,
-                way + width * at * (rise + at * (gain / 2 + at * bend / 6)),
+                distance + width * at * (rise + at * (gain / 2 + at * bend / 6)),
             )
         )
         start = start + width
-        rise, way = pieces[-1][1][:, -1:], pieces[-1][4][:, -1:]
+        rise, distance = pieces[-1][1][:, -1:], pieces[-1][4][:, -1:]
     parts = [np.concatenate(one, axis=1).T for one in zip(*pieces, strict=True)]
     return tuple(np.ascontiguousarray(part, np.float32) for part in [*parts, whole.T])

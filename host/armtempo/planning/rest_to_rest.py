@@ -15,9 +15,9 @@ from armtempo.basics.arrays import Array
 from armtempo.model.parts import Limits
 
 _ROUNDING = 8 * float(np.finfo(float).eps)
-"""Allowance for rounding: a way may be shorter by this fraction of the largest angle."""
+"""Allowance for rounding: a distance may be shorter by this fraction of the largest angle."""
 _LEAST_SHARE = 0.05
-"""Least time of a way on which the joints hardly move, as a fraction of the mean."""
+"""Least time of a leg in which the joints hardly move, as a fraction of the mean."""
 
 
 def floor_s(angles_deg: Array, limits: Limits, from_rest: bool = True, to_rest: bool | None = None) -> float:
@@ -38,15 +38,15 @@ def floor_s(angles_deg: Array, limits: Limits, from_rest: bool = True, to_rest: 
 def _leg_s(distance: float, limits: Limits, from_rest: bool, to_rest: bool) -> float:
     """Least time over one monotone interval: accelerate, perhaps cruise, decelerate."""
     low, high = 0.0, limits.speed_deg_s
-    up, way_up = _ramp(high, limits, from_rest)
-    down, way_down = _ramp(high, limits, to_rest)
-    if way_up + way_down <= distance:
-        return up + down + (distance - way_up - way_down) / high
+    up, distance_up = _ramp(high, limits, from_rest)
+    down, distance_down = _ramp(high, limits, to_rest)
+    if distance_up + distance_down <= distance:
+        return up + down + (distance - distance_up - distance_down) / high
     for _ in range(60):
         speed = 0.5 * (low + high)
-        up, way_up = _ramp(speed, limits, from_rest)
-        down, way_down = _ramp(speed, limits, to_rest)
-        low, high = (speed, high) if way_up + way_down < distance else (low, speed)
+        up, distance_up = _ramp(speed, limits, from_rest)
+        down, distance_down = _ramp(speed, limits, to_rest)
+        low, high = (speed, high) if distance_up + distance_down < distance else (low, speed)
     return up + down
 
 
@@ -83,10 +83,11 @@ def needed_s(via_deg: Array, limits: Array) -> Array:
 
     ``limits``: (J, 3). At least a fraction of the mean.
     """
-    ways = np.abs(np.diff(via_deg, axis=0))
+    distances = np.abs(np.diff(via_deg, axis=0))
     speed, acceleration, jerk = limits.T
     needs = np.maximum(
-        ways / speed, np.maximum(np.sqrt(4.0 * ways / acceleration), np.cbrt(32.0 * ways / jerk))
+        distances / speed,
+        np.maximum(np.sqrt(4.0 * distances / acceleration), np.cbrt(32.0 * distances / jerk)),
     )
     needed = needs.max(axis=1)
     return np.asarray(np.maximum(needed, _LEAST_SHARE * needed.mean()))

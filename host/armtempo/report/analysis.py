@@ -84,6 +84,11 @@ def curves(repetitions: Sequence[RepetitionData], trajectory: Trajectory) -> Cur
     return Curves(times, each, mean, sem, theory, shown, path_s, measured)
 
 
+def has_grid(repetition: RepetitionData) -> bool:
+    """Whether it has samples that ``curves`` can use."""
+    return _grid_size(repetition) > 0
+
+
 def deviations(found: Curves) -> list[list[Deviation]]:
     """``[order][joint]``: the deviation of the mean curve from theory."""
     error = found.mean - found.shown

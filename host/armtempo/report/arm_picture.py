@@ -85,6 +85,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_AXES_SHOWN = 0.1
+"""Length of a frame's axes, as a fraction of the arm's extent."""
+
+
 def arm_picture(arm: Arm) -> Figure:
     """One field for the home posture from the side and from above, one for each driven joint.
 
@@ -113,6 +117,7 @@ def _home(axis: Axes, arm: Arm, title: str, seen: tuple[int, int], size: float) 
     _draw(axis, arm, np.array(arm.all_home_deg), np.eye(3)[list(seen)], HOME, size)
     _draw_workspace(axis, arm, seen)
     _draw_capsules(axis, arm, seen)
+    _draw_frames(axis, arm, seen, _AXES_SHOWN * size)
     if seen[1] == 2:
         axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
     axis.set_xlabel(f"{'xyz'[seen[0]]} (mm)")
@@ -133,6 +138,16 @@ def _draw_workspace(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
         for end in (workspace.low_mm[place], workspace.high_mm[place]):
             if abs(end) < FAR_MM:
                 draw(end, color=HIGH, linewidth=1.0, zorder=0)
+
+
+def _draw_frames(axis: Axes, arm: Arm, seen: tuple[int, int], length: float) -> None:
+    """The frames of the arm file: their x axes solid, their y axes dotted, their names at their origins."""
+    for each in arm.frames:
+        pose = arm.frame(each.name)
+        for column, style in ((0, "-"), (1, ":")):
+            ends = pose[:3, 3] + np.outer([0.0, length], pose[:3, column])
+            axis.plot(*ends[:, list(seen)].T, style, color=GROUND, linewidth=1.2)
+        axis.annotate(each.name, tuple(pose[list(seen), 3]), fontsize=7, color=GROUND)
 
 
 def _draw_capsules(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
@@ -201,7 +216,7 @@ def _explain(figure: Figure, arm: Arm) -> None:
         Line2D([], [], color=colour, linewidth=2.6, label=label)
         for colour, label in ((HOME, "home"), (LOW, "low end"), (HIGH, "high end"))
     ]
-    lines.append(Line2D([], [], color=GROUND, linestyle=":", label="tool's way"))
+    lines.append(Line2D([], [], color=GROUND, linestyle=":", label="tool's path"))
     lines.append(
         Line2D([], [], color=HOME, linestyle="", marker="o", markerfacecolor="none", label="its axis")
     )

@@ -12,7 +12,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import RunFolderError
 from armtempo.report import analysis, drawing, html_page, plots
-from armtempo.report.evaluation import Evaluation, evaluate
+from armtempo.report.evaluation import Evaluation, LegEvaluation, evaluate
 
 PAGE = "comparison.html"
 _COLUMNS = {
@@ -47,7 +47,7 @@ def write(folders: Sequence[Path], path: Path) -> Path:
 def render(found: dict[str, Evaluation], complaints: Sequence[str]) -> str:
     """The page, for evaluations by name."""
     sheet = html_page.Page("Runs compared", ", ".join(found))
-    known = {name: evaluation.arm for name, evaluation in found.items() if evaluation.arm}
+    known = {name: arm for name, run in found.items() for leg in run.legs[:1] if (arm := leg.arm)}
     if len({replace(arm, source="") for arm in known.values()}) > 1:
         arms = ", ".join(f"{name} of {arm.name}" for name, arm in known.items())
         sheet.note(
@@ -58,13 +58,17 @@ def render(found: dict[str, Evaluation], complaints: Sequence[str]) -> str:
     for name, evaluation in found.items():
         for text in evaluation.complaints:
             sheet.note(f"{name}: {text}", html_page.BAD)
+    legs = {
+        name if run.single else f"{name}, motion {leg.number}": leg
+        for name, run in found.items()
+        for leg in run.legs
+    }
     sheet.heading("Result")
-    _table(sheet, found)
-    joints = max(len(evaluation.names) for evaluation in found.values())
-    for joint in range(joints):
+    _table(sheet, legs)
+    for joint in range(max((len(leg.names) for leg in legs.values()), default=0)):
         name, caption = f"joint-{joint + 1}", f"Joint {joint + 1}: mean angle, speed, acceleration and error."
         sheet.heading(f"Joint {joint + 1}")
-        sheet.figure(drawing.inline_svg(plots.overlay(_of_joint(found, joint)), name, caption), caption)
+        sheet.figure(drawing.inline_svg(plots.overlay(_of_joint(legs, joint)), name, caption), caption)
     return sheet.render()
 
 
@@ -82,7 +86,7 @@ def _read(folders: Sequence[Path]) -> tuple[dict[str, Evaluation], list[str]]:
     return readable, complaints
 
 
-def _table(sheet: html_page.Page, found: dict[str, Evaluation]) -> None:
+def _table(sheet: html_page.Page, found: dict[str, LegEvaluation]) -> None:
     rows = []
     for name, evaluation in found.items():
         deviation = analysis.deviations(evaluation.curves)
@@ -101,7 +105,7 @@ def _table(sheet: html_page.Page, found: dict[str, Evaluation]) -> None:
     sheet.table(tuple(_COLUMNS), rows, "The mean of the repetitions against the plan", _COLUMNS)
 
 
-def _of_joint(found: dict[str, Evaluation], joint: int) -> dict[str, tuple[Array, Array, Array]]:
+def _of_joint(found: dict[str, LegEvaluation], joint: int) -> dict[str, tuple[Array, Array, Array]]:
     """By run: times (K,), mean (3, K) and angle error (K,)."""
     return {
         name: (

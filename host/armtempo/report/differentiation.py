@@ -8,6 +8,7 @@ window is symmetric, so there is no lag, except at the ends, where it is one-sid
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -17,11 +18,13 @@ WINDOW = 5
 DEGREE = 3
 
 
+@cache  # a sequence has thousands of runs
 def weights(order: int, at: int, window: int = WINDOW, degree: int = DEGREE) -> Array:
     """Weights (window,) of the samples for the derivative at sample ``at`` of the window, for unit spacing."""
     offsets = np.arange(window) - at
     powers = np.vander(offsets, degree + 1, increasing=True).astype(float)
     fit: Array = np.linalg.pinv(powers)[order] * math.factorial(order)
+    fit.flags.writeable = False
     return fit
 
 

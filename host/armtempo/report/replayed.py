@@ -1,21 +1,23 @@
-"""The motion that a run replayed, its arm and results, and the theory for a run at another speed than planned."""
+"""The motions that a run replayed, its arm and results, and the theory for a run at another speed than planned."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import os_reason
-from armtempo.basics.errors import InputError, RunFolderError
+from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.encoding import decode
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.report import run_folder
-from armtempo.report.run_folder import ARM, MOTION
-from armtempo.report.run_reader import RepetitionData, RunData
+from armtempo.report.run_folder import ARM, SEQUENCE
+from armtempo.report.run_reader import RESTORE, RepetitionData, RunData
 from armtempo.splines.trajectory import Trajectory
 
 _EQUAL_S = 1e-6
@@ -26,34 +28,38 @@ SPEED_NOTE = "of the planned speed"
 
 
 def plan_of(run: RunData) -> Plan | None:
-    """The plan; None if only the board had the motion. Raises InputError if its file is damaged."""
+    """The plan of a motion; None if only the board had it. Raises InputError if its file is damaged."""
     return Plan.load(run.trajectory_path) if run.trajectory_path else None
 
 
-def trajectory_of(run: RunData) -> Trajectory:
-    """The motion from the board's record, to the rounding of its integers.
+def legs_of(run: RunData) -> tuple[Trajectory, ...]:
+    """The motions from the board's records, to the rounding of their integers.
 
-    Raises RunFolderError if the record is missing or damaged.
+    Raises RunFolderError if a record is missing or damaged.
     """
-    path = run.path / MOTION
+    return tuple(_leg(run.path / leg.file, leg.name, run) for leg in run.legs)
+
+
+def _leg(path: Path, name: str, run: RunData) -> Trajectory:
     try:
-        return decode.trajectory(
-            path.read_bytes(), run_folder.transmission(run.joints), str(run.meta["name"])
-        )
+        return decode.trajectory(path.read_bytes(), run_folder.transmission(run.joints), name)
     except OSError as error:
         raise RunFolderError(
-            f"{run.path}: neither a plan nor {MOTION} can be read ({os_reason(error)}), "
-            "so the planned motion is not known",
-            "restore one of them from a copy, or run again",
+            f"{path}: cannot be read ({os_reason(error)}), so the planned motion is not known", RESTORE
         ) from error
-    except InputError as error:
-        raise RunFolderError(f"{path}: {error.problem}", "restore it from a copy, or run again") from error
+    except ArmtempoError as error:
+        raise RunFolderError(f"{path}: {error.problem}", RESTORE) from error
 
 
-def arm_of(run: RunData) -> Arm | None:
-    """The arm of a motion without a plan; None if it is not known. Raises InputError if its file is damaged."""
-    path = run.path / ARM
-    return arm_json.load(path) if path.is_file() else None
+def arms_of(run: RunData) -> list[Arm]:
+    """The arm on each leg of a run without a motion's plan, with what the tool holds there; empty if it is not known.
+
+    Raises InputError if its file is damaged.
+    """
+    sequence, arm = run.path / SEQUENCE, run.path / ARM
+    if sequence.is_file():
+        return [loaded for loaded, _ in SequencePlan.load(sequence).loaded_legs]
+    return [arm_json.load(arm)] * len(run.legs) if arm.is_file() else []
 
 
 @dataclass(frozen=True)
@@ -123,4 +129,4 @@ def speed_note(repetition: RepetitionData) -> str:
     rates = 100 * np.diff(repetition.path_s)[whole] / passed_s[whole]
     low, high = round(float(rates.min()), 1), round(float(rates.max()), 1)
     speed = f"at {high:g} %" if high - low < 1.0 else f"between {low:g} and {high:g} %"
-    return f"{repetition.file}: ran {speed} {SPEED_NOTE}; it is checked against the plan at that speed"
+    return f"ran {speed} {SPEED_NOTE}; it is checked against the plan at that speed"

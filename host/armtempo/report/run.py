@@ -1,4 +1,4 @@
-"""A recorded run: its samples, results and report."""
+"""A recorded run, of a motion or a sequence: its samples, results and report."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ from typing import Any
 import numpy as np
 
 from armtempo.basics.arguments import checked
+from armtempo.basics.errors import RunFolderError
 from armtempo.model.plan import Plan
-from armtempo.report import replayed, run_reader, run_report
+from armtempo.report import replayed, run_folder, run_reader, run_report
 from armtempo.report.replayed import JointResult, results
-from armtempo.report.run_folder import COMPLETE, Repetition
+from armtempo.report.run_folder import Repetition
+from armtempo.report.run_reader import RowPassed
 from armtempo.splines.trajectory import Trajectory
 
 
 @checked
 class Run:
-    """A run folder: the motion, and its recorded samples."""
+    """A run folder: what was run, a motion or a sequence, and the recorded samples."""
 
     def __init__(self, content: run_reader.RunData) -> None:
         self._content = content
@@ -39,7 +41,7 @@ class Run:
 
     @property
     def name(self) -> str:
-        """The motion's name on the board."""
+        """Its name on the board."""
         return str(self.meta["name"])
 
     @property
@@ -69,41 +71,76 @@ class Run:
         }
 
     @property
+    def state(self) -> str:
+        """How the last repetition ended, a sequence by the board; ``interrupted`` or ``broken`` if the host did not
+        receive that, ``running`` before the end."""
+        return self.entries[-1].state if self.entries else run_folder.RUNNING
+
+    @property
     def complete(self) -> bool:
         """Whether every repetition reached its end without a stop, a fault or a broken connection."""
-        return bool(self.repetitions) and all(one.state == COMPLETE for one in self.repetitions)
+        return bool(self.entries) and all(entry.complete for entry in self.entries)
+
+    @property
+    def rows(self) -> tuple[RowPassed, ...]:
+        """The rows of a sequence as they began; empty for a motion."""
+        return tuple(row for repetition in self.repetitions for row in repetition.rows)
+
+    @property
+    def last(self) -> RowPassed | None:
+        """The last reported row, which shows how far a sequence was at a power failure; None if there is none."""
+        return self.rows[-1] if self.rows else None
+
+    @property
+    def rows_lost(self) -> int:
+        """Number of rows before the last reported one that were not reported."""
+        return sum(one.rows[-1].passed - len(one.rows) for one in self.repetitions if one.rows)
 
     @cached_property
     def plan(self) -> Plan | None:
-        """The plan of the motion; None if it is not known, as for a motion that only the board had."""
+        """The plan of a motion; None if it is not known, as for a motion that only the board had, and for a
+        sequence."""
         return replayed.plan_of(self._content)
 
     @cached_property
-    def trajectory(self) -> Trajectory:
-        """The motion: as planned, or from the board's record.
+    def legs(self) -> tuple[Trajectory, ...]:
+        """The motions, one of a motion and all of a sequence: as planned, or from the board's records.
 
-        Raises RunFolderError if neither can be read.
+        Raises RunFolderError if one cannot be read.
         """
-        return self.plan.trajectory if self.plan is not None else replayed.trajectory_of(self._content)
+        return (self.plan.trajectory,) if self.plan is not None else replayed.legs_of(self._content)
 
     @property
-    def samples(self) -> np.ndarray[Any, np.dtype[np.void]]:
-        """All samples of all repetitions, (N,), as a structured array.
+    def trajectory(self) -> Trajectory:
+        """The only leg. Raises RunFolderError if there is not just one, or it cannot be read."""
+        if len(self._content.legs) != 1:
+            raise RunFolderError(
+                f"{self.path}: ran {len(self._content.legs)} motions", "take them from 'legs'"
+            )
+        return self.legs[0]
 
-        Fields: ``repetition`` (from 1), ``index`` of the sample in its repetition (from 0), ``time_s`` by the
-        board's motion clock and ``path_s`` in the motion's own time; and for each driven joint, (J,):
-        ``commanded_steps``, ``commanded_deg``, and ``angle_deg`` from the encoder (NaN without an encoder).
+    def leg_of(self, row: int) -> int:
+        """Number of the leg that a row runs, from 1; 0 for none."""
+        return self._content.rows[row].leg
+
+    @property
+    def samples(self) -> np.recarray[Any, np.dtype[np.void]]:
+        """All samples of all repetitions, (N,), as a structured array: ``samples["time_s"]`` or ``samples.time_s``.
+
+        Fields: ``repetition`` (from 1), ``run`` (the board's number of the motion's run), ``row`` (from 0; -1 if it
+        was not reported), ``index`` of the sample in its motion's run (from 0), ``time_s`` by the board's motion
+        clock and ``path_s`` in the motion's own time; and for each driven joint, (J,): ``commanded_steps``,
+        ``commanded_deg``, and ``angle_deg`` from the encoder (NaN without an encoder).
         """
         joints = len(self._content.joints)
+        whole = ("repetition", "run", "row", "index")
+        of_joints = (("commanded_steps", np.int64), ("commanded_deg", np.float64), ("angle_deg", np.float64))
         kind = np.dtype(
             [
-                ("repetition", np.int64),
-                ("index", np.int64),
+                *((name, np.int64) for name in whole),
                 ("time_s", np.float64),
                 ("path_s", np.float64),
-                ("commanded_steps", np.int64, (joints,)),
-                ("commanded_deg", np.float64, (joints,)),
-                ("angle_deg", np.float64, (joints,)),
+                *((name, of, (joints,)) for name, of in of_joints),
             ]
         )
         table = np.empty(sum(len(one.index) for one in self.repetitions), kind)
@@ -114,16 +151,20 @@ class Run:
             for name in kind.names[1:] if kind.names else ():
                 rows[name] = getattr(one, name)
             begin += len(one.index)
-        return table
+        return table.view(np.recarray)
 
     @property
     def results(self) -> tuple[JointResult, ...]:
-        """The final position of each joint in the last repetition; empty if it is not known."""
-        return results(self._content, self.trajectory)
+        """The final position of each joint in the last repetition of a motion; empty if it is not known."""
+        return results(self._content, self.legs[0]) if len(self._content.legs) == 1 else ()
 
     def report(self) -> Path:
-        """Write report.html and its figures into the run folder; returns the page.
+        """Write report.html, and for one motion its figures, into the run folder; returns the page.
 
-        Raises RunFolderError if the motion is not known or there is no sample, MissingPackageError without matplotlib.
+        Raises RunFolderError if a motion is not known or nothing was recorded, MissingPackageError without matplotlib.
         """
         return run_report.write(self.path)
+
+
+SequenceRun = Run
+"""An earlier name, of a run of a sequence."""

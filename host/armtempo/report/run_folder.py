@@ -1,15 +1,19 @@
 """The run folder: what was run and what was measured; readable at any time during the run.
 
+A run is a list of legs, the motions that the board replayed: one for a motion, all of them for a sequence.
+
 ::
 
-    run.json          what ran, when, on which board; how each repetition ended; meaning of the columns
-    trajectory.json   the plan, if known
+    run.json          what ran, when, on which board; legs and rows; how each repetition ended; meaning of the columns
+    trajectory.json   the plan of a motion, if known
+    sequence.json     the plan of a sequence, if known
     arm.json          without a plan: the arm
-    motion.bin        the record that the board replayed
+    leg-01.bin        the records that the board replayed, one per leg
     samples-01.csv    one file per repetition, one line per sample (see ``columns``)
+    rows-01.csv       of a sequence: one line per row, written when it begins (see ``ROW_COLUMNS``)
 
-``run.json`` is replaced as a whole; sample lines are flushed one by one, so that an interrupted run is readable
-up to its last complete line.
+``run.json`` is replaced as a whole; lines are flushed one by one, so that an interrupted run is readable up to its
+last complete line, and after a power failure shows how far a sequence was.
 """
 
 from __future__ import annotations
@@ -18,7 +22,7 @@ import csv
 import json
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,22 +30,63 @@ from types import TracebackType
 from typing import Any, Self
 
 from armtempo_shared import limits
+from armtempo_shared.sequence import ENDINGS, FINISHED
 
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.basics.installation import installed_version
-from armtempo.link.board_messages import Positions, Sample
+from armtempo.link.board_messages import Positions, RowBegun, Sample, SequenceState
 from armtempo.link.follow import Gap
 from armtempo.model.arm import Arm
 from armtempo.model.transmission import Transmission
 
 FORMAT = "armtempo run"
-VERSION = 1
+VERSION = 2
 META = "run.json"
 TRAJECTORY = "trajectory.json"
+SEQUENCE = "sequence.json"
 ARM = "arm.json"
-MOTION = "motion.bin"
 RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrupted", "fault", "broken"
+ROW_COLUMNS = {
+    "passed": "number of rows begun since the start, including this one; a jump means lost rows",
+    "time_s": "when it was reported, by the host's clock, seconds since the start",
+    "run": "the board's run number of the last motion; of this row's, if it moves",
+    "row": "number of the row in run.json, from 0",
+    "step": "number of the step in the sequence file, from 1",
+    "cycle": "finished passes of the outermost repeats",
+    "value": "value of the counter, if the row counts",
+    "words": "what it does",
+}
+
+
+def leg_file(number: int) -> str:
+    """File name of a leg's record; ``number`` from 1."""
+    return f"leg-{number:02d}.bin"
+
+
+@dataclass(frozen=True)
+class RunLeg:
+    """A motion of the run: its name on the board, and the file of its record."""
+
+    name: str
+    file: str
+
+
+@dataclass(frozen=True)
+class RunRow:
+    """A row of what was run; a motion has one."""
+
+    step: int
+    """Step of the sequence file, from 1."""
+    leg: int
+    """Number of the leg that it runs, from 1; 0 for none."""
+    words: str
+    """What it does."""
+
+
+def only_row(name: str) -> RunRow:
+    """The row of a motion."""
+    return RunRow(1, 1, f"run {name}")
 
 
 @dataclass(frozen=True)
@@ -103,28 +148,31 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
         if seen:
             same = same.replace("steps of all motors", "encoders of all motors")
             found[f"j{number}_angle_deg"] = f"{joint.name}: {same}"
-    return found
+    return found | {
+        "run": "the board's number of the motion's run",
+        "row": "number of its row in run.json, from 0; empty if the row was not reported",
+    }
 
 
-def row(sample: Sample, joints: Sequence[JointScale]) -> list[str]:
+def cells(sample: Sample, joints: Sequence[JointScale], row: int | None) -> list[str]:
     """One line of a sample file."""
-    cells = [str(sample.index), str(sample.ticks), f"{sample.ticks / limits.TICK_HZ:.9f}"]
-    cells.append(f"{sample.path_ticks / limits.TICK_HZ:.9f}")
+    found = [str(sample.index), str(sample.ticks), f"{sample.ticks / limits.TICK_HZ:.9f}"]
+    found.append(f"{sample.path_ticks / limits.TICK_HZ:.9f}")
     gears, positions = transmission(joints), sample.positions
     commanded_deg = gears.angles_of_steps(positions.commanded_steps)
     measured_deg = gears.angles_of_counts(positions.counts)
     for number, joint in enumerate(joints):
-        cells += [str(positions.commanded_steps[number]), f"{commanded_deg[number]:.6f}"]
+        found += [str(positions.commanded_steps[number]), f"{commanded_deg[number]:.6f}"]
         if joint.counts_per_deg:
-            cells.append(str(positions.counts[number]))
+            found.append(str(positions.counts[number]))
         if gears.measured[number]:
-            cells.append(f"{measured_deg[number]:.6f}")
-    return cells
+            found.append(f"{measured_deg[number]:.6f}")
+    return [*found, str(sample.run), "" if row is None else str(row)]
 
 
 @dataclass
 class Repetition:
-    """A repetition in run.json."""
+    """A repetition in run.json: one start of the motion or sequence."""
 
     file: str
     state: str = RUNNING
@@ -137,12 +185,26 @@ class Repetition:
     counts: tuple[int, ...] = ()
     notices: tuple[str, ...] = ()
     """Texts from the board."""
+    rows: str = ""
+    """File of a sequence's rows; "" for a motion."""
+    ended: dict[str, Any] = field(default_factory=dict)
+    """Of a sequence: ``step``, ``cycle`` and ``counters`` at its end; empty if the host did not receive it."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the motion or sequence reached its end."""
+        return self.state in (COMPLETE, ENDINGS[FINISHED])
 
     def end(self, state: str, fault: str, ticks: int, positions: Positions, lost: tuple[Gap, ...]) -> None:
-        """Store the end of the motion."""
+        """Store the end of a motion."""
         self.state, self.fault, self.lost = state, fault, lost
         self.duration_s = ticks / limits.TICK_HZ
         self.commanded_steps, self.counts = positions.commanded_steps, positions.counts
+
+    def end_rows(self, state: SequenceState, fault: str, counters: dict[str, int], duration_s: float) -> None:
+        """Store the end of a sequence."""
+        self.state, self.fault, self.duration_s = state.ending, fault, duration_s
+        self.ended = {"step": state.step, "cycle": state.cycle, "counters": counters}
 
 
 @dataclass
@@ -153,35 +215,52 @@ class RunFolder:
     name: str
     joints: tuple[JointScale, ...]
     origin: dict[str, Any] = field(default_factory=dict)
-    """More entries of run.json: port, board, arm, checksum of the motion."""
+    """More entries of run.json: port, board, arm."""
     started: str = field(default_factory=lambda: now())
+    legs: tuple[str, ...] = ()
+    """Names of the motions on the board; none given: one motion, ``name``."""
+    rows: tuple[RunRow, ...] = ()
+    """Of a sequence; none given: the motion's."""
     repetitions: list[Repetition] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if not self.rows:
+            self.legs, self.rows = (self.name,), (only_row(self.name),)
 
     def write(self) -> None:
         """Write run.json again."""
         meta = {
             "format": FORMAT,
             "version": VERSION,
-            **written_head(self.name, self.started),
+            "armtempo": installed_version(),
+            "name": self.name,
+            "started": self.started,
+            "written": now(),
             "joints": [joint.values for joint in self.joints],
+            "legs": [{"name": name, "file": leg_file(number)} for number, name in enumerate(self.legs, 1)],
+            "rows": [vars(row) for row in self.rows],
             "columns": columns(self.joints),
+            "row_columns": ROW_COLUMNS,
             **self.origin,
             "repetitions": [vars(repetition) for repetition in self.repetitions],
         }
-        write_meta(self.path, meta)
+        replace_text(self.path / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
 
-    def write_motion(self, data: bytes) -> None:
-        """Write the record that the board replays; raises RunFolderError if that fails."""
-        with writing(self.path / MOTION):
-            (self.path / MOTION).write_bytes(data)
+    def write_legs(self, records: Iterable[bytes]) -> None:
+        """Write the records that the board replays; raises RunFolderError if that fails."""
+        for number, data in enumerate(records, 1):
+            path = self.path / leg_file(number)
+            with writing(path):
+                path.write_bytes(data)
 
-    def begin_repetition(self) -> SampleFile:
-        """A new sample file, to be used as a context."""
-        repetition = Repetition(f"samples-{len(self.repetitions) + 1:02d}.csv")
-        file = SampleFile(self, repetition)
-        self.repetitions.append(repetition)
+    def begin_repetition(self, with_rows: bool = False) -> Recording:
+        """A new sample file, and one for the rows of a sequence, to be used as a context."""
+        number = len(self.repetitions) + 1
+        rows = f"rows-{number:02d}.csv" if with_rows else ""
+        recording = Recording(self, Repetition(f"samples-{number:02d}.csv", rows=rows))
+        self.repetitions.append(recording.repetition)
         self.write()
-        return file
+        return recording
 
 
 class RowFile:
@@ -207,23 +286,34 @@ class RowFile:
             self._file.close()
 
 
-def end_without_board(error: type[BaseException] | None) -> str:
-    """The state of what ended before the board said how, by the ``error`` that ended it."""
-    return INTERRUPTED if error is not None and issubclass(error, KeyboardInterrupt) else BROKEN
-
-
-class SampleFile:
-    """The sample file of a running repetition; leaving the context stores how it ended."""
+class Recording:
+    """The files of a running repetition; leaving the context stores how it ended."""
 
     def __init__(self, folder: RunFolder, repetition: Repetition) -> None:
         self.repetition = repetition
         self._folder = folder
-        self._rows = RowFile(folder.path / repetition.file, columns(folder.joints))
+        with ExitStack() as files:
+            self._samples = self._begun(repetition.file, columns(folder.joints), files)
+            self._rows = self._begun(repetition.rows, ROW_COLUMNS, files) if repetition.rows else None
+            self._files = files.pop_all()
 
-    def append(self, sample: Sample) -> None:
-        """Add a sample; raises RunFolderError if it cannot be written."""
-        self._rows.add(row(sample, self._folder.joints))
+    def _begun(self, name: str, head: Iterable[str], files: ExitStack) -> RowFile:
+        file = RowFile(self._folder.path / name, head)
+        files.callback(file.close)
+        return file
+
+    def append(self, sample: Sample, row: int | None = 0) -> None:
+        """Add a sample of a ``row``; raises RunFolderError if it cannot be written, as ``begin_row`` does."""
+        self._samples.add(cells(sample, self._folder.joints, row))
         self.repetition.samples += 1
+
+    def begin_row(self, row: RowBegun, time_s: float) -> None:
+        """A row of the sequence has begun."""
+        rows = self._folder.rows
+        words = rows[row.row].words if row.row < len(rows) else ""
+        numbers = (row.run, row.row, row.step, row.cycle, row.value)
+        if self._rows is not None:
+            self._rows.add([str(row.passed), f"{time_s:.3f}", *map(str, numbers), words])
 
     def __enter__(self) -> Self:
         return self
@@ -231,11 +321,15 @@ class SampleFile:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._rows.close()
+        self._files.close()
         if self.repetition.state == RUNNING:
-            self.repetition.state = end_without_board(kind)
-        with unless(value):
+            interrupted = kind is not None and issubclass(kind, KeyboardInterrupt)
+            self.repetition.state = INTERRUPTED if interrupted else BROKEN
+        try:
             self._folder.write()
+        except InputError:
+            if value is None:  # otherwise it says more
+                raise
 
 
 @contextmanager
@@ -269,16 +363,6 @@ def _made(parent: Path, name: str) -> Path:
 
 
 @contextmanager
-def unless(error: BaseException | None) -> Iterator[None]:
-    """Suppress an InputError after an earlier ``error``, which says more."""
-    try:
-        yield
-    except InputError:
-        if error is None:
-            raise
-
-
-@contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Convert OSError of writing ``path`` to RunFolderError."""
     try:
@@ -288,16 +372,6 @@ def writing(path: Path) -> Iterator[None]:
             f"{path}: cannot be written: {error.strerror}; what came before is kept",
             "free disk space, then run again",
         ) from None
-
-
-def written_head(name: str, started: str) -> dict[str, Any]:
-    """The entries of any run.json after its format: version, name, start."""
-    return {"armtempo": installed_version(), "name": name, "started": started, "written": now()}
-
-
-def write_meta(folder: Path, meta: dict[str, Any]) -> None:
-    """Write run.json into a run folder, atomically."""
-    replace_text(folder / META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
 
 
 def now() -> str:

@@ -1,10 +1,11 @@
-"""Reading run folders."""
+"""Reading run folders, also those of version 1, which has another layout for motions than for sequences."""
 
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,47 @@ from armtempo.basics.errors import RunFolderError
 from armtempo.basics.text import visible
 from armtempo.link.follow import Gap
 from armtempo.model.transmission import coupling_problem
-from armtempo.report.run_folder import FORMAT, META, TRAJECTORY, VERSION, JointScale, Repetition, transmission
-from armtempo.report.sequence_folder import FORMAT as SEQUENCE_FORMAT
+from armtempo.report.run_folder import (
+    FORMAT,
+    META,
+    TRAJECTORY,
+    VERSION,
+    JointScale,
+    Repetition,
+    RunLeg,
+    RunRow,
+    leg_file,
+    only_row,
+    transmission,
+)
 
+_FORMAT_1 = "armtempo sequence run"
+"""Format of a sequence's run folder of version 1."""
+_UNKNOWN = -1
 RESTORE = "restore the folder from a copy, or run again"
 _LARGEST = 2.0**53
 """Integers beyond this are not exact as doubles."""
 _LONGEST_S = 86_400.0
 """A day; longer than any motion on the board."""
+
+
+@dataclass(frozen=True)
+class RowPassed:
+    """A row of a sequence that has begun."""
+
+    passed: int
+    """Number of rows begun, including this one; a jump means lost rows."""
+    time_s: float
+    """Seconds since the start, by the host's clock."""
+    run: int
+    row: int
+    """From 0."""
+    step: int
+    """Step of the sequence file, from 1."""
+    cycle: int
+    value: int
+    """Value of the counter, if the row counts."""
+    words: str
 
 
 @dataclass(frozen=True)
@@ -35,7 +69,7 @@ class RepetitionData:
     state: str
     """How it ended, see ``run_folder``."""
     index: NDArray[np.int64]
-    """(N,), from 0; a jump means lost samples."""
+    """(N,), from 0 in each run of a motion; a jump means lost samples."""
     time_s: Array
     """(N,)"""
     path_s: Array
@@ -46,8 +80,29 @@ class RepetitionData:
     """(N, J)"""
     angle_deg: Array
     """(N, J), from the encoders; NaN for a joint without one."""
+    run: NDArray[np.int64]
+    """(N,), the board's number of the motion's run."""
+    row: NDArray[np.int64]
+    """(N,), the row in run.json; -1 if it was not reported."""
+    rows: tuple[RowPassed, ...] = ()
+    """The rows of a sequence in the order of their beginning."""
     problem: str = ""
-    """Why the file could not be read."""
+    """Why a file could not be read."""
+
+    def part(self, chosen: NDArray[np.int64], file: str, state: str) -> RepetitionData:
+        """Those of its samples that ``chosen`` indexes."""
+        return RepetitionData(
+            file,
+            state,
+            self.index[chosen],
+            self.time_s[chosen],
+            self.path_s[chosen],
+            self.commanded_steps[chosen],
+            self.commanded_deg[chosen],
+            self.angle_deg[chosen],
+            self.run[chosen],
+            self.row[chosen],
+        )
 
 
 @dataclass(frozen=True)
@@ -60,6 +115,8 @@ class RunData:
     repetitions: tuple[RepetitionData, ...]
     entries: tuple[Repetition, ...]
     """The repetitions in run.json."""
+    legs: tuple[RunLeg, ...] = ()
+    rows: tuple[RunRow, ...] = ()
 
     @property
     def trajectory_path(self) -> Path | None:
@@ -74,27 +131,26 @@ def load(path: Path) -> RunData:
     A repetition whose file is missing or damaged has no samples; ``problem`` says why.
     """
     meta = description(path)
-    if meta.get("format") == SEQUENCE_FORMAT:
-        raise RunFolderError(
-            f"{path} is the run of a sequence, not of one motion",
-            "'armtempo report' writes its page; read it with SequenceRun.load",
-        )
-    check_version(path, meta, FORMAT, VERSION)
     try:
         joints = scales(meta)
-        entries = tuple(_entry(entry) for entry in meta["repetitions"])
+        legs = tuple(_leg(entry) for entry in meta["legs"])
+        rows = tuple(_row(entry, len(legs)) for entry in meta["rows"])
+        entries = tuple(entry(values) for values in meta["repetitions"])
         meta |= {key: visible(str(meta[key])) for key in ("name", "started")}
     except (LookupError, TypeError, ValueError) as error:
-        raise wrong(path / META, error) from error
-    repetitions = tuple(_samples(path / entry.file, entry.state, joints) for entry in entries)
-    return RunData(path, meta, joints, repetitions, entries)
+        raise _wrong(path / META, error) from error
+    repetitions = tuple(_repetition(path, entry, joints, len(rows)) for entry in entries)
+    return RunData(path, meta, joints, repetitions, entries, legs, rows)
 
 
 def description(folder: Path) -> dict[str, Any]:
-    """The content of a folder's run.json; raises RunFolderError if it has none, or it is damaged."""
+    """The content of a folder's run.json, as of this version.
+
+    Raises RunFolderError if it has none, or it is damaged or of a later version.
+    """
     path = folder / META
     try:
-        found = json_text.loads(path.read_text(encoding="utf-8"))
+        meta = json_text.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise RunFolderError(
             f"{folder} is not a run folder: {META}: {error.strerror}",
@@ -102,25 +158,47 @@ def description(folder: Path) -> dict[str, Any]:
         ) from error
     except ValueError as error:
         raise RunFolderError(f"{path}: damaged: {error}", RESTORE) from error
-    return found if isinstance(found, dict) else {}
-
-
-def check_version(folder: Path, meta: Mapping[str, Any], form: str, version: int) -> None:
-    """Raise RunFolderError if a ``description`` is of another format or version."""
-    path = folder / META
-    if meta.get("format") != form:
+    if not isinstance(meta, dict) or meta.get("format") not in (FORMAT, _FORMAT_1):
         raise RunFolderError(
             f"{path}: not the description of an armtempo run",
             "give a folder that 'armtempo run' or 'armtempo fetch' wrote",
         )
-    if meta.get("version") != version:
+    version = meta.get("version")
+    try:
+        if version == 1:
+            return meta | (_of_sequence_1(meta) if meta["format"] == _FORMAT_1 else _of_motion_1(meta))
+    except (LookupError, TypeError, ValueError) as error:
+        raise _wrong(path, error) from error
+    if version != VERSION:
         raise RunFolderError(
-            f"{path}: version {meta.get('version')!r:.20}; this armtempo reads {version}",
+            f"{path}: version {version!r:.20}; this armtempo reads 1 and {VERSION}",
             "update armtempo, or read it with the version that wrote it",
         )
+    return meta
 
 
-def wrong(where: Path, error: Exception) -> RunFolderError:
+def _of_motion_1(meta: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of version 2 for a motion of version 1."""
+    name = str(meta["name"])
+    return {"legs": [{"name": name, "file": "motion.bin"}], "rows": [vars(only_row(name))]}
+
+
+def _of_sequence_1(meta: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of version 2 for a sequence of version 1."""
+    rows = [{"step": row["step"], "leg": row["motion"], "words": row["words"]} for row in meta["rows"]]
+    names = meta.get("motions", ())
+    legs = [{"name": name, "file": leg_file(number)} for number, name in enumerate(names, 1)]
+    ended = dict(meta["ended"])
+    entry = {
+        "file": "samples.csv",
+        "rows": "rows.csv",
+        "state": meta["state"],
+        "fault": ended.pop("code", ""),
+    }
+    return {"legs": legs, "rows": rows, "repetitions": [{**entry, "ended": ended}]}
+
+
+def _wrong(where: Path, error: Exception) -> RunFolderError:
     """The error for content that does not fit: a missing key, or a wrong value."""
     if isinstance(error, KeyError):
         return RunFolderError(f"{where}: {error} is missing", RESTORE)
@@ -140,64 +218,111 @@ def scales(meta: Mapping[str, Any]) -> tuple[JointScale, ...]:
 
 def _scale(joint: Mapping[str, Any]) -> JointScale:
     name = visible(str(joint["name"]))
-    row = tuple(map(finite, joint.get("coupling", ())))
-    found = JointScale(name, finite(joint["steps_per_deg"]), finite(joint["counts_per_deg"]), row)
+    row = tuple(map(_finite, joint.get("coupling", ())))
+    found = JointScale(name, _finite(joint["steps_per_deg"]), _finite(joint["counts_per_deg"]), row)
     if not found.steps_per_deg:
         raise ValueError("steps_per_deg is 0")
     return found
 
 
-def finite(value: Any) -> float:
+def _finite(value: Any) -> float:
     """A number from a file; raises ValueError if it is not finite, or too large to be exact, or none."""
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
     if not abs(number) <= _LARGEST:
         raise ValueError(f"{value!r:.20} is no number that a run can have")
     return number
 
 
-def whole(value: Any) -> int:
+def _whole(value: Any) -> int:
     """A whole number from a file; raises ValueError if it is too large to be exact, or none."""
-    number = int(value)
-    if abs(number) > _LARGEST or number != float(value):
-        raise ValueError(f"{value!r:.20} is no whole number that a run can have")
-    return number
+    number = _finite(value)
+    if number != int(number):
+        raise ValueError(f"{value!r:.20} is no whole number")
+    return int(number)
 
 
-def _entry(values: dict[str, Any]) -> Repetition:
-    """A repetition of run.json; keys of another version that do not fit are ignored."""
-    found = Repetition(visible(str(values["file"])), visible(str(values["state"])))
-    if Path(found.file).name != found.file:
-        raise ValueError(f"{found.file!r} is not the name of a file in the folder")
-    found.samples = whole(values.get("samples", 0))
-    found.lost = tuple(Gap(whole(first), whole(number)) for first, number in values.get("lost", ()))
-    found.duration_s = finite(values.get("duration_s", 0.0))
+def entry(values: Mapping[str, Any]) -> Repetition:
+    """A repetition of run.json; raises LookupError, TypeError or ValueError if it is wrong."""
+    found = Repetition(_file(values["file"]), visible(str(values["state"])))
+    found.rows = _file(values["rows"]) if values.get("rows") else ""
+    found.ended = _ended(values.get("ended", {}))
+    found.samples = _whole(values.get("samples", 0))
+    found.lost = tuple(Gap(_whole(first), _whole(number)) for first, number in values.get("lost", ()))
+    found.duration_s = _finite(values.get("duration_s", 0.0))
     found.fault = visible(str(values.get("fault", "")))
-    found.commanded_steps = tuple(map(whole, values.get("commanded_steps", ())))
-    found.counts = tuple(map(whole, values.get("counts", ())))
+    found.commanded_steps = tuple(map(_whole, values.get("commanded_steps", ())))
+    found.counts = tuple(map(_whole, values.get("counts", ())))
     if len(found.counts) != len(found.commanded_steps):
         raise ValueError("a repetition has not as many counts as commanded_steps")
     found.notices = tuple(visible(str(text)) for text in values.get("notices", ()))
     return found
 
 
-def _samples(path: Path, state: str, joints: tuple[JointScale, ...]) -> RepetitionData:
+def _ended(ended: Mapping[str, Any]) -> dict[str, Any]:
+    """The end of a sequence; empty if the host did not receive it."""
+    if not ended:
+        return {}
+    counters = {visible(name): _whole(value) for name, value in dict(ended["counters"]).items()}
+    return {"step": _whole(ended["step"]), "cycle": _whole(ended["cycle"]), "counters": counters}
+
+
+def _leg(values: Mapping[str, Any]) -> RunLeg:
+    return RunLeg(visible(str(values["name"])), _file(values["file"]))
+
+
+def _row(values: Mapping[str, Any], legs: int) -> RunRow:
+    found = RunRow(_whole(values["step"]), _whole(values["leg"]), visible(str(values["words"])))
+    if not 0 <= found.leg <= legs:
+        raise ValueError(f"there is no leg {found.leg}")
+    return found
+
+
+def _file(value: Any) -> str:
+    """The name of a file in the folder."""
+    found = visible(str(value))
+    if Path(found).name != found:
+        raise ValueError(f"{found!r} is not the name of a file in the folder")
+    return found
+
+
+def _repetition(folder: Path, entry: Repetition, joints: tuple[JointScale, ...], rows: int) -> RepetitionData:
+    """The samples and rows of a repetition."""
+    problems = []
+    lines: list[dict[str, str]] = []
+    passed: tuple[RowPassed, ...] = ()
     try:
-        return parsed(path, state, joints, whole_lines(path))
+        if entry.rows:
+            passed = tuple(map(_passed, _whole_lines(folder / entry.rows)))
     except OSError as error:
-        problem = f"missing ({error.strerror})"
+        problems.append(f"{entry.rows} is missing ({error.strerror})")
+    except (LookupError, ValueError) as error:
+        problems.append(f"{entry.rows} is damaged ({error})")
+    try:
+        lines = _whole_lines(folder / entry.file)
+        return _parsed(entry, joints, lines, rows, passed, "; ".join(problems))
+    except OSError as error:
+        problems.append(f"missing ({error.strerror})")
     except ValueError as error:
-        problem = f"damaged ({error})"
-    return replace(parsed(path, state, joints, []), problem=problem)
+        problems.append(f"damaged ({error})")
+    return _parsed(entry, joints, [], rows, passed, "; ".join(problems))
 
 
-def parsed(
-    path: Path, state: str, joints: tuple[JointScale, ...], rows: list[dict[str, str]]
+def _parsed(
+    entry: Repetition,
+    joints: tuple[JointScale, ...],
+    lines: list[dict[str, str]],
+    rows: int,
+    passed: tuple[RowPassed, ...],
+    problem: str,
 ) -> RepetitionData:
-    """The samples in the rows of a file; raises ValueError for a value that is missing, not a number, or impossible."""
-    table = {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
+    """The samples in the lines of a file; raises ValueError for a value that is missing, no number, or impossible."""
+    table = {name: [line[name] for line in lines] for name in (lines[0] if lines else ())}
 
     def column(name: str, largest: float) -> Array:
-        if rows and name not in table:
+        if lines and name not in table:
             raise ValueError(f"column {name} is missing")
         values = np.array(table.get(name, []), dtype=float)
         if not np.all(np.abs(values) <= largest):
@@ -205,26 +330,43 @@ def parsed(
         return values
 
     def joint_columns(name: str) -> Array:
-        cells = [column(f"j{number}_{name}", _LARGEST) for number in range(1, len(joints) + 1)]
-        return np.array(cells).reshape(len(joints), len(rows)).T
+        found = [column(f"j{number}_{name}", _LARGEST) for number in range(1, len(joints) + 1)]
+        return np.array(found).reshape(len(joints), len(lines)).T
 
-    angle_deg = np.full((len(rows), len(joints)), np.nan)
+    angle_deg = np.full((len(lines), len(joints)), np.nan)
     for number, seen in enumerate(transmission(joints).measured):
         if seen:
             angle_deg[:, number] = column(f"j{number + 1}_angle_deg", _LARGEST)
+    for name in {"run", "row"} - table.keys():  # a motion of version 1
+        table[name] = ["0"] * len(lines)
+    table["row"] = [text or str(_UNKNOWN) for text in table["row"]]
+    row = column("row", _LARGEST).astype(np.int64)
+    if row.size and not _UNKNOWN <= row.min() <= row.max() < rows:
+        raise ValueError("a sample of a row that does not exist")
     return RepetitionData(
-        path.name,
-        state,
+        entry.file,
+        entry.state,
         column("index", _LARGEST).astype(np.int64),
         column("time_s", _LONGEST_S),
         column("path_s" if "path_s" in table else "time_s", _LONGEST_S),
         joint_columns("commanded_steps").astype(np.int64),
         joint_columns("commanded_deg"),
         angle_deg,
+        column("run", _LARGEST).astype(np.int64),
+        row,
+        passed,
+        problem,
     )
 
 
-def whole_lines(path: Path) -> list[dict[str, str]]:
+def _passed(cells: Mapping[str, str]) -> RowPassed:
+    """A line of the file of rows."""
+    run, row, step, cycle, value = (_whole(cells[name]) for name in ("run", "row", "step", "cycle", "value"))
+    time_s, words = _finite(cells["time_s"]), visible(cells["words"])
+    return RowPassed(_whole(cells["passed"]), time_s, run, row, step, cycle, value, words)
+
+
+def _whole_lines(path: Path) -> list[dict[str, str]]:
     """The rows of a file of the run by column, without an incomplete last line.
 
     Raises ValueError for a row that has not a cell for each column.

@@ -1,4 +1,4 @@
-"""The report of a run folder: a page and its figures."""
+"""The report of a run folder: a page, and for one motion its figures."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from armtempo.kinematics import chain
 from armtempo.model.arm import Arm
 from armtempo.planning import torque
 from armtempo.report import arm_picture, drawing, html_page, plots, sections
-from armtempo.report.evaluation import Evaluation, evaluate
-from armtempo.report.run_folder import COMPLETE
+from armtempo.report.evaluation import Evaluation, LegEvaluation, evaluate
+from armtempo.report.run_folder import SEQUENCE, TRAJECTORY
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -31,20 +31,24 @@ _PATH_POINTS = 300
 
 
 def write(folder: Path) -> Path:
-    """Write report.html and its figures (SVG) into the run folder; returns the page's path.
+    """Write report.html, and for one motion its figures (SVG), into the run folder; returns the page's path.
 
-    Raises RunFolderError if the motion is not known, or there is no sample.
+    Raises RunFolderError if a motion is not known, or nothing was recorded.
     """
-    found = evaluate(folder)
-    drawn = figures(found)
+    return write_page(evaluate(folder))
+
+
+def write_page(found: Evaluation) -> Path:
+    """The same for a run that is evaluated already."""
+    drawn = figures(found.legs[0]) if found.single else {}
     for name, (figure, _) in drawn.items():
-        drawing.save(figure, folder / f"{name}.svg")
-    path = folder / PAGE
+        drawing.save(figure, found.run.path / f"{name}.svg")
+    path = found.run.path / PAGE
     replace_text(path, render(found, drawn))
     return path
 
 
-def figures(found: Evaluation) -> dict[str, tuple[Figure, str]]:
+def figures(found: LegEvaluation) -> dict[str, tuple[Figure, str]]:
     """The figures by file name, each with its caption."""
     trajectory, names, limits = found.trajectory, found.names, found.limits
     band = " with its standard error (band)" if found.curves.measured.any() else ""
@@ -89,7 +93,7 @@ def _of_arm(arm: Arm, trajectory: Trajectory) -> dict[str, tuple[Figure, str]]:
     return drawn
 
 
-def _what_is_seen(found: Evaluation) -> str:
+def _what_is_seen(found: LegEvaluation) -> str:
     """What the curves show."""
     measured = found.curves.measured
     if measured.all():
@@ -101,12 +105,12 @@ def _what_is_seen(found: Evaluation) -> str:
 
 def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
     """The page as HTML."""
-    meta = found.run.meta
-    done = sum(repetition.state == COMPLETE for repetition in found.run.repetitions)
-    arm = found.arm.name if found.arm else meta.get("arm", "not known")
+    meta, entries = found.run.meta, found.run.entries
+    done = sum(entry.complete for entry in entries)
+    arm = next((leg.arm.name for leg in found.legs if leg.arm), meta.get("arm", "not known"))
     sheet = html_page.Page(
         f"Run of {meta['name']!r}",
-        f"{meta['started']}, arm {arm}, {done} of {len(found.run.repetitions)} repetitions complete",
+        f"{meta['started']}, arm {arm}, {done} of {len(entries)} repetitions complete",
     )
     sections.result(sheet, found)
     for name, (figure, caption) in drawn.items():
@@ -114,12 +118,13 @@ def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
             sheet.heading(_HEADINGS[name])
         sheet.figure(drawing.inline_svg(figure, name, caption), caption)
         if name == "errors":
-            _planned(sheet, found)
+            _planned(sheet, found.legs[0])
+    sections.course(sheet, found)
     _origin(sheet, found)
     return sheet.render()
 
 
-def _planned(sheet: html_page.Page, found: Evaluation) -> None:
+def _planned(sheet: html_page.Page, found: LegEvaluation) -> None:
     sheet.heading("The plan")
     if found.plan:
         sections.plan_extremes(sheet, found.plan)
@@ -132,13 +137,17 @@ def _planned(sheet: html_page.Page, found: Evaluation) -> None:
 
 
 def _origin(sheet: html_page.Page, found: Evaluation) -> None:
-    meta, plan = found.run.meta, found.plan
+    run = found.run
+    plan = found.legs[0].plan if found.single else None
     sheet.heading("How to repeat it")
-    what = "trajectory.json" if plan else meta["name"]
-    sheet.code(f"armtempo run {what} --repeat {len(found.run.repetitions)}")
-    known: list[tuple[str, str]] = [(key, _flat(meta[key])) for key in ("port", "board") if key in meta]
-    if "virtual" in meta:
-        known.append(("virtual board", "yes" if meta["virtual"] else "no"))
+    there = [name for name in (TRAJECTORY, SEQUENCE) if (run.path / name).is_file()]
+    repeat = "" if any(entry.rows for entry in run.entries) else f" --repeat {len(run.repetitions)}"
+    sheet.code(f"armtempo run {[*there, run.meta['name']][0]}{repeat}")
+    known: list[tuple[str, str]] = [
+        (key, _flat(run.meta[key])) for key in ("port", "board") if key in run.meta
+    ]
+    if "virtual" in run.meta:
+        known.append(("virtual board", "yes" if run.meta["virtual"] else "no"))
     if plan:
         sections.plan_origin(sheet, plan, known)
     else:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from armtempo.model.plan import Plan
 from armtempo.planning import checks, path_deviation
 from armtempo.report import analysis, html_page, peaks, verdict
-from armtempo.report.evaluation import Evaluation
+from armtempo.report.evaluation import Evaluation, LegEvaluation
 from armtempo.report.run_folder import transmission
+from armtempo.report.run_reader import RepetitionData
 
 _MEASURED = {
     "joint": "",
@@ -28,7 +29,7 @@ _STEPS = {
     "steps made": "what the board counted in the last repetition",
     "one step (°)": "what one step turns the joint by; a coupled joint: one step of each of its motors",
     "command off plan (°)": "largest difference of the commanded from the planned angle at a sample: half a step is "
-    "rounding",
+    "rounding; up to its backlash while a motor crosses that",
 }
 _PEAKS = {
     "joint": "",
@@ -39,6 +40,19 @@ _PEAKS = {
     "verdict": f"{peaks.KEPT}, {peaks.WITHIN} or {peaks.EXCEEDED}: three uncertainties more or less do not change it, "
     f"else it {peaks.UNDECIDED}; a time-optimal motion reaches its limits, so no measurement could show that one is "
     "kept exactly",
+}
+_LEGS = {
+    "motion": "its number, as in the file NAME-1, NAME-2 … on the board",
+    "what": "",
+    "planned (s)": "how long it takes at 100 % speed",
+    "runs": "number of recorded runs",
+    "whole": "runs of which every sample arrived, to their end",
+    "joint": "",
+    "command off plan (steps)": "largest difference of the commanded from the planned angle at a sample: half a step "
+    "is rounding; up to its backlash while a motor crosses that",
+    "at the end (steps)": "largest difference of the step pulses from those planned, at the end of a run",
+    "largest (°)": "largest difference of the measured from the planned angle; – without an encoder",
+    "RMS (°)": "root mean square of these differences over all samples",
 }
 _MEASURED_PEAKS = ("measured", "verdict")
 """Columns that are omitted if nothing was measured."""
@@ -67,7 +81,68 @@ def result(sheet: html_page.Page, found: Evaluation) -> None:
     for text in found.complaints:
         if "cut short" in text:
             sheet.note(text, html_page.BAD)
-    sheet.heading("Result")
+    if found.single:
+        sheet.heading("Result")
+        _of_motion(sheet, found.legs[0])
+    elif found.legs:
+        sheet.heading("Its motions")
+        sheet.table(tuple(_LEGS), [row for leg in found.legs for row in _leg_rows(leg)], explained=_LEGS)
+    else:
+        sheet.note("No motion was recorded.")
+
+
+def course(sheet: html_page.Page, found: Evaluation) -> None:
+    """How a sequence went: its end, its counters, its cycles."""
+    for repetition, entry in zip(found.run.repetitions, found.run.entries, strict=True):
+        if entry.rows:
+            rows = [("ended", entry.state)]
+            if entry.ended:
+                rows += [("last step", str(entry.ended["step"])), ("whole cycles", str(entry.ended["cycle"]))]
+                rows += [(f"counter {name}", str(value)) for name, value in entry.ended["counters"].items()]
+            rows.append(("reported rows", str(len(repetition.rows))))
+            if (cycle_s := _cycle_s(repetition)) is not None:
+                rows.append(("time of a cycle, by the host's clock, median", f"{cycle_s:.3f} s"))
+            sheet.heading("How it went")
+            sheet.table(("what", "value"), rows)
+            sheet.note(f"Each row as it began is in {entry.rows}, each sample with its row in {entry.file}.")
+
+
+def _cycle_s(repetition: RepetitionData) -> float | None:
+    """Median time from the first reported row of a cycle to that of the next; None for fewer than three cycles."""
+    begins: dict[int, float] = {}
+    for row in repetition.rows:
+        begins.setdefault(row.cycle, row.time_s)
+    times = [begins[cycle + 1] - begun for cycle, begun in begins.items() if cycle + 1 in begins]
+    return float(np.median(times)) if len(times) > 1 else None
+
+
+def _leg_rows(leg: LegEvaluation) -> Iterator[list[object]]:
+    """The rows of _LEGS, one per joint."""
+    path_s, commanded_deg, angle_deg = (
+        np.concatenate([getattr(one, name) for one in leg.repetitions])
+        for name in ("path_s", "commanded_deg", "angle_deg")
+    )
+    planned_deg = leg.trajectory(np.minimum(path_s, leg.trajectory.duration_s))
+    command = np.abs(transmission(leg.joints).steps(commanded_deg - planned_deg)).max(axis=0)
+    measured = np.abs(angle_deg - planned_deg)
+    rms = np.sqrt(np.mean(measured**2, axis=0))
+    ends = np.array(leg.ends_steps) - verdict.planned_steps(leg)[1] if leg.ends_steps else None
+    for joint, name in enumerate(leg.names):
+        yield [
+            leg.number,
+            leg.words,
+            f"{leg.trajectory.duration_s:.3f}",
+            len(leg.repetitions),
+            leg.whole,
+            name,
+            html_page.number(command[joint], ".2f"),
+            "–" if ends is None else str(np.abs(ends[:, joint]).max()),
+            html_page.number(measured[:, joint].max(), ".3f"),
+            html_page.number(rms[joint], ".3f"),
+        ]
+
+
+def _of_motion(sheet: html_page.Page, found: LegEvaluation) -> None:
     if found.curves.measured.any():
         _measured(sheet, found)
     _steps(sheet, found)
@@ -77,7 +152,7 @@ def result(sheet: html_page.Page, found: Evaluation) -> None:
         sheet.note("The folder does not say which arm it was, so the motion is not checked against limits.")
 
 
-def _measured(sheet: html_page.Page, found: Evaluation) -> None:
+def _measured(sheet: html_page.Page, found: LegEvaluation) -> None:
     finals = analysis.final_errors(found.last, found.trajectory)
     lags = analysis.lags_s(found.curves, found.trajectory)
     deviation = analysis.deviations(found.curves)
@@ -98,19 +173,19 @@ def _measured(sheet: html_page.Page, found: Evaluation) -> None:
     sheet.table(tuple(_MEASURED), rows, "Measured against the plan: mean of the repetitions", _MEASURED)
 
 
-def _steps(sheet: html_page.Page, found: Evaluation) -> None:
+def _steps(sheet: html_page.Page, found: LegEvaluation) -> None:
     start, end = verdict.planned_steps(found)
     made = found.last.commanded_steps[-1] - start
-    step_deg = transmission(found.run.joints).step_deg
+    step_deg = transmission(found.joints).step_deg
     off = np.abs(found.last.commanded_deg - found.trajectory(found.last.path_s)).max(axis=0)
     rows = [
         [joint.name, str(end[n] - start[n]), str(made[n]), f"{step_deg[n]:.4f}", f"{off[n]:.4f}"]
-        for n, joint in enumerate(found.run.joints)
+        for n, joint in enumerate(found.joints)
     ]
     sheet.table(tuple(_STEPS), rows, "Step pulses", _STEPS)
 
 
-def _peaks(sheet: html_page.Page, found: Evaluation) -> None:
+def _peaks(sheet: html_page.Page, found: LegEvaluation) -> None:
     seen = bool(found.curves.measured.any())
     rows: list[Sequence[object]] = []
     for name, most, checked in zip(found.names, found.extremes, found.limit_checks, strict=True):

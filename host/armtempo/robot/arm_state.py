@@ -161,6 +161,7 @@ def difference(old: bytes, new: bytes) -> str:
     try:
         (old_head, old_joints, _), (new_head, new_joints, _) = armrecord.unpack(old), armrecord.unpack(new)
         wiring = [*zip(armrecord.unpack_outputs(old), armrecord.unpack_outputs(new), strict=True)]
+        wiring.append((armrecord.unpack_backlash(old), armrecord.unpack_backlash(new)))
     except armrecord.ArmRecordError:
         return "the board's record is of another version"
     if len(old_joints) != len(new_joints):
@@ -170,7 +171,9 @@ def difference(old: bytes, new: bytes) -> str:
         words = _describe_change(*rows)
         found.append(f"joint {number}: {words}" if words else "")
     found += [
-        what for what, (before, after) in zip(("outputs", "inputs"), wiring, strict=True) if before != after
+        what
+        for what, (before, after) in zip(("outputs", "inputs", "backlash"), wiring, strict=True)
+        if before != after
     ]
     return "other " + "; ".join(filter(None, found))
 

@@ -18,13 +18,12 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Hello, Status
 from armtempo.model.arm import Arm
 from armtempo.report.run import Run
-from armtempo.report.sequence_reader import SequenceRun
 from armtempo.robot import board_state, kept_position
-from armtempo.robot.board_io import BoardIO
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.connection import Connection
 from armtempo.robot.motions import Motions
 from armtempo.robot.motor_test import MotorTest
+from armtempo.robot.outputs import BoardIO
 from armtempo.robot.position import ArmPosition
 from armtempo.robot.programs import Programs
 from armtempo.robot.stop_request import StopRequest
@@ -135,7 +134,7 @@ class Board:
         return self.motions.last_run
 
     @property
-    def last_sequence(self) -> SequenceRun | None:
+    def last_sequence(self) -> Run | None:
         """The last sequence that this object recorded, even if it ended early; None before the first."""
         return self.motions.last_sequence
 

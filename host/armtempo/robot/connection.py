@@ -43,15 +43,10 @@ class Connection:
 
     def configure_for(self, plan: Plan | SequencePlan) -> None:
         """Set the board up for the arm of a plan, as ``configure``; InputError if a frame has changed since."""
-        name, frames = (
-            (f"plan {plan.job.name!r}", plan.job.frames)
-            if isinstance(plan, Plan)
-            else (f"sequence {plan.name!r}", plan.frames)
-        )
         if self.arm is None or arm_record(self.arm) != arm_record(plan.arm):
             self.configure(plan.arm)
             return
-        planned_for.check_frames(name, plan.arm, frames, self.arm)
+        planned_for.check_frames(f"plan {plan.name!r}", plan.arm, plan.frames, self.arm)
         self.configure(self.arm)  # it may have postures and frames that the plan's arm has not
 
     @contextmanager

@@ -18,7 +18,7 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.planning import point_to_point, via_points, workspace_check
 from armtempo.ports.names import is_sim
 from armtempo.robot import arm_state
@@ -137,12 +137,8 @@ def posture_deg(where: Where, arm: Arm) -> Array:
     Raises InputError for an unknown name, or a posture that does not fit the arm.
     """
     if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
-        where = Plan.load(where)
-    if isinstance(where, Plan):
-        return where.trajectory(0.0)
-    if isinstance(where, EncodedMotion):
-        return where.start_deg
-    if isinstance(where, SequencePlan):
+        where = load_plan(where)
+    if isinstance(where, Plan | SequencePlan | EncodedMotion):
         start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
         return point_to_point.posture(start_deg, where.arm)
     if isinstance(where, str):

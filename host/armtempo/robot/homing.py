@@ -161,14 +161,14 @@ class _GroupHoming:
         }
         self.told(f"{self._names(whole)}: on the way to the switch")
         gone_deg = self._approach(whole, FAST)
-        for index, way_deg in gone_deg.items():
-            self.told(f"{self._names([index])}: switch seen after {way_deg:.1f}°; once more, slowly")
+        for index, distance_deg in gone_deg.items():
+            self.told(f"{self._names([index])}: switch seen after {distance_deg:.1f}°; once more, slowly")
         self._approach_again()
         away_deg = {index: BACK_DEG + switch.outside_deg for index, switch in self.switches.items()}
         self._leave(away_deg)
-        for index, way_deg in away_deg.items():
+        for index, distance_deg in away_deg.items():
             switch = self.switches[index]
-            self.found_deg[index] = switch.trip_deg - switch.side * way_deg
+            self.found_deg[index] = switch.trip_deg - switch.side * distance_deg
         coupled = [self.arm.transmission.group(index) for index in self.switches]
         found = [index for group in coupled if set(group) <= self.found_deg.keys() for index in group]
         if found:
@@ -182,17 +182,17 @@ class _GroupHoming:
         pressed = list(self.switches)
         while pressed:
             self._leave(dict.fromkeys(pressed, BACK_DEG))
-            ways = self._approach(dict.fromkeys(pressed, 2 * BACK_DEG), SLOW)
+            moves = self._approach(dict.fromkeys(pressed, 2 * BACK_DEG), SLOW)
             pressed = []
-            for index, way_deg in ways.items():
-                left[index] += BACK_DEG - way_deg
-                if way_deg > 1.5 * BACK_DEG:
+            for index, distance_deg in moves.items():
+                left[index] += BACK_DEG - distance_deg
+                if distance_deg > 1.5 * BACK_DEG:
                     raise LinkError(
-                        f"{self.arm.driven[index].name}: its limit switch tripped {way_deg:.2f} degrees after it had "
-                        f"been left by {BACK_DEG:g}",
+                        f"{self.arm.driven[index].name}: its limit switch tripped {distance_deg:.2f} degrees after it "
+                        f"had been left by {BACK_DEG:g}",
                         "check its wiring and that it sits firmly",
                     )
-                if way_deg < 0.5 * BACK_DEG:
+                if distance_deg < 0.5 * BACK_DEG:
                     pressed.append(index)
             if stuck := [index for index in pressed if left[index] > MOST_PRESSED_DEG]:
                 self._fail_pressed(stuck)
@@ -205,22 +205,22 @@ class _GroupHoming:
             f"its level is probably inverted: the arm file has {levels}; or it is stuck, or wired to another pin",
         )
 
-    def _approach(self, ways_deg: dict[int, float], fraction: float) -> dict[int, float]:
+    def _approach(self, distances_deg: dict[int, float], fraction: float) -> dict[int, float]:
         """Move joints towards their switches until all have tripped; returns the distance of each, degrees."""
-        left = dict(ways_deg)
+        left = dict(distances_deg)
         gone = dict.fromkeys(left, 0.0)
         while left:
             moved, tripped = self._towards(left, fraction)
-            for index, way_deg in moved.items():
-                gone[index] += way_deg
-                left[index] -= way_deg
-            missed = [index for index, way_deg in left.items() if way_deg <= _TOLERANCE_DEG]
+            for index, distance_deg in moved.items():
+                gone[index] += distance_deg
+                left[index] -= distance_deg
+            missed = [index for index, distance_deg in left.items() if distance_deg <= _TOLERANCE_DEG]
             if tripped in left:
                 del left[tripped]
             elif missed:
                 raise LinkError(
-                    f"{self._names(missed)}: no limit switch tripped within {ways_deg[missed[0]]:.0f} degrees, its "
-                    "range and a margin",
+                    f"{self._names(missed)}: no limit switch tripped within {distances_deg[missed[0]]:.0f} degrees, "
+                    "its range and a margin",
                     "check its wiring, its pin and its level ('active') in the arm file, and where the joint stands",
                 )
             elif max(moved.values()) <= _TOLERANCE_DEG:
@@ -233,20 +233,20 @@ class _GroupHoming:
     def _towards(self, left: dict[int, float], fraction: float) -> tuple[dict[int, float], int]:
         """One motion towards the switches, at most over a range; returns each joint's distance, and whose
         switch tripped."""
-        ways = {}
-        for index, way_deg in left.items():
+        moves = {}
+        for index, distance_deg in left.items():
             switch = self.switches[index]
-            step_deg = min(way_deg, abs(switch.far_deg - switch.edge_deg))
-            ways[index] = (switch.edge_deg - switch.side * step_deg, switch.edge_deg)
-        ends, tripped = self._move(ways, fraction)
-        return {index: abs(end_deg - ways[index][0]) for index, end_deg in ends.items()}, tripped
+            step_deg = min(distance_deg, abs(switch.far_deg - switch.edge_deg))
+            moves[index] = (switch.edge_deg - switch.side * step_deg, switch.edge_deg)
+        ends, tripped = self._move(moves, fraction)
+        return {index: abs(end_deg - moves[index][0]) for index, end_deg in ends.items()}, tripped
 
-    def _leave(self, ways_deg: dict[int, float]) -> None:
-        ways = {}
-        for index, way_deg in ways_deg.items():
+    def _leave(self, distances_deg: dict[int, float]) -> None:
+        moves = {}
+        for index, distance_deg in distances_deg.items():
             switch = self.switches[index]
-            ways[index] = (switch.edge_deg, switch.edge_deg - switch.side * way_deg)
-        self._move(ways, FAST)
+            moves[index] = (switch.edge_deg, switch.edge_deg - switch.side * distance_deg)
+        self._move(moves, FAST)
 
     def _declare(self, found: list[int]) -> None:
         """Declare that joints are at the angles that were found for them."""
@@ -257,9 +257,11 @@ class _GroupHoming:
 
     def _go_home(self, found: list[int]) -> None:
         stands_deg = self._posture_deg()
-        ways = {index: (stands_deg[index], self.arm.driven[index].home_deg) for index in found}
-        ends, _ = self._move(ways, FAST)
-        stopped = [index for index, end_deg in ends.items() if abs(end_deg - ways[index][1]) > _TOLERANCE_DEG]
+        moves = {index: (stands_deg[index], self.arm.driven[index].home_deg) for index in found}
+        ends, _ = self._move(moves, FAST)
+        stopped = [
+            index for index, end_deg in ends.items() if abs(end_deg - moves[index][1]) > _TOLERANCE_DEG
+        ]
         if stopped:
             raise LinkError(
                 f"{self._names(stopped)}: a switch tripped on the way to its home posture",
@@ -270,7 +272,7 @@ class _GroupHoming:
         return ", ".join(self.arm.driven[index].name for index in joints)
 
     def _move(
-        self, ways_deg: dict[int, tuple[float, float]], fraction: float
+        self, turns_deg: dict[int, tuple[float, float]], fraction: float
     ) -> tuple[dict[int, float], int]:
         """Move joints at a fraction of their limits, each from and to an angle.
 
@@ -278,17 +280,17 @@ class _GroupHoming:
         """
         start_deg = self._posture_deg()
         end_deg = list(start_deg)
-        for index, (from_deg, to_deg) in ways_deg.items():
+        for index, (from_deg, to_deg) in turns_deg.items():
             start_deg[index], end_deg[index] = from_deg, to_deg
         slow_arm = _slowed(self.arm, fraction)
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
         motion = encoded_motion.of_trajectory(trajectory, self.arm)
-        end = replay(self.client, put_once(self.client, motion.data), self.stop, flags=self._flags(ways_deg))
+        end = replay(self.client, put_once(self.client, motion.data), self.stop, flags=self._flags(turns_deg))
         tripped = self.client.status().fault_joint
         raise_fault(end)
         self.stop.check()
         ends_deg = self.arm.transmission.angles_of_steps(end.positions.commanded_steps)
-        return {index: float(ends_deg[index]) for index in ways_deg}, tripped
+        return {index: float(ends_deg[index]) for index in turns_deg}, tripped
 
     def _flags(self, moving: Iterable[int]) -> int:
         """The flags of the start: also whose switches end it, if motors turn that do not show who moves."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from armtempo_shared.messages import RESUME
@@ -16,18 +17,18 @@ from armtempo.encoding import encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.link.board_messages import SequenceState
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, move_of
 from armtempo.report.run import Run
-from armtempo.report.sequence_reader import SequenceRun
-from armtempo.robot import arm_state, goto, jog, recording, sequence_recording, sequence_run, stored_motion
+from armtempo.report.run_folder import RunFolder
+from armtempo.robot import arm_state, goto, jog, recording, sequence_run, stored_motion
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
-from armtempo.robot.recording import Watcher
+from armtempo.robot.recording import RunContent, Watcher
 from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest
@@ -86,11 +87,11 @@ class Motions:
     ) -> Array:
         """Move a joint or the tool: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
 
-        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base or "tool-x", "tool-y",
-        "tool-z": the tool moves along it by ``by_mm``, or turns about it by ``by_deg``; ``speed``: fraction
-        of the speed limits, 0.01 to 1. The jog ends early at the end of a range, or if the tool cannot
-        continue along the line (``last_jog_ends`` says why). Returns the posture in degrees, (J,). Raises
-        LinkError if the position is unknown, InputError if no motion in that direction is possible.
+        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base, "tool-x", … of the tool or
+        "tray-x", … of a frame of the arm: the tool moves along it by ``by_mm``, or turns about it by
+        ``by_deg``; ``speed``: fraction of the speed limits, 0.01 to 1. The jog ends early at the end of a range,
+        or if the tool cannot continue along the line (``last_jog_ends`` says why). Returns the posture in degrees,
+        (J,). Raises LinkError if the position is unknown, InputError if no motion in that direction is possible.
         """
         arm = self._board.known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
@@ -142,35 +143,48 @@ class Motions:
 
     def run(
         self,
-        motion: Plan | EncodedMotion | Path | str,
+        motion: Plan | SequencePlan | EncodedMotion | Path | str,
         repeat: int = 1,
         out: Path | str = "runs",
         progress: Progress | None = None,
         watcher: Watcher | None = None,
         stop: StopRequest | None = None,
     ) -> Run:
-        """Replay a motion ``repeat`` times, 1 to 99, and record it in a new run folder in ``out``.
+        """Replay a motion ``repeat`` times, 1 to 99, or run a sequence, and record it in a new run folder in ``out``.
 
-        ``motion``: a plan, its file (FILE.json), or the name of a motion on the board. The arm must be homed
-        and at the start of the motion; the arm of a virtual board is moved there. Between repetitions it
-        returns along the same path. The speed is that of the last ``speed`` call. ``progress`` counts seconds
-        of motion; ``watcher`` is called with folder, samples and repetitions. If the run ends early, it
-        raises, and ``last_run`` holds the recording. Raises LinkError if the arm is not homed or not at the
-        start, the board has another motion of this name (``upload`` can replace it), or is set up for another
-        arm.
+        ``motion``: a plan, its file (FILE.json), or the name of a motion or sequence on the board; a sequence
+        takes neither ``repeat`` nor ``progress`` nor ``watcher``. The arm must be homed and at the start; the
+        arm of a virtual board is moved there. Between repetitions it returns along the same path. The speed is
+        that of the last ``speed`` call. ``progress`` counts seconds of motion; ``watcher`` is called with
+        folder, samples and repetitions. If the run ends early, it raises, and ``last_run`` holds the recording.
+        Raises LinkError if the arm is not homed or not at the start, the board has another motion of this name
+        (``upload`` can replace it), or is set up for another arm.
         """
         if not 1 <= repeat <= MOST_REPETITIONS:
             raise InputError(f"repeat: {repeat} is not in the range 1<=x<={MOST_REPETITIONS}", "change it")
+        if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
+            motion = load_plan(motion)
+        if isinstance(motion, SequencePlan) or (isinstance(motion, str) and self._is_sequence(motion)):
+            if repeat != 1 or progress is not None or watcher is not None:
+                raise InputError(
+                    "run: a sequence takes no repeat, progress or watcher",
+                    "leave them out; its steps repeat it, 'run_sequence' takes a watcher of its states",
+                )
+            self.run_sequence(motion, stop=stop, out=out)
+            return Run.load(cast(Path, self._last_folder))
         encoded = self._encoded(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._board.stoppable(stop) as wanted:
             self._bring_to_start(encoded, wanted)
-            folder = recording.new_run(Path(out), encoded, self._board.port, self._board.client)
-            self._last_folder = folder.path
+            folder = self._recorded(recording.of_motion(encoded), Path(out))
             seen.begin(encoded, folder)
             for _ in recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen):
                 pass
         return Run.load(folder.path)
+
+    def _is_sequence(self, name: str) -> bool:
+        found = self._board.client.find(stored_name(name))
+        return found is not None and found.sequence
 
     def run_sequence(
         self,
@@ -192,16 +206,17 @@ class Motions:
             key = self._sequence(sequence, wanted, replace)
             if out is None:
                 return sequence_run.run(self._board.client, key, wanted, watcher)
+            client = self._board.client
             content = (
-                sequence_recording.fetched(self._board.client, sequence, self._board.known_arm())
+                recording.of_stored_sequence(client, sequence, self._board.known_arm())
                 if isinstance(sequence, str)
-                else sequence_recording.of_plan(sequence)
+                else recording.of_sequence(sequence)
             )
-            with sequence_recording.recorder(
-                self._board.client, content, Path(out), self._board.port
-            ) as recorder:
-                self._last_sequence = recorder.path
-                return sequence_run.run(self._board.client, key, wanted, watcher, recorder)
+            folder = self._recorded(content, Path(out))
+            self._last_sequence = folder.path
+            with folder.begin_repetition(with_rows=True) as file:
+                events = recording.RowRecorder(client, file, content.rows)
+                return sequence_run.run(client, key, wanted, watcher, events)
 
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
         """Store the sequence if it is a plan, and move a virtual arm to its start; returns its key."""
@@ -222,15 +237,22 @@ class Motions:
         )
         return key
 
+    def _recorded(self, content: RunContent, out: Path) -> RunFolder:
+        """A new run folder in ``out``, that of ``last_run``."""
+        folder = recording.new_run(out, content, self._board.port, self._board.client)
+        self._last_folder = folder.path
+        return folder
+
     @property
     def last_run(self) -> Run | None:
-        """The last run that this object recorded, even if it ended early; None before the first."""
+        """The last run that this object recorded, of a motion or a sequence, even if it ended early; None before the
+        first."""
         return Run.load(self._last_folder) if self._last_folder else None
 
     @property
-    def last_sequence(self) -> SequenceRun | None:
+    def last_sequence(self) -> Run | None:
         """The last sequence that this object recorded, even if it ended early; None before the first."""
-        return SequenceRun.load(self._last_sequence) if self._last_sequence else None
+        return Run.load(self._last_sequence) if self._last_sequence else None
 
     def fetch(self, motion: Plan | EncodedMotion | Path | str | None = None, out: Path | str = "runs") -> Run:
         """Write the samples that the board kept of its last run into a new run folder in ``out``.

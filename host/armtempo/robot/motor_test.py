@@ -232,26 +232,32 @@ def judge_encoder(joint: DrivenJoint, steps: int, counts: int) -> tuple[Measurem
 def judge_backlash(
     joint: DrivenJoint, reversed_: Moved, further: Moved
 ) -> tuple[Measurement | None, list[str]]:
-    """The backlash of a joint, by the encoder on it; also returns lines for the arm file.
+    """The backlash of a joint, by the encoder on it and what its motor crosses; also returns lines for the arm file.
 
     ``reversed_``: a move in the other direction than the one before; ``further``: one as far in the same direction,
     with the play taken up. Both ends of a move are counts that may be off by one. None if the encoder does not count.
     """
     what, within_deg = f"{joint.name}: backlash", _NOISE_COUNTS / joint.counts_per_deg
     seen, whole = abs(reversed_.counts), abs(further.counts)
-    lost_deg = (whole - seen) / joint.counts_per_deg
+    lost_deg, crossed_deg = (whole - seen) / joint.counts_per_deg, joint.motor.backlash_deg
     if whole <= _NOISE_COUNTS:
         return None, []
-    if lost_deg <= within_deg:
-        return Measurement(PART, what, f"none that its encoder shows, less than {within_deg:.2g}°"), []
+    if abs(lost_deg) <= within_deg or (lost_deg < 0.0 and not crossed_deg):
+        beside = f" beside the {crossed_deg:g}° that its motor crosses" if crossed_deg else ""
+        measured = f"none that its encoder shows{beside}, less than {within_deg:.2g}°"
+        return Measurement(PART, what, measured), []
     if seen <= _NOISE_COUNTS:
         size_deg = abs(reversed_.steps) / joint.steps_per_deg
         measured = f"it did not move in the first {size_deg:.2g}° after it was reversed"
         cure = "look for a loose coupling, belt or set screw; its encoder was not checked"
         return judged(PART, what, measured, f"less than {size_deg:.2g}°", False, cure), []
-    measured = f"{lost_deg:.2g}° within {within_deg:.2g}°, of the joint against its motor"
+    whole_deg = max(crossed_deg + lost_deg, 0.0)
+    measured = f"{whole_deg:.2g}° within {within_deg:.2g}°, of the joint against its motor"
+    if crossed_deg:
+        measured += f", which crosses {crossed_deg:g}°"
     return Measurement(PART, what, measured), [
-        f"model: backlash_deg = {lost_deg:.2g} or so, for the virtual arm"
+        f"motor: backlash_deg = {whole_deg:.2g} or so, which its motor then crosses at each reversal; for the virtual "
+        "arm the same in model"
     ]
 
 

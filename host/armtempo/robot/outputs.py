@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
+from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import LinkError
 from armtempo.link.board_messages import Levels
 from armtempo.model.arm import Arm
 from armtempo.model.outputs import Input, Output
+from armtempo.robot.connection import Connection
 
 _LOOK_S = 0.02
 
@@ -80,3 +82,19 @@ class BoardInput:
                     f"look at its wiring (pin {self.input.pin}, active {self.input.active}), or wait longer",
                 )
             time.sleep(_LOOK_S)
+
+
+@checked_as("Board")
+class BoardIO:
+    """``Board.io``: the arm's outputs and inputs."""
+
+    def __init__(self, board: Connection) -> None:
+        self._board = board
+
+    def output(self, name: str) -> BoardOutput:
+        """An output of the arm by name; raises InputError if the arm has no such output or is not known."""
+        return BoardOutput(self._board.client, self._board.configured_arm(), name)
+
+    def input(self, name: str) -> BoardInput:
+        """An input of the arm by name; raises as ``output``."""
+        return BoardInput(self._board.client, self._board.configured_arm(), name)

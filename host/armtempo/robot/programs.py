@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from armtempo.basics.arguments import checked_as
@@ -10,15 +11,28 @@ from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_program
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.encoding.encoded_program import EncodedProgram
-from armtempo.link.board_messages import SequenceState
+from armtempo.link.board_messages import Event, Notice, SequenceState
 from armtempo.model.arm import Arm
 from armtempo.model.job import is_name
 from armtempo.model.user_program import UserProgram
-from armtempo.robot import program_run
+from armtempo.robot import sequence_run
 from armtempo.robot.connection import Connection
-from armtempo.robot.program_run import Listener
-from armtempo.robot.sequence_run import SequenceWatcher
+from armtempo.robot.sequence_run import Events, SequenceWatcher
 from armtempo.robot.stop_request import StopRequest
+
+Listener = Callable[[str], object]
+"""Called with each line that a program prints, and with the traceback of a failure."""
+
+
+class _Notices(Events):
+    """Passes on the board's texts."""
+
+    def __init__(self, listener: Listener) -> None:
+        self._listener = listener
+
+    def take(self, event: Event) -> None:
+        if isinstance(event, Notice):
+            self._listener(event.text)
 
 
 @checked_as("Board")
@@ -65,7 +79,7 @@ class Programs:
         if not isinstance(program, EncodedProgram):
             program = self.encode(program, self._board.known_arm())
         self._board.configure(program.arm)
-        key = program_run.store(self._board.client, program, progress, replace)
+        key = sequence_run.store(self._board.client, program, progress, replace)
         if default:
             self._board.client.set_default(key.name)
         return key
@@ -93,4 +107,6 @@ class Programs:
                 key = self.upload(program, replace=replace)
             if self._board.arm is not None:
                 self._board.start.home_virtual_arm(self._board.arm)
-            return program_run.run(self._board.client, key, wanted, listener, watcher)
+            return sequence_run.run(
+                self._board.client, key, wanted, watcher, _Notices(listener), program=True
+            )

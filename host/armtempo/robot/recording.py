@@ -1,28 +1,34 @@
-"""Recording runs: the run folder, its repetitions, and the samples of a run without a host."""
+"""Recording runs of motions and sequences: the run folder, its repetitions, and the samples of a run without a host."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.sequence import MOVE, SequenceData, SequenceError
 
-from armtempo.basics.errors import LinkError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_motion, encoded_sequence
 from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link import Client
-from armtempo.link.board_messages import Sample
+from armtempo.link.board_messages import Event, RowBegun, Sample, SequenceState
 from armtempo.link.follow import Follower, RunEnd
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.report import run_folder
-from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder
+from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Recording, Repetition, RunFolder, RunRow
 from armtempo.robot.goto import move_once
+from armtempo.robot.sequence_run import Events
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
 
+ACKNOWLEDGED = 8
+"""Received samples of a sequence are acknowledged to the board after this many."""
 _END_S = 1e-3
 """A run that ended earlier than its motion by more than this was stopped."""
 
@@ -63,23 +69,95 @@ class ProgressWatcher(Watcher):
         self._inner.end(repetition)
 
 
-def origin(client: Client, arm: Arm, port: str) -> dict[str, Any]:
-    """The entries of any run.json on arm and board."""
-    return {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
+@dataclass(frozen=True, eq=False)
+class RunContent:
+    """What is run: the records of its legs, and the rows that run them."""
+
+    name: str
+    arm: Arm
+    legs: tuple[tuple[str, bytes], ...]
+    """Name on the board and record of each."""
+    rows: tuple[RunRow, ...] = ()
+    """Of a sequence."""
+    plan: Plan | SequencePlan | None = None
+    """None if only the board had it."""
 
 
-def new_run(parent: Path, motion: EncodedMotion, port: str, client: Client) -> RunFolder:
+def of_motion(motion: EncodedMotion) -> RunContent:
+    """A motion: a run of one leg."""
+    return RunContent(motion.name, motion.arm, ((motion.name, motion.data),), plan=motion.plan)
+
+
+def of_sequence(plan: SequencePlan) -> RunContent:
+    """A planned sequence."""
+    legs = tuple((motion.name, motion.data) for motion in encoded_sequence.of_plan(plan).motions)
+    rows = tuple(_row(row.op, row.number, row.step, row.words) for row in plan.rows)
+    return RunContent(plan.name, plan.arm, legs, rows, plan)
+
+
+def of_stored_sequence(client: Client, name: str, arm: Arm) -> RunContent:
+    """A sequence on the board; raises InputError if its record is damaged or of another version."""
+    try:
+        record = SequenceData(client.fetch(name))
+    except SequenceError as error:
+        raise InputError(
+            f"sequence {name!r} on the board: {error}", "plan it again and 'armtempo upload --force' it"
+        ) from error
+    names = [record.motion(index)[0] for index in range(record.motions)]
+    rows = [record.row(index) for index in range(record.rows)]
+    described = zip(rows, encoded_sequence.describe(record, arm), strict=True)
+    return RunContent(
+        name,
+        arm,
+        tuple((leg, client.fetch(leg)) for leg in names),
+        tuple(_row(op, number, step, words) for (op, number, _, _, step), words in described),
+    )
+
+
+def _row(op: int, number: int, step: int, words: str) -> RunRow:
+    return RunRow(step, number + 1 if op == MOVE else 0, words)
+
+
+def new_run(parent: Path, content: RunContent, port: str, client: Client) -> RunFolder:
     """A new run folder with everything that is needed to repeat the run."""
-    where = {**origin(client, motion.arm, port), "motion_crc": f"{motion.key.crc:08x}"}
-    with run_folder.new_folder(parent, motion.name) as path:
-        folder = RunFolder(path, motion.name, run_folder.scales(motion.arm), where)
-        folder.write_motion(motion.data)
-        if motion.plan is not None:
-            motion.plan.save(path / run_folder.TRAJECTORY)
+    arm, plan = content.arm, content.plan
+    where = {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
+    names = tuple(name for name, _ in content.legs)
+    with run_folder.new_folder(parent, content.name) as path:
+        folder = RunFolder(path, content.name, run_folder.scales(arm), where, legs=names, rows=content.rows)
+        folder.write_legs(data for _, data in content.legs)
+        if plan is None:
+            arm_json.save(arm, path / run_folder.ARM)
         else:
-            arm_json.save(motion.arm, path / run_folder.ARM)
+            plan.save(path / (run_folder.TRAJECTORY if isinstance(plan, Plan) else run_folder.SEQUENCE))
         folder.write()
     return folder
+
+
+class RowRecorder(Events):
+    """Records a running sequence: its rows and samples."""
+
+    def __init__(self, client: Client, recording: Recording, rows: Sequence[RunRow]) -> None:
+        self._client = client
+        self._recording = recording
+        self._rows = rows
+        self._begun_s = client.session.clock()
+        self._run, self._row = 0, -1  # number of the motion's run that was reported last, and its row
+
+    def take(self, event: Event) -> None:
+        if isinstance(event, RowBegun):
+            self._recording.begin_row(event, self._client.session.clock() - self._begun_s)
+            if event.row < len(self._rows) and self._rows[event.row].leg:
+                self._run, self._row = event.run, event.row
+        elif isinstance(event, Sample):
+            self._recording.append(event, self._row if event.run == self._run else None)
+            if self._recording.repetition.samples % ACKNOWLEDGED == 0:
+                self._client.samples(event.index + 1)
+
+    def end(self, state: SequenceState) -> None:
+        taken_s = self._client.session.clock() - self._begun_s
+        code = fault_name(state.code)
+        self._recording.repetition.end_rows(state, code, self._client.counters(), taken_s)
 
 
 def repeat(
@@ -135,7 +213,7 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
             "fetch samples before the next run and before a reset; 'armtempo run' starts a new run",
         )
     follower = Follower(client, status.run)
-    folder = new_run(folder_in, motion, port, client)
+    folder = new_run(folder_in, of_motion(motion), port, client)
     with folder.begin_repetition() as file:
         for sample in follower.samples():
             file.append(sample)

@@ -187,7 +187,8 @@ def tracking() -> Figure:
     """The demo's motion, measured and planned."""
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([sys.executable, *TOOL, "demo"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
-        return run_report.figures(evaluate(Path(folder) / "runs" / "feed-001"))["tracking"][0]
+        (leg,) = evaluate(Path(folder) / "runs" / "feed-001").legs
+        return run_report.figures(leg)["tracking"][0]
 
 
 def _slowest(plan: Any, joint: int) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ from armtempo.basics.errors import PlanError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
+from armtempo.model.frame import ArmFrame
+from armtempo.model.pose import from_rpy
 from armtempo.panel import teaching, words
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.robot import homing
@@ -24,10 +27,11 @@ from tests.host.panel.pages import pages
 def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
     here = np.array([10.0, -60.0, 40.0])
     place = forward(ARM, (20.0, -70.0, 50.0))[:3, 3].tolist()
-    found = teaching.nearest(ARM, place, (0.0, 0.0, 0.0), here)
+    wanted = from_rpy(place, (0.0, 0.0, 0.0))
+    found = teaching.nearest(ARM, wanted, here)
     assert forward(ARM, found)[:3, 3] == pytest.approx(place, abs=0.1)
     with pytest.raises(PlanError):
-        teaching.nearest(ARM, [9999.0, 0.0, 0.0], (0.0, 0.0, 0.0), here)
+        teaching.nearest(ARM, from_rpy((9999.0, 0.0, 0.0), (0.0, 0.0, 0.0)), here)
 
 
 def test_what_the_switches_home_is_named_in_its_order() -> None:
@@ -60,6 +64,43 @@ def test_a_jog_that_is_not_possible_is_grey_with_the_reason(operator: PanelBoard
         assert not page.named("⟳ x +").enabled
         reasons = [control.reason for control in page.of.controls if control.element is page.named("⟳ x +")]
         assert "the arm cannot turn the tool about x from here" in reasons[0]
+
+
+def test_the_tool_is_jogged_along_the_axes_of_a_frame(operator_of: Callable[[Arm], PanelBoard]) -> None:
+    turned = ((0.0, -1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    operator = operator_of(replace(ARM, frames=(ArmFrame("tray", turned), ArmFrame("joints", turned))))
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        assert page.named("tray z +").enabled
+        assert not _in_view(page.named("joints z +"))
+        assert _in_view(page.named("joint 1 +"))
+        page.named(words.FRAME).value = "joints"
+        assert _in_view(page.named("joints z +"))
+        assert not _in_view(page.named("joint 1 +"))
+        turn = page.named("⟳ tray y +")  # about the base's x
+        (reason,) = [control.reason for control in page.of.controls if control.element is turn]
+        assert "the arm cannot turn the tool about tray-y from here" in reason
+
+
+def _in_view(element: Any) -> bool:
+    return all(around.visible for around in element.ancestors(include_self=True))
+
+
+def test_a_typed_pose_is_in_the_chosen_frame(operator_of: Callable[[Arm], PanelBoard]) -> None:
+    turned = ((0.0, -1.0, 0.0, 50.0), (1.0, 0.0, 0.0, -20.0), (0.0, 0.0, 1.0, 10.0), (0.0, 0.0, 0.0, 1.0))
+    operator = operator_of(replace(ARM, frames=(ArmFrame("tray", turned),)))
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        there = np.linalg.inv(turned) @ forward(ARM, operator.live.angles_deg)
+        page.named(words.FRAME_OF_POSE).value = "tray"
+        page.fire(page.named(words.TAKE_PRESENT), "click")
+        fields = [page.named(name).value for name in words.POSE_FIELDS]
+        assert fields[:3] == pytest.approx(there[:3, 3].tolist(), abs=0.01)
+        shown = [page.of.scene]
+        page.of.show_ghost = shown.append  # type: ignore[method-assign, assignment]
+        page.named(words.TYPED_TARGET).value = "pose"
+        page.fire(page.named(words.SHOW), "click")
+        np.testing.assert_allclose(shown[-1], operator.live.angles_deg, atol=0.1)
 
 
 def test_homing_names_and_shows_the_posture_of_home_first(

@@ -15,6 +15,7 @@ import pytest
 from armtempo.basics.errors import RunFolderError
 from armtempo.panel import layout, past_runs, words
 from armtempo.panel.panel_board import PanelBoard
+from armtempo.report import run_report
 from armtempo.report.comparison import PAGE as COMPARISON
 
 from tests.host.panel.fakes import ARM, board_state
@@ -24,8 +25,14 @@ from tests.host.panel.pages import Page, pages
 def test_runs_of_the_command_line_are_listed_the_newest_first(tmp_path: Path) -> None:
     for number, (name, state) in enumerate({"feed-001": "complete", "feed-002": "fault"}.items()):
         (tmp_path / name).mkdir()
-        made = {"duration_s": 6.8, "fault": "" if state == "complete" else "estop", "state": state}
-        meta = {"format": "armtempo run", "started": "2026-01-02T03:04:05+00:00", "repetitions": [made, made]}
+        fault = "" if state == "complete" else "estop"
+        made = {"file": "samples-01.csv", "duration_s": 6.8, "fault": fault, "state": state}
+        meta: dict[str, Any] = {
+            "format": "armtempo run",
+            "version": 2,
+            "started": "2026-01-02T03:04:05+00:00",
+        }
+        meta["repetitions"] = [made, made]
         (tmp_path / name / "run.json").write_text(json.dumps(meta))
         os.utime(tmp_path / name / "run.json", (1000 + number, 1000 + number))
     for name, text in (("damaged", "{"), ("other", "[1]"), ("empty", "{}")):
@@ -38,7 +45,7 @@ def test_runs_of_the_command_line_are_listed_the_newest_first(tmp_path: Path) ->
         ("feed-001", "13.6 s", "complete"),
     ]
     assert {row.ending for row in rows[2:]} == {"cannot be read"}
-    with pytest.raises(RunFolderError, match="cannot be read"):
+    with pytest.raises(RunFolderError, match="damaged"):
         past_runs.report(tmp_path, "damaged")
 
 
@@ -71,7 +78,7 @@ def test_a_report_is_made_once_and_again_when_the_run_was_written_since(
         with ThreadPoolExecutor(2) as threads:
             return set(threads.map(lambda _: past_runs.report(tmp_path, "feed"), range(2)))
 
-    monkeypatch.setattr(past_runs, "_write_report", write)
+    monkeypatch.setattr(run_report, "write", write)
     assert asked() == {b"report 1"}
     os.utime(meta.with_name(past_runs.REPORT_PAGE), (1, 1))  # the run was written since
     assert asked() == {b"report 2", b"report 3"}

@@ -127,3 +127,25 @@ def test_what_is_being_typed_into_a_step_stays_when_another_changes(
         assert page.named("step 1: repeat").value == "5"
         assert page.named("step 3: wait_s") is typed
         assert typed.value == "7"
+
+
+def test_planning_is_seen_and_not_begun_twice(
+    operator: PanelBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    operator.sequences.open("day.toml")
+    during: list[str] = []
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        buttons = [words.PLAN, words.RUN]
+
+        def plan(*_: object) -> None:
+            during.extend([*page.texts(), *(str(page.named(one).enabled) for one in buttons)])
+            raise InputError("no plan", "change it")
+
+        monkeypatch.setattr("armtempo.pipeline.plan_sequence", plan)
+        page.press(words.PLAN)
+        assert words.PLANNING in during
+        assert during[-2:] == ["False", "False"]
+        assert words.PLANNING not in page.texts()
+        assert page.named(words.PLAN).enabled

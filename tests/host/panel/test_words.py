@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from armtempo.panel import layout, words
 from armtempo.panel.panel_board import PanelBoard
+from nicegui import ui
 
 from tests.host.panel import fakes
 from tests.host.panel.pages import pages
@@ -88,3 +89,13 @@ def test_names_from_files_and_boards_turn_no_line_on_any_tab(operator: PanelBoar
             assert not any("\u202e" in one or "\x1b" in one for one in found), (element, found)
             shown += found
         assert any('j"□<b>□' in text for text in shown)
+
+
+def test_hints_are_found_by_the_elements_own_number(operator: PanelBoard) -> None:
+    """Quasar looks for the element of a hint by the id that NiceGUI gives it."""
+    with pages(operator) as page:
+        for tab in (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD):
+            page.show(tab)
+        targets = {str(hint.props["target"]) for hint in page.elements(ui.tooltip) if "target" in hint.props}
+        assert targets
+        assert not [one for one in page.elements() if "id" in one.props and f"#{one.html_id}" in targets]

@@ -41,17 +41,17 @@ _PLACE = f"""name => {{
 def test_a_via_point_is_clicked_and_dragged_in_the_picture(picture: Any) -> None:
     page = picture
     show(page, "Job")
-    page.wait_for_function(_IS_DRAWN, arg="via 3")
-    cell = page.get_by_label("P3 joint 1")
+    page.wait_for_function(_IS_DRAWN, arg="via 1")
+    cell = page.get_by_label("P1 joint 1")
     before = cell.input_value()
-    page.mouse.click(*page.evaluate(_PLACE, "via 3"))
-    page.wait_for_selector("text=P3: postures that reach it")
+    page.mouse.click(*page.evaluate(_PLACE, "via 1"))
+    page.wait_for_selector("text=P1: postures that reach it")
     assert cell.input_value() == before
-    x, y = page.evaluate(_PLACE, "via 3")
+    x, y = page.evaluate(_PLACE, "via 1")
     page.mouse.down()
     page.mouse.move(x + 15, y + 15, steps=5)
     page.mouse.up()
-    moved = "before => document.querySelector('[aria-label=\"P3 joint 1\"]').value != before"
+    moved = "before => document.querySelector('[aria-label=\"P1 joint 1\"]').value != before"
     page.wait_for_function(moved, arg=before)
 
 
@@ -64,6 +64,16 @@ def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> N
     }"""
     assert page.evaluate(silent, 1000 - page.evaluate("armtempo.LOOK_MS"))
     page.wait_for_selector("body:not(.lost)")  # it hears again
+
+
+def test_escape_answers_a_question_with_no(page: Any) -> None:
+    show(page, "Job")
+    panels.press(page, page.get_by_role("button", name="New…", exact=True))
+    name = page.get_by_label("New name")
+    name.fill("other")
+    page.keyboard.press("Escape")
+    name.wait_for(state="detached")
+    assert page.get_by_role("button", name="New…", exact=True).count() == 1
 
 
 _FOCUS = """async () => {

@@ -21,7 +21,7 @@ _RESOLUTION_US = 2.0
 _LONGEST_TURN_US = 4000
 """The capture keeps 4096 samples; after a longer turn some are lost."""
 _SLOWEST_STOP_US = 30.0
-STOPS = tuple(f"{pin} by {way}" for pin in ("E-stop", "limit switch") for way in ("software", "an edge"))
+STOPS = tuple(f"{pin} by {how}" for pin in ("E-stop", "limit switch") for how in ("software", "an edge"))
 """The stops of ``on_board/estop.py``."""
 CYCLES_PER_US = 168
 _SHORTED = "look for a short between the two pins, and take what is connected off one after the other"
@@ -58,26 +58,26 @@ def judge(
 ) -> Iterator[Measurement]:
     """Lines about ``measured`` of ``on_board/pulses.py``, which ran ``motion``."""
     values = measured.values
-    way = "forward together" if forward else "back alone"
+    how = "forward together" if forward else "back alone"
     if values["fault"]:
         name, meaning, cure = ERRORS[values["fault"]]
-        yield judged(PULSES, f"motion {way}", f"fault {name}: {meaning}", "no fault", False, cure)
+        yield judged(PULSES, f"motion {how}", f"fault {name}: {meaning}", "no fault", False, cure)
     longest_us = values["longest_turn_cycles"] / CYCLES_PER_US
     if longest_us > _LONGEST_TURN_US:
         measured_words = f"a turn of the loop took {longest_us:.0f} us"
         yield judged(
-            PULSES, f"capture {way}", measured_words, f"below {_LONGEST_TURN_US}", False, "run it again"
+            PULSES, f"capture {how}", measured_words, f"below {_LONGEST_TURN_US}", False, "run it again"
         )
         return
     found = rises_us(measured)
     wanted = {pin: 1e6 * steps for pin, steps in zip(values["steps"], motion.steps_s, strict=True)}
     offset = _offset_us(found, wanted)
     for number, (pin, steps) in enumerate(wanted.items()):
-        yield _channel(joints[number]["channel"] + 1, pin, (found[pin] - offset, steps), found, wanted, way)
+        yield _channel(joints[number]["channel"] + 1, pin, (found[pin] - offset, steps), found, wanted, how)
     levels = [int(forward) ^ joint["dir_inverted"] for joint in joints]
     yield judged(
         PULSES,
-        f"DIR of the joints, {way}",
+        f"DIR of the joints, {how}",
         str(values["directions"])[1:-1],
         str(levels)[1:-1],
         values["directions"] == levels,
@@ -101,11 +101,11 @@ def _channel(
     times: tuple[Array, Array],
     found: dict[str, Array],
     wanted: dict[str, Array],
-    way: str,
+    how: str,
 ) -> Measurement:
     """The line about a joint's STEP pin."""
     rises, steps = times
-    what = f"channel {channel}, STEP on P{pin}, {way}"
+    what = f"channel {channel}, STEP on P{pin}, {how}"
     expected = f"{len(steps)} steps, within {_RESOLUTION_US:g} us"
     if len(rises) == len(steps):
         worst = float(np.max(np.abs(rises - steps), initial=0.0))
@@ -160,12 +160,12 @@ def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
 
 def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
     """Lines about ``values`` of ``on_board/estop.py``."""
-    for way in STOPS:
-        if took := values["cycles"].get(way):
-            yield _stops(way, took)
+    for how in STOPS:
+        if took := values["cycles"].get(how):
+            yield _stops(how, took)
         else:
             yield Measurement(
-                SAFETY, way, "left out: what is wired to its pin holds it", "", Level.NOTE,
+                SAFETY, how, "left out: what is wired to its pin holds it", "", Level.NOTE,
                 "press it in 'armtempo selftest --with-motors'",
             )  # fmt: skip
     wrong, count = values["wrong_faults"], sum(map(len, values["cycles"].values()))
@@ -189,12 +189,12 @@ def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
     )
 
 
-def _stops(way: str, cycles: Sequence[int]) -> Measurement:
+def _stops(how: str, cycles: Sequence[int]) -> Measurement:
     took_us = np.array(cycles) / CYCLES_PER_US
     gone_on = int(np.sum(took_us < 0))
     return judged(
         SAFETY,
-        f"{way} to frozen outputs, {len(took_us)} times",
+        f"{how} to frozen outputs, {len(took_us)} times",
         f"worst {took_us.max():.1f} us" + (f", {gone_on} times they went on" if gone_on else ""),
         f"below {_SLOWEST_STOP_US:g} us each time",
         not gone_on and float(took_us.max()) < _SLOWEST_STOP_US,

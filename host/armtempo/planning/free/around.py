@@ -23,16 +23,16 @@ from armtempo.planning.through_plan import Planned
 from armtempo.planning.workspace_check import Bodies, Touch
 
 _ROUNDS = 5
-"""Largest number of planned motions, each closer to the collision-free way."""
+"""Largest number of planned motions, each closer to the collision-free path."""
 _NODES = 400
-"""Largest number of postures in the trees of one way."""
+"""Largest number of postures in the trees of one path."""
 _STEP = 0.15
 """Length of a branch, as a fraction of the sampled space."""
 _SHORTCUTS = 100
 _ASIDE_DEG = 90.0
 """Postures are sampled up to this far outside of the two via points."""
 _CLEAR_MM = 10.0
-"""Clearance of the way, so that the path may cut its corners; less if a via point is closer."""
+"""Clearance of the trees' path, so that the motion may cut its corners; less if a via point is closer."""
 _SAMPLE_MM = 8.0
 """Largest motion of a link between checked postures."""
 _MOST_SAMPLES = 300
@@ -55,32 +55,32 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
     space = _Space(holding)
     if not space.is_free(via_deg):
         return first
-    ways = [via_deg[number : number + 2] for number in range(len(via_deg) - 1)]
+    paths = [via_deg[number : number + 2] for number in range(len(via_deg) - 1)]
     names = set()
     rng = np.random.default_rng([job.seed, len(via_deg)])
     for _ in range(_ROUNDS):
         names.add(touch.other)
         stage(f"looking for a way around {touch.other}")
-        leg, part = _place(planned, touch, ways)
-        if len(ways[leg]) == 2:
-            found = space.way(ways[leg][0], ways[leg][1], rng)
+        leg, part = _place(planned, touch, paths)
+        if len(paths[leg]) == 2:
+            found = space.path(paths[leg][0], paths[leg][1], rng)
             if found is None:
                 break
-            ways[leg] = found
-        else:  # the path cuts a corner too much: keep it closer to the way
-            middle = 0.5 * (ways[leg][part] + ways[leg][part + 1])
-            ways[leg] = np.insert(ways[leg], part + 1, middle, axis=0)
-        helped = _helped(job, ways)
-        angles = np.concatenate([ways[0], *(way[1:] for way in ways[1:])])
+            paths[leg] = found
+        else:  # the path cuts a corner too much: keep it closer to the path found
+            middle = 0.5 * (paths[leg][part] + paths[leg][part + 1])
+            paths[leg] = np.insert(paths[leg], part + 1, middle, axis=0)
+        helped = _helped(job, paths)
+        angles = np.concatenate([paths[0], *(path[1:] for path in paths[1:])])
         try:
             planned = free_plan.motion(arm, helped, angles, progress, trial=True)
         except PlanError:
             break
         if not (touch := _touch(arm, job, planned)):
-            own = set(_places(ways).tolist())
+            own = set(_places(paths).tolist())
             if nearest:
                 planned = _loosened(arm, helped, angles, own, planned, progress)
-            return _without_help(arm, job, via_deg, planned, ways, names)
+            return _without_help(arm, job, via_deg, planned, paths, names)
     return first
 
 
@@ -113,35 +113,35 @@ def _loosened(
     return planned
 
 
-def _places(ways: Sequence[Array]) -> Array:
+def _places(paths: Sequence[Array]) -> Array:
     """Indices of the job's via points among all: (n + 1,)."""
-    return np.cumsum([0, *(len(way) - 1 for way in ways)])
+    return np.cumsum([0, *(len(path) - 1 for path in paths)])
 
 
-def _place(planned: Planned, touch: Touch, ways: Sequence[Array]) -> tuple[int, int]:
-    """The leg in which a motion touches something, and the part of its way."""
+def _place(planned: Planned, touch: Touch, paths: Sequence[Array]) -> tuple[int, int]:
+    """The leg in which a motion touches something, and the part of its path."""
     times = planned.trajectory.joints[0].via_times_s
     part = int(np.clip(np.searchsorted(times, touch.time_s) - 1, 0, len(times) - 2))
-    places = _places(ways)
+    places = _places(paths)
     leg = int(np.searchsorted(places, part, side="right")) - 1
     return leg, part - int(places[leg])
 
 
-def _helped(job: Job, ways: Sequence[Array]) -> Job:
+def _helped(job: Job, paths: Sequence[Array]) -> Job:
     """The job with auxiliary via points between its own."""
-    places = _places(ways)
+    places = _places(paths)
     via = [*job.via[:1]]
-    for number, way in enumerate(ways, 1):
-        via += [*(tuple(map(float, angles)) for angles in way[1:-1]), job.via[number]]
+    for number, path in enumerate(paths, 1):
+        via += [*(tuple(map(float, angles)) for angles in path[1:-1]), job.via[number]]
     stops = tuple(replace(stop, via=int(places[stop.via])) for stop in job.stops)
     return replace(job, via=tuple(via), stops=stops)
 
 
 def _without_help(
-    arm: Arm, job: Job, via_deg: Array, planned: Planned, ways: Sequence[Array], names: set[str]
+    arm: Arm, job: Job, via_deg: Array, planned: Planned, paths: Sequence[Array], names: set[str]
 ) -> Planned:
     """The motion described by the job's own via points only."""
-    places = _places(ways)
+    places = _places(paths)
     joints = []
     for joint in planned.trajectory.joints:
         assert joint.via_segments is not None  # a free path has these
@@ -170,7 +170,7 @@ class _Space:
         """Whether all clearances at postures (N, J) are at least ``clear_mm``."""
         return bool(np.all(self.bodies.distances(driven_deg) > clear_mm))
 
-    def way(self, start: Array, end: Array, rng: np.random.Generator) -> Array | None:
+    def path(self, start: Array, end: Array, rng: np.random.Generator) -> Array | None:
         """Collision-free postures (K, J) from one to another, connected by straight lines; None if none is found."""
         clear = np.minimum(_CLEAR_MM, 0.5 * self.bodies.distances(np.stack([start, end])).min(axis=0))
         low, high = np.array([joint.range_deg for joint in self.arm.driven]).T
@@ -198,35 +198,35 @@ class _Space:
         count = min(_MOST_SAMPLES, int(np.ceil(farthest / _SAMPLE_MM)) + 2)
         return self.is_free(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start), clear)
 
-    def _shortened(self, way: Array, clear: Array, rng: np.random.Generator) -> Array:
-        """The way with random straight shortcuts."""
+    def _shortened(self, path: Array, clear: Array, rng: np.random.Generator) -> Array:
+        """The path with random straight shortcuts."""
         speeds = np.array([joint.limits.speed_deg_s for joint in self.arm.driven])
         for _ in range(_SHORTCUTS):
             alive()
-            takes = np.abs(np.diff(way, axis=0) / speeds).max(axis=1)
+            takes = np.abs(np.diff(path, axis=0) / speeds).max(axis=1)
             passed = np.concatenate([[0.0], np.cumsum(takes)])
-            if len(way) == 2:
+            if len(path) == 2:
                 break
             first, last = np.sort(rng.uniform(0.0, passed[-1], 2))
             before, after = (int(np.searchsorted(passed, each, side="right")) for each in (first, last))
             if before == after:
                 continue
             begin, end = (
-                np.array([np.interp(each, passed, angles) for angles in way.T]) for each in (first, last)
+                np.array([np.interp(each, passed, angles) for angles in path.T]) for each in (first, last)
             )
             if self.leads(begin, end, clear):
-                way = np.concatenate([way[:before], begin[None], end[None], way[after:]])
-        return self._straightened(way, clear)
+                path = np.concatenate([path[:before], begin[None], end[None], path[after:]])
+        return self._straightened(path, clear)
 
-    def _straightened(self, way: Array, clear: Array) -> Array:
-        """The way without unnecessary postures."""
+    def _straightened(self, path: Array, clear: Array) -> Array:
+        """The path without unnecessary postures."""
         number = 1
-        while number < len(way) - 1:
-            if self.leads(way[number - 1], way[number + 1], clear):
-                way = np.delete(way, number, axis=0)
+        while number < len(path) - 1:
+            if self.leads(path[number - 1], path[number + 1], clear):
+                path = np.delete(path, number, axis=0)
             else:
                 number += 1
-        return way
+        return path
 
 
 class _Tree:

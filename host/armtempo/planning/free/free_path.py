@@ -69,13 +69,13 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
         looser = Improver(_tightened(demand), exact.motion.layout).improved(exact.motion, _ROUNDS)
         return replace(exact, motion=_within_corridor(demand, looser))
     even = effort.pieces is not None or _in_corridor(demand)
-    ways = _starts(_tightened(demand), effort, even)
-    whole = len(ways) + _ROUNDS
+    starts = _starts(_tightened(demand), effort, even)
+    whole = len(starts) + _ROUNDS
     best: FreeMotion | None = None
     times: list[float] = []
     problem: PlanError | None = None
-    for number, start in enumerate(ways):
-        stage(f"start {number + 1} of {len(ways)}")
+    for number, start in enumerate(starts):
+        stage(f"start {number + 1} of {len(starts)}")
         try:
             motion = start()
             found = Improver(_tightened(demand), motion.layout).improved(motion, 1)
@@ -123,19 +123,19 @@ def _starts(demand: Demand, effort: Effort, even: bool) -> list[Callable[[], Fre
     if even:
         pieces = effort.pieces or automatic_pieces(legs, effort.most)
     level = np.ones(legs)
-    ways: list[Callable[[], FreeMotion]] = [partial(free_start.along_spline, demand, pieces, level)]
+    starts: list[Callable[[], FreeMotion]] = [partial(free_start.along_spline, demand, pieces, level)]
     needed = rest_to_rest.needed_s(demand.via_deg, demand.limits)
     for number in range(1, effort.starts):
         factors = np.exp(_SPREAD * effort.rng.standard_normal(legs)) if number > 1 else np.ones(legs)
         shares = needed * factors
         if _in_corridor(demand):
-            ways.append(partial(free_start.along_spline, demand, pieces, shares))
+            starts.append(partial(free_start.along_spline, demand, pieces, shares))
             continue
         chosen = layout.uniform(legs + 1, pieces, demand.stops)
         if not even:
             chosen = layout.shared_out(shares, chosen.segments, demand.stops)
-        ways.append(partial(free_start.smooth, demand, chosen, shares))
-    return ways
+        starts.append(partial(free_start.smooth, demand, chosen, shares))
+    return starts
 
 
 def _finished(demand: Demand, motion: FreeMotion, effort: Effort, even: bool) -> FreeMotion:

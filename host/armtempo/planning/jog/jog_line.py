@@ -18,7 +18,8 @@ from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.tool_pose import APPROACH, PITCH, ROLL, WHOLE, YAW, Pose
+from armtempo.model.frame import TOOL
+from armtempo.model.tool_pose import APPROACH, BASE, PITCH, ROLL, WHOLE, YAW, Pose
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line.deviation import LineDeviation, proven
 from armtempo.planning.line.tool_path import ToolPath, ToolPiece, rotations
@@ -35,8 +36,6 @@ MOST_GAIN = 5.0
 """A posture is singular if a joint moves by more radians per radian of the tool, or per arm's reach of the tool."""
 MARGIN_STEPS = 2.0
 """Motor steps kept as a margin to the end of a joint's range."""
-AXES = ("x", "y", "z", "tool-x", "tool-y", "tool-z")
-"""Axes of the base, and of the tool as it is at the start."""
 _TRIED = (WHOLE, (APPROACH,), (PITCH,), (YAW,), (ROLL,), ())
 _PARALLEL = 0.99
 _HALVINGS = 8
@@ -48,6 +47,28 @@ _MISSED = 0.01
 """Part of a motion along the axis that the joints may leave out."""
 
 
+def direction_of(arm: Arm, axis: str, tool: Array) -> Array:
+    """The direction of an axis in the base, (3,), with the tool at a pose (4, 4).
+
+    ``axis``: "x", "y" or "z" of the base; "tool-x", … of the tool; "NAME-x", … of a frame of the arm. Raises InputError
+    if there is no such axis.
+    """
+    frame, _, letter = axis.rpartition("-")
+    if len(letter) != 1 or letter not in "xyz" or axis.startswith("-"):
+        raise InputError(f"there is no axis {axis!r}", f"give x, y or z, tool-x, … or {_of_frames(arm)}")
+    pose = tool if frame == TOOL else arm.frame(frame or BASE)
+    return np.asarray(pose[:3, "xyz".index(letter)])
+
+
+def axis_of(frame: str, letter: str) -> str:
+    """The name of an axis as ``direction_of`` takes it: of the base, TOOL, or a frame of the arm."""
+    return letter if frame == BASE else f"{frame}-{letter}"
+
+
+def _of_frames(arm: Arm) -> str:
+    return f"{arm.frames[0].name if arm.frames else 'NAME'}-x, … of a frame of the arm file"
+
+
 @dataclass(frozen=True, eq=False)
 class ToolLine:
     """A line of the tool from a posture of the arm."""
@@ -56,7 +77,7 @@ class ToolLine:
     start_deg: Array
     """The driven joints, (J,)."""
     axis: str
-    """One of AXES."""
+    """As ``direction_of`` takes it."""
     about: bool
     """Turn about the axis instead of moving along it."""
     sign: int
@@ -87,8 +108,7 @@ class ToolLine:
     @cached_property
     def direction(self) -> Array:
         """Direction of the axis in the frame of the base, (3,)."""
-        unit = np.eye(3)["xyz".index(self.axis[-1])]
-        return self.sign * np.asarray(self._pose[:3, :3] @ unit if self.axis.startswith("tool") else unit)
+        return self.sign * direction_of(self.arm, self.axis, self._pose)
 
     def pose(self, distance: float) -> Array:
         """The tool's pose after a distance in mm or deg, (4, 4)."""
@@ -238,7 +258,7 @@ class FollowedLine:
             found.append(np.degrees(angles[list(line.arm.driven_indices)]))
         return np.array(found)
 
-    def stray(self, angle_points_deg: Array, way_points: Array) -> LineDeviation:
+    def stray(self, angle_points_deg: Array, distance_points: Array) -> LineDeviation:
         """Bound of the tool's deviation for splines of the driven joints, (S + 5, J), and of the distance, (S + 5,)."""
         line = self.line
         fixed = line.fixed if line.fixed in (WHOLE, (APPROACH,)) else ()
@@ -246,7 +266,10 @@ class FollowedLine:
         direction = np.zeros(3) if line.about else line.direction
         piece = ToolPiece(line._pose, self.length, direction, np.zeros(3), turn)
         tool = Tool(line.arm, list(range(len(line.arm.driven))), line.start_deg)
-        angles, distances = of_path(angle_points_deg, DEGREE), of_path(way_points[:, None], DEGREE)[:, :, 0]
+        angles, distances = (
+            of_path(angle_points_deg, DEGREE),
+            of_path(distance_points[:, None], DEGREE)[:, :, 0],
+        )
         return proven(angles, distances, tool, ToolPath((piece,)), fixed, LineDeviation(STRAY_MM, STRAY_DEG))
 
 

@@ -17,8 +17,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning import brake_time, move_law, point_to_point, workspace_check
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.planning.jog.jog_line import AXES, STRAY_DEG, STRAY_MM, FollowedLine, ToolLine
-from armtempo.planning.move_law import DEGREE, WayLimits
+from armtempo.planning.jog.jog_line import STRAY_DEG, STRAY_MM, FollowedLine, ToolLine, direction_of
+from armtempo.planning.move_law import DEGREE, MoveLimits
 from armtempo.splines import bspline, extremes
 from armtempo.splines.trajectory import Trajectory
 
@@ -31,7 +31,7 @@ _SHORTER = 0.98
 _TRIES = 6
 _INSIDE_STEPS = 1e-6
 _SHORTENED, _NEARER = 8, 0.9
-"""A jog that would leave the workspace is shortened up to this often, each time to this fraction of the way to the
+"""A jog that would leave the workspace is shortened up to this often, each time to this fraction of the distance to the
 touch."""
 
 
@@ -44,7 +44,7 @@ class JogMove:
     joint: int | None = None
     """Index among the driven joints, from 0."""
     axis: str = ""
-    """One of AXES, if it is not a joint."""
+    """As ``jog_line.direction_of`` takes it, if it is not a joint."""
     about: bool = False
     """Turn the tool about the axis instead of moving it along."""
 
@@ -84,22 +84,22 @@ def move_of(
 
     Raises InputError if the arguments contradict, or the arm has no such joint.
     """
-    ways = [by for by in (by_deg, by_mm) if by is not None]
-    if (joint is None) == (axis is None) or len(ways) != 1 or (joint is not None and by_deg is None):
+    given = [by for by in (by_deg, by_mm) if by is not None]
+    if (joint is None) == (axis is None) or len(given) != 1 or (joint is not None and by_deg is None):
         raise InputError(
             "a jog moves a joint by degrees, or the tool along an axis by mm or about it by degrees",
             "give joint and by_deg, axis and by_mm, or axis and by_deg",
         )
     if joint is not None:
-        return JogMove(ways[0], joint=number_of_joint(arm, joint))
-    return JogMove(ways[0], axis=axis or "", about=by_deg is not None)
+        return JogMove(given[0], joint=number_of_joint(arm, joint))
+    return JogMove(given[0], axis=axis or "", about=by_deg is not None)
 
 
 def plan(name: str, arm: Arm, here_deg: Sequence[float], move: JogMove, speed: float = SPEED) -> JogMotion:
     """The jog from rest at ``here_deg`` (J,), at the fraction ``speed`` of the arm's speed limits.
 
     It ends early at the end of a range, before it would leave the arm's workspace, and, for a line of the tool,
-    where the arm cannot follow. Raises InputError for a move that is none, or if there is no way to go.
+    where the arm cannot follow. Raises InputError for a move that is none, or if it can go nowhere.
     """
     start = np.array(here_deg, dtype=float)
     if not SLOWEST <= speed <= 1.0:
@@ -132,8 +132,8 @@ def _in_workspace(name: str, arm: Arm, start: Array, move: JogMove, speed: float
     """The jog, shortened to stay in the workspace, and why it ends early."""
     why = ""
     for _ in range(_SHORTENED):
-        way = _joint if move.joint is not None else _tool
-        trajectory, ends = way(name, arm, start, move, speed)
+        planned = _joint if move.joint is not None else _tool
+        trajectory, ends = planned(name, arm, start, move, speed)
         touch = workspace_check.touch_of(arm, trajectory, outwards=True)
         if touch is None:
             workspace_check.tell_start(arm, start)
@@ -176,9 +176,9 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
     joint = arm.driven[move.joint]
     end, ends = _end_deg(joint, start[move.joint], move.by)
     found = move_law.law(abs(end - start[move.joint]), move_law.of_joints([joint.limits], [1.0], speed))
-    way = math.copysign(1.0, end - start[move.joint]) * found.way
+    turned = math.copysign(1.0, end - start[move.joint]) * found.distance
     rows = [
-        start[index] + (way if index == move.joint else np.zeros_like(way))
+        start[index] + (turned if index == move.joint else np.zeros_like(turned))
         for index in range(len(arm.driven))
     ]
     return found.trajectory(name, rows), ends
@@ -221,8 +221,7 @@ def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tup
 
 def _line(arm: Arm, start: Array, move: JogMove) -> ToolLine:
     """The line of the tool; InputError if there is no such axis, or the arm cannot be at ``start``."""
-    if move.axis not in AXES:
-        raise InputError(f"there is no axis {move.axis!r}", f"give one of {', '.join(AXES)}")
+    direction_of(arm, move.axis, np.eye(4))  # raises InputError for an axis that there is not
     point_to_point.posture(start, arm)
     return ToolLine(arm, start, move.axis, move.about, 1 if move.by > 0 else -1)
 
@@ -238,24 +237,24 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
         trajectory = law.trajectory(name, list(points.T))
         if not _within(trajectory, arm):
             return None
-        stray = followed.stray(points, law.way)
+        stray = followed.stray(points, law.distance)
         if stray.position_mm <= STRAY_MM and stray.rotation_deg <= STRAY_DEG:
             return _slowed(trajectory, arm, speed)
     return None
 
 
-def _line_limits(followed: FollowedLine, length: float, speed: float) -> WayLimits:
-    """Limits of the way along the line, from those of the joints."""
+def _line_limits(followed: FollowedLine, length: float, speed: float) -> MoveLimits:
+    """Limits of the distance along the line, from those of the joints."""
     arm = followed.line.arm
     upto = followed.distances <= length * (1 + 1e-9)
     angles = np.degrees(followed.angles_rad[upto][:, list(arm.driven_indices)])
-    ways = followed.distances[upto]
-    if len(ways) < 2:
-        angles, ways = (
+    distances = followed.distances[upto]
+    if len(distances) < 2:
+        angles, distances = (
             np.degrees(followed.angles_rad[:2][:, list(arm.driven_indices)]),
             followed.distances[:2],
         )
-    gains = np.abs(np.diff(angles, axis=0) / np.diff(ways)[:, None]).max(axis=0) + 1e-12
+    gains = np.abs(np.diff(angles, axis=0) / np.diff(distances)[:, None]).max(axis=0) + 1e-12
     return move_law.of_joints([joint.limits for joint in arm.driven], gains.tolist(), speed)
 
 

@@ -1,6 +1,6 @@
-"""Proven bounds of the tool's deviation from its way.
+"""Proven bounds of the tool's deviation from its path.
 
-Let e(u) be the difference between the tool for the joints' spline and the way at the same u. Over a piece of
+Let e(u) be the difference between the tool for the joints' spline and the path at the same u. Over a piece of
 length h, |e| exceeds the chord between its ends by at most h^2 / 8 times the largest second derivative, which
 is bounded by Bernstein coefficients. Pieces that may have the maximum are halved.
 """
@@ -24,7 +24,7 @@ _MOST_PIECES = 20_000
 
 
 class LineDeviation(NamedTuple):
-    """Bounds of the deviation over a way."""
+    """Bounds of the deviation over a path."""
 
     position_mm: float
     rotation_deg: float
@@ -38,21 +38,27 @@ class _Bends(NamedTuple):
 
 
 def proven(
-    angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...], enough: LineDeviation
+    angles_deg: Array,
+    distances: Array,
+    tool: Tool,
+    path: ToolPath,
+    fixed: tuple[str, ...],
+    enough: LineDeviation,
 ) -> LineDeviation:
-    """Bounds on the deviation of a spline from its way.
+    """Bounds on the deviation of a spline from its path.
 
-    ``angles_deg``: Bernstein coefficients (S, 6, J), ``ways``: (S, 6). Found to 2 %, or to that part of ``enough``.
+    ``angles_deg``: Bernstein coefficients (S, 6, J), ``distances``: (S, 6). Found to 2 %, or to that part of
+    ``enough``.
     """
     bounds = path.bounds
     floor = np.array([enough.position_mm, _chord(enough.rotation_deg)]) * _SHARP
     counts = np.array([1.0, 1.0 if fixed else 0.0])
-    outside = max(0.0, -float(ways.min()), float(ways.max()) - path.length)
+    outside = max(0.0, -float(distances.min()), float(distances.max()) - path.length)
     best = np.zeros(2)
     while True:
         alive()
-        reached = counts * _at_ends(angles_deg, ways, tool, path, fixed)
-        bends = _bends(angles_deg, ways, tool, bounds)
+        reached = counts * _at_ends(angles_deg, distances, tool, path, fixed)
+        bends = _bends(angles_deg, distances, tool, bounds)
         best = np.maximum(best, reached.max(axis=0))
         most = reached + counts * np.stack(bends, axis=1) / 8.0
         open_ = np.any(most > best * (1.0 + _SHARP) + floor, axis=1)
@@ -61,15 +67,17 @@ def proven(
             beyond_deg = float(np.degrees(bounds.turn)) * outside
             turned_deg = _degrees(float(found[1])) + beyond_deg
             return LineDeviation(float(found[0]) + bounds.slope * outside, turned_deg if fixed else 0.0)
-        angles_deg, ways = halved(angles_deg[open_]), halved(ways[open_, :, None])[:, :, 0]
+        angles_deg, distances = halved(angles_deg[open_]), halved(distances[open_, :, None])[:, :, 0]
 
 
-def _at_ends(angles_deg: Array, ways: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...]) -> Array:
+def _at_ends(
+    angles_deg: Array, distances: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...]
+) -> Array:
     """The larger deviation of the two ends of pieces, (N, 2): position in mm, and chord of the rotation."""
     found = []
     for end in (0, -1):
         state = tool.at(angles_deg[:, end])
-        position, rotation = path.poses(ways[:, end])
+        position, rotation = path.poses(distances[:, end])
         away = np.linalg.norm(state.position_mm - position, axis=1)
         axes = slice(2, 3) if fixed == (APPROACH,) else slice(0, 3)
         turned = (state.rotation - rotation)[:, :, axes]
@@ -91,8 +99,8 @@ def _degrees(chord: float) -> float:
     return float(np.degrees(2.0 * np.arcsin(min(chord / 2.0, 1.0))))
 
 
-def _bends(angles_deg: Array, ways: Array, tool: Tool, bounds: Bounds) -> _Bends:
-    """Bounds of the second derivatives over each piece, of arm and way together.
+def _bends(angles_deg: Array, distances: Array, tool: Tool, bounds: Bounds) -> _Bends:
+    """Bounds of the second derivatives over each piece, of arm and path together.
 
     Columns of the Jacobian are at most as long as the reach of their joint; their derivative by another joint
     is at most the reach of the outer of the two. Axes turn at most as fast as all joints together.
@@ -104,9 +112,9 @@ def _bends(angles_deg: Array, ways: Array, tool: Tool, bounds: Bounds) -> _Bends
     position = bend @ reach + np.einsum("nk,kj,nj->n", speed, outer, speed)
     turn = speed.sum(axis=1)
     rotation = bend.sum(axis=1) + 2.0 * turn**2
-    way_speed, way_bend = (each[:, 0] for each in derivatives(ways[:, :, None], 2))
-    position = position + bounds.slope * way_bend + bounds.bend * way_speed**2
-    rotation = rotation + bounds.turn * way_bend + (bounds.turn_bend + bounds.turn**2) * way_speed**2
+    rate, bend = (each[:, 0] for each in derivatives(distances[:, :, None], 2))
+    position = position + bounds.slope * bend + bounds.bend * rate**2
+    rotation = rotation + bounds.turn * bend + (bounds.turn_bend + bounds.turn**2) * rate**2
     return _Bends(position, rotation)
 
 

@@ -1,4 +1,4 @@
-"""The joints' spline of a job with lines of the tool, with enough segments to prove that the tool stays near its way.
+"""The joints' spline of a job with lines of the tool, with enough segments to prove that the tool stays near its path.
 
 Each leg from rest to rest is a separate spline: at a rest between two, five control points are equal.
 """
@@ -31,15 +31,15 @@ _LINE_PIECES = 8
 _SAME_DEG = 1e-4
 """Tolerance for equal postures."""
 _FLOOR, _CORNER = 0.2, 2.5
-"""Slowness of the way relative to its mean: the least, and at a cut corner."""
+"""Slowness along the path relative to its mean: the least, and at a cut corner."""
 _SMOOTH = 0.05
-"""The slowness is smoothed over this fraction of the way."""
+"""The slowness is smoothed over this fraction of the path."""
 _TABLE = 512
 
 
 @dataclass(frozen=True, eq=False)
 class Led:
-    """A leg with a line or arc of the tool, and the postures along its way."""
+    """A leg with a line or arc of the tool, and the postures along its path."""
 
     leg: Leg
     followed: Followed
@@ -64,8 +64,8 @@ class LinePath:
 
     angle_points_deg: Array
     """(S + 5, J)."""
-    way_points: Array
-    """Control points of the ways of all legs, with the same knots: (S + 5,)."""
+    distance_points: Array
+    """Control points of the distances of all legs, with the same knots: (S + 5,)."""
     knots: tuple[int, ...]
     """Segments before each leg, and in total."""
     arrivals: tuple[int, ...]
@@ -75,9 +75,9 @@ class LinePath:
         """Bound of the tool's deviation in a leg."""
         first, last = self.knots[number], self.knots[number + 1]
         angles = of_path(self.angle_points_deg, DEGREE)[first:last]
-        ways = of_path(self.way_points[:, None], DEGREE)[first:last, :, 0]
+        distances = of_path(self.distance_points[:, None], DEGREE)[first:last, :, 0]
         course, tool = led.followed.course, led.followed.tool
-        return proven(angles, ways - ways[0, 0], tool, course.path, course.fixed, led.leg.enough)
+        return proven(angles, distances - distances[0, 0], tool, course.path, course.fixed, led.leg.enough)
 
 
 def led_legs(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
@@ -106,7 +106,7 @@ def _followed(arm: Arm, job: Job, leg: Leg, via_deg: Array) -> Followed:
 
 
 def _places(found: Followed, speeds: Array) -> Array:
-    """Places on the way at equal steps of u: dense at both ends, and where the joints turn far."""
+    """Places on the path at equal steps of u: dense at both ends, and where the joints turn far."""
     u = np.linspace(0.0, 1.0, _TABLE + 1)
     places = found.distances / found.distances[-1]
     taken = np.abs(np.diff(found.angles_deg, axis=0) / speeds).max(axis=1) / np.diff(places)
@@ -149,7 +149,7 @@ def proven_paths(
     ]
     if sum(pieces) > most:
         raise PlanError(
-            f"job {job.name!r}: its lines and the ways between them need {sum(pieces)} segments at least, the board "
+            f"job {job.name!r}: its lines and the motions between them need {sum(pieces)} segments at least, the board "
             f"holds {most}",
             "use fewer via points, or plan the legs between rests one by one with --split",
         )
@@ -170,7 +170,7 @@ def proven_paths(
         if sum(pieces) > most:
             raise PlanError(
                 f"{led[wide[0]].leg.name}: with {before[wide[0]]} segments the tool is only proven to stay "
-                f"within {away[wide[0]].position_mm:.3g} mm and {away[wide[0]].rotation_deg:.3g} deg of its way, and "
+                f"within {away[wide[0]].position_mm:.3g} mm and {away[wide[0]].rotation_deg:.3g} deg of its path, and "
                 f"the board holds {most} in all",
                 "widen tolerance_mm and tolerance_deg, keep away from singular postures, or plan with --split",
             )
@@ -186,26 +186,26 @@ def _path(
     for number, (leg, count) in enumerate(zip(legs, pieces, strict=True)):
         one = parts[number]
         if isinstance(one, Led):
-            ways = one.distances(count)
-            angles = one.followed.at(ways)
-            passed = _passed(one, ways)
+            distances = one.distances(count)
+            angles = one.followed.at(distances)
+            passed = _passed(one, distances)
         else:
-            ways = np.linspace(0.0, 1.0, count + 1)
+            distances = np.linspace(0.0, 1.0, count + 1)
             angles = one.at_knots
             passed = list(one.arrivals[1:])
         angles[[0, -1]] = via_deg[[leg.first, leg.last]]
-        rows.append(np.column_stack([angles, before + ways])[0 if number == 0 else 1 :])
-        before += float(ways[-1])
+        rows.append(np.column_stack([angles, before + distances])[0 if number == 0 else 1 :])
+        before += float(distances[-1])
         arrivals += [knots[-1] + knot for knot in passed]
         knots.append(knots[-1] + count)
     whole = bspline.fit(np.concatenate(rows), DEGREE, knots[1:-1])
     return LinePath(np.asarray(whole[:, :-1]), np.asarray(whole[:, -1]), tuple(knots), tuple(arrivals))
 
 
-def _passed(one: Led, ways: Array) -> list[int]:
+def _passed(one: Led, distances: Array) -> list[int]:
     """The knots of a leg nearest to each of its via points except the first, increasing."""
     found: list[int] = []
     for place in one.followed.course.path.starts[1:]:
-        nearest = int(np.argmin(np.abs(ways - place)))
+        nearest = int(np.argmin(np.abs(distances - place)))
         found.append(max(nearest, found[-1] + 1) if found else max(nearest, 1))
     return found

@@ -48,7 +48,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     Raises PlanError, naming via points and place, if the arm cannot follow, or the tolerance of the tool
     cannot be proven.
     """
-    stage("following the tool's way")
+    stage("following the tool's path")
     led = led_legs(arm, job, via_deg)
     others = {
         number: between(arm, job, leg, via_deg, progress)
@@ -95,9 +95,7 @@ def _moving(path: LinePath) -> Index:
 
 def _away(led: Led, found: LineDeviation) -> str:
     turned = f" and {found.rotation_deg:.2g} deg" if led.followed.course.fixed else ""
-    return (
-        f"{led.leg.name}: the tool leaves its way by no more than {found.position_mm:.2g} mm{turned} (proven)"
-    )
+    return f"{led.leg.name}: the tool leaves its path by no more than {found.position_mm:.2g} mm{turned} (proven)"
 
 
 def _timed(
@@ -176,7 +174,7 @@ def _best_axis(
 
 
 def _watched(path: LinePath, tool: Tool, limits: ToolLimits, refine: int) -> Along | None:
-    """The tool's way as a quantity with limits; None without limits."""
+    """The tool's distance as a quantity with limits; None without limits."""
     if not limits.any:
         return None
     pieces = bspline.subdivide(bspline.polynomials(path.angle_points_deg, DEGREE), refine)
@@ -208,7 +206,7 @@ def _floor(
 
 
 def _asked(job: Job, via: int) -> tuple[float, float]:
-    """Limits of the tool's speed and acceleration on the way to a via point; infinite without a limit."""
+    """Limits of the tool's speed and acceleration on the path to a via point; infinite without a limit."""
     segment = tool_segment.at(job.tool_segments, via)
     both = []
     for key in ("speed_mm_s", "acceleration_mm_s2"):
@@ -230,7 +228,7 @@ def _tool_limits(job: Job, path: LinePath) -> ToolLimits:
 
 
 def _limit_notes(job: Job, path: LinePath, angles: Array, axis_s: Array, tool: Tool) -> list[str]:
-    """Notes: proven maxima of the tool on each way with a limit.
+    """Notes: proven maxima of the tool on each path with a limit.
 
     From Bernstein coefficients of angles (S, 6, J) and time (S, 6).
     """

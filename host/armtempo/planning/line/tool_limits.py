@@ -39,7 +39,7 @@ class ToolLimits:
 
 
 def along(pieces_deg: Array, tool: Tool, limits: ToolLimits) -> Along:
-    """The tool's way on each segment, for the time axis; ``pieces_deg``: power coefficients (S, 6, J).
+    """The tool's path on each segment, for the time axis; ``pieces_deg``: power coefficients (S, 6, J).
 
     Polynomials are interpolated at six places of a segment: accurate enough for the search; the result is
     proven by ``excess``.

@@ -1,6 +1,6 @@
-"""The way of the tool between two rests: straight lines, arcs, and cut corners.
+"""The path of the tool between two rests: straight lines, arcs, and cut corners.
 
-``way``: arc length in mm; in degrees if the tool only turns.
+``distance``: arc length in mm; in degrees if the tool only turns.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 
 _STILL_MM, _STILL_DEG = 1e-6, 1e-6
-"""Shorter ways and smaller turns count as 0."""
+"""Shorter distances and smaller turns count as 0."""
 _NO_SINE = 1e-12
 _HALF_TURN_DEG = 179.9
 """The direction of a larger turn is not defined."""
@@ -40,24 +40,24 @@ class ToolPiece:
     inward: Array
     """To the centre of the arc times its curvature, (3,) in 1/mm; 0 for a line."""
     turn: Array
-    """Rotation vector per mm of way, (3,) in rad."""
+    """Rotation vector per mm, (3,) in rad."""
 
-    def moved(self, way: Array) -> Array:
-        """Position relative to the start at ways (N,): (N, 3)."""
+    def moved(self, distance: Array) -> Array:
+        """Position relative to the start at distances (N,): (N, 3)."""
         bend = float(np.linalg.norm(self.inward))
         if bend == 0.0:
-            return way[:, None] * self.direction
-        along, across = np.sin(bend * way) / bend, (1.0 - np.cos(bend * way)) / bend
+            return distance[:, None] * self.direction
+        along, across = np.sin(bend * distance) / bend, (1.0 - np.cos(bend * distance)) / bend
         return np.asarray(along[:, None] * self.direction + across[:, None] * self.inward / bend)
 
-    def turned(self, way: Array) -> Array:
+    def turned(self, distance: Array) -> Array:
         """Rotation from the start's orientation: (N, 3, 3)."""
-        return rotations(way[:, None] * self.turn)
+        return rotations(distance[:, None] * self.turn)
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Largest derivatives by the way: of position and orientation, first and second (mm, rad)."""
+    """Largest derivatives by the distance: of position and orientation, first and second (mm, rad)."""
 
     slope: float
     bend: float
@@ -67,7 +67,7 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class ToolPath:
-    """Consecutive pieces; ``cuts``: the way before and after each corner over which it is cut, mm."""
+    """Consecutive pieces; ``cuts``: the distance before and after each corner over which it is cut, mm."""
 
     pieces: tuple[ToolPiece, ...]
     cuts: tuple[float, ...] = ()
@@ -82,21 +82,21 @@ class ToolPath:
         """All of it."""
         return float(self.starts[-1])
 
-    def poses(self, way: Array) -> tuple[Array, Array]:
-        """Positions (N, 3) and rotations (N, 3, 3) at ways (N,); beyond the ends the way continues."""
+    def poses(self, distance: Array) -> tuple[Array, Array]:
+        """Positions (N, 3) and rotations (N, 3, 3) at distances (N,); beyond the ends the path continues."""
         starts = self.starts
-        number = np.clip(np.searchsorted(starts, way, side="right") - 1, 0, len(self.pieces) - 1)
-        positions, rotated = np.empty((len(way), 3)), np.empty((len(way), 3, 3))
+        number = np.clip(np.searchsorted(starts, distance, side="right") - 1, 0, len(self.pieces) - 1)
+        positions, rotated = np.empty((len(distance), 3)), np.empty((len(distance), 3, 3))
         for index, piece in enumerate(self.pieces):
             own = number == index
-            local = way[own] - starts[index]
+            local = distance[own] - starts[index]
             positions[own] = piece.start[:3, 3] + piece.moved(local)
             rotated[own] = piece.turned(local) @ piece.start[:3, :3]
         for index, cut in enumerate(self.cuts):
             place = starts[index + 1]
-            near = np.abs(way - place) < cut
+            near = np.abs(distance - place) < cut
             if cut > 0.0 and near.any():
-                positions[near], rotated[near] = self._cut(index, (way[near] - place) / cut, cut)
+                positions[near], rotated[near] = self._cut(index, (distance[near] - place) / cut, cut)
         return positions, rotated
 
     def _cut(self, index: int, part: Array, cut: float) -> tuple[Array, Array]:
@@ -110,12 +110,12 @@ class ToolPath:
 
     @property
     def bounds(self) -> Bounds:
-        """Bounds over the whole way."""
+        """Bounds over the whole path."""
         bends = [float(np.linalg.norm(piece.inward)) for piece in self.pieces]
         turns = [float(np.linalg.norm(piece.turn)) for piece in self.pieces]
         corner = max((2.0 * _CORNER_BEND / cut for cut in self.cuts if cut > 0.0), default=0.0)
         bend, turn = max(bends) + corner, max(turns)
-        # in a corner the ways of both pieces sum to at most one, each with its own turn
+        # in a corner the distances of both pieces sum to at most one, each with its own turn
         slope = max(float(np.linalg.norm(piece.direction)) for piece in self.pieces)
         return Bounds(slope, bend, turn, turn * corner + turn * turn)
 
@@ -129,10 +129,10 @@ def _corner(part: Array) -> Array:
 
 def line(start: Array, end: Array, turn: Array, where: str) -> ToolPiece:
     """The straight line between two poses (4, 4), with the rotation vector ``turn``, (3,) in rad."""
-    way = end[:3, 3] - start[:3, 3]
-    length = float(np.linalg.norm(way))
+    distance = end[:3, 3] - start[:3, 3]
+    length = float(np.linalg.norm(distance))
     if length > _STILL_MM:
-        return ToolPiece(start, length, way / length, np.zeros(3), turn / length)
+        return ToolPiece(start, length, distance / length, np.zeros(3), turn / length)
     turned_deg = float(np.degrees(np.linalg.norm(turn)))
     if turned_deg <= _STILL_DEG:
         raise PlanError(

@@ -89,10 +89,10 @@ def locked(function, argument=None):
         micropython.heap_unlock()
 
 
-def run(joints, brake_at):
+def run(joints, brake_at, backlash=()):
     """A whole motion, braked at a time (or not)."""
     stm.BLOCKS["TIM1"][isr.CNT] = 0
-    engine = Engine(EngineParts(HEAD, joints, ENGINE_MEMORY))
+    engine = Engine(EngineParts(HEAD, joints, ENGINE_MEMORY, backlash))
     engine.home(7, [0, 0, 0])
     motion = record()
     engine.load(motion)
@@ -116,11 +116,11 @@ def run(joints, brake_at):
     return samples, [engine.commanded(number) for number in range(3)], [s.matched for s in streams]
 
 
-def heap(count):
+def heap(count, backlash=()):
     """Bytes that an engine with that many joints keeps."""
     gc.collect()
     before = gc.mem_alloc()
-    engine = Engine(EngineParts(HEAD, arm(count), ENGINE_MEMORY))
+    engine = Engine(EngineParts(HEAD, arm(count), ENGINE_MEMORY, backlash))
     gc.collect()
     return gc.mem_alloc() - before if engine else 0
 
@@ -128,7 +128,10 @@ def heap(count):
 JOINTS = arm(3)
 for joint in JOINTS[1:]:
     joint["following_counts"] = 0
+BACKLASH = [{"steps": steps, "on_motor": 0, "spare": 0, "pace": 20_000} for steps in (0, 40, 0)]
 heap(3)  # stale words on the stack keep garbage of the first time alive: the second time counts
-print(heap(3), heap(6))
+heap(3, BACKLASH)
+print(heap(3), heap(6), heap(3, BACKLASH))
 print(*run(JOINTS, 0))
 print(*run(JOINTS, 40_000_000))
+print(*run(JOINTS, 0, BACKLASH))

@@ -238,9 +238,9 @@ class Evaluator:
 
 
 class Rig:
-    """A board, an arm, an engine. ``turn_us``: how long the main loop takes."""
+    """A board, an arm, an engine. ``turn_us``: how long the main loop takes; ``backlash``: as of ``EngineParts``."""
 
-    def __init__(self, joints, planned=True, turn_us=1000, **head):
+    def __init__(self, joints, planned=True, turn_us=1000, backlash=(), **head):
         self.head = dict(HEAD)
         self.head.update(head)
         self.joints = joints
@@ -263,15 +263,15 @@ class Rig:
             for joint in joints
         ]
         self.engine_memory = self._engine_memory()
-        self.make_engine(joints)
+        self.make_engine(joints, backlash)
         self.engine.home((1 << len(joints)) - 1, [0] * len(joints))
 
-    def make_engine(self, joints):
+    def make_engine(self, joints, backlash=()):
         """The engine for the rig's head and these joints."""
         from armtempo_board.motion.engine import Engine
         from armtempo_board.motion.engine_parts import EngineParts
 
-        self.engine = Engine(EngineParts(self.head, joints, self.engine_memory))
+        self.engine = Engine(EngineParts(self.head, joints, self.engine_memory, backlash))
 
     @staticmethod
     def _engine_memory():

@@ -95,7 +95,7 @@ def install():
     memory_shares = Module()
     memory_shares.for_engine = EngineMemory
     memory_shares.sample_bytes = lambda: 4096
-    memory_shares.resize = lambda made, joints: None
+    memory_shares.resize = lambda made, joints, with_backlash=0: None
     ends = Module()
     ends.duration_ticks = lambda motion: 84000
     ends.start_offset = lambda motion, joint, position: 7 - position
@@ -173,7 +173,7 @@ class Engine:
     """Moves when told, ends when told; remembers what was asked of it."""
 
     def __init__(self, parts):
-        _, joints, _ = parts
+        _, joints, _, _ = parts
         self.joints = len(joints)
         self.limits = joints
         self.known = 0

@@ -137,10 +137,10 @@ class Stepper(IdealMotor):
         if not self.moved:
             self.moved = True
             self._done += (rises[0] - self._done) // _DT_TICKS * _DT_TICKS
-        way = 1 if self._dir.level ^ self._inverted else -1
+        direction = 1 if self._dir.level ^ self._inverted else -1
         for tick in rises:
-            self._pending.append((tick, way))
-        self.position += way * len(rises)
+            self._pending.append((tick, direction))
+        self.position += direction * len(rises)
 
     def angle_deg(self):
         return self._start_deg + self._joint / self._steps_per_deg
@@ -182,11 +182,11 @@ class Stepper(IdealMotor):
         begun = self._commanded
         end = self._done + _DT_TICKS
         weight = taken = 0
-        for tick, way in self._pending:
+        for tick, direction in self._pending:
             if tick > end:
                 break
-            weight += way * (end - tick)
-            self._commanded += way
+            weight += direction * (end - tick)
+            self._commanded += direction
             taken += 1
         if taken:
             self._pending = self._pending[taken:]
