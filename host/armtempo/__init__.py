@@ -23,6 +23,7 @@ __all__ = [
     "Arm",
     "ArmFrame",
     "ArmPosture",
+    "ArmTool",
     "ArmtempoError",
     "Board",
     "BoardError",
@@ -119,6 +120,7 @@ if TYPE_CHECKING:
     from armtempo.model.sequence import Sequence
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.model.steps import Count, Goto, Hold, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
+    from armtempo.model.tool import ArmTool
     from armtempo.model.tool_pose import Pose
     from armtempo.model.tool_segment import ToolSegment
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
@@ -174,6 +176,7 @@ _HOMES = {
     "armtempo.model.plan": ("Plan",),
     "armtempo.model.sequence": ("Sequence",),
     "armtempo.model.sequence_plan": ("SequencePlan",),
+    "armtempo.model.tool": ("ArmTool",),
     "armtempo.model.tool_pose": ("Pose",),
     "armtempo.model.tool_segment": ("ToolSegment",),
     "armtempo.pipeline": ("compare", "connect", "plan", "plan_sequence", "summary"),

@@ -10,6 +10,7 @@ from typing import Any
 from armtempo import optimise
 from armtempo.basics import toml_section
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
+from armtempo.model.tool import ArmTool
 from armtempo.optimise.task import Number, Parameter
 from armtempo_board.app.cell import Cell
 
@@ -100,6 +101,7 @@ TABLES = {
         "keys of motor": _keys(Motor, "motor"),
         "keys of encoder": _keys(Encoder, "encoder"),
         "keys of load": _keys(Load, "[load.NAME]"),
+        "keys of tool": _keys(ArmTool, "[tool.NAME]"),
     },
     "programs.md": {"cell": _cell},
     "virtual-board.md": {"keys of model": _keys(JointModel, "model")},

@@ -112,6 +112,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "teach points.toml",
             "teach --posture above_tray",
             "teach frame tray",
+            "teach tool gripper",
         ),
         "run": Entry(
             "run:run",

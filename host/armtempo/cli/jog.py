@@ -42,6 +42,7 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
     show_default=True,
     help="Percent of the speed limits.",
 )
+@options.tool
 @options.holds
 @options.gamepad
 @options.board(options.arm_of_board, options.replace_arm)
@@ -53,6 +54,7 @@ def jog(
     by: float | None,
     to: float | None,
     speed: float,
+    tool: str | None,
     holds: str | None,
     gamepad: bool,
     given: BoardOptions,
@@ -70,10 +72,10 @@ def jog(
     if frame is not None and (joint is not None or "-" in (chosen or "")):
         raise InputError("--frame says whose x, y or z is meant", "for example --frame tray --axis x --by 10")
     arm = resolve.named_arm(given.arm_path)
-    if arm is not None and frame not in (None, TOOL):
-        arm.frame(frame)  # a wrong name is reported before a port is opened
+    if arm is not None:  # a wrong name is reported before a port is opened
+        arm.with_tool(tool).frame(BASE if frame in (None, TOOL) else frame)
     with resolve.board(given, arm) as board:
-        prepare(board, resolve.arm_of_board(board, arm).holding(holds), given.replace_arm)
+        prepare(board, resolve.arm_of_board(board, arm).with_tool(tool).holding(holds), given.replace_arm)
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 made = screen(board, pressed, speed)

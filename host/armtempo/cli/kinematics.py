@@ -36,6 +36,7 @@ from armtempo.model.tool_pose import BASE, Pose
 @click.option("--matrix", metavar="NUMBERS", help="12 or 16 numbers in quotes: its rows, lengths in mm.")
 @typed_pose.options
 @options.frame
+@options.tool
 @options.file(
     "--poses",
     help="One pose per line: x y z alone, with roll pitch yaw (- if free) or a quaternion, or 12 or 16 "
@@ -64,6 +65,7 @@ def ik(
     matrix: str | None,
     poses: Path | None,
     frame: str,
+    tool: str | None,
     previous: str | None,
     numerical: bool,
     as_json: bool,
@@ -78,7 +80,7 @@ def ik(
     motor. Exit code 1 if a pose has no solution.
     """
     found_poses = _poses(matrix, poses, TypedPose(**given))
-    solver = PoseSolver(resolve.arm_or_paper(arm_path, for_shape=True))
+    solver = PoseSolver(resolve.arm_or_paper(arm_path, for_shape=True).with_tool(tool))
     in_base = [solver.arm.in_base(pose, frame) for pose in found_poses]
     wanted = [_within(pose, tolerance_mm, tolerance_deg) for pose in in_base]
     found = listings(solver, wanted, _posture(previous, solver), numerical)
@@ -156,6 +158,7 @@ def _fail(without: list[int]) -> None:
 @click.command("fk", cls=options.TakesNumbers)
 @click.argument("where", nargs=-1)
 @options.frame
+@options.tool
 @options.job
 @options.arm
 @options.altered
@@ -163,6 +166,7 @@ def _fail(without: list[int]) -> None:
 def fk(
     where: tuple[str, ...],
     frame: str,
+    tool: str | None,
     job_path: Path | None,
     arm_path: Path | None,
     altered: bool,
@@ -176,6 +180,7 @@ def fk(
     """
     if len(where) == 1 and posture.is_via(where[0]):
         arm, job = resolve.arm_and_job(arm_path, job_path)
+        arm = arm.with_tool(job.tool)
         angles_deg = spread_deg(arm, posture.via_deg(where[0], arm, job).tolist())
     elif len(where) == 1 and posture.is_named(where[0]):
         wanted = posture.NamedPosture.of(where[0], arm_path, altered)
@@ -184,6 +189,7 @@ def fk(
     else:
         arm = resolve.arm_or_paper(arm_path, for_shape=True)
         angles_deg = _angles(where, arm)
+    arm = arm.with_tool(tool)
     if as_json:
         results.show_json(_values(arm, angles_deg, frame))
     else:

@@ -104,6 +104,9 @@ frame = click.option(
     metavar="NAME",
     help="Frame of the arm file in which poses are.  [default: base]",
 )
+tool = click.option(
+    "--tool", metavar="NAME", help="Tool of the arm file that is on the arm: poses and axes are of its point."
+)
 holds = click.option(
     "--holds",
     metavar="NAME",

@@ -34,6 +34,7 @@ from armtempo.robot.stop_request import Stopped
 @typed_pose.options
 @options.frame
 @click.option("--line", is_flag=True, help="Move the tool in a straight line, turning evenly.")
+@options.tool
 @options.holds
 @options.job
 @options.board(options.arm_of_board, options.replace_arm, options.altered)
@@ -41,6 +42,7 @@ def goto(
     where: tuple[str, ...],
     frame: str,
     line: bool,
+    tool: str | None,
     holds: str | None,
     job_path: Path | None,
     given: BoardOptions,
@@ -67,10 +69,10 @@ def goto(
         )
     wanted = NamedPosture.of(where[0], given.arm_path, given.altered) if where else None
     named = wanted.arm if wanted else resolve.named_arm(given.arm_path)
-    if named is not None:
-        named.frame(frame)  # a wrong name is reported before a port is opened
+    if named is not None:  # a wrong name is reported before a port is opened
+        named.with_tool(tool).frame(frame)
     with resolve.board(given, named) as board:
-        arm = resolve.arm_of_board(board, named).holding(holds)
+        arm = resolve.arm_of_board(board, named).with_tool(tool).holding(holds)
         target = wanted.angles_deg(arm, job_path) if wanted else arm.in_base(typed.pose, frame)
         board.configure(arm, replace=given.replace_arm)
         try:

@@ -14,8 +14,10 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import results
 from armtempo.diagnosis import figures
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import frame, taught, taught_frame
+from armtempo.model import frame, taught, taught_frame, taught_tool, tool
 from armtempo.model.arm import Arm
+from armtempo.model.parts import NOTHING
+from armtempo.model.pose import to_rpy_deg
 from armtempo.planning import via_points
 
 TAKE, UNDO = "p", "u"
@@ -80,6 +82,9 @@ class JobPoints(TaughtPoints):
 class NewFrame:
     """The frame that is taught, and the arm file that gets it."""
 
+    kind = frame.KIND
+    points = taught_frame.POINTS
+
     def __init__(self, file: Path, arm: Arm, name: str, level: bool, replace_old: bool) -> None:
         """Raise InputError for a name that is not allowed or taken, before anything moves."""
         frame.check_name(name)
@@ -91,15 +96,6 @@ class NewFrame:
         self._replace = replace_old
         self._step_error_mm = 0.5 * sum(resolution.step_mm for resolution in figures.resolutions(arm))
         """By how much half a step of each joint moves the tool at most."""
-
-    def postures_deg(self, names: Sequence[str]) -> list[list[float]]:
-        """The angles, (J,), of three postures of the arm file."""
-        if len(names) != len(taught_frame.POINTS):
-            raise InputError(
-                f"--at {','.join(names)}: {len(names)} postures",
-                f"give three: at {', '.join(taught_frame.POINTS)}",
-            )
-        return [via_points.posture_deg(self._arm, self._arm.posture(name.strip())).tolist() for name in names]
 
     def problem(self, points_deg: Sequence[Sequence[float]]) -> str:
         """Why the first points of a frame, (1 to 3, J), cannot be its points; "" if they can."""
@@ -133,33 +129,88 @@ class NewFrame:
         )
 
 
-class FramePoints(TaughtPoints):
-    """The three points of a frame."""
+class NewTool:
+    """The tool whose point is taught, and the arm file that gets it."""
 
-    def __init__(self, arm: Arm, where: Callable[[], Array], new: NewFrame) -> None:
+    kind = tool.KIND
+    points = taught_tool.POINTS
+
+    def __init__(self, file: Path, arm: Arm, name: str, replace_old: bool) -> None:
+        """Raise InputError for a name that is not allowed or taken, before anything moves."""
+        tool.check_name(name)
+        taught.check_free(file, (tool.KIND, name), replace_old)
+        self._file = file
+        self._arm = arm.with_tool(NOTHING)
+        self._name = name
+        self._replace = replace_old
+        self._step_error_mm = 0.5 * sum(resolution.step_mm for resolution in figures.resolutions(self._arm))
+
+    def problem(self, points_deg: Sequence[Sequence[float]]) -> str:
+        """Why postures (1 to 4, J) do not give the tool's point; "" if they do, or are still too few."""
+        try:
+            if len(points_deg) == len(self.points):
+                taught_tool.of_postures(self._flanges(points_deg), self._step_error_mm)
+        except InputError as error:
+            return f"{error.problem}; {error.hint}"
+        return ""
+
+    def _flanges(self, points_deg: Sequence[Sequence[float]]) -> Array:
+        return np.array([forward(self._arm, angles) for angles in points_deg])
+
+    def save(self, points_deg: Sequence[Sequence[float]]) -> None:
+        """Write the tool whose point is at one tip in postures (4, J); InputError if they give none."""
+        found = taught_tool.of_postures(self._flanges(points_deg), self._step_error_mm)
+        place = (tool.KIND, self._name)
+        old = next((each for each in self._arm.tools if each.name == self._name), None)
+        turns = to_rpy_deg(old.matrix) if old else (0.0, 0.0, 0.0)
+        values = taught_tool.values(taught.table_of(self._file, place), turns, found.position_mm)
+        taught.save_table(self._file, place, values, self._replace)
+        results.echo(
+            f"{self._file}: tool {self._name!r}: {', '.join(f'{key} {value}' for key, value in values.items())}"
+        )
+        results.echo(
+            f"the postures meet within {found.apart_mm:.2g} mm; half a step of each joint may move the point by up to "
+            f"{found.error_mm:.2g} mm"
+        )
+
+
+def postures_deg(arm: Arm, names: Sequence[str], points: Sequence[str]) -> list[list[float]]:
+    """The angles, (J,), of the postures of the arm file at ``points``; InputError unless there is one for each."""
+    if len(names) != len(points):
+        raise InputError(
+            f"--at {','.join(names)}: {len(names)} postures", f"give {len(points)}: at {', '.join(points)}"
+        )
+    return [via_points.posture_deg(arm, arm.posture(name.strip())).tolist() for name in names]
+
+
+class NamedPoints(TaughtPoints):
+    """The points of a frame, or the postures for a tool, which are taken in this order."""
+
+    def __init__(self, arm: Arm, where: Callable[[], Array], new: NewFrame | NewTool) -> None:
         super().__init__(arm, where)
         self._new = new
 
     def take(self) -> str:
         """Store the arm's position as the next point; returns a message."""
-        count = len(self.points_deg)
-        if count == len(taught_frame.POINTS):
-            return "not taken: all three points are there; q writes the frame, u removes the last"
+        count, points = len(self.points_deg), self._new.points
+        if count == len(points):
+            return f"not taken: all {count} are there; q writes the {self._new.kind}, u removes the last"
         said = super().take()
         if len(self.points_deg) == count:
             return said
         if problem := self._new.problem(self.points_deg):
             self.points_deg.pop()
             return f"not taken: {problem}"
-        then = [*taught_frame.POINTS[1:], "q writes the frame"][count]
-        return f"{taught_frame.POINTS[count]} taken; next: {then}"
+        then = [*points[1:], f"q writes the {self._new.kind}"][count]
+        return f"{points[count]} taken; next: {then}"
 
     def save(self) -> None:
-        """Write the frame; raises InputError if it has not three points."""
-        if len(self.points_deg) < len(taught_frame.POINTS):
+        """Write what they give; raises InputError if some are missing."""
+        points = self._new.points
+        if len(self.points_deg) < len(points):
             raise InputError(
-                f"{len(self.points_deg)} of 3 points, so no frame was written",
-                f"take {', '.join(taught_frame.POINTS)}",
+                f"{len(self.points_deg)} of {len(points)} points, so no {self._new.kind} was written",
+                f"take {', '.join(points)}",
             )
         self._new.save(self.points_deg)
 

@@ -12,7 +12,15 @@ from armtempo.basics.settings import ARM, ProjectSettings, missing_setting
 from armtempo.cli import jog, keys, options, resolve, results
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.cli.options import BoardOptions
-from armtempo.cli.taught_points import FramePoints, JobPoints, NewFrame, TaughtPoints, row
+from armtempo.cli.taught_points import (
+    JobPoints,
+    NamedPoints,
+    NewFrame,
+    NewTool,
+    TaughtPoints,
+    postures_deg,
+    row,
+)
 from armtempo.model import posture, shipped, taught
 from armtempo.robot.board import Board
 
@@ -25,9 +33,10 @@ from armtempo.robot.board import Board
 @click.option(
     "--at",
     metavar="NAMES",
-    help="Postures of the arm file at the three points of a frame, with commas, instead of keys: origin,on_x,on_y.",
+    help="Postures of the arm file at the points of a frame or the tip of a tool, with commas, instead of keys: o,x,y.",
 )
 @click.option("--level", is_flag=True, help="Make the z axis of a frame parallel to the base's.")
+@options.tool
 @click.option("--by-hand", is_flag=True, help="Switch the motors' current off and follow the encoders.")
 @click.option(
     "--replace", "replace_old", is_flag=True, help="Replace the posture, frame or job file of that name."
@@ -41,6 +50,7 @@ def teach(
     name: str | None,
     at: str | None,
     level: bool,
+    tool: str | None,
     by_hand: bool,
     replace_old: bool,
     gamepad: bool,
@@ -50,19 +60,24 @@ def teach(
 ) -> None:
     """Teach: store the arm's present position.
 
-    WHAT: a new job file, such as points.toml, for via points; or 'frame NAME' for a frame of the arm file. Move
+    WHAT: a new job file, such as points.toml, for via points; or 'frame NAME' or 'tool NAME' of the arm file. Move
     by the keys of 'armtempo jog' and press p for a point, or move the arm --by-hand. A frame takes three points of
     the tool: its origin, one on its x axis, one on the side of y; [frame.NAME] is written with what they say of
-    its accuracy. --posture NAME writes the present position as a posture; nothing moves. Then 'armtempo goto NAME'
-    moves the arm there, and a job can use it: [[via]] posture = "NAME". The arm file keeps its comments and layout.
+    its accuracy. A tool takes four postures in which its point touches the same tip, turned differently;
+    [tool.NAME] is written, with how well they meet. --posture NAME writes the present position as a posture; nothing
+    moves. Then 'armtempo goto NAME' moves the arm there, and a job can use it: [[via]] posture = "NAME". The arm
+    file keeps its comments and layout.
     """
-    is_frame = what[:1] == ("frame",)
-    if len(what) > 1 + is_frame or (len(what) < 1 + is_frame) == (name is None) or (is_frame and name):
+    kind = what[0] if what[:1] in (("frame",), ("tool",)) else ""
+    if len(what) > 1 + bool(kind) or (len(what) < 1 + bool(kind)) == (name is None) or (kind and name):
         raise InputError(
-            "give one thing to teach", "give JOB.toml, frame NAME, or --posture NAME; nothing else beside it"
+            "give one thing to teach",
+            "give JOB.toml, frame NAME, tool NAME, or --posture NAME; nothing else beside it",
         )
-    if (at or level) and not is_frame:
-        raise InputError("--at and --level are for frames", "armtempo teach frame NAME")
+    if (level or tool) and kind != "frame":
+        raise InputError("--level and --tool are for frames", "armtempo teach frame NAME")
+    if at and not kind:
+        raise InputError("--at is for frames and tools", "armtempo teach frame NAME")
     if by_hand and (name or at):
         raise InputError("--by-hand is for points that are taken one by one", "leave it out")
     if gamepad and (by_hand or name or at):
@@ -76,16 +91,20 @@ def teach(
             jog.prepare(board, arm)
             _write_posture(board, file, name, replace_old)
         return
-    if is_frame:
-        file, arm = _own_arm_file(arm_path), resolve.load_arm(arm_path)
-        new = NewFrame(file, arm, what[1], level, replace_old)
+    if kind:
+        file, arm = _own_arm_file(arm_path), resolve.load_arm(arm_path).with_tool(tool)
+        new = (
+            NewFrame(file, arm, what[1], level, replace_old)
+            if kind == "frame"
+            else NewTool(file, arm, what[1], replace_old)
+        )
         if at is not None:
-            new.save(new.postures_deg(at.split(",")))
+            new.save(postures_deg(arm, at.split(","), new.points))
             return
         _check_terminal()
         with resolve.board(board_options, arm) as board:
             jog.prepare(board, arm)
-            _collect(board, FramePoints(arm, board.posture_deg, new), by_hand, gamepad)
+            _collect(board, NamedPoints(arm, board.posture_deg, new), by_hand, gamepad)
         return
     job_file = Path(what[0])
     check_free(job_file, replace_old)

@@ -22,6 +22,7 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
     suspected: list[Finding] = []
     try:
         job = Job.load(path, arm)
+        arm = arm.with_tool(job.tool)
         suspected = _units(arm, job)
         checks.check_job(arm, job)
         via_deg, notes = planner.via_angles(arm, job)

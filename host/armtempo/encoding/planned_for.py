@@ -26,6 +26,9 @@ def check(what: Path | str, planned: Arm, frames: Sequence[str], arm: Arm) -> No
 
 def check_frames(what: Path | str, planned: Arm, frames: Sequence[str], arm: Arm) -> None:
     """The same for the frames alone."""
-    if change := frame.changed(planned.frames, arm.frames, frames):
+    change = frame.changed(planned.frames, arm.frames, frames)
+    if planned.tool and planned.tool not in (arm.tool, *arm.tools):
+        change = f"tool {planned.tool.name!r} has changed since, or is gone"
+    if change:
         where = f"arm {arm.name!r}" + (f" ({arm.source})" if arm.source else "")
         raise InputError(f"{what} is old: {change}, in {where}", "plan it again")

@@ -44,11 +44,11 @@ def chains_mm(arm: Arm, driven_deg: Array) -> Array:
 
 
 def outline_mm(arm: Arm, angles_deg: Array) -> Array:
-    """The arm as a line through its frames, along each d and then along each a: (..., 2 joints + 1, 3).
+    """The arm without a tool as a line through its frames, along each d and then along each a: (..., 2 joints + 1, 3).
 
     For angles of all joints, (..., joints).
     """
-    geometry = Geometry.of(arm)
+    geometry = Geometry.of(arm).bare
     found = array_frames(geometry, np.radians(angles_deg))
     points = [np.stack(found[0].origin, axis=-1)]
     for link, before, after in zip(geometry.links, found, found[1:], strict=False):

@@ -22,19 +22,33 @@ _M = 1e-3
 def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) -> Array:
     """Torque of each joint, including friction, Nm: (N, joints); a row without ``dynamics`` has no mass.
 
-    The load is part of the last link.
+    Tool and load are parts of the last link.
 
     ``angles``, ``rates`` and ``rate_changes`` of all joints, each (N, joints) in rad, rad/s and rad/s^2.
     Angles of a parallel linkage are relative to the link before the previous one; its rods have no mass.
     """
     bodies = [joint.dynamics or Dynamics(0.0) for joint in arm.joints]
-    if arm.payload:
-        bodies[-1] = _with_load(bodies[-1], arm.payload)
     geometry = Geometry.of(arm)
+    if arm.tool:
+        bodies[-1] = _with_load(bodies[-1], Load("tool", arm.tool.mass_kg, centre_mm=arm.tool.centre_mm))
+    if arm.payload:
+        bodies[-1] = _with_load(bodies[-1], _on_tool(arm.payload, geometry))
+    geometry = geometry.bare
     by_row = _row_torques(geometry, bodies, angles, rates, rate_changes)
     turns = np.array(geometry.turns(list(np.eye(len(bodies)))))
     friction, damping = np.array([(body.friction_nm, body.viscous_nm_s) for body in bodies]).T
     return np.asarray(by_row @ turns + friction * np.sign(rates) + damping * rates)
+
+
+def _on_tool(load: Load, geometry: Geometry) -> Load:
+    """A load in the tool's frame, in the frame after the last row."""
+    if not geometry.tool:
+        return load
+    tool = np.reshape(geometry.tool, (3, 4))
+    turn = tool[:, :3]
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = turn @ inertia_matrix(load.inertia_kg_m2) @ turn.T
+    x, y, z = turn @ np.array(load.centre_mm) + tool[:, 3]
+    return replace(load, centre_mm=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
 
 
 def _with_load(link: Dynamics, load: Load) -> Dynamics:

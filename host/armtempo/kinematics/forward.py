@@ -74,7 +74,23 @@ def _chain(geometry: Geometry, cosines: Sequence[T], sines: Sequence[T], zero: T
     found = [base]
     for link, cos, sin in zip(geometry.links, cosines, sines, strict=True):
         found.append(_next(link, found[-1], cos, sin))
+    if geometry.tool:
+        found[-1] = _with_tool(found[-1], geometry.tool)
     return found
+
+
+def _with_tool(frame: Frame[T], tool: tuple[float, ...]) -> Frame[T]:
+    """The frame of a tool on ``frame``; ``tool``: its pose there, 3 rows of 4."""
+    columns = [(tool[column], tool[4 + column], tool[8 + column]) for column in range(4)]
+    x, y, z, offset = (
+        tuple(
+            a * along + b * across + c * up
+            for along, across, up in zip(frame.x, frame.y, frame.z, strict=True)
+        )
+        for a, b, c in columns
+    )
+    origin = tuple(here + away for here, away in zip(frame.origin, offset, strict=True))
+    return Frame(x, y, z, origin)  # type: ignore[arg-type]
 
 
 def _next(link: Link, frame: Frame[T], cos: T, sin: T) -> Frame[T]:

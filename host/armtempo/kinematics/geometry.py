@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeVar
 
@@ -48,6 +48,8 @@ class Geometry:
     """Indices of joints with a parallel linkage: their row turns by their angle minus that of the joint before."""
     still: tuple[tuple[int, float], ...] = ()
     """Indices and angles of rows that never turn: a pedestal under the arm, a tool on it."""
+    tool: tuple[float, ...] = ()
+    """The tool's pose in the frame after the last row, its first 3 rows of 4; (): that frame is the tool's."""
 
     def __hash__(self) -> int:
         """Computed once, as caches look up a geometry for every pose."""
@@ -55,7 +57,7 @@ class Geometry:
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.d, self.a, self.alpha, self.offset, self.linked, self.still))
+        return hash((self.d, self.a, self.alpha, self.offset, self.linked, self.still, self.tool))
 
     @classmethod
     def of(cls, arm: Arm) -> Geometry:
@@ -71,6 +73,7 @@ class Geometry:
                 for i, joint in enumerate(arm.joints)
                 if joint.motor is None and joint.range_deg[1] - joint.range_deg[0] <= STILL_DEG
             ),
+            tool=tuple(value for row in arm.tool.matrix[:3] for value in row) if arm.tool else (),
         )
 
     @cached_property
@@ -101,14 +104,24 @@ class Geometry:
 
     @cached_property
     def moving(self) -> Geometry:
-        """The geometry of the joints of ``core``; itself if these are all."""
+        """The geometry of the joints of ``core``, without a tool; itself if these are all and it has none."""
         if self.core == slice(0, self.joints):
-            return self
+            return self.bare
         first, end = self.core.start, self.core.stop
         d, a, alpha, offset = (row[self.core] for row in (self.d, self.a, self.alpha, self.offset))
         linked = tuple(joint - first for joint in self.linked)
         still = tuple((index - first, angle) for index, angle in self.still if first <= index < end)
         return Geometry(d, a, alpha, offset, linked, still)
+
+    @cached_property
+    def bare(self) -> Geometry:
+        """The rows without a tool; itself if it has none."""
+        return replace(self, tool=()) if self.tool else self
+
+    @property
+    def tool_length(self) -> float:
+        """Distance of the tool's point from the frame after the last row."""
+        return math.hypot(*self.tool[3::4])
 
     @property
     def joints(self) -> int:
@@ -118,7 +131,7 @@ class Geometry:
     @property
     def reach(self) -> float:
         """Sum of all lengths except the base height: a bound of the tool's distance from the foot of joint 2."""
-        return math.fsum(map(abs, self.d[1:])) + math.fsum(map(abs, self.a))
+        return math.fsum(map(abs, self.d[1:])) + math.fsum(map(abs, self.a)) + self.tool_length
 
 
 def twist(alpha: float) -> tuple[float, float]:

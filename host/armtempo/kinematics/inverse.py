@@ -176,7 +176,8 @@ def _still(geometry: Geometry) -> tuple[Array, Array]:
     for rows in (slice(0, core.start), slice(core.stop, geometry.joints)):
         d, a, alpha, offset = (row[rows] for row in (geometry.d, geometry.a, geometry.alpha, geometry.offset))
         angles = [angle for index, angle in geometry.still if index in range(geometry.joints)[rows]]
-        frame = frames(Geometry(d, a, alpha, offset), angles)[-1]
+        tool = geometry.tool if rows.stop == geometry.joints else ()
+        frame = frames(Geometry(d, a, alpha, offset, tool=tool), angles)[-1]
         pose = np.eye(4)
         pose[:3] = np.column_stack(frame)
         inverse = np.eye(4)

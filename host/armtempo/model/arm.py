@@ -29,10 +29,12 @@ from armtempo.model import (
 )
 from armtempo.model import frame as frames_of
 from armtempo.model import posture as named
+from armtempo.model import tool as tool_of
 from armtempo.model.frame import ArmFrame
 from armtempo.model.outputs import Input, Output
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
+from armtempo.model.tool import ArmTool
 from armtempo.model.tool_pose import Pose
 from armtempo.model.transmission import Transmission
 from armtempo.model.workspace import Workspace
@@ -73,6 +75,11 @@ class Arm:
     joint."""
     frames: tuple[ArmFrame, ...] = field(default=(), metadata=json_codec.ADDED)
     """Frames of what is around it; not sent to the board."""
+    tools: tuple[ArmTool, ...] = field(default=(), metadata=json_codec.ADDED)
+    """What may be on it; the board knows nothing of them."""
+    tool: ArmTool | None = field(default=None, metadata=json_codec.ADDED)
+    """What is on it, so that poses are of its point; None: they are of the frame after the last row. See
+    ``with_tool``."""
 
     def __post_init__(self) -> None:
         """Raise InputError for values that a file may not have either."""
@@ -162,6 +169,7 @@ class Arm:
         outputs, inputs = outputs_file.outputs(top), outputs_file.inputs(top)
         postures = top.table("posture")
         frames = frames_of.read(top)
+        tools = tool_of.read(top)
         around = workspace.read(top, frames)
         loads = parts_file.loads(top)
         homing = parts_file.homing(top, [joint.name for joint in joints])
@@ -182,6 +190,7 @@ class Arm:
             homing=homing,
             coupling=coupling,
             frames=frames,
+            tools=tools,
         )
         if not postures:
             return arm
@@ -273,6 +282,17 @@ class Arm:
         """
         return frames_of.pose_in_base(pose, self.frames, frame, f"arm {self.name!r}")
 
+    def with_tool(self, name: str | None) -> Arm:
+        """The arm with a tool of its file on it; "nothing": with none, "" or None: unchanged.
+
+        InputError if it has no such tool.
+        """
+        if not name:
+            return self
+        if name == NOTHING:
+            return replace(self, tool=None)
+        return replace(self, tool=self.tools[self._number("tool", name, [each.name for each in self.tools])])
+
     def _number(self, what: str, name: str, names: list[str]) -> int:
         if name in names:
             return names.index(name)
@@ -333,6 +353,7 @@ class Arm:
         if not isinstance(posture.where, Pose):
             return self.angles_problem(posture.where)
         reach_mm = sum((joint.d_mm**2 + joint.a_mm**2) ** 0.5 for joint in self.joints)
+        reach_mm += max((each.length_mm for each in self.tools), default=0.0)
         away_mm = sum(row[3] ** 2 for row in posture.where.matrix[:3]) ** 0.5
         if away_mm > reach_mm + posture.where.tolerance_mm + _REACHES_MM:
             return f"{away_mm:g} mm from the base, but all links together are {reach_mm:g} mm long"

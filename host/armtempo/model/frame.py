@@ -22,7 +22,7 @@ TOOL = "tool"
 _RESERVED = {BASE: "the frame of the arm itself", TOOL: "the frame of its tool"}
 _LEVEL = 1e-9
 """Sine of the angle between two vertical axes."""
-_WHOLE_ORIENTATION = "give rpy_deg, a quaternion or a matrix, or single angles, of which the others are 0"
+WHOLE_ORIENTATION = "give rpy_deg, a quaternion or a matrix, or single angles, of which the others are 0"
 
 
 @checked_fields
@@ -61,7 +61,7 @@ def _frame(name: str, table: Table) -> ArmFrame:
     if table.has("approach"):
         raise InputError(
             f"{table.file}: {table.place}approach does not say how a frame is turned about its own z axis",
-            _WHOLE_ORIENTATION,
+            WHOLE_ORIENTATION,
         )
     parent = table.text("frame", BASE)
     found = tool_pose.given(table, f"{table.file}: frame.{name}")

@@ -70,6 +70,8 @@ class Job:
     """Limits of the tool for the whole motion."""
     holds: str = field(default="", metadata=json_codec.ADDED)
     """The load of the arm that the tool holds; "": none, and in a sequence what it holds there."""
+    tool: str = field(default="", metadata=json_codec.ADDED)
+    """The tool of the arm on it, whose point the poses are for; "": the arm's as it is."""
     start_touches: bool = field(default=False, metadata=json_codec.ADDED)
     """Whether it may start where the arm touches something, to move out."""
     path: str = field(default="free", metadata=json_codec.added_as("through"))
@@ -172,6 +174,7 @@ class Job:
             speed_mm_s=tool_segment.limit(top, "speed_mm_s"),
             acceleration_mm_s2=tool_segment.limit(top, "acceleration_mm_s2"),
             holds=held(top, arm),
+            tool=tool_named(top, arm),
             start_touches=top.boolean("start_touches", cls.start_touches),
             path=top.choice("path", PATHS, cls.path),
             corridor_deg=_corridor(top, "corridor_deg"),
@@ -230,6 +233,16 @@ def held(top: Table, arm: Arm) -> str:
         arm.holding(name)
     except InputError as error:
         raise InputError(f"{top.file}: {top.place}holds: {error.problem}", error.hint) from None
+    return name
+
+
+def tool_named(top: Table, arm: Arm) -> str:
+    """``tool``: a tool of the arm, or "nothing"; "" if it is not given."""
+    name = top.text("tool") if top.has("tool") else ""
+    try:
+        arm.with_tool(name)
+    except InputError as error:
+        raise InputError(f"{top.file}: {top.place}tool: {error.problem}", error.hint) from None
     return name
 
 

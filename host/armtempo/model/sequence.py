@@ -17,7 +17,7 @@ from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
 from armtempo.model import tool_segment
 from armtempo.model.arm import Arm, read_posture
-from armtempo.model.job import Job, held, is_name, name_of, read_angles
+from armtempo.model.job import Job, held, is_name, name_of, read_angles, tool_named
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.steps import (
@@ -59,6 +59,8 @@ class Sequence:
     start: ArmPosture | None = None
     """Start posture; None: the target of its first motion."""
     source: str = ""
+    tool: str = ""
+    """The tool of the arm on it in all motions whose job names none; "": the arm's as it is."""
 
     def __post_init__(self) -> None:
         """Raise InputError for a name that is invalid on the board."""
@@ -89,8 +91,9 @@ class Sequence:
         reader = _Reader(arm, Path(top.file), _postures(top, arm))
         start = reader.posture(top, "start") if top.has("start") else None
         steps = reader.steps(top)
+        tool = tool_named(top, arm)
         top.done()
-        return cls(name, steps, start, top.file)
+        return cls(name, steps, start, top.file, tool)
 
 
 def _numbered(steps: Iterable[Step], numbers: Iterator[int]) -> tuple[Step, ...]:

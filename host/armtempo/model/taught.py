@@ -107,7 +107,15 @@ def with_table(text: str, place: tuple[str, str], values: Mapping[str, Any], pat
     return changed
 
 
-def _value(value: str | Sequence[float]) -> str:
+def table_of(path: Path, place: tuple[str, str]) -> dict[str, Any]:
+    """The keys of the table ``[KIND.NAME]`` of a file as they are written; none if there is no such table."""
+    kind, name = place
+    return dict(_parsed(_text(path), path).get(kind, {}).get(name, {}))
+
+
+def _value(value: str | float | Sequence[float]) -> str:
+    if isinstance(value, int | float):
+        return f"{value:.12g}"
     return json.dumps(value) if isinstance(value, str) else f"[{', '.join(f'{one:.12g}' for one in value)}]"
 
 

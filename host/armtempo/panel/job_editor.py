@@ -39,6 +39,7 @@ OPTIONS = (
     "acceleration_mm_s2",
     "holds",
     "frame",
+    "tool",
 )
 """Keys of the job that are edited as fields."""
 WAY_KEYS = (*tool_segment.KEYS, "stop", "dwell_s")
@@ -171,6 +172,14 @@ class JobEditor(FileEditor):
         if text != self.vias[number].text(key):
             self._change_table(number, lambda table: put(table, key, text))
 
+    @property
+    def tooled_arm(self) -> Arm:
+        """The arm with the job's tool on it; without one while the job names a tool that there is not."""
+        try:
+            return self.arm.with_tool(self.option("tool"))
+        except InputError:
+            return self.arm
+
     def _frame(self, number: int) -> str:
         """The frame in which a via point is given."""
         return str(self._rows()[number].get("frame", self._values.get("frame", BASE)))
@@ -187,7 +196,7 @@ class JobEditor(FileEditor):
         angles = self.vias[number].angles_deg
         if angles is None:
             raise InputError(f"P{number} has no angles", "correct the job first")
-        pose = pose_values(self.arm, angles, self._frame(number))
+        pose = pose_values(self.tooled_arm, angles, self._frame(number))
         self._change_table(number, lambda table: _place(table, pose))
 
     def insert(self, number: int, values: dict[str, Any] | Sequence[float] | None = None) -> None:

@@ -205,13 +205,13 @@ class JobTab:
             [row for row in angles if row is not None and len(row) == len(self._operator.arm.driven)]
         )
         if len(rows) == len(angles) and len(rows) and np.isfinite(rows).all():
-            self._page.scene.dots(chains_mm(self._operator.arm, rows)[:, -1])
+            self._page.scene.dots(chains_mm(self._jobs.tooled_arm, rows)[:, -1])
 
     def _pick(self, number: int) -> None:
         """Show a via point and the other postures that reach it."""
         vias = self._jobs.vias
         if number < len(vias) and (angles := vias[number].angles_deg) is not None:
-            tool_mm = chains_mm(self._operator.arm, np.array(angles))[-1]
+            tool_mm = chains_mm(self._jobs.tooled_arm, np.array(angles))[-1]
             self._page.attempt(lambda: self._offer(number, tool_mm))
 
     def _drag(self, number: int, position_mm: Array) -> None:
@@ -227,7 +227,7 @@ class JobTab:
     def _offer(self, number: int, position_mm: Array) -> None:
         """Take the posture that is nearest to the via point's, and offer the others."""
         angles = self._jobs.vias[number].angles_deg
-        postures = moved_tool_deg(self._operator.arm, np.array(angles), position_mm.tolist())
+        postures = moved_tool_deg(self._jobs.tooled_arm, np.array(angles), position_mm.tolist())
         texts = [", ".join(f"{angle:.1f}" for angle in posture) + "°" for posture in postures]
         self._offered.clear()
         with self._offered:
@@ -257,8 +257,14 @@ class JobTab:
         """The field of a key of the job; an empty one is the default."""
         value, label = self._jobs.option(key), words.OPTIONS[key]
         choices: Any = _CHOICES.get(key)
-        if key == "holds":
-            choices = [load.name for load in self._operator.arm.loads]
+        arm = self._operator.arm
+        named = {
+            "holds": [load.name for load in arm.loads],
+            "frame": [frame.name for frame in arm.frames],
+            "tool": [tool.name for tool in arm.tools],
+        }
+        if key in named:
+            choices = named[key]
             if not choices:
                 return
         if choices is None:

@@ -110,6 +110,7 @@ OPTIONS = {
     "acceleration_mm_s2": "Tool acceleration, mm/s²",
     "holds": "Tool holds",
     "frame": "Frame",
+    "tool": "Tool",
 }
 VIA_KEYS = {
     "line": "Straight line to it",

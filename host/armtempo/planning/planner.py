@@ -48,6 +48,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     and arm do not fit each other, PlanError if there is no motion within the limits and ranges; an exception
     of ``progress`` ends the planning.
     """
+    arm = arm.with_tool(job.tool)
     checks.limits_of(arm)
     holding = arm.holding(job.holds)
     checks.check_job(arm, job)
@@ -91,6 +92,7 @@ def versions() -> Mapping[str, str]:
 
 def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:
     """Angles of the driven joints at the via points in degrees, (n + 1, J), and notes on poses."""
+    arm = arm.with_tool(job.tool)
     if any(isinstance(via, Pose) for via in job.via):
         from armtempo.planning import via_points  # here, because most jobs need no kinematics
 

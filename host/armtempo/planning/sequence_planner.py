@@ -18,6 +18,7 @@ from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
 from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
+from armtempo.model.tool import ArmTool
 from armtempo.model.tool_pose import BASE, Pose
 from armtempo.planning import checks, planner, via_points, workspace_check
 from armtempo.splines.trajectory import Trajectory
@@ -36,6 +37,7 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     Raises InputError, naming file and step, if a motion does not begin at the end of the one before, or the
     sequence has no effect; PlanError if a motion cannot be planned.
     """
+    arm = arm.with_tool(sequence.tool)
     compiler = _Compiler(arm, progress)
     source = sequence.source or f"sequence {sequence.name!r}"
     start = compiler.posture(sequence.start, f"{source}: start: ") if sequence.start else _End(None, "")
@@ -248,13 +250,25 @@ class _Compiler:
 
     def _check_arm(self, plan: Plan, where: str) -> None:
         """Raise InputError for a plan for another arm; its postures, and frames that it does not use, may differ."""
-        arm = replace(plan.arm, postures=self.arm.postures, frames=self.arm.frames)
+        kept = {key: getattr(self.arm, key) for key in ("postures", "frames", "tools", "tool")}
+        arm = replace(plan.arm, **kept)
         if arm != self.arm:
             raise InputError(
                 f"{where}run: it was planned for a different arm than {self.arm.name!r}", "plan it again"
             )
         if change := frame.changed(plan.arm.frames, self.arm.frames, plan.job.frames):
             raise InputError(f"{where}run: it is old: {change}", "plan it again")
+        self._check_tool(plan.arm.tool, where)
+
+    def _check_tool(self, tool: ArmTool | None, where: str) -> None:
+        """Raise InputError for a motion with another tool than the arm has in this sequence."""
+        if tool != self.arm.tool:
+            has, wants = (f"tool {each.name!r}" if each else "no tool" for each in (self.arm.tool, tool))
+            changed = ", as it was before it changed" if tool and tool not in self.arm.tools else ""
+            raise InputError(
+                f"{where}run: it is for {wants}{changed}, but the sequence has {has}",
+                'write tool = "NAME" before the first step of the sequence, or plan the motion again',
+            )
 
     def _of(self, source: Job | Plan, where: str) -> Trajectory:
         if isinstance(source, Plan):
@@ -262,6 +276,7 @@ class _Compiler:
             arm = self.arm.holding(source.job.holds or self._holds)
             workspace_check.check(arm, source.trajectory, source.job.start_touches)
             return source.trajectory
+        self._check_tool(self.arm.with_tool(source.tool).tool, where)
         job = replace(source, holds=source.holds or self._holds)
         planned = planner.plan(self.arm, job, self.progress)
         checks.check_held(planned.trajectory, self.arm)

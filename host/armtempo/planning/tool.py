@@ -103,4 +103,4 @@ class Tool:
     def reach_mm(self) -> Array:
         """Largest distance of the tool from the axis of each moving row: (R,)."""
         lengths = np.abs(self._geometry.a) + np.abs(self._geometry.d)
-        return np.asarray(np.cumsum(lengths[::-1])[::-1][self._rows])
+        return np.asarray(np.cumsum(lengths[::-1])[::-1][self._rows] + self._geometry.tool_length)

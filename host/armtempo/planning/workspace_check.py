@@ -61,7 +61,7 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """The links of an arm: two segments per row of the table, along its d and its a; and the load."""
+    """The links of an arm: two segments per row of the table, along its d and its a; the tool; and the load."""
 
     arm: Arm
 
@@ -74,12 +74,14 @@ class Bodies:
     def names(self) -> list[str]:
         """Of each segment, (S,)."""
         found = [f"the link of {joint.name}" for joint in self.arm.joints for _ in range(2)]
+        found += [f"the tool {self.arm.tool.name}"] if self.arm.tool else []
         return [*found, *([f"the load {self.arm.payload.name}"] if self.arm.payload else [])]
 
     @cached_property
     def radius_mm(self) -> Array:
         """Of each segment, (S,)."""
         found = np.repeat([joint.radius_mm for joint in self.arm.joints], 2)
+        found = np.append(found, self.arm.tool.radius_mm) if self.arm.tool else found
         return np.append(found, self.arm.payload.radius_mm) if self.arm.payload else found
 
     @cached_property
@@ -96,8 +98,13 @@ class Bodies:
         angles = all_angles_deg(self.arm, driven_deg)
         points = np.moveaxis(outline_mm(self.arm, angles), 1, 0)
         starts, ends = points[:-1], points[1:]
+        if not (self.arm.tool or self.arm.payload):
+            return starts, ends
+        tool = forward(Geometry.of(self.arm), np.radians(angles))
+        if self.arm.tool:
+            starts = np.concatenate([starts, points[-1:]])
+            ends = np.concatenate([ends, tool[None, :, :3, 3]])
         if self.arm.payload:
-            tool = forward(Geometry.of(self.arm), np.radians(angles))
             load = tool[:, None, :3, 3] + self.load_ends_mm @ np.swapaxes(tool[:, :3, :3], 1, 2)
             starts, ends = (
                 np.concatenate([both, load[None, :, end]]) for end, both in enumerate((starts, ends))
@@ -114,6 +121,7 @@ class Bodies:
     def reach_mm(self) -> Array:
         """Largest distance of a segment from the axis of a row, (S, joints); 0 if the row does not move it."""
         lengths = np.array([(abs(joint.d_mm), abs(joint.a_mm)) for joint in self.arm.joints]).ravel()
+        lengths = np.append(lengths, [self.arm.tool.length_mm] if self.arm.tool else [])
         lengths = np.append(lengths, np.linalg.norm(self.load_ends_mm, axis=1).max(initial=0.0))[
             : len(self.names)
         ]
@@ -136,7 +144,7 @@ class Bodies:
             return []
         found = []
         starts, ends = self.ends(np.array([self.arm.home_deg]))
-        # The load belongs to the last row
+        # The tool and the load belong to the last row
         row = np.minimum(np.arange(len(self.radius_mm)) // 2, len(self.arm.joints) - 1)
         for one in range(len(self.radius_mm)):
             for other in range(one + 1, len(self.radius_mm)):
@@ -190,6 +198,7 @@ def _away(box: KeepOut, starts: Array, ends: Array) -> Array:
 def can_touch(arm: Arm) -> bool:
     """Whether there is anything that the arm could touch."""
     thick = sum(joint.radius_mm > 0.0 for joint in arm.joints) + bool(arm.payload and arm.payload.radius_mm)
+    thick += bool(arm.tool and arm.tool.radius_mm)
     return bool(arm.workspace and arm.workspace.obstacles) or thick > 1
 
 
