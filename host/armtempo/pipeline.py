@@ -6,7 +6,7 @@
     load     trajectory file -> Plan          model.plan
     run      Plan -> records -> board         records.encode, link, robot.stored_motion; there evaluator, rings, timers
              board -> samples -> run folder   link.follow, report.run_folder
-    report   run folder -> page and figures   report
+    report   run folder -> page and figures   Run.report
 
 Each stage needs only the result of the previous one, and each result can be stored: a plan in a file, a
 motion on the board, a run in its folder.
@@ -39,7 +39,6 @@ __all__ = [
     "load",
     "plan",
     "plan_sequence",
-    "report",
     "run",
     "split",
     "summary",
@@ -120,11 +119,6 @@ def run(
     """
     with connect(port, plan.arm) as board:
         return board.run(plan, repeat, out, progress, watcher)
-
-
-def report(run: Run) -> Path:
-    """``Run.report``."""
-    return run.report()
 
 
 @checked

@@ -41,7 +41,7 @@ MARK = "__at__"
 loop."""
 EACH = "__each__"
 """It calls this with the number of a line and what a loop goes through."""
-HEAP_BYTES = 26_000
+HEAP_BYTES = 16_000
 """Heap that a program needs besides its own: its interface, and the start of a motion,"""
 HEAP_PER_BYTE = 8
 """and for each byte of the source, most of it while it is compiled (host/docs/measurements.md)."""

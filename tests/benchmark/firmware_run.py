@@ -31,6 +31,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
 from armtempo.deploy import program_files
+from armtempo.encoding import encoded_motion
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -38,15 +39,21 @@ from armtempo.model.parts import LimitSwitches, Safety
 from armtempo.planning import planner
 from armtempo.robot.board import Board
 from armtempo.robot.connect import connect
+from armtempo_shared.motion import Motion
 
 from tests.benchmark import firmware, loop
+from tests.board import oracle
 from tests.system import commandline
 from tests.system.test_examples import README, command_lines
 
 PROBES = ("firmware_loop.py", "firmware_host.py")
 MANIFEST = 'include("$(PORT_DIR)/boards/manifest.py")\n' + "".join(f'module("{name}")\n' for name in PROBES)
 CYCLES = 1.3
+OWN = loop.OWN + 3_100
+"""Bytes of heap for what stands in for hardware, as in loop: what is received takes more."""
 PATIENCE_S = 300.0
+FIRST_COMPARE = 0x40000034
+"""Address of TIM2's first compare register."""
 SIX_JOINTS = "ar4"
 USB = 'pyb.usb_mode("VCP")'
 START = """import gc
@@ -100,8 +107,11 @@ def build_with_program(micropython: Path, board: Path, out: Path) -> Path:
     return out / "firmware.elf"
 
 
-def flash(folder: Path, elf: Path, with_library: bool) -> Path:
-    """The image of a flash whose main.py starts the program between the stand-ins."""
+def flash(folder: Path, elf: Path, with_library: bool, edges: bool = True) -> Path:
+    """The image of a flash whose main.py starts the program between the stand-ins.
+
+    ``edges``: they tell of all edges, and collect the heap then.
+    """
     places = firmware.symbols(elf)
     scale = round(2 * loop._INSTRUCTION_NS / CYCLES)
     settings: dict[str, Any] = {
@@ -109,6 +119,7 @@ def flash(folder: Path, elf: Path, with_library: bool) -> Path:
     }
     settings |= loop.IN_FIRMWARE
     settings |= {
+        "edges": edges,
         "prescaler": scale - 1,
         "millisecond": round(loop.CORE_HZ / 1000 / CYCLES * loop._INSTRUCTION_NS * loop.CORE_HZ / 1e9),
     }
@@ -138,7 +149,7 @@ def running(elf: Path, image: Path) -> Iterator[tuple[str, list[str]]]:
         number = probe.getsockname()[1]
     serial = f"tcp:127.0.0.1:{number},server=on,wait=off,nodelay=on"
     with tempfile.NamedTemporaryFile() as cut:
-        cut.write(struct.pack("<i", -loop.OWN))
+        cut.write(struct.pack("<i", -OWN))
         cut.flush()
         command = firmware.emulator(elf, image, Path(cut.name), "-icount", f"shift={loop._SHIFT}")
         command += ["-serial", serial]
@@ -165,9 +176,26 @@ def heaps(said: list[str]) -> dict[str, Heap]:
     """By stage."""
     text = "".join(said).replace("\r", "")
     (own,) = re.findall(r"@ own (\d+)", text)
-    assert 0 <= loop.OWN - int(own) < 500, own
+    assert 0 <= OWN - int(own) < 500, own
     found = re.findall(r"@ (\w+)\nstack.*\nGC: total: \d+, used: (\d+).*\n.*max free sz: (\d+)", text)
     return {name: Heap(int(used) - int(own), 16 * int(free)) for name, used, free in found}
+
+
+def worst_edge(record: bytes, said: list[str]) -> float:
+    """Largest distance in ticks of a rising edge from where the spline passes half a step, above 50 steps/s.
+
+    ``said``: what a board with ``edges`` printed during the motion. AssertionError if there are more or fewer edges.
+    """
+    data = bytes.fromhex("".join(re.findall(r"@ edges (\w+)", "".join(said))))
+    rows = np.frombuffer(data, dtype="<i4").reshape(-1, 2)
+    motion, worst = Motion(record), 0.0
+    for joint in range(motion.joints):
+        exact = oracle.without_grazes(oracle.crossings(motion, joint), oracle.GAP_TICKS)
+        ticks = rows[rows[:, 0] == FIRST_COMPARE + 4 * joint, 1]
+        assert len(ticks) == 2 * len(exact.ticks), (joint, len(ticks), len(exact.ticks))
+        error = (ticks[::2] - exact.ticks + (1 << 31)) % (1 << 32) - (1 << 31)
+        worst = max(worst, float(np.max(np.abs(error[exact.speed > 50]))))
+    return worst
 
 
 def unwatched(arm: Arm) -> Arm:
@@ -191,10 +219,13 @@ def run(elf: Path, image: Path) -> dict[str, Heap]:
         with connect(port) as board:
             board.home(arm)
             board.goto(plan)
+            before = len(said)
             done = board.run(plan, out=runs)
             _check_steps(board, arm, plan.trajectory(plan.total_s))
         print(f"    {plan.job.name}: {plan.total_s:.3f} s, {len(done.samples)} samples, ends where planned")
         _wait(said, "@ ended")
+        error = worst_edge(encoded_motion.of_plan(plan).data, said[before:])
+        print(f"    pulses: one for each half step that the spline passes, at most {error:.2f} ticks from it")
         return heaps(said)
 
 

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.run_progress import RunProgress
+from armtempo.cli.sequences import StateLine
 from armtempo.encoding import encoded_motion
 from armtempo.kinematics import chain
-from armtempo.link.board_messages import Positions, Sample
+from armtempo.link.board_messages import Positions, Sample, SequenceState
 from armtempo.paper import searches
 from armtempo.report import analysis, arm_picture, drawing, html_page, plots, run_folder, sections
 from armtempo.report.run_folder import RunFolder
@@ -183,3 +184,18 @@ def test_the_bar_never_wraps(
     assert len(lines) > 5
     assert any("[" in line for line in lines)
     assert max(len(line.rstrip("\n")) for line in lines) <= columns
+
+
+def test_the_state_of_a_sequence_or_program_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed: list[str] = []
+    line = StateLine(lambda state: f"step {state.step}", printed.append)
+    for step, cycle in ((1, 0), (2, 0), (3, 1)):
+        line(SequenceState("running", 0, step, 0, cycle, "pick"))
+    assert printed == ["step 1", "step 3"]  # without a terminal: each new cycle
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    line(SequenceState("running", 0, 4, 0, 2, "pick"))
+    line.clear()
+    assert capsys.readouterr().err == "\r\x1b[Kstep 4\r\x1b[K"
+    assert len(printed) == 2

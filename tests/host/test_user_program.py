@@ -30,6 +30,8 @@ from tests.system.commandline import small_plan
 PAGE = (ROOT / "host" / "docs" / "programs.md").read_text()
 ARM_FILE = shipped.arm_path().parent / "pick_and_place" / "arm.toml"
 ARM = Arm.load(ARM_FILE)
+CHIP_BYTES = 32_000
+"""Free on the chip with an arm of six joints (host/docs/measurements.md)."""
 HEAD = "from armtempo_board import cell\n"
 
 
@@ -150,6 +152,12 @@ def test_check_needs_no_board(tmp_path: Path) -> None:
     done = run_command("program", path, "--check", "--arm", ARM_FILE, folder=tmp_path, ARMTEMPO_PORT="none")
     assert done.exit_code == 2
     done.said("pick.py, line 2", "hom")
+
+
+@pytest.mark.parametrize("name", ["pick_place.py", "pallet.py", "polling.py"])
+def test_the_pages_examples_fit_on_the_chip(name: str, tmp_path: Path) -> None:
+    found = UserProgram.load(example(name, tmp_path), ARM)
+    assert encoded_program.of_program(found, ARM).heap_bytes <= CHIP_BYTES
 
 
 class Small:

@@ -55,7 +55,6 @@ if TYPE_CHECKING:
 
 
 _OP, _NUMBER, _AMOUNT, _STEP_OF_ROW = const(0), const(1), const(3), const(4)  # of a row
-_START_BYTES = const(22_000)  # heap for the start of a motion, partly in large blocks (docs/memory.md)
 _MOST = const(0x3FFFFFFF)  # that a counter reaches; a larger number would take memory
 
 
@@ -97,6 +96,9 @@ class Place:
 class Sequencer:
     """``status`` is its state, also after its end; indices are in ``sequence_command``."""
 
+    start_bytes = 22_000
+    """Heap for the start of a motion, and for garbage while one runs (docs/memory.md)."""
+
     def __init__(self, controller: "Runner", record: "SequenceFile", name: bytes, rate: int) -> None:
         self._controller = controller
         self._record = record
@@ -115,10 +117,10 @@ class Sequencer:
         """Begin with the next pass; raises Refused if the heap has no room for a motion."""
         controller = self._controller
         controller.release_memory()
-        free = gc.mem_free() if hasattr(gc, "mem_free") else _START_BYTES
-        if free < _START_BYTES:
+        free = gc.mem_free() if hasattr(gc, "mem_free") else self.start_bytes
+        if free < self.start_bytes:
             controller.sequence = None
-            raise Refused(codes.NO_SEQUENCE_MEMORY, value=_START_BYTES - free)
+            raise Refused(codes.NO_SEQUENCE_MEMORY, value=self.start_bytes - free)
         heap.collect_often(heap.OFTEN if controller.board.engine_memory.is_short else heap.SELDOM)
         self._command.attach(controller.board.extra_commands)
 

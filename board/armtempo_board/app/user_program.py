@@ -40,6 +40,9 @@ _ALONE_MS = const(20)  # and if none was heard so long
 class UserProgram(Sequencer):
     """See ``Sequencer``; ``record``: the program's."""
 
+    start_bytes = 8_000
+    """Less: its own garbage is collected while a motion runs, too."""
+
     def __init__(self, controller: "Runner", record: "ProgramFile", name: bytes, rate: int) -> None:
         self.table = record.table()
         counters: "Any" = _Counters(self.table["counters"])
@@ -92,9 +95,11 @@ class UserProgram(Sequencer):
         gc.collect()
         before = list(sys.modules)
         armtempo_board.cell = cell
+        self._app.fills_heap = True
         try:
             exec(code, names)
         finally:
+            self._app.fills_heap = False
             del armtempo_board.cell
             _forget_modules(before)
 
@@ -105,6 +110,7 @@ class UserProgram(Sequencer):
             controller.board.pending = codes.PROGRAM_FAILED
         if controller.board.engine.moving:
             controller.stop(0)
+        gc.collect()  # what the program held
         try:
             text, line = _traceback(error, self.table["file"])
             self.status[STEP] = line or self.status[STEP]

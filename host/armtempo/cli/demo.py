@@ -61,7 +61,7 @@ def demo(out: Path | None, port: str, pick_and_place: bool, log_traffic: Path | 
     with resolve.board(BoardOptions(port, log_traffic), plan.arm) as board:
         run = run_and_report(board, plan, 1, resolve.runs(out))
     try:
-        page = pipeline.report(run)
+        page = run.report()
         results.echo(_NEXT.format(page=page, uri=page.resolve().as_uri()))
     except MissingPackageError as error:
         results.show_error(

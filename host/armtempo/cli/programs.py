@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,11 @@ from armtempo.basics.errors import MissingPackageError
 from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
+from armtempo.cli.sequences import StateLine
 from armtempo.cli.state import counted
 from armtempo.deploy import program_files
 from armtempo.encoding import encoded_program
 from armtempo.encoding.encoded_program import EncodedProgram
-from armtempo.link.board_messages import SequenceState
 from armtempo.model.arm import Arm
 from armtempo.model.user_program import UserProgram
 from armtempo.robot.board import Board
@@ -112,26 +111,10 @@ def _show_check(encoded: EncodedProgram, as_json: bool) -> None:
     results.show(as_json, values, lines)
 
 
-class _Shown:
-    """Shows the line of a running program on a terminal."""
-
-    def __init__(self) -> None:
-        self.is_terminal = sys.stderr.isatty()
-
-    def __call__(self, state: SequenceState) -> None:
-        if self.is_terminal and state.ending == "running":
-            click.echo(f"\r\x1b[Kline {state.step}", nl=False, err=True)
-
-    def clear(self) -> None:
-        """Remove the line, for another text."""
-        if self.is_terminal:
-            click.echo("\r\x1b[K", nl=False, err=True)
-
-
 def run_and_report(board: Board, name: str, as_json: bool) -> None:
     """Run a stored program; print what it prints, and its end."""
     say = results.progress_printer(as_json)
-    shown = _Shown()
+    shown = StateLine(lambda state: f"line {state.step}")
 
     def listen(text: str) -> None:
         shown.clear()

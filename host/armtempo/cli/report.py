@@ -12,8 +12,8 @@ from armtempo import pipeline
 from armtempo.basics.atomic_file import check_replaceable
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.cli import options, results
-from armtempo.report import evaluation, verdict
-from armtempo.report.run import Run
+from armtempo.report import run_report, verdict
+from armtempo.report.evaluation import Evaluation, evaluate
 
 
 @click.command("report")
@@ -33,38 +33,32 @@ def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool)
 
     RUNS: run folders. With two or more, one more page compares them, and names those that cannot be read.
     """
-    if len(runs) == 1:
-        if out is not None:
-            raise InputError(
-                "--out needs two or more runs",
-                "leave it out: the page of one run is report.html in its folder",
-            )
-        page = pipeline.report(Run.load(runs[0]))
-        values = {"runs": [_values(runs[0], page)], "comparison": None} if as_json else None
-        results.show(as_json, values, [f"wrote {page}"])
-        return
+    if len(runs) == 1 and out is not None:
+        raise InputError(
+            "--out needs two or more runs", "leave it out: the page of one run is report.html in its folder"
+        )
     if out is not None:
         check_replaceable(out, "", force or _is_comparison(out), "a page that compares runs is replaced")
-    pages: dict[Path, Path] = {}
-    for run in runs:
+    pages, found = [], []
+    for folder in runs:
         try:
-            pages[run] = pipeline.report(Run.load(run))
+            run = evaluate(folder)
+            pages.append(run_report.write_page(run))
+            found.append(_values(run, folder, pages[-1]))
         except RunFolderError as error:
+            if len(runs) == 1:
+                raise
             results.show_error(error)
-    compared = pipeline.compare(runs, out)
-    found = [_values(run, page) for run, page in pages.items()] if as_json else []
-    results.show(
-        as_json,
-        {"runs": found, "comparison": str(compared)},
-        [f"wrote {page}" for page in (*pages.values(), compared)],
-    )
+    compared = pipeline.compare(runs, out) if len(runs) > 1 else None
+    values = {"runs": found, "comparison": str(compared) if compared else None}
+    results.show(as_json, values, [f"wrote {page}" for page in (*pages, compared) if page])
 
 
-def _values(run: Path, page: Path) -> dict[str, Any]:
+def _values(run: Evaluation, folder: Path, page: Path) -> dict[str, Any]:
     """The verdict (``good``, ``bad`` or ``open``) and the findings of a page."""
-    result = verdict.of(evaluation.evaluate(run))
+    result = verdict.of(run)
     findings = [asdict(finding) for finding in result.findings]
-    return {"folder": str(run), "page": str(page), "verdict": result.state, "findings": findings}
+    return {"folder": str(folder), "page": str(page), "verdict": result.state, "findings": findings}
 
 
 def _is_comparison(page: Path) -> bool:

@@ -111,29 +111,32 @@ def _made_of(share: Any) -> str:
     )
 
 
-class Shown:
-    """A watcher that updates one line on a terminal, or else prints a line for each new cycle."""
+class StateLine:
+    """A watcher that keeps the state of a running sequence or program on the last line of a terminal.
 
-    def __init__(self, planned: SequencePlan | None, say: Callable[[str], object]) -> None:
+    Without a terminal it prints a line for each new cycle of a sequence.
+    """
+
+    def __init__(
+        self, describe: Callable[[SequenceState], str], say: Callable[[str], object] | None = None
+    ) -> None:
+        self._describe = describe
         self._say = say
-        self._rows = planned.rows if planned else ()
         self._cycle = -1
         self.last: SequenceState | None = None
 
     def __call__(self, state: SequenceState) -> None:
-        """Show step and cycle."""
         self.last = state
-        doing = f": {self._rows[state.row].words}" if state.row < len(self._rows) else ""
         if sys.stderr.isatty():
-            click.echo(f"\r\x1b[K{position(state.step, state.cycle)}{doing}", nl=False, err=True)
-        elif state.cycle != self._cycle:
-            self._say(f"{position(state.step, state.cycle)}{doing}")
+            click.echo(f"\r\x1b[K{self._describe(state)}", nl=False, err=True)
+        elif state.cycle != self._cycle and self._say is not None:
+            self._say(self._describe(state))
         self._cycle = state.cycle
 
-    def close(self) -> None:
-        """End the line."""
+    def clear(self) -> None:
+        """Remove the line, for another text."""
         if sys.stderr.isatty():
-            click.echo(err=True)
+            click.echo("\r\x1b[K", nl=False, err=True)
 
 
 def run_and_report(
@@ -145,22 +148,28 @@ def run_and_report(
     ``as_json``: print the end as JSON. Exit code 1 if the wait for an input timed out.
     """
     say = results.progress_printer(as_json)
-    shown = Shown(sequence if not isinstance(sequence, str) else None, say)
+    rows = () if isinstance(sequence, str) else sequence.rows
+
+    def describe(state: SequenceState) -> str:
+        doing = f": {rows[state.row].words}" if state.row < len(rows) else ""
+        return f"{position(state.step, state.cycle)}{doing}"
+
+    shown = StateLine(describe, say)
     try:
         end = board.run_sequence(sequence, shown, replace=replace, out=out)
     except Stopped:
-        shown.close()
+        shown.clear()
         say(f"stopped {where(board.client.sequence())}{counted(board.counters)}")
         raise
     except LinkError:
-        shown.close()
+        shown.clear()
         if shown.last is not None:
             say(f"last known state: {where(shown.last)}")
         raise
     finally:
+        shown.clear()
         if (recorded := board.last_sequence) is not None and out is not None:
             say(f"recorded in {recorded.path}")
-    shown.close()
     if end.ending == "timed_out":
         raise ArmtempoError(
             f"an input did not change in time {where(end)}",

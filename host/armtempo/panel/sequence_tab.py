@@ -225,7 +225,7 @@ class SequenceTab:
                 board.run_sequence(plan, operator.live.take_sequence, replace=True, out=operator.runs)
             )
             if (recorded := board.last_sequence) is not None:
-                pipeline.report(recorded)
+                recorded.report()
 
         self._page.do(press, words.RUN, run_it)
 

@@ -35,11 +35,15 @@ def write(folder: Path) -> Path:
 
     Raises RunFolderError if a motion is not known, or nothing was recorded.
     """
-    found = evaluate(folder)
+    return write_page(evaluate(folder))
+
+
+def write_page(found: Evaluation) -> Path:
+    """The same for a run that is evaluated already."""
     drawn = figures(found.legs[0]) if found.single else {}
     for name, (figure, _) in drawn.items():
-        drawing.save(figure, folder / f"{name}.svg")
-    path = folder / PAGE
+        drawing.save(figure, found.run.path / f"{name}.svg")
+    path = found.run.path / PAGE
     replace_text(path, render(found, drawn))
     return path
 

@@ -1,7 +1,7 @@
 """The board program as a folder from which MicroPython's own build makes it a part of the firmware.
 
-The sources go in as they are: what one reads is what runs. Machine code, byte code, names and line numbers stay in the
-flash.
+The sources go in as they are, but with constants in the place of their names (``constants.py``), which would take
+eight kilobytes of the heap. Machine code, byte code, names and line numbers stay in the flash.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 
 from armtempo.basics.errors import InputError
 from armtempo.deploy import program_files
+from armtempo.deploy.constants import fold
 from armtempo.link.program_version import PACKAGES, own_crc
 
 MANIFEST = "manifest.py"
@@ -41,7 +42,8 @@ def write(folder: Path, board_manifest: str = USUAL_MANIFEST) -> None:
 
 def files(board_manifest: str = USUAL_MANIFEST) -> dict[str, bytes]:
     """The folder's files by their path in it."""
-    sources = {name: path.read_bytes() for name, path in program_files.modules().items()}
+    texts = fold(program_files.sources())
+    sources = {name: texts[program_files.dotted(name)].encode() for name in program_files.modules()}
     manifest = Path(__file__).with_name(MANIFEST).read_text(encoding="utf-8")
     made = {
         f"{PACKAGES[1]}/program_hash.py": _HASH_MODULE,

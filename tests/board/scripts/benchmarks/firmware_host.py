@@ -14,10 +14,15 @@ import vfs
 from micropython import const, mem_info
 
 ROOT = "/ram/armtempo"
-_BEYOND = const(0x20020000)  # 60 KB of the emulator's that the chip has not; the last 512 bytes: loop_board.c
-_BLOCKS = const(119)
+_BEYOND = const(
+    0x20020000
+)  # 60 KB of the emulator's that the chip has not, as _EDGES of firmware_loop and loop_board.c
+_BLOCKS = const(100)  # the edges of firmware_loop begin where they end
 _BLOCK = const(512)
 _UART = const(3)
+_RECEIVED = const(
+    4096
+)  # bytes: USB would hold the host back, which repeats a command of 1 KB five times a second
 _STARTS = const(6)  # word of the state
 
 
@@ -79,6 +84,8 @@ class Port:
             print("@ start", spent_ms)
         elif moves:
             self._longest_ms = max(self._longest_ms, spent_ms)
+        if loop.here["edges"]:
+            loop.tell_edges()
         if not moves:
             loop.hold_clock()
         if self._stage < 0:
@@ -104,4 +111,4 @@ def replace(settings):
     vfs.VfsFat.mkfs(blocks)
     vfs.mount(vfs.VfsFat(blocks), "/ram")
     loop.replace(dict(settings, again=True), Port)
-    loop.here["uart"] = pyb.UART(_UART, 115200, timeout=0, rxbuf=1024)
+    loop.here["uart"] = pyb.UART(_UART, 115200, timeout=0, rxbuf=_RECEIVED)

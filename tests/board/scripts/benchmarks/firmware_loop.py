@@ -26,6 +26,8 @@ _EVERY_MS = const(50)  # a command that often while something moves, if the sett
 _BEFORE, _BEHIND = const(20), const(40)  # turns between two commands, and at the end
 _LOGGED = const(100)
 _BACKUP_SRAM = const(0x2002F000)  # memory of the emulator's that the chip has not, for what it has not
+_EDGES = const(0x2002C800)  # there too: how many edges, and of each the compare register and its time
+_MOST_EDGES = const(1200)
 
 dma = array("I", bytes(4 * 64))
 unmoved = array("I", bytes(4 * 24))  # the encoders' timers
@@ -114,7 +116,13 @@ def catch_up(stream: ptr32) -> int:
         ring = ptr32(stream[3])
         if timer[3] & (1 << (place - 4)):
             due = timer[place]
+            edges = ptr32(_EDGES)
             while now - due >= 0:
+                count = edges[0]
+                if count < _MOST_EDGES:
+                    edges[0] = count + 1
+                    edges[2 * count + 1] = stream[2]
+                    edges[2 * count + 2] = due
                 due = ring[entries - left]
                 left -= 1
                 if left == 0:
@@ -288,6 +296,16 @@ class Port:
         for entry in range(state[1]):
             print("", state[8 + 2 * entry], in_turn(9 + 2 * entry), end="")
         print()
+
+
+def tell_edges():
+    """What the compare units did since the last time, for the host that watches."""
+    count = mem32[_EDGES]
+    if count:
+        assert count < _MOST_EDGES
+        print("@ edges", hexlify(uctypes.bytearray_at(_EDGES + 4, 8 * count)).decode())
+        mem32[_EDGES] = 0
+        gc.collect()  # as in ``_turn``
 
 
 def hold_clock():

@@ -333,17 +333,22 @@ def case_a_fault_of_the_board_ends_it():
 
 
 def case_nothing_of_it_acts_after_its_end():
-    from armtempo_board.app.cell import Ended
-
-    world = World("import cases, sys\nsys.modules['helper'] = cases\ncases.kept = cell\n")
+    world = World(
+        "import cases, sys\nsys.modules['helper'] = cases\ncases.kept = cell\n"
+        "cases.Ended = sys.modules['armtempo_board.app.cell'].Ended\n"
+    )
     assert world.run()[0] == "finished"
     assert "helper" not in sys.modules and cases is sys.modules["cases"]
+    assert not [name for name in sys.modules if name.endswith(("cell", "user_program", "rest_to_rest"))]
+    assert not hasattr(sys.modules["armtempo_board.app"], "cell")
     for call in (lambda: cases.kept.goto("there"), lambda: cases.kept.set("gripper", "closed")):
         try:
             call()
             raise AssertionError("it acted")
-        except Ended:
+        except cases.Ended:
             pass
+    assert world.start_stored()[0] == "ok"  # what it needs is imported again
+    world.execute()
     assert not sequence_rig.runs(world.app) and not world.board.outputs.log
 
 
@@ -369,6 +374,27 @@ def case_a_full_heap_ends_it():
     assert (ending, line) == ("fault", 4), (ending, line)
     text = world.said()[0]
     assert "MemoryError" in text or "OverflowError" in text, text
+
+
+def case_a_pass_without_memory_is_the_programs_fault():
+    """The program has filled the heap, and what the board's own work lacks is missing."""
+
+    def script(world):
+        engine = world.board.engine
+        if "brake" in engine.calls:
+            engine.finish()
+        elif world.turns == 10:
+            world.app.link.poll = full
+
+    def full():
+        del world.app.link.poll
+        raise MemoryError
+
+    world = World("cell.start('there')\nwhile True:\n    cell.moving()\n", script)
+    ending, code, line = world.run()
+    assert (ending, wire.ERRORS[code][0], line) == ("fault", "program_failed", 4), (ending, code, line)
+    assert "brake" in world.board.engine.calls and "freeze" not in world.board.engine.calls
+    assert "MemoryError" in world.said()[0]
 
 
 def case_other_programs_than_the_stored_one_are_refused():
