@@ -8,7 +8,8 @@ SEQUENCES = True
 OUTPUTS = True  # and inputs
 JOG = True
 SPEED = True  # another one than planned
+BACKLASH = True  # of arms, crossed at each reversal
 
-ALL = SEQUENCES and OUTPUTS and JOG and SPEED
+ALL = SEQUENCES and OUTPUTS and JOG and SPEED and BACKLASH
 BITS = SEQUENCES << 0 | OUTPUTS << 1 | JOG << 2 | SPEED << 3
 """As ``messages.FEATURES`` names them."""

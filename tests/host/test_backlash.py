@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
+from armtempo.deploy import program_files
 from armtempo.diagnosis import drives
 from armtempo.encoding import encode, engine_heap
 from armtempo.model import arm_json
@@ -105,7 +106,17 @@ def test_check_names_it_and_the_memory_grows() -> None:
     assert line.where == "joint 1"
     more = engine_memory.object_bytes(3, 1) - engine_memory.object_bytes(3)
     needed = engine_memory.needed_bytes(encode.step_rates(arm))
-    assert f" {needed + more} bytes for 3 joints" in engine_heap.of_arm(arm)
+    assert f" {needed + more} bytes for 3 joints: fits only with the program in" in engine_heap.of_arm(arm)
+
+
+def test_the_core_on_stock_micropython_does_not_cross_it() -> None:
+    """Its modules are not there, and the host says so before it sends the arm."""
+    arm = with_backlash(0.3)
+    assert "armtempo_board.motion.backlash_drive" not in program_files.core()
+    with pytest.raises(InputError, match=r"has backlash_deg, which the program.s core .* does not cross"):
+        engine_heap.check(arm, engine_heap.CORE)
+    engine_heap.check(arm, engine_heap.IN_FIRMWARE)
+    assert "needs the program in the firmware" in engine_heap.of_arm(arm, engine_heap.CORE)
 
 
 def test_a_run_keeps_it(tmp_path: Path) -> None:

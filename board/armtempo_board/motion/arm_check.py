@@ -39,6 +39,8 @@ def checked(data: bytes, free_bytes: int) -> "Record":
         raise Refused(codes.NEEDS_FIRMWARE)
     _check_pins(head, joints, outputs, inputs)
     backlash = armrecord.unpack_backlash(data)
+    if backlash and not features.BACKLASH:
+        raise Refused(codes.NEEDS_FIRMWARE)
     for number, row in enumerate(backlash):
         if row["steps"] > MAX_BACKLASH_STEPS or row["steps"] * row["pace"] ** 2 > _LONGEST_SQUARE:
             raise Refused(codes.BAD_RECORD, number)

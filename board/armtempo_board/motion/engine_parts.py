@@ -3,6 +3,7 @@
 from armtempo_shared import armrecord
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.hardware import isr, registers
 from armtempo_board.hardware.encoders import EncoderInput, NoEncoder
 from armtempo_board.hardware.inputs import Inputs
@@ -81,8 +82,8 @@ def _drive(
     memory: "Memory",
     backlash: "Rows",
 ) -> JointDrive:
-    if not backlash or not backlash[number]["steps"]:
-        return JointDrive(number, arm, sampler, ring, memory)
-    from armtempo_board.motion.backlash_drive import BacklashDrive  # here, as few arms need its memory
+    if features.BACKLASH and backlash and backlash[number]["steps"]:
+        from armtempo_board.motion.backlash_drive import BacklashDrive  # here, as few arms need its memory
 
-    return BacklashDrive(number, arm, sampler, ring, memory, backlash[number])
+        return BacklashDrive(number, arm, sampler, ring, memory, backlash[number])
+    return JointDrive(number, arm, sampler, ring, memory)

@@ -34,9 +34,11 @@ _LOADER = "sectors.py"
 _HASH = f"{PACKAGES[1]}.program_hash"
 _MAIN = f"{PACKAGES[0]}.app.program"
 _FEATURES = f"{PACKAGES[0]}.features"
-_NO_FEATURES = "".join(f"{name} = 0\n" for name in ("SEQUENCES", "OUTPUTS", "JOG", "SPEED", "ALL", "BITS"))
+_NO_FEATURES = "".join(
+    f"{name} = 0\n" for name in ("SEQUENCES", "OUTPUTS", "JOG", "SPEED", "BACKLASH", "ALL", "BITS")
+)
 _IN_FIRMWARE = (
-    f"{PACKAGES[0]}.motion.next_motion",
+    *(f"{PACKAGES[0]}.motion.{name}" for name in ("next_motion", "backlash_drive", "crossing")),
     *(f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")),
     *(f"{PACKAGES[0]}.app.output_{name}" for name in ("commands", "setup")),
     *(f"{PACKAGES[0]}.app.{name}" for name in ("cell", "program_start", "user_program")),

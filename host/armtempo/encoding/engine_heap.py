@@ -25,8 +25,13 @@ class EngineHeap:
         return engine_memory.fits(rates, self.size, with_backlash)
 
     def holds_arm(self, arm: Arm) -> bool:
-        """Whether the engine for an arm fits."""
-        return self.holds(encode.step_rates(arm), _with_backlash(arm))
+        """Whether the engine for an arm fits, and the program has what it needs."""
+        return not self.lacks_backlash(arm) and self.holds(encode.step_rates(arm), _with_backlash(arm))
+
+    def lacks_backlash(self, arm: Arm) -> bool:
+        """Whether the arm has backlash and the program cannot cross it: only that in the firmware, which has all the
+        memory, does."""
+        return _with_backlash(arm) > 0 and self.size < IN_FIRMWARE.size
 
     def describe(self) -> str:
         """Describe what fits: bytes, joints, steps/s."""
@@ -57,6 +62,11 @@ def check(arm: Arm, heap: EngineHeap) -> None:
     """Raise InputError if the engine for the arm does not fit, with the bytes needed and available."""
     if heap.holds_arm(arm):
         return
+    if heap.lacks_backlash(arm):
+        raise InputError(
+            f"arm {arm.name!r} has backlash_deg, which the program's core on stock MicroPython does not cross",
+            f"put the program into the board's firmware ({_BUILD}), or leave backlash_deg out",
+        )
     rates = encode.step_rates(arm)
     raise InputError(
         f"arm {arm.name!r} needs {_needed_bytes(arm)} bytes for its engine; the board has {heap.size}",
@@ -69,6 +79,8 @@ def of_arm(arm: Arm, heap: EngineHeap | None = None) -> str:
     """One line: the memory that an arm needs, and whether the board has it (without ``heap``: which boards
     have it)."""
     needs = f"memory on the board: {_needed_bytes(arm)} bytes for {len(arm.motors)} joints"
+    if heap is not None and heap.lacks_backlash(arm):
+        return f"{needs}; its backlash needs the program in the firmware ({_BUILD})"
     if heap is not None:
         return f"{needs} of {heap.size}" if heap.holds_arm(arm) else f"{needs}, too much{_or_firmware(arm)}"
     if CORE.holds_arm(arm):
