@@ -12,7 +12,7 @@ from armtempo_shared import engine_memory, limits
 from tests import interpreters
 from tests.board import heap_use
 
-MODULES = 72_500
+MODULES = 72_000
 MARGIN = 8_192
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "arm_changes.py"
 CHANGES = 25

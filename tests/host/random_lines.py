@@ -11,6 +11,7 @@ import numpy as np
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
+from armtempo.model.tool import ArmTool
 from armtempo.model.tool_pose import APPROACH, WHOLE, Pose
 from armtempo.model.tool_segment import ToolSegment
 from scipy.spatial.transform import Rotation
@@ -37,7 +38,16 @@ def tool_poses(arm: Arm, driven_deg: np.ndarray) -> np.ndarray:
         link[:, 1, 0], link[:, 1, 1], link[:, 1, 2], link[:, 1, 3] = s, c * ca, -c * sa, joint.a_mm * s
         link[:, 2, 1], link[:, 2, 2], link[:, 2, 3], link[:, 3, 3] = sa, ca, joint.d_mm, 1.0
         poses = poses @ link
-    return poses
+    return poses @ np.array(arm.tool.matrix) if arm.tool else poses
+
+
+def with_random_tool(arm: Arm, rng: np.random.Generator) -> Arm:
+    """The arm with a tool on it."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+    matrix[:3, 3] = rng.uniform(-0.2, 0.2, 3) * sum(abs(joint.d_mm) + abs(joint.a_mm) for joint in arm.joints)
+    rows = tuple(map(tuple, matrix.tolist()))
+    return replace(arm, tool=ArmTool("random", rows, radius_mm=float(rng.uniform(0.0, 20.0))))
 
 
 @dataclass(frozen=True)
@@ -118,6 +128,8 @@ def random_lines(seed: int) -> tuple[Arm, Job]:
     rng = np.random.default_rng([seed, 31])
     name = ARMS[int(rng.integers(len(ARMS)))]
     arm = Arm.paper() if name == "paper" else Arm.of(name)
+    if seed % 2:
+        arm = with_random_tool(arm, np.random.default_rng([seed, 32]))
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     low, high = np.maximum(low, -170.0), np.minimum(high, 288.0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)

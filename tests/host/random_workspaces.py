@@ -17,6 +17,8 @@ from armtempo.planning import point_to_point, workspace_check
 from armtempo.splines.trajectory import Trajectory
 from scipy.spatial.transform import Rotation
 
+from tests.host.random_lines import with_random_tool
+
 ARMS = ("parol6", "ar4", "thor", "community", "moveo", "scara", "paper")
 _POINTS = 41
 """Points on a link."""
@@ -52,6 +54,8 @@ def random_workspace(seed: int) -> tuple[Arm, Trajectory]:
             centre = tuple(map(float, 0.1 * reach * rng.uniform(-1.0, 1.0, 3)))
             load = Load("random", 0.0, *map(float, figures), "xyz"[rng.integers(3)], centre)
         arm = replace(arm, joints=joints, workspace=Workspace(tuple(boxes)), payload=load)
+        if seed % 3 == 1:
+            arm = with_random_tool(arm, turns)
         if not workspace_check.posture_touches(arm, start):
             return arm, point_to_point.straight("random", start, end, arm)
     raise AssertionError("no posture is free")
@@ -82,6 +86,11 @@ def dense_least(arm: Arm, trajectory: Trajectory, count: int) -> float:
         pose[:, :3, 1] = np.cos(alpha) * across + np.sin(alpha) * z
         pose[:, :3, 2] = np.cos(alpha) * z - np.sin(alpha) * across
         pose[:, :3, 3] = out[:, :, -1]
+    if arm.tool:
+        tool = pose @ np.array(arm.tool.matrix)
+        shaft = pose[:, :3, 3:] + part * (tool[:, :3, 3:] - pose[:, :3, 3:])
+        least = min(least, _least(arm, shaft) - arm.tool.radius_mm)
+        pose = tool
     if load := arm.payload:
         held = np.tile(np.array(load.centre_mm)[:, None], (1, _POINTS))
         held["xyz".index(load.along)] += load.length_mm * (part - 0.5)

@@ -20,7 +20,6 @@ READ_BY_PROGRAMS = {
     "help.py": 1,  # a page
     "jog_screen.py": 5,  # fits its line to the terminal itself
     "panel.py": 1,  # an address
-    "programs.py": 2,  # a line that is written again and again
     "results.py": 3,
     "sequences.py": 2,  # a line that is written again and again
     "taught_points.py": 1,  # TOML

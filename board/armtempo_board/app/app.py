@@ -30,13 +30,14 @@ if TYPE_CHECKING:
 _EXTRA_SERVICES_PER_PASS = const(3)  # calls of the engine, during a motion
 _SPARE_BYTES = const(512)  # reserved for reporting an exception: a traceback, and its end for the host
 _MOST_FAILURES = const(10)  # consecutive failing passes of the loop after which the program ends
-_OF_PROGRAMS = (
-    "armtempo_board.app.program_start",
-    "armtempo_board.app.user_program",
-    "armtempo_board.app.cell",
-    "armtempo_shared.rest_to_rest",
-    "armtempo_shared.shapes",
-)
+if features.SEQUENCES:
+    _OF_PROGRAMS = (
+        "armtempo_board.app.program_start",
+        "armtempo_board.app.user_program",
+        "armtempo_board.app.cell",
+        "armtempo_shared.rest_to_rest",
+        "armtempo_shared.shapes",
+    )
 
 
 class App:
@@ -53,7 +54,6 @@ class App:
         self.passes = self._failed = 0  # number of passes, and number of the last one that failed
         self._failures = 0
         self._spare: "bytearray | None" = bytearray(_SPARE_BYTES)
-        self.fills_heap = False  # a user's program executes: without memory it is at fault
         self.controller.configure()
 
     def enter(self) -> None:
@@ -63,6 +63,8 @@ class App:
         self.link.forget()
 
     if features.SEQUENCES:
+        fills_heap = False
+        """A user's program executes: it is at fault if memory is short."""
 
         def execute_program(self, run_once: "Callable[[], None]") -> None:
             """Execute the user's program that was started, if one was; ``run_once``: one pass of the loop."""
@@ -116,7 +118,7 @@ class App:
         Raises the error again after too many consecutive failures, and if it is a user's program that has filled the
         heap: the program gets it, in its call of the cell.
         """
-        if self.fills_heap and isinstance(error, MemoryError):
+        if features.SEQUENCES and self.fills_heap and isinstance(error, MemoryError):
             raise error
         again = (self.passes - self._failed) & 0xFFFF <= 1
         self._failures = self._failures + 1 if again else 1
@@ -133,13 +135,15 @@ class App:
             raise error
 
 
-def _forget_modules() -> None:
-    """Give back the memory of what only programs need; the next one imports it again."""
-    for name in _OF_PROGRAMS:
-        if name in sys.modules:
-            del sys.modules[name]
-            package, _, last = name.rpartition(".")
-            delattr(sys.modules[package], last)
+if features.SEQUENCES:
+
+    def _forget_modules() -> None:
+        """Give back the memory of what only programs need; the next one imports it again."""
+        for name in _OF_PROGRAMS:
+            if name in sys.modules:
+                del sys.modules[name]
+                package, _, last = name.rpartition(".")
+                delattr(sys.modules[package], last)
 
 
 def _traceback(error: "BaseException") -> str:
