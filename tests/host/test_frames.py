@@ -494,38 +494,6 @@ def test_run_and_upload_refuse_an_old_plan_before_a_port_is_opened(
             assert "nowhere" not in result.output
 
 
-# the panel's table
-
-
-def test_the_panel_keeps_poses_in_their_frame(tmp_path: Path) -> None:
-    arm = Arm.load(arm_file(tmp_path))
-    place = place_of(arm, [20.0, -40.0, 30.0], "tray")
-    (tmp_path / "job.toml").write_text(
-        f'name = "j"\nframe = "tray"\n[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nposition_mm = {place}\n'
-        f'[[via]]\nframe = "table"\nposition_mm = {place_of(arm, [25.0, -45.0, 30.0], "table")}\n',
-        encoding="utf-8",
-    )
-    job_editor = pytest.importorskip("armtempo.panel.job_editor", exc_type=ImportError)
-    editor = job_editor.JobEditor(arm, tmp_path, tmp_path / "job.toml")
-    there = np.array([forward(arm, angles)[:3, 3] for angles in ([20.0, -40.0, 30.0], [25.0, -45.0, 30.0])])
-    there += (3.0, -2.0, 4.0)
-    for number, place in enumerate(there.tolist(), 1):
-        editor.set_position(number, place)
-    for via, place in zip(editor.vias[1:], there, strict=True):
-        np.testing.assert_allclose(forward(arm, via.angles_deg)[:3, 3], place, atol=0.1)
-    editor.set_angles(2, [25.0, -45.0, 30.0])
-    assert "frame" not in editor.vias[2].values
-    editor.set_pose(2)
-    assert editor.vias[2].values["position_mm"] == pytest.approx(
-        place_of(arm, [25, -45, 30], "tray"), abs=1e-3
-    )
-    editor.insert(3)
-    editor.set_key(1, "frame", "base")
-    editor.insert(2)
-    assert editor.vias[2].values == editor.vias[1].values, "with its frame"
-    assert editor.job().frames == ("tray",)
-
-
 def test_the_library_takes_frames_and_gives_poses_in_them() -> None:
     there = armtempo.Pose.of_angles([100, 0, 200], {"roll": 0, "pitch": 0, "yaw": 30})
     arm = replace(PAPER, frames=(armtempo.ArmFrame("tray", there.matrix),))

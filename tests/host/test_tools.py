@@ -307,20 +307,6 @@ def test_a_posture_as_a_pose_is_of_the_tool_that_is_on(tmp_path: Path) -> None:
     )
 
 
-def test_the_panel_gives_poses_of_the_jobs_tool(tmp_path: Path) -> None:
-    arm = Arm.load(arm_file(tmp_path))
-    (tmp_path / "job.toml").write_text(f'tool = "gripper"\n{JOB}', encoding="utf-8")
-    job_editor = pytest.importorskip("armtempo.panel.job_editor", exc_type=ImportError)
-    editor = job_editor.JobEditor(arm, tmp_path, tmp_path / "job.toml")
-    editor.set_pose(1)
-    place = forward(arm.with_tool("gripper"), [20, 10, -10, 5, 40, 8])[:3, 3]
-    assert editor.vias[1].values["position_mm"] == pytest.approx(place.tolist(), abs=1e-3)
-    assert editor.vias[1].angles_deg == pytest.approx([20, 10, -10, 5, 40, 8], abs=0.02)
-    editor.set_option("tool", "")
-    assert editor.tooled_arm.tool is None
-    assert editor.tooled_arm == arm
-
-
 # taught from four postures
 
 

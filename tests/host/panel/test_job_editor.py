@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
@@ -12,6 +13,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.panel.job_editor import ANGLES, POSE, JobEditor
 from armtempo.panel.toml_blocks import TomlBlocks
+
+from tests.host import test_frames, test_tools
 
 ARM = Arm.paper()
 TABLES = """# my job
@@ -256,3 +259,44 @@ def test_blocks_keep_what_is_around_them() -> None:
     assert blocks.tail.startswith("[parameters]")
     with pytest.raises(InputError, match="one after the other"):
         TomlBlocks('[[via]]\nposture = "a"\n[parameters]\nPa = 1\n[[via]]\nposture = "b"\n', "via")
+
+
+def test_poses_stay_in_their_frame(tmp_path: Path) -> None:
+    arm = Arm.load(test_frames.arm_file(tmp_path))
+    place = test_frames.place_of(arm, [20.0, -40.0, 30.0], "tray")
+    (tmp_path / "job.toml").write_text(
+        f'name = "j"\nframe = "tray"\n[[via]]\nangles_deg = [0, -60, 40]\n[[via]]\nposition_mm = {place}\n'
+        f'[[via]]\nframe = "table"\nposition_mm = {test_frames.place_of(arm, [25.0, -45.0, 30.0], "table")}\n',
+        encoding="utf-8",
+    )
+    editor = JobEditor(arm, tmp_path, tmp_path / "job.toml")
+    there = np.array([forward(arm, angles)[:3, 3] for angles in ([20.0, -40.0, 30.0], [25.0, -45.0, 30.0])])
+    there += (3.0, -2.0, 4.0)
+    for number, place in enumerate(there.tolist(), 1):
+        editor.set_position(number, place)
+    for via, place in zip(editor.vias[1:], there, strict=True):
+        np.testing.assert_allclose(forward(arm, via.angles_deg)[:3, 3], place, atol=0.1)
+    editor.set_angles(2, [25.0, -45.0, 30.0])
+    assert "frame" not in editor.vias[2].values
+    editor.set_pose(2)
+    assert editor.vias[2].values["position_mm"] == pytest.approx(
+        test_frames.place_of(arm, [25, -45, 30], "tray"), abs=1e-3
+    )
+    editor.insert(3)
+    editor.set_key(1, "frame", "base")
+    editor.insert(2)
+    assert editor.vias[2].values == editor.vias[1].values, "with its frame"
+    assert editor.job().frames == ("tray",)
+
+
+def test_poses_are_of_the_jobs_tool(tmp_path: Path) -> None:
+    arm = Arm.load(test_tools.arm_file(tmp_path))
+    (tmp_path / "job.toml").write_text(f'tool = "gripper"\n{test_tools.JOB}', encoding="utf-8")
+    editor = JobEditor(arm, tmp_path, tmp_path / "job.toml")
+    editor.set_pose(1)
+    place = forward(arm.with_tool("gripper"), [20, 10, -10, 5, 40, 8])[:3, 3]
+    assert editor.vias[1].values["position_mm"] == pytest.approx(place.tolist(), abs=1e-3)
+    assert editor.vias[1].angles_deg == pytest.approx([20, 10, -10, 5, 40, 8], abs=0.02)
+    editor.set_option("tool", "")
+    assert editor.tooled_arm.tool is None
+    assert editor.tooled_arm == arm
