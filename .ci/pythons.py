@@ -21,8 +21,8 @@ PLACE = ROOT / ".cache" / "ci"
 OLDEST = (3, 11)
 WHAT = ["-e", ".[plot,cluster,mpy,urdf,ros,panel,docs]", "-r", "tests/requirements.txt"]
 RELEASE = "import sys, venv; sys.version_info.releaselevel == 'final' and print(*sys.version_info[:2])"
-QUICK = ("WORKERS=2", "PYTEST_ARGS=-k 'not micropython'")
-"""What runs on MicroPython is the same with every Python, and quick tests do not wait for anything."""
+QUICK = ("WORKERS=2", "PYTEST_ARGS=-k 'not (micropython or test_structure or test_layers)'")
+"""What runs on MicroPython, or reads sources, is the same with every Python; quick tests do not wait for anything."""
 DESCRIBE = """
 from importlib.metadata import version
 import platform

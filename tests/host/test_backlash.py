@@ -109,6 +109,7 @@ def test_check_names_it_and_the_memory_grows() -> None:
     assert f" {needed + more} bytes for 3 joints: fits only with the program in" in engine_heap.of_arm(arm)
 
 
+@pytest.mark.slow
 def test_the_core_on_stock_micropython_does_not_cross_it() -> None:
     """Its modules are not there, and the host says so before it sends the arm."""
     arm = with_backlash(0.3)

@@ -324,6 +324,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @SITE
+@pytest.mark.long
 def test_every_page_is_built_and_reached_from_the_first(site: Path) -> None:
     first = (site / "host" / "docs" / "index.html").read_text(encoding="utf-8")
     links = set(re.findall(r'class="reference internal" href="([^"#]+)"', first))
@@ -336,6 +337,7 @@ def test_every_page_is_built_and_reached_from_the_first(site: Path) -> None:
 
 @pytest.mark.slow
 @SITE
+@pytest.mark.long
 def test_the_first_page_has_a_picture_and_two_buttons_and_no_list_of_pages(site: Path) -> None:
     text = (site / "host" / "docs" / "index.html").read_text(encoding="utf-8")
     article = text[text.index("<article") : text.index("</article>")]
@@ -347,6 +349,7 @@ def test_the_first_page_has_a_picture_and_two_buttons_and_no_list_of_pages(site:
 
 @pytest.mark.slow
 @SITE
+@pytest.mark.long
 def test_types_are_written_as_a_person_writes_them(site: Path) -> None:
     text = (site / "host" / "docs" / "api.html").read_text(encoding="utf-8")
     plain = re.sub(r"<[^>]+>", "", text)
@@ -357,6 +360,7 @@ def test_types_are_written_as_a_person_writes_them(site: Path) -> None:
 
 @pytest.mark.slow
 @SITE
+@pytest.mark.long
 def test_the_papers_page_is_one_of_the_site(site: Path) -> None:
     text = (site / "host" / "docs" / "paper-repeated.html").read_text(encoding="utf-8")
     assert "sidebar" in text
@@ -375,6 +379,7 @@ def test_every_argument_is_described() -> None:
 
 @pytest.mark.slow
 @SITE
+@pytest.mark.long
 def test_ranges_are_numbers(site: Path) -> None:
     page = re.sub(r"<[^>]+>", "", (site / "host" / "docs" / "commands.html").read_text(encoding="utf-8"))
     assert "RANGE" not in page
@@ -389,6 +394,7 @@ def test_links_say_where_they_lead() -> None:
 
 @pytest.mark.slow
 @SITE
+@pytest.mark.long
 def test_every_command_has_its_section(site: Path) -> None:
     page = (site / "host" / "docs" / "commands.html").read_text(encoding="utf-8")
     for name in main.list_commands(click.Context(main)):
@@ -398,6 +404,7 @@ def test_every_command_has_its_section(site: Path) -> None:
 
 @pytest.mark.slow
 @SITE
+@pytest.mark.long
 def test_every_code_of_the_board_is_listed(site: Path) -> None:
     page = (site / "host" / "docs" / "errors.html").read_text(encoding="utf-8")
     for code, (name, _, _) in meanings.ERRORS.items():
@@ -407,6 +414,7 @@ def test_every_code_of_the_board_is_listed(site: Path) -> None:
 
 @pytest.mark.slow
 @SITE
+@pytest.mark.long
 def test_the_top_leads_to_the_first_page(site: Path) -> None:
     assert "host/docs/index.html" in (site / "index.html").read_text(encoding="utf-8")
 

@@ -108,6 +108,7 @@ def test_many_places_of_one_problem_are_one_sentence(tmp_path: Path) -> None:
     assert text == f"{runs} and 5 more: samples 1 to 1 are missing"
 
 
+@pytest.mark.slow
 def test_the_page_and_the_comparison_take_a_sequence(
     recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -377,7 +377,7 @@ def test_what_a_file_may_not_say(tmp_path: Path, old: str, new: str, message: st
         Job.load(file, ARM)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.seeds(1)
 def test_a_wider_tolerance_of_an_arc_is_never_slower(seed: int) -> None:
     """The more segments a spline has, the more it bends as the fastest path does, or less: so several are tried."""

@@ -137,7 +137,9 @@ def test_python_example(name: str, code: str, started: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize(
-    ("page", "block"), BLOCKS, ids=[f"{page}-{number}" for number, (page, _) in enumerate(BLOCKS)]
+    ("page", "block"),
+    [pytest.param(*one, marks=[pytest.mark.long] * (one[0] != "README.md")) for one in BLOCKS],
+    ids=[f"{page}-{number}" for number, (page, _) in enumerate(BLOCKS)],
 )
 def test_commands(page: str, block: list[list[str]], started: Path, tmp_path: Path) -> None:
     for name in ("my_arm.toml", "my_job.toml"):
@@ -190,7 +192,7 @@ SHORTER = (
     ("PARTS = 2", "PARTS = 1"),
 )
 """What takes time and shows nothing new here."""
-EVERY_DAY = ("feeding.py", "pick_and_place.py")
+EVERY_DAY = ("feeding.py",)
 ARGUMENTS = {"sweep.py": ["--jobs", "6"], "compare_searches.py": FEW}
 
 

@@ -72,6 +72,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @TOGETHER
+@pytest.mark.long
 def test_an_own_arm_moves_within_ten_commands(installed: Path, tmp_path: Path) -> None:
     assert len(COMMANDS) <= 10
     assert COMMANDS[0].startswith("pipx install")
@@ -95,6 +96,7 @@ def test_an_own_arm_moves_within_ten_commands(installed: Path, tmp_path: Path) -
 
 
 @TOGETHER
+@pytest.mark.long
 def test_it_is_the_wheel_that_ran(installed: Path) -> None:
     code = "import armtempo; print(armtempo.__file__)"
     done = subprocess.run([str(installed / "python"), "-c", code], capture_output=True, text=True, check=True)

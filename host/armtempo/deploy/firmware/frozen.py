@@ -7,6 +7,7 @@ eight kilobytes of the heap. Machine code, byte code, names and line numbers sta
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 from armtempo.basics.errors import InputError
@@ -42,7 +43,7 @@ def write(folder: Path, board_manifest: str = USUAL_MANIFEST) -> None:
 
 def files(board_manifest: str = USUAL_MANIFEST) -> dict[str, bytes]:
     """The folder's files by their path in it."""
-    texts = fold(program_files.sources())
+    texts = _folded()
     sources = {name: texts[program_files.dotted(name)].encode() for name in program_files.modules()}
     manifest = Path(__file__).with_name(MANIFEST).read_text(encoding="utf-8")
     made = {
@@ -51,6 +52,12 @@ def files(board_manifest: str = USUAL_MANIFEST) -> dict[str, bytes]:
         MANIFEST: manifest.replace(USUAL_MANIFEST, board_manifest),
     }
     return sources | {name: text.encode() for name, text in made.items()}
+
+
+@cache
+def _folded() -> dict[str, str]:
+    """The sources with constants in the place of their names: it takes seconds."""
+    return fold(program_files.sources())
 
 
 def fill(folder: Path, files: Mapping[str, bytes]) -> None:
