@@ -87,6 +87,7 @@ def test_a_frame_that_never_ends_hides_the_answer_behind_it_for_an_instant_only(
     assert pipe.clock() - before_s < 0.2
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_three_minutes_to_a_host_that_pauses_two_seconds_lose_nothing(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
@@ -241,6 +242,7 @@ def test_no_command_has_ctrl_c_for_its_number(tmp_path: Path) -> None:
 # a line that damages bytes: what arrives is right, or the host says why not
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_hundred_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> None:
     to_board, from_board = Noise("to", 0.01), Noise("from", 0.01)

@@ -97,6 +97,7 @@ def test_searches_get_the_paper_s_problem(made: motions.Plans) -> None:
     assert fitness.penalised(np.array([printed.INTERVALS_S[0]]))[0] == pytest.approx(6.033, abs=0.02)
 
 
+@pytest.mark.long
 def test_searches_on_all_cores(made: motions.Plans, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searches, "QUICK_POPULATIONS", (4,))
     monkeypatch.setattr(searches, "QUICK_SEEDS", 1)

@@ -255,6 +255,7 @@ def spoil_table(path: Path, numbers: random.Random) -> None:
     path.write_text("\n".join(map(",".join, lines)))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_damaged_run_folder_is_read_or_refused_in_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

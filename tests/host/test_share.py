@@ -380,6 +380,7 @@ def random_request(numbers: random.Random) -> Message:
     return {"id": numbers.randrange(100), "request": name, **fields}
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_hundred_thousand_random_requests_are_answered(owner: tuple[Owner, PortClaim]) -> None:
     """All of them by the table, one in ten over a socket too."""

@@ -95,6 +95,7 @@ def test_held_jogs_rest_within_the_stated_time_and_the_range(tmp_path: Path, kin
         assert end is None or end.good, (case, end)
 
 
+@pytest.mark.long
 def test_the_same_from_python() -> None:
     with homed() as port, armtempo.connect(port, PAPER) as board:
         board.configure(PAPER)

@@ -167,7 +167,7 @@ def case_replay_typed_at_the_prompt(world):  # on CPython
     yield from alive(world, 2 * BITE_MS)
 
 
-def case_ctrl_c_stops_a_replay_wherever_it_comes(world):  # not compiled
+def case_ctrl_c_stops_a_replay_wherever_it_comes(world):  # not compiled, slow
     """Once: it brakes along the path; twice: it freezes. The steps are those on the pins, and the prompt is back."""
     numbers = whole_board.Numbers(SEED)
     yield from world.hello()

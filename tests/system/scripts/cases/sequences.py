@@ -192,7 +192,7 @@ def whole(world, watch, crc):
     return watch.motions(), said(world), counted
 
 
-def case_the_pins_do_the_same(world):  # on CPython
+def case_the_pins_do_the_same(world):  # on CPython, slow
     """With and without a motion that is prepared; nested repeats, waits and counters between."""
     watch = yield from ready(world)
     numbers = whole_board.Numbers(SEED)
