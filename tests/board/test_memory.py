@@ -28,6 +28,7 @@ def test_heap_of_the_compiled_program() -> None:
     assert max(stages.values()) <= heap_use.HEAP - MARGIN, stages
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in interpreters.AVAILABLE if name == "micropython"])
 def test_arms_one_after_the_other(name: str, tmp_path: Path) -> None:

@@ -87,6 +87,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[bytes], list[
     return records, oracle.walk(QUICK, tmp_path_factory.mktemp("shared"), records, room=2)[1]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_all_interpreters_give_the_same_edges(
     interpreter: str, shared: tuple[list[bytes], list[bytes]], tmp_path: Path
@@ -147,6 +148,7 @@ def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
             assert not off[~begins].any()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_braking_from_full_speed(tmp_path: Path) -> None:
     start, length = _brake(0.9, 0.8)

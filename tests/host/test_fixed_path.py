@@ -80,6 +80,7 @@ def test_every_polished_axis_has_a_bound_near_it(seed: int) -> None:
         assert search.total_s <= 1.02 * search.optimum_s, f"seed {seed}"
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_equal_plans_have_equal_bounds() -> None:
     plans = [
@@ -127,6 +128,7 @@ def test_more_refinement_is_never_slower() -> None:
     assert np.all(np.diff(totals) < 0)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_automatic_refinement_stays_within_the_record() -> None:
     rng = np.random.default_rng(3)

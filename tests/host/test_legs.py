@@ -173,6 +173,7 @@ def test_a_sequence_is_run_and_gone_to_as_a_motion_is(tmp_path: Path) -> None:
         armtempo.Board(board, "port").run(tmp_path / "pick.json", repeat=2)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_damaged_folder_is_read_or_refused_in_words(
     recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

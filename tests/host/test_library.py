@@ -242,6 +242,7 @@ def test_an_arm_and_a_sequence_are_made_in_code() -> None:
         armtempo.Motor(channel=1, steps_per_rev=200, microsteps=0, gear_ratio=10)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_goto_takes_a_speed_and_a_closed_board_says_so(arm: armtempo.Arm, tmp_path: Path) -> None:
     with armtempo.connect("sim", arm) as board:

@@ -49,6 +49,7 @@ def shown_safely(text: str) -> bool:
     return all(char.isprintable() or char == "\n" for char in text)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_formulas_and_control_characters_are_text_in_a_report(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run", repetitions=1)

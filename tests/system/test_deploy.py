@@ -188,6 +188,7 @@ def test_without_a_compiler_the_program_runs_again(tmp_path: Path, monkeypatch: 
         armtempo("status", "--port", found.port, folder=tmp_path)
 
 
+@pytest.mark.long
 def test_program_in_the_firmware_needs_only_start_files(tmp_path: Path) -> None:
     """What is in the firmware is found before /flash/lib; here the root of the flash stands for it."""
     flash = tmp_path / "flash"

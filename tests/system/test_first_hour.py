@@ -234,6 +234,7 @@ def test_it_sums_up_plan_and_run(joint: str, net_steps: int, demo: tuple[Ended, 
     assert abs(error_deg) < 0.2  # two encoder counts
 
 
+@pytest.mark.long
 @DEMO
 def test_its_trajectory_file_runs_again(demo: tuple[Ended, Path]) -> None:
     _, folder = demo

@@ -57,6 +57,7 @@ def where(port: str) -> np.ndarray:
         return board.posture_deg()
 
 
+@pytest.mark.long
 def test_steps_by_the_command_line() -> None:
     with launch(LaunchOptions(arm=PAPER)) as virtual:
         assert "is unknown" in jogged(virtual.port, "--joint", "1", "--by", "5", code=1)

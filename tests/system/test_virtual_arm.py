@@ -268,6 +268,7 @@ def test_homing_run_finds_where_the_arm_stands(
 HOMED_FROM = (-24, -141, 113, 100, -85, 185)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_six_joints_by_their_switches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Homing from far off ends at home; so say the board and, by their pulses, the motors."""
