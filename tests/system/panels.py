@@ -252,7 +252,11 @@ def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> st
         act() if act else button.click()
         if not act and page.evaluate("armtempo.number") == before:  # grey since Playwright had looked
             continue
-        page.wait_for_function("before => armtempo.answered && armtempo.answered[0] > before", arg=before)
+        try:
+            answered = "before => armtempo.answered && armtempo.answered[0] > before"
+            page.wait_for_function(answered, arg=before, timeout=10_000)
+        except Exception:  # a time-out: the server had turned it grey already, and takes no event of it
+            continue
         refusal = str(page.evaluate("armtempo.answered[1]"))
         if not refusal.startswith("Not done"):
             return refusal
