@@ -1,10 +1,8 @@
-"""Frames of an arm file: what is given in one is the same as when given in the base; a plan of a moved one is old."""
+"""Frames of the arm file: which may be, and that what is given in one is where it should be in the base."""
 
 from __future__ import annotations
 
 import json
-import tomllib
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -12,29 +10,21 @@ from typing import Any, cast
 import armtempo
 import numpy as np
 import pytest
-from armtempo import pipeline
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.cli import main
-from armtempo.cli.jog_screen import JogScreen
-from armtempo.cli.taught_points import NamedPoints, NewFrame
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import frame, shipped, taught, taught_frame, workspace
+from armtempo.model import frame, shipped, workspace
 from armtempo.model.arm import Arm
 from armtempo.model.frame import ArmFrame
 from armtempo.model.job import Job
-from armtempo.model.plan import Plan
 from armtempo.model.pose import to_rpy_deg
-from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.model.tool_pose import WHOLE, Pose
 from armtempo.planning import via_points
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
-from armtempo.robot import arm_state
-from armtempo.robot.connection import Connection
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
@@ -388,315 +378,9 @@ def test_check_finds_frames_in_metres_or_out_of_reach(tmp_path: Path) -> None:
     assert not [each for each in check_arm(Arm.load(arm_file(tmp_path))) if "frame" in each.where]
 
 
-# plans that are old
-
-
-def moved(folder: Path, old: str, new: str) -> Arm:
-    """The arm after a change of its file."""
-    path = folder / "arm.toml"
-    text = path.read_text(encoding="utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    return Arm.load(path)
-
-
-@pytest.fixture(scope="module")
-def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, SequencePlan]:
-    """A motion and a sequence with a pose in the tray."""
-    folder = tmp_path_factory.mktemp("planned")
-    place = place_of(Arm.load(arm_file(folder)), [20.0, -55.0, 30.0], "tray")
-    posture = f'\n[posture.over]\nframe = "tray"\nposition_mm = {place}\n'
-    arm = Arm.load(arm_file(folder, FRAMES + posture))
-    text = f'frame = "tray"\n[[via]]\nposture = "home"\n[[via]]\nposition_mm = {place}\n'
-    plan = pipeline.plan(arm, replace(job(text, arm), path="through", population=4, iterations=1, refine=1))
-    np.testing.assert_allclose(
-        forward(arm, plan.trajectory(plan.total_s))[:3, 3], forward(arm, [20, -55, 30])[:3, 3], atol=0.15
-    )
-    steps = 'name = "s"\nstart = "home"\n[[step]]\ngoto = "over"\n'
-    sequence = Sequence.of_table(toml_table.parse(steps, "s.toml"), arm)
-    return plan, pipeline.plan_sequence(arm, sequence)
-
-
-def loaded(plan: Plan, sequence: SequencePlan, arm: Arm, folder: Path) -> list[Callable[[], object]]:
-    """The ways in which a plan meets an arm."""
-    plan.save(folder / "plan.json", force=True)
-    board = Connection(cast(Any, None), "sim")
-    board.arm = arm
-    return [
-        lambda: pipeline.load(folder / "plan.json", arm),
-        lambda: board.configure_for(plan),
-        lambda: board.configure_for(sequence),
-    ]
-
-
-def test_a_plan_is_old_when_its_frame_is_elsewhere(
-    tmp_path: Path, planned: tuple[Plan, SequencePlan], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(arm_state, "configure", lambda *_: None)
-    plan, sequence = planned
-    assert plan.job.frames == sequence.frames == ("tray",)
-    arm_file(tmp_path)
-    for old, new in (("[frame.table]", "[frame.bin]\nposition_mm = [1, 2, 3]\n[frame.table]"), ("", "")):
-        for call in loaded(plan, sequence, moved(tmp_path, old, new), tmp_path):
-            call()
-    # the tray stands on the table
-    for old, new, said in (
-        ("yaw_deg = 20", "yaw_deg = 21.5", "frame 'tray' has changed since, by 1.41 mm and 1.5 degrees"),
-        ("frame.tray", "frame.trays", "frame 'tray' is no longer in the arm file"),
-    ):
-        for call in loaded(plan, sequence, moved(tmp_path, old, new), tmp_path):
-            with pytest.raises(InputError, match="plan it again") as refused:
-                call()
-            assert said in str(refused.value)
-
-
-def test_a_sequence_takes_a_plan_unless_its_own_frame_is_elsewhere(
-    tmp_path: Path, planned: tuple[Plan, SequencePlan]
-) -> None:
-    """Teaching a posture or a frame makes no other plan old."""
-    plan, _ = planned
-    plan.save(tmp_path / "plan.json")
-    text = 'name = "s"\n[[step]]\nrun = "plan.json"\n'
-    more = postures(new=[1.0, -60.0, 40.0]) + "[frame.new]\nposition_mm = [5, 6, 7]\n"
-    source = Path(plan.arm.source)
-    before = source.read_text(encoding="utf-8")
-    try:
-        for change in (more, more.replace("[5, 6", "[6, 6")):
-            source.write_text(before + change, encoding="utf-8")
-            arm = Arm.load(source)
-            sequence = Sequence.of_table(toml_table.parse(text, str(tmp_path / "s.toml")), arm)
-            assert pipeline.plan_sequence(arm, sequence).frames == ("tray",)
-        source.write_text(before.replace("yaw_deg = 20", "yaw_deg = 22"), encoding="utf-8")
-        arm = Arm.load(source)
-        sequence = Sequence.of_table(toml_table.parse(text, str(tmp_path / "s.toml")), arm)
-        with pytest.raises(InputError, match=r"step\[1\].run: it is old: frame 'tray' has changed"):
-            pipeline.plan_sequence(arm, sequence)
-    finally:
-        source.write_text(before, encoding="utf-8")
-
-
-def test_run_and_upload_refuse_an_old_plan_before_a_port_is_opened(
-    tmp_path: Path, planned: tuple[Plan, SequencePlan]
-) -> None:
-    plan, sequence = planned
-    plan.save(tmp_path / "plan.json")
-    sequence.save(tmp_path / "sequence.json")
-    arm_file(tmp_path)
-    moved(tmp_path, "position_mm = [50, 20, 5]", "position_mm = [50, 20, 6]")
-    for command in ("run", "upload"):
-        for name in ("plan.json", "sequence.json"):
-            path = str(tmp_path / name)
-            result = cli(command, path, "--arm", str(tmp_path / "arm.toml"), "--port", "nowhere")
-            assert result.exit_code == 2, result.output
-            assert f"{path} is old: frame 'tray' has changed since, by 1 mm and 0 degrees" in " ".join(
-                result.output.split()
-            )
-            assert "nowhere" not in result.output
-
-
 def test_the_library_takes_frames_and_gives_poses_in_them() -> None:
     there = armtempo.Pose.of_angles([100, 0, 200], {"roll": 0, "pitch": 0, "yaw": 30})
     arm = replace(PAPER, frames=(armtempo.ArmFrame("tray", there.matrix),))
     over = arm.in_base(armtempo.Pose.of_angles([0, 0, 50], {}), "tray")
     np.testing.assert_allclose(np.array(over.matrix)[:3, 3], [100, 0, 250])
     assert Job("j", via=((0, -60, 40), over)).frames == ("tray",)
-
-
-# taught from three points
-
-
-def taught_points(arm: Arm, matrix: np.ndarray, *local: list[float]) -> list[list[float]]:
-    """Angles with the tool at points of a frame."""
-    found = []
-    for point in local:
-        place = Pose.of_angles((matrix @ [*point, 1.0])[:3].tolist(), {})
-        found.append(via_points.nearest(arm, replace(place, tolerance_mm=1e-3), arm.home_deg).tolist())
-    return found
-
-
-def postures(**angles_deg: list[float]) -> str:
-    """Postures of an arm file."""
-    return "".join(f"\n[posture.{name}]\nangles_deg = {angles}\n" for name, angles in angles_deg.items())
-
-
-AR4 = Arm.load("ar4")
-TILTED = pose([280, 40, 120], Rotation.from_euler("xyz", [4, -3, 30], degrees=True))
-
-
-@pytest.mark.parametrize("level", [False, True])
-def test_a_frame_is_taught_from_three_postures(tmp_path: Path, level: bool) -> None:
-    o, x, y = taught_points(AR4, TILTED, [0, 0, 0], [90, 0, 0], [-20, 60, 0])
-    before = "\n# the tray\n[frame.tray]\n# old\nposition_mm = [1, 2, 3]\nyaw_deg = 4 # old\n# end\n"
-    path = arm_file(tmp_path, before + postures(o=o, x=x, y=y), "ar4")
-    words = ["teach", "frame", "tray", "--at", "o,x,y", "--arm", str(path)] + ["--level"] * level
-    refused = cli(*words)
-    assert refused.exit_code == 2
-    assert "already has a frame 'tray'" in " ".join(refused.output.split())
-    assert "[1, 2, 3]" in path.read_text(encoding="utf-8")
-    result = cli(*words, "--replace")
-    assert result.exit_code == 0, result.output
-    said = " ".join(result.output.split())
-    assert "90 and 63.25 mm from the origin, 108 degrees apart" in said
-    assert ("made level, it was tilted by 5 degrees" if level else "it is tilted by 5 degrees") in said
-    found = Arm.load(path).frame("tray")
-    x_axis = TILTED[:3, 0] * [1, 1, 0 if level else 1]
-    np.testing.assert_allclose(found[:3, 0], x_axis / np.linalg.norm(x_axis), atol=1e-4)
-    np.testing.assert_allclose(found[:3, 2], [0, 0, 1] if level else TILTED[:3, 2], atol=1e-4)
-    np.testing.assert_allclose(found[:3, 3], TILTED[:3, 3], atol=0.01)
-    text = path.read_text(encoding="utf-8")
-    assert all(comment in text for comment in ("# the tray", "\n# old\n", "# end"))
-
-
-@pytest.mark.seeds(*range(2))
-def test_random_errors_of_the_points_turn_the_axes_by_no_more_than_is_said(seed: int) -> None:
-    rng = np.random.default_rng([seed, 44])
-    worst = 0.0
-    for _ in range(30):
-        turn, error_mm = Rotation.random(random_state=rng).as_matrix(), 10 ** rng.uniform(-3, -1)
-        along = rng.uniform(-150, 250)
-        local = np.array([[0, 0, 0], [rng.uniform(50, 100), 0, 0], [along, 40 + abs(along), 0]])
-        points = local @ turn.T + rng.normal(0, 300, 3)
-        found = taught_frame.of_points(points, error_mm)
-        np.testing.assert_allclose(found.matrix[:3, :3], turn, atol=1e-9)
-        for _ in range(8):
-            off = rng.normal(size=(3, 3))
-            off *= error_mm / np.linalg.norm(off, axis=1, keepdims=True)
-            there = taught_frame.of_points(points + off, error_mm).matrix[:3, :3]
-            turned_deg = np.degrees(Rotation.from_matrix(there @ turn.T).magnitude())
-            worst = max(worst, turned_deg / found.axes_error_deg)
-    assert 0.5 < worst < 1.01
-
-
-def test_a_frame_that_is_in_another_one_stays_in_it(tmp_path: Path) -> None:
-    o, x, y = taught_points(AR4, TILTED, [0, 0, 0], [90, 0, 0], [20, 60, 0])
-    path = arm_file(tmp_path, FRAMES + postures(o=o, x=x, y=y), "ar4")
-    assert cli("teach", "frame", "tray", "--at", "o,x,y", "--arm", str(path), "--replace").exit_code == 0
-    arm = Arm.load(path)
-    assert [each.frame for each in arm.frames if each.name == "tray"] == ["table"]
-    np.testing.assert_allclose(arm.frame("tray"), TILTED, atol=0.02)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[frame.a]\nmatrix = [\n [1,0,0,5],\n [0, 1, 0, 6],\n [0,0,1,7],\n [0, 0, 0, 1]\n]\n# end\n",
-        '[frame.a]\nframe = "b" # on it\n# c\nposition_mm = [1,\n 2, 3]\nrpy_deg = [1,2,3]\n',
-        '[frame.a]\nrpy_deg = [1,2,3] # r\n# p\nframe = "b"\nposition_mm = [1, 2, 3]\n',
-        "[frame.a] # a\nposition_mm = [1, 2, 3]\n# turned\nyaw_deg = 5\n",
-    ],
-)
-def test_only_the_table_of_the_frame_changes(text: str) -> None:
-    values = {"frame": "b", "position_mm": [7.0, 8.5, -9.0], "rpy_deg": [0.0, 0.0, 1.0]}
-    after = "\n[frame.b]\nposition_mm = [1, 2, 3]\n"
-    changed = taught.with_table(text + after, ("frame", "a"), values, Path("arm.toml"))
-    assert tomllib.loads(changed) == {"frame": {"a": values, "b": {"position_mm": [1, 2, 3]}}}
-    assert changed.endswith(after)
-    assert changed.count("#") == text.count("#")
-
-
-@pytest.mark.parametrize(
-    ("points", "more", "said"),
-    [
-        ([[90, 0, 0], [45, 1, 0]], [], "the three points are almost on a line: the third is 1 mm beside"),
-        ([[90, 0, 0], [-40, 5, 0]], [], "almost on a line"),
-        (
-            [[3, 0, 0], [0, 60, 0]],
-            [],
-            "a point on the x axis is 3 mm from the origin, too near for the steps",
-        ),
-        ([[90, 0, 0], [0, 2, 0]], [], "a point on the side of y is 2 mm from the origin"),
-        ([[90, 0, 0], [0, 20, 60]], ["--level"], "which is not made level"),
-    ],
-)
-def test_points_that_say_too_little_are_refused(
-    tmp_path: Path, points: list[list[float]], more: list[str], said: str
-) -> None:
-    o, x, y = taught_points(AR4, TILTED, [0, 0, 0], *points)
-    path = arm_file(tmp_path, postures(o=o, x=x, y=y), "ar4")
-    before = path.read_text(encoding="utf-8")
-    result = cli("teach", "frame", "tray", "--at", "o,x,y", "--arm", str(path), *more)
-    assert result.exit_code == 2
-    assert said in " ".join(result.output.split())
-    assert path.read_text(encoding="utf-8") == before
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["frame"], "give one thing to teach"),
-        (["frame", "tray", "more"], "give one thing to teach"),
-        (["frame", "tray", "--posture", "park"], "give one thing to teach"),
-        (["frame", "base", "--at", "home,home,home"], "'base' is the frame of the arm itself"),
-        (["frame", "a b", "--at", "home,home,home"], "the name is not allowed"),
-        (["frame", "bin", "--at", "home,home"], "2 postures; give 3"),
-        (["frame", "bin", "--at", "home,homme,home"], "no posture 'homme'; did you mean 'home'"),
-        (["frame", "bin", "--at", "home,home,home"], "is 0 mm from the origin"),
-        (["frame", "bin", "--at", "home,home,home", "--by-hand"], "--by-hand is for points"),
-        (["frame", "bin"], "teach by keys needs a terminal"),
-        (["job.toml", "--level"], "--level and --tool are for frames"),
-    ],
-)
-def test_a_frame_is_taught_only_as_far_as_it_makes_sense(tmp_path: Path, words: list[str], said: str) -> None:
-    result = cli("teach", *words, "--arm", str(arm_file(tmp_path)), "--port", "nowhere")
-    assert result.exit_code == 2
-    assert said in " ".join(result.output.replace("\nhint: ", "; ").split())
-    assert "nowhere" not in result.output
-    refused = cli("teach", "frame", "tray", "--at", "home,home,home", "--arm", "ar4")
-    assert "belongs to armtempo" in refused.output
-
-
-def test_the_keys_take_the_three_points_one_by_one(tmp_path: Path) -> None:
-    o, x, near, line, y = taught_points(
-        AR4, TILTED, [0, 0, 0], [90, 0, 0], [2, 0, 0], [150, 0.5, 0], [20, 60, 0]
-    )
-    path = arm_file(tmp_path, "", "ar4")
-    new = NewFrame(path, AR4, "tray", level=False, replace_old=False)
-    here = iter([o, near, x, line, y, y])
-    points = NamedPoints(AR4, lambda: np.array(next(here)), new)
-    with pytest.raises(InputError, match="0 of 3 points, so no frame"):
-        points.save()
-    said = [points.take() for _ in range(6)]
-    for one, wanted in zip(
-        said,
-        (
-            "the origin taken; next: a point on the x axis",
-            "not taken: a point on the x axis is 2 mm",
-            "a point on the x axis taken; next: a point on the side of y",
-            "not taken: the three points are almost on a line",
-            "a point on the side of y taken; next: q writes the frame",
-            "not taken: all 3 are there",
-        ),
-        strict=True,
-    ):
-        assert one.startswith(wanted), one
-    points.save()
-    np.testing.assert_allclose(Arm.load(path).frame("tray"), TILTED, atol=0.03)
-
-
-def test_the_screen_says_the_whole_reason_why_a_point_is_not_taken(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    class Keys:
-        """Takes two points at the same place, and ends."""
-
-        def __init__(self) -> None:
-            self._left = iter("ppq")
-
-        def read(self, timeout_s: float) -> str:
-            return next(self._left)
-
-    class Here:
-        """A board whose arm stays at home."""
-
-        arm = AR4
-
-        def posture_deg(self) -> np.ndarray:
-            return np.array(AR4.home_deg)
-
-    new = NewFrame(arm_file(tmp_path, "", "ar4"), AR4, "tray", level=False, replace_old=False)
-    moved_a_step = iter([0.0, 0.1])
-    points = NamedPoints(AR4, lambda: np.array(AR4.home_deg) + next(moved_a_step), new)
-    JogScreen(cast(Any, Here()), cast(Any, Keys()), more=points.keys).loop()
-    said = capsys.readouterr().out
-    assert "too near for the steps of this arm; take it at least" in said
-    assert "…" not in said

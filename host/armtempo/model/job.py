@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, InitVar, dataclass, field, replace
 from pathlib import Path
 
@@ -228,21 +228,20 @@ class Job:
 
 def held(top: Table, arm: Arm) -> str:
     """``holds``: a load of the arm, or "nothing"; "" if it is not given."""
-    name = top.text("holds") if top.has("holds") else ""
-    try:
-        arm.holding(name)
-    except InputError as error:
-        raise InputError(f"{top.file}: {top.place}holds: {error.problem}", error.hint) from None
-    return name
+    return _of_the_arm(top, "holds", arm.holding)
 
 
 def tool_named(top: Table, arm: Arm) -> str:
     """``tool``: a tool of the arm, or "nothing"; "" if it is not given."""
-    name = top.text("tool") if top.has("tool") else ""
+    return _of_the_arm(top, "tool", arm.with_tool)
+
+
+def _of_the_arm(top: Table, key: str, find: Callable[[str], object]) -> str:
+    name = top.text(key) if top.has(key) else ""
     try:
-        arm.with_tool(name)
+        find(name)
     except InputError as error:
-        raise InputError(f"{top.file}: {top.place}tool: {error.problem}", error.hint) from None
+        raise InputError(f"{top.file}: {top.place}{key}: {error.problem}", error.hint) from None
     return name
 
 
