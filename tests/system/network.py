@@ -88,7 +88,7 @@ class Network:
             return
         to_reader, to_writer = await asyncio.open_connection(*self._to)
         self._writers |= {writer, to_writer}
-        with suppress(ConnectionError, asyncio.IncompleteReadError):
+        with suppress(ConnectionError, asyncio.IncompleteReadError, asyncio.CancelledError):
             await asyncio.gather(_back(to_reader, writer), self._there(reader, to_writer))
         for one in (writer, to_writer):
             self._writers.discard(one)

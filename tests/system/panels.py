@@ -328,3 +328,8 @@ def rest(state: Callable[[], BoardState]) -> BoardState:
         assert time.monotonic() < limit_s, found
         time.sleep(0.02)
     return found
+
+
+def place(state: Callable[[], BoardState]) -> list[float | None]:
+    """The joint angles where the arm rests, as the board says: a page is behind it by a message."""
+    return [joint.angle_deg for joint in rest(state).joints]

@@ -116,12 +116,12 @@ def test_a_target_is_shown_then_approached_while_held_and_postures_are_stored(
     page: Any, panel: Panel
 ) -> None:
     home(page)
-    where = page.inner_text("#armtempo-where")
+    place = panels.place(panel.state)
     away = page.get_by_role("button", name="Go to away")
     press(page, away, lambda: away.click())  # it is only shown
     page.wait_for_function("armtempo.ghost")
     page.wait_for_timeout(1000)
-    assert page.inner_text("#armtempo-where") == where
+    assert panels.place(panel.state) == place
     page.get_by_role("switch", name="With one click").click()
     press(page, away, lambda: away.click())
     wait_for(page, "away: done", place="armtempo-said")

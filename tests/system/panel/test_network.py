@@ -87,13 +87,6 @@ def network(panel: Panel) -> Iterator[Network]:
         yield made
 
 
-def _moved(page: Any, panel: Panel) -> str:
-    """Where the arm is, after the time in which a press that was kept would move it."""
-    page.wait_for_timeout(2000)
-    assert not panels.rest(panel.state).moving
-    return str(page.inner_text("#armtempo-where"))
-
-
 @pytest.mark.parametrize("command", ["jog", pytest.param("posture", marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     "how", ["stalls", *(pytest.param(how, marks=pytest.mark.long) for how in ("delays", "cuts", "reorders"))]
@@ -105,7 +98,7 @@ def test_nothing_moves_that_nobody_means_any_more(
         pytest.skip("a click has no release that could overtake it")
     page = panels.opened(window, network.address, drawn=False)
     home(page)
-    where = page.inner_text("#armtempo-where")
+    place = panels.place(panel.state)
     button = (
         page.get_by_label("joint 1 +") if command == "jog" else page.get_by_role("button", name="Go to away")
     )
@@ -128,7 +121,8 @@ def test_nothing_moves_that_nobody_means_any_more(
     network.stall(False)
     network.refuses, network.delay_s = False, 0.0
     page.wait_for_selector("body:not(.lost)")
-    assert _moved(page, panel) == where
+    page.wait_for_timeout(2000)  # in which a press that was kept would move it
+    assert panels.place(panel.state) == place
     network.last_first = None
     hold(page)  # it works again
     network.stall(True)
