@@ -9,6 +9,7 @@ from typing import Any
 
 from armtempo import optimise
 from armtempo.basics import toml_section
+from armtempo.model.pallet import ArmPallet
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
 from armtempo.model.tool import ArmTool
 from armtempo.optimise.task import Number, Parameter
@@ -102,6 +103,7 @@ TABLES = {
         "keys of encoder": _keys(Encoder, "encoder"),
         "keys of load": _keys(Load, "[load.NAME]"),
         "keys of tool": _keys(ArmTool, "[tool.NAME]"),
+        "keys of pallet": _keys(ArmPallet, "[pallet.NAME]"),
     },
     "programs.md": {"cell": _cell},
     "virtual-board.md": {"keys of model": _keys(JointModel, "model")},

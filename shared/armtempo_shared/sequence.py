@@ -50,7 +50,7 @@ ENDINGS = ("none", "running", "finished", "stopped", "timed_out", "fault", "refu
 """State of a sequence, or how it ended, by its number on the wire; none: no sequence since the start."""
 NONE, RUNNING, FINISHED, STOPPED, TIMED_OUT, FAULTED, REFUSED = 0, 1, 2, 3, 4, 5, 6
 
-MAX_ROWS, MAX_MOTIONS, MAX_NESTING, MAX_COUNTERS = 500, 64, 4, 8
+MAX_ROWS, MAX_MOTIONS, MAX_NESTING, MAX_COUNTERS = 500, 128, 4, 8
 MAX_WAIT_MS = 3_600_000
 MAX_REPEATS = 1_000_000
 

@@ -112,6 +112,8 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "joints": (),
         "algorithm": "acs",
         "load": "nothing",
+        "pallet": "tray",
+        "first": armtempo.Pose.of_matrix(np.eye(4)),
         "target": "home",
         "steps_per_rev": 200,
         "microsteps": 16,

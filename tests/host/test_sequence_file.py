@@ -267,7 +267,7 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (['wait_input = "part"\non_timeout = "next"'], "together with timeout_s only"),
         (['wait_input = "part"\ntimeout_s = 1\non_timeout = "go"'], "on_timeout = 'go' is not allowed"),
         (["repeat = 0", "wait_s = 1", 'end = "repeat"'], "repeat = 0 is not allowed"),
-        (['repeat = "ever"', "wait_s = 1", 'end = "repeat"'], "repeat = 'ever' is not allowed"),
+        (['repeat = "ever"', "wait_s = 1", 'end = "repeat"'], "repeat = 'ever': arm .* has no pallet .ever."),
         (["repeat = 2", "wait_s = 1"], "repeat without an end"),
         (["wait_s = 1", 'end = "repeat"'], "end = 'repeat' is not allowed"),
         (["repeat = 2", 'end = "repeat"'], "nothing is repeated"),

@@ -258,7 +258,7 @@ def test_a_job_chooses_its_tool_and_a_plan_is_old_without_it(tmp_path: Path) -> 
         pipeline.load(tmp_path / "plan.json", changed)
     with pytest.raises(InputError, match=r"job.toml: tool: .* no tool 'griper'; did you mean 'gripper'"):
         Job.of_table(toml_table.parse(text.replace("gripper", "griper"), "job.toml"), arm)
-    planned_for.check("x", arm, (), changed)
+    planned_for.check("x", replace(plan, arm=arm), changed)
 
 
 def test_a_sequence_has_one_tool(tmp_path: Path) -> None:

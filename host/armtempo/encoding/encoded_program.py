@@ -47,7 +47,7 @@ def motions_beside(found: UserProgram, arm: Arm) -> tuple[EncodedMotion, ...]:
     files = {name: found.motion_file(name) for name in found.motions}
     plans = {name: Plan.load(file) for name, file in files.items() if file.is_file()}
     for name, plan in plans.items():
-        planned_for.check(files[name], plan.arm, plan.job.frames, arm)
+        planned_for.check(files[name], plan, arm)
     return tuple(encoded_motion.of_plan(plan, name) for name, plan in plans.items())
 
 

@@ -93,6 +93,8 @@ class SequencePlan:
     """On the motions that were planned, each with the motion's name."""
     frames: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
     """The frames of the arm in which something of it was given."""
+    pallets: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
+    """The pallets of the arm that it uses."""
 
     def __repr__(self) -> str:
         return f"<SequencePlan {self.name!r} for {self.arm.name!r}: {len(self.rows)} rows, {len(self.legs)} motions>"
@@ -184,5 +186,5 @@ def check_size(rows: int, legs: int, counters: int, where: str) -> None:
     if rows > record.MAX_ROWS or legs > record.MAX_MOTIONS:
         raise InputError(
             f"{where}: {rows} rows and {legs} motions; the board takes {record.MAX_ROWS} and {record.MAX_MOTIONS}",
-            "use repeat, or split it into two sequences",
+            "use repeat, or split it into two sequences; of a pallet, plan some of its layers or rows",
         )

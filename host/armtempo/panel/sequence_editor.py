@@ -24,7 +24,9 @@ KINDS: dict[str, tuple[str, ...]] = {
     "wait_s": (),
     "wait_input": ("active", "timeout_s", "on_timeout"),
     "count": (),
-    "repeat": (),
+    "repeat": ("first_place", "last_place", "reverse"),
+    "place": ("speed_mm_s",),
+    "leave": ("speed_mm_s",),
     "end": (),
     "call": (),
 }
@@ -130,6 +132,7 @@ class SequenceEditor(FileEditor):
     def choices(self, key: str, jobs: list[str]) -> list[str]:
         """What a key can name, of the arm and the folder; empty for what is typed. ``jobs``: the folder's."""
         steps = self.steps
+        pallets = [pallet.name for pallet in self.arm.pallets]
         return {
             "goto": ["home", *(posture.name for posture in self.arm.postures)],
             "run": jobs,
@@ -138,9 +141,12 @@ class SequenceEditor(FileEditor):
             "holds": [NOTHING, *(load.name for load in self.arm.loads)],
             "call": self.files(),
             "count": sorted({step["count"] for step in steps if "count" in step}),
-            "repeat": ["for ever"],
+            "repeat": ["for ever", *pallets],
+            "place": pallets,
+            "leave": pallets,
             "end": ["repeat"],
             "active": ["true", "false"],
+            "reverse": ["true", "false"],
             "on_timeout": list(ON_TIMEOUT),
             "to": [name for one in self.arm.outputs for name, _ in one.states],
         }.get(key, [])

@@ -10,6 +10,7 @@ from armtempo_shared.wire import ERROR_CODES
 
 from armtempo.basics.errors import BoardError, LinkError, OtherBoardError
 from armtempo.basics.progress import Progress
+from armtempo.encoding import flash_use
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.encoding.encoded_sequence import EncodedSequence
@@ -35,8 +36,8 @@ def store(
     """Store a sequence or program, its motions first, so that what is stored is always complete.
 
     Motions of an earlier sequence of this name that are no longer needed are removed. Raises LinkError if the
-    board has too little memory for a program, or other content under one of the names and ``replace`` is false; a
-    program replaces one of its name.
+    board has too little flash, or memory for a program, or other content under one of the names and ``replace`` is
+    false; a program replaces one of its name.
     """
     key = encoded.key
     kind, named = ("program", "program's file") if isinstance(encoded, EncodedProgram) else ("sequence",) * 2
@@ -55,6 +56,7 @@ def store(
                 f"the board has something else as {one.name!r} (checksum {entry.crc:08x})",
                 f"replace it with --force, or give the {named} another name",
             )
+    _check_flash(client, records, kept)
     whole, done = sum(len(data) for _, data in records), 0
     for one, data in records:
         if one.name not in kept or kept[one.name].crc != one.crc:
@@ -75,6 +77,30 @@ def _check_memory(client: Client, encoded: EncodedProgram) -> None:
             f"program {encoded.key.name!r} needs {encoded.heap_bytes} bytes of the board's memory, with this arm "
             f"{free} are free",
             "make it shorter; with the program in the firmware more is free: 'armtempo flash'",
+        )
+
+
+def _check_flash(
+    client: Client, records: list[tuple[MotionKey, bytes]], kept: dict[str, StoredMotion]
+) -> None:
+    """Raise LinkError if the flash cannot take all records, each of which is written before an old one is removed."""
+    new = [
+        (key.name, len(data))
+        for key, data in records
+        if key.name not in kept or kept[key.name].crc != key.crc
+    ]
+    free = whole = client.hello().free_flash
+    free -= flash_use.of_names([name for name, _ in new if name not in kept])
+    fits = True
+    for name, size in new:
+        fits = fits and size + flash_use.BLOCK <= free
+        free -= flash_use.in_blocks(size) - (flash_use.in_blocks(kept[name].size) if name in kept else 0)
+    if not fits:
+        raise LinkError(
+            f"{len(new)} records take {whole - free + flash_use.BLOCK} bytes of the board's flash, of which {whole} "
+            "are free; nothing was stored",
+            "remove what is not needed ('armtempo list', 'armtempo remove'), or plan fewer motions, such as for a "
+            "part of the pallet",
         )
 
 
