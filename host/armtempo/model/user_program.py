@@ -32,7 +32,7 @@ _INTERNAL = ("at", "each")
 
 @dataclass(frozen=True)
 class UserProgram:
-    """A program; ``postures``, ``motions``, ``counters``: those that it names in its text, with the first line."""
+    """A program; ``postures``, ``motions`` and so on: those that it names in its text, with the first line."""
 
     name: str
     """Name on the board."""
@@ -42,6 +42,8 @@ class UserProgram:
     postures: dict[str, int]
     motions: dict[str, int]
     counters: dict[str, int]
+    pallets: dict[str, int]
+    tools: dict[str, int]
 
     @property
     def file(self) -> str:
@@ -72,7 +74,8 @@ class UserProgram:
         reader = _Reader(path, arm, _cell_name(tree, path))
         reader.read(tree)
         marked = _Marks(source, reader.cell).marked(tree)
-        return cls(path.stem, path, source, marked, reader.postures, reader.motions, reader.counters)
+        named = reader.postures, reader.motions, reader.counters, reader.pallets, reader.tools
+        return cls(path.stem, path, source, marked, *named)
 
 
 def _cell_name(tree: ast.Module, path: Path) -> str:
@@ -95,6 +98,8 @@ class _Reader:
     postures: dict[str, int] = field(default_factory=dict)
     motions: dict[str, int] = field(default_factory=dict)
     counters: dict[str, int] = field(default_factory=dict)
+    pallets: dict[str, int] = field(default_factory=dict)
+    tools: dict[str, int] = field(default_factory=dict)
 
     def read(self, tree: ast.Module) -> None:
         """Check all calls."""
@@ -134,6 +139,11 @@ class _Reader:
                 self.motions.setdefault(_valid(text), node.lineno)
             elif name == "count":
                 self.counters.setdefault(_valid(text), node.lineno)
+            elif name == "pallet":
+                self.arm.pallet(text)
+                self.pallets.setdefault(text, node.lineno)
+            elif name == "tool" and self.arm.with_tool(text).tool:
+                self.tools.setdefault(text, node.lineno)
             elif name in ("wait", "active"):
                 self.arm.input(text)
             elif name == "set":
