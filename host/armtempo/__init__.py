@@ -68,6 +68,7 @@ __all__ = [
     "ToPlace",
     "ToolSegment",
     "Trajectory",
+    "UseTool",
     "Wait",
     "WaitInput",
     "Watcher",
@@ -133,6 +134,7 @@ if TYPE_CHECKING:
         SetOutput,
         Step,
         ToPlace,
+        UseTool,
         Wait,
         WaitInput,
     )
@@ -189,6 +191,7 @@ _HOMES = {
         "SetOutput",
         "Step",
         "ToPlace",
+        "UseTool",
         "Wait",
         "WaitInput",
     ),

@@ -302,3 +302,63 @@ def test_what_the_flash_cannot_take_is_refused_before_anything_is_stored(tmp_pat
     ):
         sequence_run.store(full, encoded)
     assert not full.uploaded
+
+
+# the tool of each step
+
+TOOLS = """
+[tool.pen]
+position_mm = [0, 0, 10]
+
+[posture.over]
+frame = "tray"
+position_mm = [5, 5, 60]
+rpy_deg = [180, 0, 0]
+"""
+
+
+def tool_at_ends(plan: SequencePlan) -> list[np.ndarray]:
+    """Where the tool of each motion is at its end."""
+    return [forward(on, leg(leg.duration_s)) for on, leg in plan.loaded_legs]
+
+
+def test_a_step_changes_the_tool_of_the_motions_after_it(tmp_path: Path, quick: None) -> None:
+    steps = '[[step]]\ngoto = "over"\n[[step]]\ntool = "pen"\n[[step]]\ngoto = "over"\n'
+    plan = planned(tmp_path, steps + STEPS.replace("leave", "place"), SMALL + TOOLS)
+    assert plan.tools == ("nothing", *("pen",) * (len(plan.legs) - 1))
+    over = np.array(plan.arm.posture("over").where.matrix)  # type: ignore[union-attr]
+    for there in tool_at_ends(plan)[:2]:
+        np.testing.assert_allclose(there, over, atol=0.1)
+    assert not np.allclose(plan.legs[1](0.0), plan.legs[1](plan.legs[1].duration_s), atol=0.1)
+    place = np.array(plan.arm.pallets[0].pose(1, plan.arm.frames).matrix)
+    np.testing.assert_allclose(tool_at_ends(plan)[3], place, atol=0.1)
+    plan.save(tmp_path / "s.json")
+    assert SequencePlan.load(tmp_path / "s.json").tools == plan.tools
+    changed = arm(tmp_path, SMALL + TOOLS.replace("[0, 0, 10]", "[0, 0, 11]"))
+    with pytest.raises(InputError, match=r"s.json is old: tool 'pen' has changed since, or is gone"):
+        planned_for.check("s.json", plan, changed)
+
+
+def test_a_tool_that_changes_in_a_repeat_makes_its_first_pass_another(tmp_path: Path, quick: None) -> None:
+    steps = '[[step]]\nrepeat = 5\n[[step]]\ngoto = "over"\n[[step]]\ntool = "pen"\n[[step]]\ngoto = "home"\n'
+    plan = planned(tmp_path, f'{steps}[[step]]\nend = "repeat"\n', SMALL + TOOLS)
+    assert [row.words for row in plan.rows].count("goto over") == 2
+    assert (plan.tools, plan.cycles[0].times) == (("nothing", "pen", "pen", "pen"), 5)
+    with pytest.raises(
+        InputError, match=r"step\[2\]\.tool: arm 'AR4-MK3' has no tool 'pin'; did you mean 'pen'"
+    ):
+        planned(tmp_path, '[[step]]\ngoto = "over"\n[[step]]\ntool = "pin"\n', SMALL + TOOLS)
+
+
+def test_a_job_for_another_tool_is_refused_until_a_step_puts_it_on(tmp_path: Path, quick: None) -> None:
+    (tmp_path / "j.toml").write_text(
+        'name = "j"\ntool = "pen"\nvia_deg = [[0, 0, 0, 0, 0, 0], [5, 0, 0, 0, 0, 0]]\n'
+    )
+    run = '[[step]]\nrun = "j.toml"\n'
+    with pytest.raises(InputError, match="it is for tool 'pen', but the sequence has no tool here"):
+        planned(tmp_path, run, SMALL + TOOLS)
+    back = '[[step]]\ngoto = "home"\n[[step]]\ntool = "nothing"\n'
+    with_tool = f'[[step]]\ntool = "pen"\n{run}{back}'
+    assert planned(tmp_path, with_tool, SMALL + TOOLS).tools == ("pen", "pen")
+    with pytest.raises(InputError, match="it is for tool 'pen', but the sequence has no tool here"):
+        planned(tmp_path, with_tool + run, SMALL + TOOLS)

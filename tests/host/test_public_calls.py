@@ -113,6 +113,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "algorithm": "acs",
         "load": "nothing",
         "pallet": "tray",
+        "tool": "nothing",
         "first": armtempo.Pose.of_matrix(np.eye(4)),
         "target": "home",
         "steps_per_rev": 200,

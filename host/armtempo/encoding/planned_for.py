@@ -35,8 +35,9 @@ def _change(plan: Plan | SequencePlan, arm: Arm) -> str:
         found := pallet.changed(plan.arm.pallets, arm.pallets, plan.pallets)
     ):
         return found
-    if plan.arm.tool and plan.arm.tool not in (arm.tool, *arm.tools):
-        return f"tool {plan.arm.tool.name!r} has changed since, or is gone"
+    for loaded, _ in plan.loaded_legs if isinstance(plan, SequencePlan) else ((plan.arm, None),):
+        if loaded.tool and loaded.tool not in (arm.tool, *arm.tools):
+            return f"tool {loaded.tool.name!r} has changed since, or is gone"
     return ""
 
 

@@ -37,6 +37,7 @@ from armtempo.model.steps import (
     SourceMotion,
     Step,
     ToPlace,
+    UseTool,
     Wait,
     WaitInput,
 )
@@ -45,7 +46,7 @@ LONGEST_NAME = 20
 """Longest name of a sequence: its motions NAME-1, NAME-2, … must fit the board's 24 characters."""
 HOME = "home"
 _KINDS = (
-    "goto", "run", "place", "leave", "output", "holds", "wait_s", "wait_input", "count", "repeat", "end", "call"
+    "goto", "run", "place", "leave", "output", "holds", "tool", "wait_s", "wait_input", "count", "repeat", "end", "call"
 )  # fmt: skip
 _OF_PALLETS = ("first_place", "last_place", "reverse")
 """Keys of a repeat for each place of a pallet."""
@@ -68,7 +69,7 @@ class Sequence:
     """Start posture; None: the target of its first motion."""
     source: str = ""
     tool: str = ""
-    """The tool of the arm on it in all motions whose job names none; "": the arm's as it is."""
+    """The tool of the arm that is on it at first; "": the arm's as it is."""
 
     def __post_init__(self) -> None:
         """Raise InputError for a name that is invalid on the board."""
@@ -282,6 +283,10 @@ class _Reader:
         only(table, "holds", "output", "to", "wait_s")
         return [Hold(held(table, self.arm), where=_place(table), step=step)]
 
+    def tool(self, table: Table, step: int) -> list[Step]:
+        only(table, "tool")
+        return [UseTool(tool_named(table, self.arm), where=_place(table), step=step)]
+
     def wait(self, table: Table, step: int) -> list[Step]:
         only(table, "output", "to", "wait_s", "holds")
         return [Wait(table.number("wait_s", least=0.001, most=MOST_S), where=_place(table), step=step)]
@@ -332,6 +337,7 @@ _GETTERS: dict[str, _Getter] = {
     "leave": _Reader.place,
     "output": _Reader.output,
     "holds": _Reader.holds,
+    "tool": _Reader.tool,
     "wait_s": _Reader.wait,
     "wait_input": _Reader.wait_input,
     "count": _Reader.count,

@@ -93,6 +93,8 @@ class SequencePlan:
     """On the motions that were planned, each with the motion's name."""
     frames: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
     """The frames of the arm in which something of it was given."""
+    tools: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
+    """The tool in each leg, "nothing": none; (): that of ``arm`` in all."""
     pallets: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
     """The pallets of the arm that it uses."""
 
@@ -101,9 +103,10 @@ class SequencePlan:
 
     @property
     def loaded_legs(self) -> list[tuple[Arm, Trajectory]]:
-        """Each leg with the arm as it is loaded there."""
-        loads = self.loads or ("",) * len(self.legs)
-        return [(self.arm.holding(load), leg) for load, leg in zip(loads, self.legs, strict=False)]
+        """Each leg with the arm as it is there, with its tool and load."""
+        none = ("",) * len(self.legs)
+        each = zip(self.tools or none, self.loads or none, self.legs, strict=False)
+        return [(self.arm.with_tool(tool).holding(load), leg) for tool, load, leg in each]
 
     @property
     def start_deg(self) -> tuple[float, ...] | None:

@@ -79,6 +79,14 @@ class Hold(Placed):
 
 @checked_fields
 @dataclass(frozen=True)
+class UseTool(Placed):
+    """This tool of the arm is on it from now on; "nothing": none."""
+
+    tool: str
+
+
+@checked_fields
+@dataclass(frozen=True)
 class Wait(Placed):
     """Wait for a time."""
 
@@ -173,7 +181,7 @@ class ToPlace(Placed):
     """Speed limit of the tool on the line."""
 
 
-Step = Goto | RunMotion | SetOutput | Hold | Wait | WaitInput | Count | Repeat | EachPlace | ToPlace
+Step = Goto | RunMotion | SetOutput | Hold | UseTool | Wait | WaitInput | Count | Repeat | EachPlace | ToPlace
 
 
 def _check_wait(wait_s: float) -> None:

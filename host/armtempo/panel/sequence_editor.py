@@ -21,6 +21,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "run": (),
     "output": ("to", "holds", "wait_s"),
     "holds": (),
+    "tool": (),
     "wait_s": (),
     "wait_input": ("active", "timeout_s", "on_timeout"),
     "count": (),
@@ -31,7 +32,14 @@ KINDS: dict[str, tuple[str, ...]] = {
     "call": (),
 }
 """Kinds of steps, with their further keys."""
-_FIRST = {"goto": "home", "holds": NOTHING, "wait_s": "1", "repeat": "for ever", "end": "repeat"}
+_FIRST = {
+    "goto": "home",
+    "holds": NOTHING,
+    "tool": NOTHING,
+    "wait_s": "1",
+    "repeat": "for ever",
+    "end": "repeat",
+}
 _STEP = "step"
 
 
@@ -139,6 +147,7 @@ class SequenceEditor(FileEditor):
             "output": [one.name for one in self.arm.outputs],
             "wait_input": [one.name for one in self.arm.inputs],
             "holds": [NOTHING, *(load.name for load in self.arm.loads)],
+            "tool": [NOTHING, *(tool.name for tool in self.arm.tools)],
             "call": self.files(),
             "count": sorted({step["count"] for step in steps if "count" in step}),
             "repeat": ["for ever", *pallets],

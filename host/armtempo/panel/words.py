@@ -181,6 +181,7 @@ STEP_KINDS = {
     "run": "run",
     "output": "set output",
     "holds": "tool holds",
+    "tool": "tool on the arm",
     "wait_s": "wait, s",
     "wait_input": "wait for input",
     "count": "count",

@@ -13,6 +13,7 @@ from armtempo.model import frame
 from armtempo.model import steps as kinds
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
+from armtempo.model.parts import NOTHING
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
@@ -57,7 +58,8 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
         tuple(compiler.loads),
         tuple(dict.fromkeys(compiler.notes)),
         tuple(dict.fromkeys(compiler.frames)),
-        tuple(compiler.places),
+        tuple(compiler.tools) if compiler.changes_tool else (),
+        tuple(dict.fromkeys(name for name, _ in compiler.places)),
     )
 
 
@@ -88,14 +90,17 @@ class _Compiler:
     notes: list[str] = field(default_factory=list)
     frames: list[str] = field(default_factory=list)
     """Those in which poses were given."""
-    places: dict[str, list[Place]] = field(default_factory=dict)
-    """Of each pallet that is used."""
-    _present: dict[str, Place] = field(default_factory=dict)
-    """The present place of each pallet that a repeat goes through."""
+    tools: list[str] = field(default_factory=list)
+    """The tool in each leg."""
+    changes_tool: bool = False
+    places: dict[tuple[str, str], list[Place]] = field(default_factory=dict)
+    """Of each pallet that is used, and tool."""
+    _present: dict[str, int] = field(default_factory=dict)
+    """Index of the present place of each pallet that a repeat goes through."""
     _holds: str = ""
     """The present load."""
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
-    _plans: dict[tuple[int, str], Trajectory] = field(default_factory=dict)
+    _plans: dict[tuple[int, str, str], Trajectory] = field(default_factory=dict)
     _motions: dict[int, SourceMotion] = field(default_factory=dict)
     _depth: int = 0
 
@@ -116,6 +121,8 @@ class _Compiler:
                 rows, end = self._run(step, end)
             elif isinstance(step, kinds.Hold):
                 rows = self._hold(step)
+            elif isinstance(step, kinds.UseTool):
+                rows = self._use_tool(step)
             else:
                 rows = [self._still(step)]
             found += rows
@@ -128,6 +135,20 @@ class _Compiler:
         except InputError as error:
             raise InputError(f"{step.where}{error.problem}", error.hint) from None
         self._holds = step.load
+        return []
+
+    @property
+    def _tool(self) -> str:
+        """The name of the present tool."""
+        return self.arm.tool.name if self.arm.tool else NOTHING
+
+    def _use_tool(self, step: kinds.UseTool) -> list[SequenceRow]:
+        """The following motions are planned with the tool, of which the board knows nothing."""
+        try:
+            self.arm = self.arm.with_tool(step.tool)
+        except InputError as error:
+            raise InputError(f"{step.where}{error.problem}", error.hint) from None
+        self.changes_tool = True
         return []
 
     def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
@@ -168,37 +189,39 @@ class _Compiler:
         outermost = not self._depth
         self._depth += 1
         found: list[SequenceRow] = []
-        for place in places[step.first - 1 : last][:: -1 if step.reverse else 1]:
-            self._present[step.pallet] = place
+        for index in range(step.first - 1, last)[:: -1 if step.reverse else 1]:
+            self._present[step.pallet] = index
             rows, end = self.rows(step.steps, end.angles_deg, end.name)
-            found.append(SequenceRow(record.REPEAT, 0, 0, 1, step.step, place.name))
+            found.append(SequenceRow(record.REPEAT, 0, 0, 1, step.step, places[index].name))
             found += rows
             found.append(SequenceRow(record.END, 0, int(outermost), 0, step.step, "end of place"))
         del self._present[step.pallet]
         self._depth -= 1
         return found, end
 
-    def _places(self, step: kinds.EachPlace) -> list[Place]:
+    def _places(self, step: kinds.EachPlace | kinds.ToPlace) -> list[Place]:
         """The places of a pallet, with the angles above them; PlanError names one that cannot be reached."""
         try:
             pallet = self.arm.pallet(step.pallet)
             if pallet.frame != BASE:
                 self.frames.append(pallet.frame)
-            if step.pallet not in self.places:
-                self.places[step.pallet] = pallet_places.resolve(self.arm, pallet)
+            key = step.pallet, self._tool
+            if key not in self.places:
+                self.places[key] = pallet_places.resolve(self.arm, pallet)
         except ArmtempoError as error:
             raise type(error)(f"{step.where}repeat: {error.problem}", error.hint) from error
-        return self.places[step.pallet]
+        return self.places[key]
 
     def _place(self, step: kinds.ToPlace, here: _End) -> tuple[list[SequenceRow], _End]:
         """To the point above a place and down to it, or up from it."""
         key = "leave" if step.leave else "place"
-        place = self._present.get(step.pallet)
-        if place is None:
+        index = self._present.get(step.pallet)
+        if index is None:
             raise InputError(
                 f"{step.where}{key} = {step.pallet!r}: it is not within a repeat for this pallet",
                 f'put it between repeat = "{step.pallet}" and its end',
             )
+        place = self._places(step)[index]
         above = _End(place.above_deg, f"above {place.name}")
         where = f"{step.where}{key}: "
         if step.leave:
@@ -214,7 +237,7 @@ class _Compiler:
         target = self._target(step)
         if here.angles_deg is None or here.angles_deg == target.angles_deg:
             return [], _End(target.angles_deg, target.name)
-        key = (self._holds, here.angles_deg, target.angles_deg)
+        key = (self._tool, self._holds, here.angles_deg, target.angles_deg)
         if key not in self._known:
             found = self._straight(step, here.angles_deg, target.angles_deg)
             self._known[key] = self._add(found, self._holds)
@@ -243,7 +266,7 @@ class _Compiler:
             )
         if to == here.angles_deg:
             return [], here
-        key = (self._holds, "line", here.angles_deg, to, step.speed_mm_s)
+        key = (self._tool, self._holds, "line", here.angles_deg, to, step.speed_mm_s)
         if key not in self._known:
             try:
                 found = planner.straight_line(
@@ -267,7 +290,7 @@ class _Compiler:
                 f"put a step before it that goes there: goto with the same file as run, {motion.name!r}",
             )
         holds = _job(motion).holds or self._holds
-        key = ("run", id(trajectory), holds)
+        key = ("run", id(trajectory), self._tool, holds)
         if key not in self._known:
             self._known[key] = self._add(trajectory, holds)
         return [_move(self._known[key], step.step, f"run {motion.name}")], _End(
@@ -312,12 +335,14 @@ class _Compiler:
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
         self.frames.extend(_job(motion).frames)
         # A plan with another load is accepted if it keeps to the workspace
-        for (known, _), found in self._plans.items():
+        for (known, tool, _), found in self._plans.items():
+            if (known, tool) != (id(motion), self._tool):
+                continue
             arm = self.arm.holding(_job(motion).holds or self._holds)
             outwards = _job(motion).start_touches
-            if known == id(motion) and workspace_check.touch_of(arm, found, None, outwards) is None:
+            if workspace_check.touch_of(arm, found, None, outwards) is None:
                 return found
-        found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
+        found = self._plans[id(motion), self._tool, self._holds] = self._of(motion.source, where)
         return found
 
     def _check_arm(self, plan: Plan, where: str) -> None:
@@ -338,8 +363,8 @@ class _Compiler:
             has, wants = (f"tool {each.name!r}" if each else "no tool" for each in (self.arm.tool, tool))
             changed = ", as it was before it changed" if tool and tool not in self.arm.tools else ""
             raise InputError(
-                f"{where}run: it is for {wants}{changed}, but the sequence has {has}",
-                'write tool = "NAME" before the first step of the sequence, or plan the motion again',
+                f"{where}run: it is for {wants}{changed}, but the sequence has {has} here",
+                'write tool = "NAME" before the first step of the sequence or as a step before it, or plan it again',
             )
 
     def _of(self, source: Job | Plan, where: str) -> Trajectory:
@@ -400,6 +425,7 @@ class _Compiler:
     def _add(self, trajectory: Trajectory, holds: str) -> int:
         self.legs.append(trajectory)
         self.loads.append(holds)
+        self.tools.append(self._tool)
         return len(self.legs) - 1
 
     def _same(self, one: Angles, other: Angles) -> bool:
