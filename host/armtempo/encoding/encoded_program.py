@@ -251,3 +251,63 @@ def off_line_mm(found: EncodedProgram) -> float:
                 beside = points - points[0] - ((points - points[0]) @ line)[:, None] * line
                 most = max(most, float(np.linalg.norm(beside, axis=1).max()))
     return most
+
+
+class _Record(program.ProgramRecord):
+    """A record in memory."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        super().__init__(len(data))
+
+    def part(self, offset: int, size: int) -> bytes:
+        """See ``ProgramRecord``."""
+        return self._data[offset : offset + size]
+
+
+def motions_of(data: bytes) -> list[str]:
+    """The motions that a stored program runs; none of one that is damaged."""
+    try:
+        return [*_Record(data).table()["motions"]]
+    except ValueError:
+        return []
+
+
+def check_stored(name: str, data: bytes, arm: Arm) -> None:
+    """Raise InputError if a posture in the text of a program on the board, or one of its pallets, is elsewhere now."""
+    try:
+        record = _Record(data)
+        change = _change(record, record.table(), arm)
+    except ValueError:  # the board says what is wrong with it
+        return
+    if change:
+        raise InputError(f"{name!r} on the board is old: {change}", "upload its file again")
+
+
+def _change(record: _Record, then: dict[str, Any], arm: Arm) -> str:
+    source = record.source()
+    named = {name: steps for name, steps in then["postures"].items() if name in source}
+    for tool, others in ("", {}), *then.get("tools", {}).items():
+        try:
+            now = _postures(arm.with_tool(tool))
+        except InputError:
+            return f"tool {tool!r} is gone"
+        for name, steps in named.items():
+            if now.get(name, []) != others.get(name, steps):
+                return f"posture {name!r} is elsewhere now" + (f", with tool {tool!r}" if tool else "")
+    whole = arm.transmission.whole_steps
+    for name, (rows, columns, layers, firsts) in then.get("pallets", {}).items():
+        try:
+            pallet = arm.pallet(name)
+            same = (pallet.rows, pallet.columns, pallet.layers) == (rows, columns, layers)
+            for tool, first in firsts.items() if same else ():
+                places = _places(arm.with_tool(tool), pallet)
+                same = same and all(
+                    record.place(number, len(arm.driven)) == (*whole(above), *whole(at))
+                    for number, (above, at) in enumerate(places, first)
+                )
+        except ArmtempoError:
+            same = False
+        if not same:
+            return f"pallet {name!r} is elsewhere now, or gone"
+    return ""

@@ -9,7 +9,7 @@ from armtempo_shared import sequence, sequence_check
 from armtempo_shared.sequence import ACTIVE, FAULT_THEN, NEXT_THEN, SequenceData
 from armtempo_shared.wire import record_crc
 
-from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding import encode, encoded_motion, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.model.arm import Arm
 from armtempo.model.sequence_plan import SequencePlan, rows_of
@@ -41,7 +41,7 @@ def of_plan(plan: SequencePlan) -> EncodedSequence:
     keys = [(motion.name, motion.key.crc) for motion in motions]
     data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys, plan.counters)
     sequence_check.check(SequenceData(data))
-    return EncodedSequence(plan, motions, data)
+    return EncodedSequence(plan, motions, made_with.added(data, made_with.of_plan(plan)))
 
 
 _THEN = {NEXT_THEN: "next", FAULT_THEN: "fault"}

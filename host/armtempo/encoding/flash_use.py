@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from armtempo_shared import motion, sequence
 
+from armtempo.encoding import made_with
 from armtempo.model.sequence_plan import SequencePlan, rows_of
 from armtempo.splines.trajectory import Trajectory
 
@@ -28,12 +29,13 @@ def of_names(names: list[str]) -> int:
 def of_plan(plan: SequencePlan) -> int:
     """Bytes that a sequence and its motions take."""
     keys = [(leg.name, 0) for leg in plan.legs]
-    sizes = [_size(leg) for leg in plan.legs] + [len(sequence.pack(0, rows_of(plan), keys, plan.counters))]
+    record = made_with.added(sequence.pack(0, rows_of(plan), keys, plan.counters), made_with.of_plan(plan))
+    sizes = [*map(of_trajectory, plan.legs), len(record)]
     return sum(map(in_blocks, sizes)) + of_names([plan.name, *(name for name, _ in keys)])
 
 
-def _size(leg: Trajectory) -> int:
-    """Bytes of a motion's record."""
-    first = leg.joints[0]
+def of_trajectory(trajectory: Trajectory) -> int:
+    """Bytes of a motion's record, without what it was made with."""
+    first = trajectory.joints[0]
     segments = len(first.angle_points_deg) - first.degree
-    return motion.size(first.degree, len(leg.joints), leg.shared, segments, first.refine)
+    return motion.size(first.degree, len(trajectory.joints), trajectory.shared, segments, first.refine)

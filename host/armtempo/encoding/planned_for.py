@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from armtempo.basics.errors import InputError
+from armtempo.encoding import made_with
 from armtempo.encoding.encode import arm_record
-from armtempo.model import frame, pallet
+from armtempo.model import frame
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
@@ -22,23 +23,10 @@ def check(what: Path | str, plan: Plan | SequencePlan, arm: Arm) -> None:
 
 
 def check_surroundings(what: Path | str, plan: Plan | SequencePlan, arm: Arm) -> None:
-    """Raise InputError if a frame, pallet or tool that a plan uses has changed since."""
-    if change := _change(plan, arm):
+    """Raise InputError if something that a plan was made with has changed since."""
+    change = frame.changed(plan.arm.frames, arm.frames, plan.frames)
+    if change := change or made_with.changed(made_with.of_plan(plan), arm):
         raise InputError(f"{what} is old: {change}, in {_named(arm)}", "plan it again")
-
-
-def _change(plan: Plan | SequencePlan, arm: Arm) -> str:
-    """What has changed; "" for nothing."""
-    if found := frame.changed(plan.arm.frames, arm.frames, plan.frames):
-        return found
-    if isinstance(plan, SequencePlan) and (
-        found := pallet.changed(plan.arm.pallets, arm.pallets, plan.pallets)
-    ):
-        return found
-    for loaded, _ in plan.loaded_legs if isinstance(plan, SequencePlan) else ((plan.arm, None),):
-        if loaded.tool and loaded.tool not in (arm.tool, *arm.tools):
-            return f"tool {loaded.tool.name!r} has changed since, or is gone"
-    return ""
 
 
 def _named(arm: Arm) -> str:

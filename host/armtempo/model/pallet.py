@@ -126,15 +126,3 @@ def check(pallets: Sequence[ArmPallet], frames: Sequence[ArmFrame], where: str) 
             each.pose(1, frames)
         except InputError as error:
             raise InputError(f"{where}: {error.problem}", error.hint) from None
-
-
-def changed(before: Sequence[ArmPallet], now: Sequence[ArmPallet], names: Sequence[str]) -> str:
-    """Describe how the first of these pallets that is not as it was has changed; "" if all are."""
-    here = {each.name: each for each in now}
-    was = {each.name: each for each in before}
-    for name in names:
-        if name not in here:
-            return f"pallet {name!r} is no longer in the arm file"
-        if here[name] != was.get(name):
-            return f"pallet {name!r} has changed since"
-    return ""
