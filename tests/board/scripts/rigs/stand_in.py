@@ -252,6 +252,9 @@ class Engine:
         if not on:
             self.known = 0
 
+    def withdraw(self, mask):
+        self.known &= ~mask
+
     def home(self, mask, steps):
         self.calls.append("home")
         self.known |= mask
