@@ -75,34 +75,36 @@ class Engine:
         self.fault = 0
         self.fault_joint = NO_JOINT
         self.known = 0
-        self.withdrawn = 0  # one bit per joint whose position only homing has assumed; its steps are counted
         self._watched_joint = self._background_task = 0
         self._homing = 0  # one bit per joint whose switches end a homing motion
         self._in_service = False  # service() or refill() is running, or did not reach its end
+        if features.BACKLASH:
+            self.withdrawn = (
+                0  # one bit per joint whose position only homing has assumed; its steps are counted
+            )
         self.skip_check = False  # the next motion was already checked, and nothing has changed since
 
     # between motions
 
     def home(self, mask: int, steps: "list[int]") -> None:
         """Set the positions of the joints in ``mask`` to ``steps`` (an entry for every joint)."""
-        counted = self.known | self.withdrawn
+        counted = self.known
+        if features.BACKLASH:
+            counted |= self.withdrawn
+            self.withdrawn &= ~mask
         for number, joint in enumerate(self.drives):
             if mask >> number & 1:
                 joint.declare(steps[number], counted >> number & 1)
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
         self.known |= mask
-        self.withdrawn &= ~mask
-
-    def withdraw(self, mask: int) -> None:
-        """After a homing motion: the positions of these joints are unknown again."""
-        self.withdrawn |= self.known & mask
-        self.known &= ~mask
 
     def drivers(self, on: int) -> None:
         """Switch the drivers on or off; off, the arm can be moved by hand, and only the encoders follow it."""
         self.inputs.enable(on != 0)
         if not on:
-            self.known = self.withdrawn = 0
+            self.known = 0
+            if features.BACKLASH:
+                self.withdrawn = 0
 
     def clear(self) -> bool:
         """Clear the fault, unless its cause persists; returns whether it is cleared."""
@@ -126,7 +128,9 @@ class Engine:
     def _note_trip(self) -> None:
         """Note a switch that may have tripped, and that an E-stop released the drivers."""
         if self.inputs.note_trip() and self.inputs.releases:
-            self.known = self.withdrawn = 0
+            self.known = 0
+            if features.BACKLASH:
+                self.withdrawn = 0
 
     def _take_fault(self) -> None:
         self.fault = self.block[isr.FAULT]

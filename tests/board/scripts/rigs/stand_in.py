@@ -188,6 +188,7 @@ class Engine:
         self.rates = Rates()
         self.ticks = 0
         self.skip_check = False
+        self.withdrawn = 0
         self.drives = self
         self.unfit = None
         self.has_time = True
@@ -251,9 +252,6 @@ class Engine:
         self.calls.append("on" if on else "off")
         if not on:
             self.known = 0
-
-    def withdraw(self, mask):
-        self.known &= ~mask
 
     def home(self, mask, steps):
         self.calls.append("home")
