@@ -309,7 +309,7 @@ def test_homing_crosses_the_backlash(tmp_path: Path, start: float, monkeypatch: 
         with StopRequest() as stop:
             homing.home_to_switches(board, found, stop)
     (cycle,) = edgelog.read(log)
-    signs = _signs(cycle, found.driven[0])
+    signs = step_signs(cycle, found.driven[0])
     play = found.driven[0].steps_per_deg
     motor_steps, joint_steps = 0, 0.0
     for sign in signs:
@@ -320,11 +320,11 @@ def test_homing_crosses_the_backlash(tmp_path: Path, start: float, monkeypatch: 
 
 def _moved_deg(cycle: edgelog.PowerCycle, joint: DrivenJoint) -> float:
     """How far the pulses have moved a joint's motor since power-up."""
-    return float(_signs(cycle, joint).sum()) / joint.steps_per_deg
+    return float(step_signs(cycle, joint).sum()) / joint.steps_per_deg
 
 
-def _signs(cycle: edgelog.PowerCycle, joint: DrivenJoint) -> NDArray[np.int64]:
-    """The direction of each step of a joint's motor since power-up."""
+def step_signs(cycle: edgelog.PowerCycle, joint: DrivenJoint) -> NDArray[np.int64]:
+    """Of each step of a joint's motor since power-up, whether the joint's angle becomes larger (1) or smaller (-1)."""
     pins, channel = engine_pins.table(), joint.motor.channel - 1
     ticks, levels = cycle.pins[pins["STEP"][channel][0]]
     turns, to = cycle.pins[pins["DIR"][channel]]
