@@ -18,7 +18,7 @@ from armtempo.basics.errors import BoardError
 from armtempo.encoding import encode, encoded_motion
 from armtempo.link import Opening, open_board, traffic
 from armtempo.link.board_messages import Done, Event, Sample
-from armtempo.link.follow import Follower
+from armtempo.link.follow import MotionFollower
 from armtempo.link.session import Session
 from armtempo.link.traffic import FROM_BOARD, TO_BOARD, Chunk
 from armtempo.link.transport import SerialTransport
@@ -150,7 +150,7 @@ def test_samples_wait_for_a_host_that_does_not_read() -> None:
         stored = stored_motion.store(board, "slow", encoded_motion.of_trajectory(motion, arm).data)
         started = board.start(stored.name, stored.crc)
         assert started.duration_s > 50.0
-        follower = Follower(board, started.run)
+        follower = MotionFollower(board, started.run)
         time.sleep(AWAY_S)
         indices = [sample.index for sample in follower.samples()]
     assert follower.ended

@@ -16,6 +16,7 @@ from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.link.board_messages import SequenceState
+from armtempo.link.follow import SequenceWatcher
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
@@ -29,7 +30,6 @@ from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.recording import RunContent, Watcher
-from armtempo.robot.sequence_run import SequenceWatcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import BoardStore, stored_name
@@ -204,9 +204,11 @@ class Motions:
         """
         with self._board.stoppable(stop) as wanted:
             key = self._sequence(sequence, wanted, replace)
-            if out is None:
-                return sequence_run.run(self._board.client, key, wanted, watcher)
             client = self._board.client
+            if out is None:
+                end = sequence_run.run(client, key, wanted, watcher).end
+                sequence_run.raise_failure(client, end)
+                return end
             content = (
                 recording.of_stored_sequence(client, sequence, self._board.known_arm())
                 if isinstance(sequence, str)
@@ -214,9 +216,7 @@ class Motions:
             )
             folder = self._recorded(content, Path(out))
             self._last_sequence = folder.path
-            with folder.begin_repetition(with_rows=True) as file:
-                events = recording.RowRecorder(client, file, content.rows)
-                return sequence_run.run(client, key, wanted, watcher, events)
+            return recording.sequence(client, key, folder, wanted, watcher)
 
     def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
         """Store the sequence if it is a plan, and move a virtual arm to its start; returns its key."""

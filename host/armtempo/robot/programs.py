@@ -11,28 +11,17 @@ from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_program
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.encoding.encoded_program import EncodedProgram
-from armtempo.link.board_messages import Event, Notice, SequenceState
+from armtempo.link.board_messages import Notice, SequenceState
+from armtempo.link.follow import Followed, SequenceWatcher
 from armtempo.model.arm import Arm
 from armtempo.model.job import is_name
 from armtempo.model.user_program import UserProgram
 from armtempo.robot import sequence_run
 from armtempo.robot.connection import Connection
-from armtempo.robot.sequence_run import Events, SequenceWatcher
 from armtempo.robot.stop_request import StopRequest
 
 Listener = Callable[[str], object]
 """Called with each line that a program prints, and with the traceback of a failure."""
-
-
-class _Notices(Events):
-    """Passes on the board's texts."""
-
-    def __init__(self, listener: Listener) -> None:
-        self._listener = listener
-
-    def take(self, event: Event) -> None:
-        if isinstance(event, Notice):
-            self._listener(event.text)
 
 
 @checked_as("Board")
@@ -107,6 +96,12 @@ class Programs:
                 key = self.upload(program, replace=replace)
             if self._board.arm is not None:
                 self._board.start.home_virtual_arm(self._board.arm)
-            return sequence_run.run(
-                self._board.client, key, wanted, watcher, _Notices(listener), program=True
-            )
+            client = self._board.client
+
+            def take(event: Followed) -> None:
+                if isinstance(event, Notice):
+                    listener(event.text)
+
+            end = sequence_run.run(client, key, wanted, watcher, take, program=True).end
+            sequence_run.raise_failure(client, end, program=True)
+            return end
