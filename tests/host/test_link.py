@@ -18,6 +18,7 @@ from armtempo.link.follow import Followed, MotionFollower, SequenceFollower
 from armtempo.link.session import Session
 from armtempo.robot import recording, sequence_run, stored_motion
 from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.store import store
 from armtempo_shared import sequence, wire
 from armtempo_shared.messages import START_SWITCHES_BIT
 
@@ -359,6 +360,26 @@ def test_the_samples_of_a_sequence_are_not_fetched_as_a_motions(tmp_path: Path) 
     with pytest.raises(LinkError, match="that of a sequence"):
         recording.fetch(board, nothing, tmp_path / "runs", "pipe")
     assert not (tmp_path / "runs").exists()
+
+
+def test_what_replaces_a_sequence_takes_its_motions_along(tmp_path: Path) -> None:
+    board, data = ready(Pipe(tmp_path / "flash"))
+    record = sequence.pack(
+        wire.record_crc(ARM), [(sequence.MOVE, 0, 0, 0, 1)], [("s-1", wire.record_crc(data))]
+    )
+    counted: list[tuple[float, float]] = []
+    key = store(board, [("s-1", data), ("s", record)], lambda *at: counted.append(at))
+    whole = len(data) + len(record)
+    assert key == MotionKey("s", wire.record_crc(record))
+    assert counted == sorted(counted)
+    assert counted[-1] == (whole, whole)
+    with pytest.raises(
+        LinkError, match=rf"the board has another sequence 's' \(checksum {key.crc:08x}\)"
+    ) as caught:
+        store(board, [("s", data)])
+    assert "--force" in caught.value.hint
+    store(board, [("s", data)], replace=True)
+    assert [(entry.name, entry.sequence) for entry in board.stored()] == [("feed", False), ("s", False)]
 
 
 # the log of a link's traffic: written, read, replayed in place of a board

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
 from armtempo_shared.limits import TICK_HZ
-from armtempo_shared.sequence import MOVE, SequenceData, SequenceError
+from armtempo_shared.sequence import MOVE
 
-from armtempo.basics.errors import InputError, LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion, encoded_sequence
+from armtempo.encoding import encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
 from armtempo.link.board_messages import RowBegun, Sample, SequenceState
 from armtempo.link.follow import Followed, MotionFollower, RunEnd, SequenceWatcher, number_in_run
 from armtempo.model import arm_json
-from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import SequenceRow
 from armtempo.report import run_folder
 from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder, RunRow
 from armtempo.robot import sequence_run
@@ -68,69 +67,26 @@ class ProgressWatcher(Watcher):
         self._inner.end(repetition)
 
 
-@dataclass(frozen=True, eq=False)
-class RunContent:
-    """What is run: the records of its legs, and the rows that run them."""
-
-    name: str
-    arm: Arm
-    legs: tuple[tuple[str, bytes], ...]
-    """Name on the board and record of each."""
-    rows: tuple[RunRow, ...] = ()
-    """Of a sequence."""
-    plan: Plan | SequencePlan | None = None
-    """None if only the board had it."""
-
-
-def of_motion(motion: EncodedMotion) -> RunContent:
-    """A motion: a run of one leg."""
-    return RunContent(motion.name, motion.arm, ((motion.name, motion.data),), plan=motion.plan)
-
-
-def of_sequence(plan: SequencePlan) -> RunContent:
-    """A planned sequence."""
-    legs = tuple((motion.name, motion.data) for motion in encoded_sequence.of_plan(plan).motions)
-    rows = tuple(_row(row.op, row.number, row.step, row.words) for row in plan.rows)
-    return RunContent(plan.name, plan.arm, legs, rows, plan)
-
-
-def of_stored_sequence(client: Client, name: str, arm: Arm) -> RunContent:
-    """A sequence on the board; raises InputError if its record is damaged or of another version."""
-    try:
-        record = SequenceData(client.fetch(name))
-    except SequenceError as error:
-        raise InputError(
-            f"sequence {name!r} on the board: {error}", "plan it again and 'armtempo upload --force' it"
-        ) from error
-    names = [record.motion(index)[0] for index in range(record.motions)]
-    rows = [record.row(index) for index in range(record.rows)]
-    described = zip(rows, encoded_sequence.describe(record, arm), strict=True)
-    return RunContent(
-        name,
-        arm,
-        tuple((leg, client.fetch(leg)) for leg in names),
-        tuple(_row(op, number, step, words) for (op, number, _, _, step), words in described),
-    )
-
-
-def _row(op: int, number: int, step: int, words: str) -> RunRow:
-    return RunRow(step, number + 1 if op == MOVE else 0, words)
-
-
-def new_run(parent: Path, content: RunContent, port: str, client: Client) -> RunFolder:
+def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFolder:
     """A new run folder with everything that is needed to repeat the run."""
-    arm, plan = content.arm, content.plan
+    name, arm, plan = encoded.name, encoded.arm, encoded.plan
     where = {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
-    names = tuple(name for name, _ in content.legs)
-    with run_folder.new_folder(parent, content.name) as path:
-        folder = RunFolder(path, content.name, run_folder.scales(arm), where, legs=names, rows=content.rows)
-        folder.write_legs(data for _, data in content.legs)
+    legs = tuple((motion.name, motion.data) for motion in encoded.motions)
+    rows = tuple(map(_row, encoded.rows))
+    with run_folder.new_folder(parent, name) as path:
+        names = tuple(leg for leg, _ in legs)
+        folder = RunFolder(path, name, run_folder.scales(arm), where, legs=names, rows=rows)
+        folder.write_legs(data for _, data in legs)
         if plan is None:
             arm_json.save(arm, path / run_folder.ARM)
         else:
             plan.save(path / (run_folder.TRAJECTORY if isinstance(plan, Plan) else run_folder.SEQUENCE))
         folder.write()
     return folder
+
+
+def _row(row: SequenceRow) -> RunRow:
+    return RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words)
 
 
 def sequence(
@@ -223,7 +179,7 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
         raise LinkError(
             "the last run was that of a sequence, whose samples are not kept", "record it with 'armtempo run'"
         )
-    folder = new_run(folder_in, of_motion(motion), port, client)
+    folder = new_run(folder_in, motion, port, client)
     with folder.begin_repetition() as file:
         for sample in chain([first] if first else [], samples):
             file.append(sample)

@@ -1,4 +1,4 @@
-"""Store a motion; start, follow and stop what the board runs."""
+"""Start, follow and stop what the board runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from armtempo_shared import wire
 from armtempo_shared.messages import ONCE_NAME, PERMILLE
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
-from armtempo.basics.progress import Progress
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
@@ -30,28 +29,6 @@ FREEZE_S = 2.0
 """Longest time that freezing takes."""
 LOCK_S = 1.0
 """A request from another thread waits this long for its turn to talk to the board."""
-
-
-def store(
-    client: Client, name: str, data: bytes, progress: Progress | None = None, replace: bool = False
-) -> MotionKey:
-    """Upload a motion record under ``name``, unless the board already has it.
-
-    Raises LinkError if the board has another motion of this name, unless ``replace`` is true, or that motion is
-    damaged.
-    """
-    key = MotionKey(name, wire.record_crc(data))
-    found = client.find(name)
-    if found is not None and found.crc == key.crc:
-        return key
-    if found is not None and (found.joints or found.sequence or found.program) and not replace:
-        button = ", which its button starts" if found.default else ""
-        raise LinkError(
-            f"the board has another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
-            "replace it with --force, or store this one under another name with 'armtempo upload --name'",
-        )
-    client.upload(name, data, progress)
-    return key
 
 
 def put_once(client: Client, data: bytes) -> MotionKey:
