@@ -181,8 +181,7 @@ class Motions:
             self._take_start(encoded, wanted)
             folder = self._recorded(encoded, Path(out))
             seen.begin(encoded, folder)
-            for _ in recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen):
-                pass
+            recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen)
         return Run.load(folder.path)
 
     def _is_sequence(self, name: str) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
 
@@ -127,10 +126,10 @@ def repeat(
     times: int,
     stop: StopRequest,
     watcher: Watcher,
-) -> Iterator[Repetition]:
+) -> None:
     """Replay a stored motion ``times`` times into the run folder, and backwards in between.
 
-    Yields each repetition when it has ended. A stop request ends the series; a fault raises BoardError.
+    A stop request ends the series; a fault raises BoardError.
     """
     back = encoded_motion.way_back(motion) if times > 1 else b""
     for number in range(times):
@@ -140,7 +139,6 @@ def repeat(
             return
         end = _recorded(client, motion, folder, stop, watcher)
         watcher.end(folder.repetitions[-1])
-        yield folder.repetitions[-1]
         raise_fault(end)
 
 
