@@ -303,6 +303,10 @@ def test_fk_shows_the_tool_in_a_frame_and_ik_takes_it_back(tmp_path: Path) -> No
         (["home", "--position", "0", "0", "50"], "give a posture as WHERE, or a pose by --position"),
         ([], "give a posture as WHERE, or a pose by --position"),
         (["--position", "0", "0", "5", "--rpy", "0", "0", "0", "--yaw", "3"], "do not describe a pose"),
+        (["--position", "0", "0", "5", "--quaternion", "1", "1", "0", "0"], "this quaternion has length"),
+        (["--position", "0", "0", "5", "--pitch", "0", "--frame", "tray"], "pitch alone cannot be given"),
+        (["home", "--tool", "pen"], "no tool 'pen'"),
+        (["home", "--holds", "cup"], "no load 'cup'"),
         (["home", "--rpy", "0", "0", "0"], "do not describe a pose"),
     ],
 )
@@ -319,6 +323,7 @@ def test_goto_refuses_a_wrong_pose_before_a_port_is_opened(
     ("words", "said"),
     [
         (["--frame", "trya", "--axis", "x", "--by", "1"], "no frame 'trya'; did you mean 'tray'"),
+        (["--holds", "cup", "--axis", "x", "--by", "1"], "no load 'cup'"),
         (["--frame", "tray", "--joint", "1", "--by", "1"], "--frame says whose x, y or z is meant"),
         (["--frame", "tray", "--axis", "tool-x", "--by", "1"], "--frame says whose x, y or z is meant"),
     ],
