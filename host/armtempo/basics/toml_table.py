@@ -78,6 +78,11 @@ class Table:
         value = reprlib.repr(self._values[key])
         return InputError(f"{self.file}: {name} = {value} is not allowed", f"give {allowed}")
 
+    def misplaced(self, key: str, cure: str) -> InputError:
+        """The error for a key that may not be given beside the others."""
+        value = reprlib.repr(self._values[key])
+        return InputError(f"{self.file}: {self.place}{key} = {value} is not allowed here", cure)
+
     def _misspelt(self, key: str) -> str:
         """A note about a similar key in the table; "" if there is none."""
         near = misspelt(key, [other for other in self._values if other not in self._asked])
