@@ -106,6 +106,11 @@ def test_frames_may_be_in_each_other_in_any_order(tmp_path: Path) -> None:
         ),
         ("[frame.a]\nposition_mm = [0, 0, 0]\nframe = 3", "frame.a.frame = 3 is not allowed"),
         ("[frame]\na = 3", "frame.a = 3 is not allowed"),
+        ("[frame.a]\nposition_mm = [0, 0, 0]\nrpy_degs = [0, 0, 0]", "unknown key; did you mean 'rpy_deg'"),
+        (
+            "[frame.a]\nmatrix = [[1, 0, 0, 0], [0, 1], [0, 0, 1, 0], [0, 0, 0, 1]]",
+            "frame.a.matrix row 2 = [0, 1] is not",
+        ),
         ("[[frame]]\nname = 'a'", "frame"),
     ],
 )
@@ -306,6 +311,7 @@ def test_fk_shows_the_tool_in_a_frame_and_ik_takes_it_back(tmp_path: Path) -> No
         (["--position", "0", "0", "5", "--quaternion", "1", "1", "0", "0"], "this quaternion has length"),
         (["--position", "0", "0", "5", "--pitch", "0", "--frame", "tray"], "pitch alone cannot be given"),
         (["home", "--tool", "pen"], "no tool 'pen'"),
+        (["home", "--tool", ""], "the name is empty"),
         (["home", "--holds", "cup"], "no load 'cup'"),
         (["home", "--rpy", "0", "0", "0"], "do not describe a pose"),
     ],
