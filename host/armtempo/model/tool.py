@@ -45,11 +45,11 @@ class ArmTool:
         return float(sum(row[3] ** 2 for row in self.matrix[:3]) ** 0.5)
 
 
-def check_name(name: str) -> None:
-    """Raise InputError for a name that no tool may have."""
+def check_name(name: str, place: str = "") -> None:
+    """Raise InputError, which begins with ``place``, for a name that no tool may have."""
     if name == NOTHING:
-        raise InputError(f"{KIND}.{NOTHING}: {NOTHING!r} means no tool", "choose another name")
-    outputs_file.check_name(f"{KIND}.{name}", name)
+        raise InputError(f"{place}{KIND}.{name}: {name!r} means no tool", "choose another name")
+    outputs_file.check_name(f"{place}{KIND}.{name}", name)
 
 
 def read(top: Table) -> tuple[ArmTool, ...]:
@@ -58,6 +58,7 @@ def read(top: Table) -> tuple[ArmTool, ...]:
 
 
 def _tool(name: str, table: Table) -> ArmTool:
+    check_name(name, f"{table.file}: ")
     if table.has("approach"):
         raise InputError(
             f"{table.file}: {table.place}approach does not say how a tool is turned about its own z axis",
