@@ -213,7 +213,7 @@ def arm_file(folder: Path, more: str = TOOL) -> Path:
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ("[tool.nothing]\nposition_mm = [0, 0, 0]", "tool.nothing: 'nothing' means no tool"),
+        ("[tool.nothing]\nposition_mm = [0, 0, 0]", "arm.toml: tool.nothing: 'nothing' means no tool"),
         ("[tool.a]\nmass_kg = 1", "tool.a.position_mm is missing"),
         ("[tool.a]\nposition_mm = [0, 0, 0]\nmass_kg = -1", "tool.a.mass_kg = -1 is not allowed"),
         ("[tool.a]\nposition_mm = [0, 0, 0]\napproach = [0, 0, 1]", "tool.a.approach does not say how"),
@@ -243,6 +243,8 @@ angles_deg = [20, 10, -10, 5, 40, 8]
 
 def test_a_job_chooses_its_tool_and_a_plan_is_old_without_it(tmp_path: Path) -> None:
     arm = Arm.load(arm_file(tmp_path))
+    with pytest.raises(InputError, match="did you mean 'tool'"):
+        Job.of_table(toml_table.parse(f'tol = "gripper"\n{JOB}', "job.toml"), arm)
     assert arm.tools[0].centre_mm == (7.5, -4.0, 35.0)
     assert json_codec.decode(Arm, json_codec.encode(arm.with_tool("pen")), "arm") == arm.with_tool("pen")
     there = forward(arm.with_tool("gripper"), [20, 10, -10, 5, 40, 8])[:3, 3].tolist()

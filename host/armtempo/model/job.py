@@ -237,6 +237,7 @@ def tool_named(top: Table, arm: Arm) -> str:
 
 
 def _of_the_arm(top: Table, key: str, find: Callable[[str], object]) -> str:
+    top.known(key)
     name = top.text(key) if top.has(key) else ""
     try:
         find(name)
