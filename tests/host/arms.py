@@ -46,6 +46,11 @@ def arm(name: str, *joints: Joint) -> Arm:
     return Arm(name, tuple(named))
 
 
+def with_encoder(joint: Any, **changes: Any) -> Any:
+    """A joint with these values of its encoder changed."""
+    return replace(joint, encoder=replace(joint.encoder, **changes))
+
+
 ONE = arm("turntable", joint(20, 150, 0))
 PLANAR_2 = arm("planar 2", joint(0, 200, 0), joint(0, 150, 0))
 PLANAR_3 = arm("planar 3", joint(0, 200, 0), joint(0, 150, 0), joint(0, 50, 0))
