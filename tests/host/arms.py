@@ -237,12 +237,12 @@ DOOR = '\n[input.door]\npin = "PD3"\nactive = "high"\ndebounce_ms = 0\n'
 ALL = GRIPPER + PUMP + FAN + PART + DOOR
 
 
-def write(folder: Path, *tables: str, board: str = "") -> Path:
-    """The shipped arm's file with these tables after it."""
-    path = folder / "wired.toml"
-    text = shipped.arm_path().read_text(encoding="utf-8")
-    path.write_text(f'board = "{board}"\n{text}' if board else text, encoding="utf-8")
-    path.write_text(path.read_text(encoding="utf-8") + "".join(tables), encoding="utf-8")
+def write(folder: Path, *tables: str, board: str = "", like: str = "paper") -> Path:
+    """A shipped arm's file with these tables after it."""
+    path = folder / "arm.toml"
+    head = f'board = "{board}"\n' if board else ""
+    text = shipped.find(like).path.read_text(encoding="utf-8")
+    path.write_text("".join((head, text, *tables)), encoding="utf-8")
     return path
 
 

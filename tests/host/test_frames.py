@@ -16,7 +16,7 @@ from armtempo.cli import main
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import frame, shipped, workspace
+from armtempo.model import frame, workspace
 from armtempo.model.arm import Arm
 from armtempo.model.frame import ArmFrame
 from armtempo.model.job import Job
@@ -27,6 +27,8 @@ from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
+
+from tests.host import arms
 
 FRAMES = """
 [frame.tray]
@@ -42,10 +44,8 @@ PAPER = Arm.paper()
 
 
 def arm_file(folder: Path, more: str = FRAMES, name: str = "paper") -> Path:
-    """A shipped arm file with more after it."""
-    path = folder / "arm.toml"
-    path.write_text(shipped.find(name).path.read_text(encoding="utf-8") + more, encoding="utf-8")
-    return path
+    """A shipped arm file with frames after it."""
+    return arms.write(folder, more, like=name)
 
 
 def pose(position: list[float], turn: Rotation) -> np.ndarray:

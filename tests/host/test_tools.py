@@ -21,7 +21,7 @@ from armtempo.kinematics.forward import forward as of_geometry
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.of_arm import forward, inverse, inverse_many
 from armtempo.kinematics.solver import PoseSolver
-from armtempo.model import shipped, taught_tool
+from armtempo.model import taught_tool
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Dynamics, Joint, Load
@@ -37,6 +37,7 @@ from armtempo.splines.trajectory import Trajectory
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+from tests.host import arms
 from tests.host.arms import FIVE, FOUR, OFFSET_WRIST, SIX, THREE
 
 TOOL = """
@@ -204,10 +205,8 @@ def test_the_bound_of_a_links_speed_holds_for_the_tool(seed: int) -> None:
 
 
 def arm_file(folder: Path, more: str = TOOL) -> Path:
-    """The AR4 with more after it."""
-    path = folder / "arm.toml"
-    path.write_text(shipped.find("ar4").path.read_text(encoding="utf-8") + more, encoding="utf-8")
-    return path
+    """The AR4 with tools."""
+    return arms.write(folder, more, like="ar4")
 
 
 @pytest.mark.parametrize(
