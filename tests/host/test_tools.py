@@ -218,6 +218,10 @@ def arm_file(folder: Path, more: str = TOOL) -> Path:
         ("[tool.a]\nposition_mm = [0, 0, 0]\napproach = [0, 0, 1]", "tool.a.approach does not say how"),
         ("[tool.a]\nposition_mm = [0, 0, 0]\nframe = 'b'", "tool.a.frame: unknown key"),
         ("[tool.a]\nposition_mm = [0, 0, 0]\ncentre_mm = [1]", "tool.a.centre_mm = [1] is not allowed"),
+        (
+            "[tool.a]\nposition_mm = [0, 0, 0]\ncentre_mm = [0, 0, 1e300]",
+            "centre_mm = [0, 0, 1e+300] is not allowed",
+        ),
         ("[tool.'a b']\nposition_mm = [0, 0, 0]", "tool.a b: the name is not allowed"),
         ("[tool]\na = 3", "tool.a = 3 is not allowed"),
     ],

@@ -162,11 +162,15 @@ class Table:
             raise self.fail(key, "a text on one line, without control characters")
         return value
 
-    def numbers(self, key: str, count: int, default: Any = _REQUIRED) -> tuple[float, ...]:
-        """A list of ``count`` finite numbers."""
-        allowed = f"a list of {count} numbers"
+    def numbers(
+        self, key: str, count: int, default: Any = _REQUIRED, *, most: float = math.inf
+    ) -> tuple[float, ...]:
+        """A list of ``count`` finite numbers from -``most`` to ``most``."""
+        allowed = f"a list of {count} numbers" + (f" from {-most:g} to {most:g}" if most < math.inf else "")
         value = self._get(key, default, allowed)
         if not isinstance(value, list | tuple) or len(value) != count or not all(map(_is_number, value)):
+            raise self.fail(key, allowed)
+        if any(abs(number) > most for number in value):
             raise self.fail(key, allowed)
         return tuple(float(number) for number in value)
 

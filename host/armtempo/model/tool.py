@@ -11,6 +11,7 @@ from armtempo.basics.toml_section import key
 from armtempo.basics.toml_table import Table
 from armtempo.model import frame, outputs_file, pose, tool_pose
 from armtempo.model.parts import NOTHING
+from armtempo.model.parts_file import MAX_LENGTH_MM
 from armtempo.model.tool_pose import Rows, rows_of
 
 KIND = "tool"
@@ -67,5 +68,9 @@ def _tool(name: str, table: Table) -> ArmTool:
     matrix = tool_pose.given(table, f"{table.file}: {KIND}.{name}").matrix
     middle = tuple(0.5 * row[3] for row in matrix[:3])
     return toml_section.read(
-        ArmTool, table, name=name, matrix=matrix, centre_mm=table.numbers("centre_mm", 3, middle)
+        ArmTool,
+        table,
+        name=name,
+        matrix=matrix,
+        centre_mm=table.numbers("centre_mm", 3, middle, most=MAX_LENGTH_MM),
     )
