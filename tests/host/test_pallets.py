@@ -25,7 +25,7 @@ from armtempo.model.steps import EachPlace, ToPlace
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner, point_to_point, via_points
 from armtempo.planning.pallet_places import resolve
-from armtempo.robot import sequence_run
+from armtempo.robot import store
 
 ARM_TEXT = shipped.find("ar4").path.read_text(encoding="utf-8")
 TRAY = """
@@ -282,7 +282,7 @@ class Flash:
         """What it has."""
         return self.kept
 
-    def upload(self, name: str, _: bytes) -> None:
+    def upload(self, name: str, *_: object) -> None:
         """Note it."""
         self.uploaded.append(name)
 
@@ -294,13 +294,13 @@ def test_what_the_flash_cannot_take_is_refused_before_anything_is_stored(tmp_pat
     with_names = flash_use.of_plan(encoded.plan)
     assert needed < with_names < needed + 10 * 4 * 32
     board: Any = Flash(with_names + flash_use.BLOCK)
-    sequence_run.store(board, encoded)
+    store.store(board, encoded.records)
     assert len(board.uploaded) == len(sizes)
     full: Any = Flash(with_names - flash_use.BLOCK)
     with pytest.raises(
         LinkError, match=rf"10 records take \d+ bytes of the board's flash, of which {full.free} are"
     ):
-        sequence_run.store(full, encoded)
+        store.store(full, encoded.records)
     assert not full.uploaded
 
 

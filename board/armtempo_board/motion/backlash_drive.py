@@ -21,12 +21,9 @@ from armtempo_board.memory import Memory
 from armtempo_board.motion import crossing
 from armtempo_board.motion.following_error import FollowingError
 from armtempo_board.motion.joint_drive import JointDrive
+from armtempo_board.motion.rate_control import RateControl
 from armtempo_board.stepgen import step_queue
 from armtempo_board.stepgen.step_queue import emit
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from typing import Any
 
 _TAP_ENTRIES = const(64)
 _TAP_ROOM = const(56)  # of them: ``emit`` writes one entry more
@@ -56,10 +53,8 @@ _QUEUE_AT = const(11)
 
 
 class BacklashDrive(JointDrive):
-    """As ``JointDrive``; ``backlash``: the joint's row of ``armrecord.BACKLASH``."""
+    """As ``JointDrive``; ``backlash``: the joint's row of ``armrecord.BACKLASH``; ``rates``: of the engine."""
 
-    rates: "Any" = None
-    """The motion's ``RateControl``; given before the first motion."""
     _left = 0  # of the play in front of the motor, in steps, by the matches
 
     def __init__(
@@ -70,7 +65,9 @@ class BacklashDrive(JointDrive):
         ring_words: "memoryview",
         memory: Memory,
         backlash: "dict[str, int]",
+        rates: RateControl,
     ) -> None:
+        self._rates = rates
         self._play = backlash["steps"]
         self._is_side_known = False
         self._is_crossing = False
@@ -123,13 +120,24 @@ class BacklashDrive(JointDrive):
         if self._following:
             self.extra_counts = self._following.expected(steps - self._declared_ahead)
 
-    def declare(self, steps: int, was_known: int) -> None:
-        """As of ``JointDrive``; the encoder is declared with it. If the position was not known, nor is the side."""
-        super().declare(steps, was_known)
+    def declare(self, steps: int, were_counted: int) -> None:
+        """As of ``JointDrive``; the encoder is declared with it. If not all steps were counted, the side is unknown."""
+        super().declare(steps, were_counted)
         self._declared_ahead = self._motor_ahead
         self.extra_counts = 0
-        if not was_known:
+        if not were_counted:
             self._is_side_known = False
+
+    def side(self) -> "tuple[int, int] | None":
+        """In which direction the motor pushes, and how many steps before it does; None if that is not known."""
+        return (self._direction, self._left) if self._is_side_known else None
+
+    def take_side(self, direction: int, left: int) -> None:
+        """As ``side`` was in an engine before this one; the position is declared."""
+        self._is_side_known = True
+        self._direction = direction
+        left = self._left = self._base_steps = min(left, self._play)
+        self._motor_ahead = self._declared_ahead = -left if direction > 0 else left - self._play
 
     def settle(self) -> None:
         """As of ``JointDrive``; the last step may be one that crosses the play."""
@@ -221,7 +229,7 @@ class BacklashDrive(JointDrive):
             return 0
         generator, ring = self.generator, self.ring
         until_kiticks = now_kiticks + self.lookahead_kiticks
-        self.rates.last_until(now_kiticks + isr.kiticks_until(ring.timer, self._crossing, crossing.END))
+        self._rates.last_until(now_kiticks + isr.kiticks_until(ring.timer, self._crossing, crossing.END))
         self.can_queue_more = generator.prepare(until_kiticks)
         turns = generator.at_reversal and (
             not self._crossing[crossing.LEFT] or generator.next_kiticks() <= until_kiticks
@@ -297,3 +305,16 @@ class BacklashDrive(JointDrive):
         ring.state[_ROOM] = ring.entries - isr.SPARE_ENTRIES
         emit(_THIS_RING, ring.state, ring.timer)
         return codes.UNDERRUN if ring.run() else 0
+
+
+def sides(drives: "list[JointDrive]") -> "list[tuple[int, int] | None]":
+    """Of all joints, ``BacklashDrive.side``; None without backlash."""
+    return [drive.side() if isinstance(drive, BacklashDrive) else None for drive in drives]
+
+
+def take_sides(drives: "list[JointDrive]", found: "list[tuple[int, int] | None]") -> None:
+    """Give the drives what ``sides`` found, as far as they have backlash."""
+    for drive, side in zip(drives, found):
+        if side and isinstance(drive, BacklashDrive):
+            direction, left = side
+            drive.take_side(direction, left)

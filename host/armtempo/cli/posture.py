@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.model.tool_pose import BASE
+from armtempo.model.tool_pose import BASE, Pose
 from armtempo.planning import point_to_point, via_points
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
@@ -56,10 +57,9 @@ def goto(
     All joints move together, within their limits; with --line the tool moves in a straight line. The arm must be
     homed. Ctrl-C, or 'armtempo stop' in another terminal, brakes.
     """
-    typed = TypedPose(**pose)
-    if bool(where) == (typed.position is not None):
+    typed = TypedPose(**pose).pose()
+    if bool(where) == (typed is not None):
         raise InputError("give a posture as WHERE, or a pose by --position", "armtempo goto home")
-    typed.check()
     if where and frame != BASE:
         raise InputError("--frame is the frame of --position", "leave it out with WHERE")
     if len(where) > 1:
@@ -67,13 +67,19 @@ def goto(
             f"{len(where)} values for one posture",
             f"write them as one, with commas: armtempo goto {','.join(where)}",
         )
-    wanted = NamedPosture.of(where[0], given.arm_path, given.altered) if where else None
-    named = wanted.arm if wanted else resolve.named_arm(given.arm_path)
-    if named is not None:  # a wrong name is reported before a port is opened
-        named.with_tool(tool).frame(frame)
+    wanted = typed or NamedPosture.of(where[0], given.arm_path, given.altered)
+    named = wanted.arm if isinstance(wanted, NamedPosture) else resolve.named_arm(given.arm_path)
+    if named is not None:  # what is wrong is reported before a port is opened
+        named.with_tool(tool).holding(holds)
+        if isinstance(wanted, Pose):
+            named.in_base(wanted, frame)
     with resolve.board(given, named) as board:
         arm = resolve.arm_of_board(board, named).with_tool(tool).holding(holds)
-        target = wanted.angles_deg(arm, job_path) if wanted else arm.in_base(typed.pose, frame)
+        target: Array | Pose = (
+            wanted.angles_deg(arm, job_path)
+            if isinstance(wanted, NamedPosture)
+            else arm.in_base(wanted, frame)
+        )
         board.configure(arm, replace=given.replace_arm)
         try:
             with ProgressBar("moving") as progress:
@@ -113,6 +119,7 @@ def home(where: str, switches: bool, joint: str | None, job_path: Path | None, g
         arm = resolve.arm_of_board(board, wanted.arm)
         angles_deg = wanted.angles_deg(arm, job_path)
         board.configure(arm, replace=given.replace_arm)
+        unknown = [stands.name for stands in board.state().joints if not stands.known]
         if switches:
             say = results.progress_printer(given.as_json)
             board.home_to_switches(arm, joint=joint, progress=lambda text, done, whole: say(text))
@@ -121,6 +128,19 @@ def home(where: str, switches: bool, joint: str | None, job_path: Path | None, g
         else:
             board.home(arm, angles_deg)
         print_position(board, given.as_json)
+        if not switches:
+            _remark_on_backlash(arm, unknown)
+
+
+def _remark_on_backlash(arm: Arm, unknown: Collection[str]) -> None:
+    """Of joints whose position was unknown, so that it is unknown on which side of its play a motor is."""
+    pairs = zip(arm.driven, arm.crossings, strict=True)
+    names = [joint.name for joint, crossing in pairs if crossing and joint.name in unknown]
+    if names:
+        results.remark(
+            f"{', '.join(names)}: the first move may lose up to the backlash; to avoid that, jog each of them in one "
+            "direction by more than its backlash, then declare again where it stands"
+        )
 
 
 def is_named(text: str) -> bool:
