@@ -106,7 +106,7 @@ def test_a_goto_in_a_line_moves_the_tool_straight_and_slowly(tmp_path: Path) -> 
     assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() / times[1] == pytest.approx(20.0, rel=0.01)
     with pytest.raises(InputError, match="give the sequence a start"):
         planned(tmp_path, line, top="")
-    with pytest.raises(InputError, match="line = true only"):
+    with pytest.raises(InputError, match="give line = true too"):
         planned(tmp_path, 'goto = "a"\nspeed_mm_s = 20')
 
 
