@@ -189,19 +189,19 @@ window.armtempo = {
     });
   },
 
-  // The space bar stops from everywhere but where it writes a space; Enter holds a jog button as a finger does.
+  // The space bar stops from everywhere but where it writes a space; Enter holds a jog button as a finger does. A page
+  // that is covered takes no key but those that stop: its server may still hear them.
   key(event) {
-    if (document.body.matches(".lost") && [" ", "Enter"].includes(event.key)) {
-      event.preventDefault(); // what is covered is not pressed by keys either
-      event.stopPropagation();
-      return;
-    }
-    const typing = event.target.matches("textarea, input[type=text]:not([readonly])");
+    const lost = document.body.matches(".lost");
+    const typing = !lost && event.target.matches("textarea, input[type=text]:not([readonly])");
     if (event.key === "Escape" || (event.key === " " && !typing)) {
       event.preventDefault();
       if (event.key === " ") event.stopPropagation();
       else document.querySelector(".q-dialog .armtempo-cancel")?.click(); // a question is answered with no
       if (!event.repeat) emitEvent("armtempo-stop");
+    } else if (event.key === "Enter" && lost) {
+      event.preventDefault();
+      event.stopPropagation();
     } else if (event.key === "Enter" && !event.repeat) this.press(event);
   },
 

@@ -171,6 +171,7 @@ PLANNED = "{name}: {total:.3f} s · {file}"
 LEFT = "{name}: {part:.0%}, {left:.0f} s left"
 WRONG_REPEAT, RIGHT_REPEAT = "Repetitions: {times} are not possible", "give 1 to {most}"
 NO_RUNS, UNREADABLE = "Nothing was recorded here yet.", "cannot be read"
+CHOOSE_TWO = "Choose two runs or more."
 RUN_COLUMNS = ("Run", "Date", "Duration", "End", "")
 STORED, PAST_RUNS, REPORT, COMPARE = "Stored motions", "Past runs", "Report", "Compare"
 NO_SEQUENCE_OPEN = "Choose a sequence first."
