@@ -65,6 +65,7 @@ class JobTab:
         ]
         self._draw_vias()
         page.on_look(self._look)
+        page.on_arm(self._options.refresh)  # the frames and tools to choose
         # Texts typed while the connection was broken have not arrived
         ui.context.client.on_connect(self._connected)
 
@@ -187,7 +188,7 @@ class JobTab:
 
     async def _paste(self) -> None:
         def take(press: Press) -> None:
-            found = via_table.of_text(str(text.value or ""), words.PASTED, self._operator.arm)
+            found = via_table.of_text(str(text.value or ""), words.PASTED, self._jobs.arm)
             poses = [dict(pose) for pose in found.poses]
             self._file.change(
                 lambda: self._jobs.set_vias(poses or [{ANGLES: row} for row in found.via_deg.tolist()]), press
@@ -303,7 +304,7 @@ class JobTab:
     async def _make_plan(self, job: Job, version: int) -> None:
         try:
             self._show_planning(True)
-            plan = await run.io_bound(pipeline.plan, self._operator.arm, job, self._progress)
+            plan = await run.io_bound(pipeline.plan, self._jobs.arm, job, self._progress)
             if plan is not None:  # it is None if the panel ends meanwhile
                 self._jobs.planned(plan, version)
         except ArmtempoError as error:
