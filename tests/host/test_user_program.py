@@ -62,6 +62,8 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("cell.wait('parts')\n", 2, "no input 'parts'"),
         ("cell.count('a b')\n", 2, "not a valid name"),
         ("cell.run('my motion')\n", 2, "not a valid name"),
+        ("cell.run('')\n", 2, "'' is not a valid name"),
+        ("cell.set('', 1)\n", 2, "no output ''"),
         ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
     ],
 )
@@ -87,6 +89,9 @@ def test_other_refusals(tmp_path: Path) -> None:
     counts = "".join(f"cell.count('n{number}')\n" for number in range(9))
     with pytest.raises(InputError, match="9 counters"):
         UserProgram.load(written(counts, tmp_path), ARM)
+    for deep in ("x = " + "-" * 5000 + "1\n", "x = 1" + " + 1" * 3000 + "\n"):
+        with pytest.raises(InputError, match="nested too deep"):
+            UserProgram.load(written(deep, tmp_path), ARM)
 
 
 def test_marks_keep_the_lines_and_the_meaning(tmp_path: Path) -> None:

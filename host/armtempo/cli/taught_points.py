@@ -14,7 +14,7 @@ from armtempo.cli import results
 from armtempo.model import taught
 from armtempo.model.arm import Arm
 from armtempo.planning import via_points
-from armtempo.robot.teaching import NewFrame, NewTool
+from armtempo.robot.teaching import NewTable
 
 TAKE, UNDO = "p", "u"
 
@@ -87,7 +87,7 @@ def postures_deg(arm: Arm, names: Sequence[str], points: Sequence[str]) -> list[
 class NamedPoints(TaughtPoints):
     """The points of a frame, or the postures for a tool, which are taken in this order."""
 
-    def __init__(self, arm: Arm, where: Callable[[], Array], new: NewFrame | NewTool) -> None:
+    def __init__(self, arm: Arm, where: Callable[[], Array], new: NewTable) -> None:
         super().__init__(arm, where)
         self._new = new
 

@@ -125,7 +125,7 @@ def _locked(table: Table) -> tuple[float, float]:
     table.known("range_deg", "limits")
     for key in ("motor", "home_deg"):
         if table.has(key):
-            raise table.fail(key, "left out if fixed_deg locks the joint")
+            raise table.misplaced(key, "leave it out: fixed_deg locks the joint")
     return angle - _LOCKED_DEG, angle + _LOCKED_DEG
 
 

@@ -12,7 +12,7 @@ from armtempo.model import frame, taught, tool
 from armtempo.panel import teaching, words
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
-from armtempo.robot.teaching import NewFrame, NewTool
+from armtempo.robot.teaching import NewFrame, NewTable, NewTool
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -25,7 +25,7 @@ class TeachPoints:
     def __init__(self, page: PanelPage) -> None:
         self._page = page
         self._operator = page.operator
-        self._new: NewFrame | NewTool | None = None
+        self._new: NewTable | None = None
         """What is being taught; None before it was begun."""
         self._tool = ""
         """The tool with which its points are taken."""
