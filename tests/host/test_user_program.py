@@ -19,7 +19,7 @@ from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
-from armtempo.robot import sequence_run
+from armtempo.robot import programs
 from armtempo_board.app.cell import CellError
 from armtempo_shared.program import ProgramRecord
 
@@ -183,13 +183,12 @@ def test_a_board_without_the_memory_for_it_gets_nothing(tmp_path: Path) -> None:
     found = UserProgram.load(written("cell.goto('home')\n", tmp_path), ARM)
     encoded = encoded_program.of_program(found, ARM)
     with pytest.raises(LinkError, match=f"needs {encoded.heap_bytes} bytes") as raised:
-        sequence_run.store(Small(encoded.heap_bytes - 1), encoded)  # type: ignore[arg-type]
+        programs.check_memory(Small(encoded.heap_bytes - 1), encoded)  # type: ignore[arg-type]
     assert "armtempo flash" in raised.value.hint
     with pytest.raises(LinkError) as raised:
-        sequence_run.store(Small(100_000, features=0), encoded)  # type: ignore[arg-type]
+        programs.check_memory(Small(100_000, features=0), encoded)  # type: ignore[arg-type]
     assert "armtempo flash" in raised.value.hint
-    with pytest.raises(AttributeError, match="stored"):
-        sequence_run.store(Small(encoded.heap_bytes), encoded)  # type: ignore[arg-type]
+    programs.check_memory(Small(encoded.heap_bytes), encoded)  # type: ignore[arg-type]
 
 
 # armtempo.testing

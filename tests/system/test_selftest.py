@@ -26,15 +26,17 @@ def impatient(monkeypatch: pytest.MonkeyPatch, part: str) -> None:
     measure, run = prompt.Prompt.measure, prompt.Prompt._run
 
     def soon(self: prompt.Prompt, name: str, code: str) -> prompt.Measured:
-        return run(self, name, code.replace("timeout=10000", "timeout=1000"))
+        return run(
+            self, name, f"from armtempo_board.selftest import common\ncommon.WATCHDOG_MS = 1000\n{code}"
+        )
 
-    def measured(self: prompt.Prompt, *parts: str, **arguments: Any) -> prompt.Measured:
+    def measured(self: prompt.Prompt, name: str, **arguments: Any) -> prompt.Measured:
         with monkeypatch.context() as patch:
-            if parts[-1] == part:
+            if name == part:
                 patch.setattr(prompt, "_SILENCE_S", 0.3)
                 patch.setattr(prompt.Prompt, "_run", soon)
                 patch.setattr(self._port.serial, "timeout", 0.3)
-            return measure(self, *parts, **arguments)
+            return measure(self, name, **arguments)
 
     monkeypatch.setattr(prompt.Prompt, "measure", measured)
 

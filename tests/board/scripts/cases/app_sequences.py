@@ -134,6 +134,31 @@ def case_a_motions_row_is_told_with_its_run():
     assert told == [(run + 1, 0), (run + 1, 1), (run + 2, 2)]
 
 
+def case_no_sample_of_a_motion_is_dropped_when_the_next_begins():  # emulated
+    """Not the last one either, which is taken in the pass that starts the next motion; lost ones come again."""
+    app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
+    engine = app.controller.board.engine
+    begun = host.ask("status")[1][4]
+    begin(host)
+    for at in (10, 0, 10, 0):
+        host.turn(30)
+        engine.advance(1)
+        engine.steps = [at, at]
+        engine.sample()
+        engine.finish()
+    host.turn(30)
+    sent = [(begun + run, 3 * (run - 1) + number) for run in (1, 2, 3, 4) for number in range(3)]
+    found = [fields[:2] for kind, fields, _ in host.events if kind == "sample"]
+    assert found == sent, found
+    host.events = []
+    host.ask("samples", (1, 300))
+    host.turn()
+    assert [fields[:2] for kind, fields, _ in host.events if kind == "sample"] == sent[1:]
+    begin(host)
+    host.turn(5)
+    assert [fields[:2] for kind, fields, _ in host.events if kind == "sample"][-1] == (begun + 5, 0)
+
+
 def case_a_motion_is_checked_once_in_a_run():
     """Again in the next run; one whose start was refused counts as unchecked."""
     app, host = ready([(REPEAT, 0, 0, 2), (MOVE, "there", 0, 0), (MOVE, "back", 0, 0), (END, 0, 1, 0)])
