@@ -259,10 +259,10 @@ def test_a_job_chooses_its_tool_and_a_plan_is_old_without_it(tmp_path: Path) -> 
         pipeline.load(tmp_path / "plan.json", changed)
     with pytest.raises(InputError, match=r"job.toml: tool: .* no tool 'griper'; did you mean 'gripper'"):
         Job.of_table(toml_table.parse(text.replace("gripper", "griper"), "job.toml"), arm)
-    planned_for.check("x", arm, (), changed)
+    planned_for.check("x", replace(plan, arm=arm), changed)
 
 
-def test_a_sequence_has_one_tool(tmp_path: Path) -> None:
+def test_a_sequence_begins_with_its_tool(tmp_path: Path) -> None:
     arm = Arm.load(arm_file(tmp_path))
     (tmp_path / "job.toml").write_text(f'tool = "gripper"\n{JOB}', encoding="utf-8")
     pipeline.plan(arm, tmp_path / "job.toml").save(tmp_path / "job.json")
@@ -272,7 +272,9 @@ def test_a_sequence_has_one_tool(tmp_path: Path) -> None:
             f'name = "s"\nstart = "home"\n[posture.over]\nposition_mm = {there}\n[[step]]\nrun = "{file}"\n'
         )
         text += '[[step]]\ngoto = "over"\n'
-        with pytest.raises(InputError, match=r"run: it is for tool 'gripper', but the sequence has no tool"):
+        with pytest.raises(
+            InputError, match=r"run: it is for tool 'gripper', but the sequence has no tool here"
+        ):
             planned(arm, text, tmp_path)
         found = planned(arm, f'tool = "gripper"\n{text}', tmp_path)
         assert found.arm.tool == arm.tools[0]
