@@ -86,7 +86,7 @@ class Cell:
     def goto(self, posture: "str | Sequence[float]", speed: float = 1.0, wait: bool = True) -> None:
         """Move to a posture, a name or the joints' angles in degrees, all joints together; ``speed``: 0.01 to 1.
 
-        ``wait`` False: return at once, while the arm moves.
+        A sliding joint is given in mm. ``wait`` False: return at once, while the arm moves.
         """
         target = self._target(posture)
         percent = _percent(speed)
@@ -119,7 +119,7 @@ class Cell:
             self._work.brake()
 
     def posture(self) -> "list[float]":
-        """The joints' angles in degrees, as commanded."""
+        """The joints' angles in degrees, positions of sliding ones in mm, as commanded."""
         return [steps / per_deg for steps, per_deg in zip(self._work.steps(), self._table["per_deg"])]
 
     # outputs and inputs

@@ -19,6 +19,7 @@ from armtempo.model import pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.boards import TimerOutput, pin_number
 from armtempo.model.drive_limits import Crossing
+from armtempo.model.joint_unit import REVOLUTE
 from armtempo.model.outputs import SERVO, Output
 from armtempo.model.parts import DrivenJoint
 from armtempo.model.pin_use import Period
@@ -141,6 +142,9 @@ def _identity(arm: Arm) -> int:
             del joint["encoder"]["following_error_deg"]
         if joint["motor"]:
             del joint["motor"]["backlash_deg"]
+        if joint["type"] == REVOLUTE:  # as before there were sliding joints
+            del joint["type"]
+            (joint["motor"] or {}).pop("mm_per_rev", None)
     facts = [joints, _as_floats(arm.coupling)] if arm.coupling else joints
     text = json.dumps(facts, sort_keys=True)
     return crc32(text.encode())
@@ -169,7 +173,7 @@ def _motor(arm: Arm, number: int) -> dict[str, Any]:
     if max(abs(low), abs(high)) >= 2**30:
         raise InputError(
             f"{joint.name}: its range is {high - low} steps, more than the board can count",
-            "make range_deg narrower, or use fewer microsteps",
+            f"make {joint.unit.key('range_deg')} narrower, or use fewer microsteps",
         )
     forward = (
         arm.transmission.matrix[number, number] > 0.0
@@ -218,7 +222,7 @@ def _backlash(motor: DrivenJoint, crossing: Crossing | None) -> dict[str, Any]:
 
 
 def _check_crossing(motor: DrivenJoint, crossing: Crossing, steps: int) -> None:
-    what = f"{motor.name}: backlash_deg = {crossing.play_deg:g}"
+    what = f"{motor.name}: {motor.unit.key('backlash_deg')} = {crossing.play_deg:g}"
     if crossing.duration_s > _LONGEST_CROSSING_S:
         raise InputError(
             f"{what}: to cross it takes {crossing.duration_s:.2g} s at its limits, more than {_LONGEST_CROSSING_S:g} s",
@@ -230,7 +234,7 @@ def _check_crossing(motor: DrivenJoint, crossing: Crossing, steps: int) -> None:
         raise InputError(
             f"{what} is {steps} steps, and until they are made the motor reaches {rate:.0f} steps/s; the board makes "
             f"at most {limits.MAX_BACKLASH_STEPS} and {limits.MAX_CROSSING_RATE} steps/s",
-            "use fewer microsteps, or lower acceleration_deg_s2",
+            f"use fewer microsteps, or lower {motor.unit.key('acceleration_deg_s2')}",
         )
 
 
@@ -244,10 +248,10 @@ def _max_rate(arm: Arm, number: int) -> int:
     if rate > limits.MAX_STEP_RATE:
         raise InputError(
             (
-                f"{motor.name}: speed_deg_s = {motor.limits.speed_deg_s:g} means {rate:.0f} steps/s; the board "
-                f"makes at most {limits.MAX_STEP_RATE}"
+                f"{motor.name}: {motor.unit.key('speed_deg_s')} = {motor.limits.speed_deg_s:g} means {rate:.0f} "
+                f"steps/s; the board makes at most {limits.MAX_STEP_RATE}"
             ),
-            "check the unit, microsteps and gear_ratio",
+            f"check the unit, microsteps and {'mm_per_rev' if motor.slides else 'gear_ratio'}",
         )
     return with_margin(rate)
 

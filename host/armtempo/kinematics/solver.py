@@ -60,6 +60,7 @@ class Nearest:
 class Answer:
     """The postures of a target."""
 
+    arm: Arm
     target: Pose
     choice: Choice | None
     """The eight solutions of the closed form, if used."""
@@ -225,7 +226,7 @@ class PoseSolver:
             constraint.miss(frames(self.geometry, posture)[-1]) for posture in (angles, driven)
         )
         tool = forward(self.geometry, angles)
-        return Answer(target, choice, found, tuple(angles), tool, miss, miss_driven, reason)
+        return Answer(self.arm, target, choice, found, tuple(angles), tool, miss, miss_driven, reason)
 
 
 def _reason(choice: Choice, found: NumericalSolutions) -> str:

@@ -195,8 +195,9 @@ def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
     """All joints, the driven ones at the angles of a via point."""
     if len(via) != setup.driven.sum():
         raise InputError(
-            f"{where}: {len(via)} angles, but {setup.driven.sum()} joints have a motor",
-            "give one angle for each of them",
+            f"{where}: {len(via)} {'positions' if setup.arm.slides else 'angles'}, but {setup.driven.sum()} joints "
+            "have a motor",
+            f"give one {'position' if setup.arm.slides else 'angle'} for each of them",
         )
     posture = setup.home.copy()
     posture[setup.driven] = np.radians(via)
@@ -236,8 +237,9 @@ def _searched(
 def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Array:
     if len(posture_deg) != len(setup.home):
         raise InputError(
-            f"{where}: posture_deg has {len(posture_deg)} angles, not {len(setup.home)}",
-            "give one angle for each joint of the arm",
+            f"{where}: {setup.arm.list_key('posture_deg')} has {len(posture_deg)} "
+            f"{'positions' if setup.arm.slides else 'angles'}, not {len(setup.home)}",
+            f"give one {'position' if setup.arm.slides else 'angle'} for each joint of the arm",
         )
     return np.radians(posture_deg)
 
@@ -259,7 +261,7 @@ def _miss_note(setup: _Setup, target: Pose, needed: Array, number: int) -> list[
 
 def _needs(setup: _Setup, needed: Array) -> str:
     return ", ".join(
-        f"{joint.name} at {angle:.4g} deg (stays at {joint.home_deg:g})"
+        f"{joint.name} at {angle:.4g} {joint.unit.name} (stays at {joint.home_deg:g})"
         for joint, angle in zip(setup.arm.joints, np.degrees(needed), strict=True)
         if joint.motor is None and abs(angle - joint.home_deg) > STAYS_DEG
     )
