@@ -2,8 +2,9 @@
 
 The environment that runs this is the one of ``make test``: it has the newest releases for its Python already. One of
 each other release of Python from 3.11 on that is on PATH or that pyenv has gets the newest, and the oldest Python gets
-the oldest that pyproject.toml promises. While one environment is tested, the next is made. Prints a line for each, the
-whole output for those that fail; code 1 if one does.
+the oldest that pyproject.toml promises. One more is tested at a time than there are cores, as installing waits for the
+network; each in one process, as several would collect the same tests. Prints a line for each, the whole output for
+those that fail; code 1 if one does.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ PLACE = ROOT / ".cache" / "ci"
 OLDEST = (3, 11)
 WHAT = ["-e", ".[plot,cluster,mpy,urdf,ros,panel,docs]", "-r", "tests/requirements.txt"]
 RELEASE = "import sys, venv; sys.version_info.releaselevel == 'final' and print(*sys.version_info[:2])"
-QUICK = ("WORKERS=2", "PYTEST_ARGS=-k 'not test_structure' --ignore=tests/board --assert=plain")
+QUICK = ("WORKERS=0", "PYTEST_ARGS=-k 'not test_structure' --ignore=tests/board --assert=plain")
 """Left out: what reads the sources, and the board's program, which is for MicroPython and runs in the demo. Asserts
 that say no values are read in half of the time."""
 DESCRIBE = """
@@ -88,14 +89,25 @@ def make(environment: Environment, target: str, *variables: str) -> str:
 
 
 def prepare(environment: Environment) -> None:
-    """Make it, and the demo in it."""
+    """Make it."""
     uv = Path(sys.executable).with_name("uv")
     run(uv, "venv", "--quiet", "--clear", "--python", environment.python, environment.folder)
     python = environment.folder / "bin" / "python"
     run(uv, "pip", "install", "--quiet", *environment.options, "--python", python, *WHAT)
     for done in ("demo", "test"):  # as the Makefile notes it
         (environment.folder / done).touch()
-    make(environment, "demo")
+
+
+def test(environment: Environment) -> tuple[bool, str]:
+    """Whether all passes in it, and what is to be said."""
+    try:
+        prepare(environment)
+        make(environment, "demo")
+        passed = make(environment, "quick", *QUICK).strip().splitlines()[-1]
+    except subprocess.CalledProcessError as error:
+        return False, f"{error.output}\nfailed: {' '.join(map(str, error.cmd))}"
+    described = run(environment.folder / "bin" / "python", "-c", DESCRIBE).strip()
+    return True, f"make demo, make quick, {described}: {passed}"
 
 
 def main() -> int:
@@ -103,17 +115,10 @@ def main() -> int:
     PLACE.mkdir(parents=True, exist_ok=True)
     found = pythons()
     failed = False
-    with ThreadPoolExecutor(1) as pool:
-        for environment, ready in [(one, pool.submit(prepare, one)) for one in environments(found)]:
-            try:
-                ready.result()
-                passed = make(environment, "quick", *QUICK).strip().splitlines()[-1]
-            except subprocess.CalledProcessError as error:
-                failed = True
-                print(error.output, f"failed: {' '.join(map(str, error.cmd))}", sep="\n")
-            else:
-                described = run(environment.folder / "bin" / "python", "-c", DESCRIBE).strip()
-                print(f"make demo, make quick, {described}: {passed}", flush=True)
+    with ThreadPoolExecutor((os.cpu_count() or 1) + 1) as pool:
+        for passed, said in pool.map(test, environments(found)):
+            failed |= not passed
+            print(said, flush=True)
     if len(found) == 1:
         print(f"only one Python from {'.'.join(map(str, OLDEST))} on is on this machine; no other was tested")
     return failed
