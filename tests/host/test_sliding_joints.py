@@ -29,11 +29,13 @@ from armtempo.model.joint_trajectory import of_text
 from armtempo.model.joint_unit import PRISMATIC, SLIDE_MM
 from armtempo.model.parts import Dynamics, Joint, JointModel, Limits, Motor
 from armtempo.model.plan import Plan
-from armtempo.planning import planner, torque, workspace_check
+from armtempo.planning import planner, point_to_point, torque, via_points, workspace_check
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove, move_of
 from armtempo.planning.tool import Tool
 from armtempo.simulator.launch_options import describe
+
+from tests.host.arms import SIX
 
 SEED = 20_261_127
 TOLERANCE = 1e-9
@@ -141,8 +143,7 @@ def test_poses_derivatives_and_postures_are_those_of_the_product_of_transforms(s
 
     solver = PoseSolver(arm)
     for pose in poses[:1]:
-        fixed = ("roll", "pitch", "yaw") if len(sliding) == 6 else ()
-        answer = solver.solve(armtempo.Pose.of_matrix(pose, fixed), solver.home_rad)
+        answer = solver.solve(armtempo.Pose.of_matrix(pose, ()), solver.home_rad)
         assert answer.success, answer.reason
         np.testing.assert_allclose(product(arm, np.array(answer.angles_deg))[:3, 3], pose[:3, 3], atol=0.1)
         for joint, position in zip(arm.joints, answer.angles_deg, strict=True):
@@ -174,6 +175,36 @@ def test_a_locked_slide_under_an_arm_leaves_its_closed_form() -> None:
     np.testing.assert_allclose(found[0].angles_deg, at, atol=1e-9)
 
 
+def test_an_arm_on_a_rail_has_its_closed_form_where_the_rail_stands() -> None:
+    """Else it is searched for, and the rail moves."""
+    foot = Joint("foot", 0.0, 0.0, -90.0, 0.0, (-0.001, 0.001))
+    drive = {"limits": Limits(100.0, 100.0, 1000.0), "motor": Motor(1, 200, 16, 1.0, mm_per_rev=40.0)}
+    rail = Joint("rail", 0.0, 0.0, 90.0, 0.0, (-900.0, 900.0), type=PRISMATIC, **drive)  # type: ignore[arg-type]
+    arm = replace(SIX, joints=(foot, rail, *SIX.joints))
+    solver = PoseSolver(arm)
+    assert solver.refusals == []
+    at = np.array([0.0, 520.0, 20.0, -50.0, 30.0, 40.0, 50.0, -60.0])
+    pose = product(arm, at)
+    found = armtempo.inverse(arm, pose, at + 5.0 * np.eye(8)[2])
+    assert len(found) == 8
+    np.testing.assert_allclose(found[0].angles_deg, at, atol=1e-9)
+    assert {solution.angles_deg[1] for solution in found} == {520.0}
+    for solution in found:
+        np.testing.assert_allclose(product(arm, solution.angles_deg), pose, atol=1e-9)
+    near = solver.nearest(armtempo.Pose.of_matrix(pose), np.radians(at + 1.0))
+    assert near.method == "closed form"
+    assert near.angles_deg[1] == pytest.approx(521.0)
+    far = solver.solve(armtempo.Pose.of_matrix(pose), np.radians(at - 1400.0 * np.eye(8)[1]))
+    assert far.success
+    assert far.angles_deg[1] > -300.0
+    np.testing.assert_allclose(product(arm, np.array(far.angles_deg))[:3, 3], pose[:3, 3], atol=0.1)
+    # the next via point keeps the rail of the one before
+    given = tuple(at[1:])
+    job = Job("a", via=(given, armtempo.Pose.of_matrix(product(arm, at + 9.0 * np.eye(8)[2]))))
+    via = via_points.resolve(arm, job).via_deg
+    np.testing.assert_allclose(via[1], given + 9.0 * np.eye(7)[1], atol=1e-9)
+
+
 def test_forces_are_those_of_a_turning_slide() -> None:
     """A mass on an arm that turns and slides: polar coordinates, as in any textbook; and one that is lifted."""
     rng = np.random.default_rng(SEED)
@@ -195,10 +226,10 @@ def test_forces_are_those_of_a_turning_slide() -> None:
 
     lifted = replace(LIFT.joints[0], dynamics=Dynamics(mass))
     arm = replace(LIFT, joints=(lifted, replace(LIFT.joints[1], dynamics=Dynamics(0.0))))
-    plan = planner.plan(arm, Job("up", via=((0.0, 0.0), (100.0, 0.0)), **QUICK))
-    needed = torque.of_motion(arm, plan.trajectory)
+    motion = point_to_point.straight("up", (0.0, 0.0), (100.0, 0.0), arm)
+    needed = torque.of_motion(arm, motion)
     assert needed is not None
-    up = 1e-3 * plan.trajectory(needed.times_s, 2)[:, 0]
+    up = 1e-3 * motion(needed.times_s, 2)[:, 0]
     lead_m = 8e-3 / (2.0 * math.pi)  # of a radian of the shaft
     np.testing.assert_allclose(needed.needed_nm[:, 0], mass * (GRAVITY_M_S2 + up) * lead_m, atol=TOLERANCE)
 

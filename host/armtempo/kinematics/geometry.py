@@ -127,6 +127,14 @@ class Geometry:
         slides = tuple((index - first, far) for index, far in self.slides if first <= index < end)
         return Geometry(d, a, alpha, offset, linked, still, slides=slides)
 
+    def holding(self, angles: Sequence[float]) -> Geometry:
+        """The geometry whose sliding rows never move from where they are at a posture (joints,): for the closed form of
+        an arm on a rail; itself without such rows."""
+        if not self.slides:
+            return self
+        held = dict(self.still) | {row: angles[row] for row, _ in self.slides}
+        return replace(self, still=tuple(sorted(held.items())))
+
     def depths(self, turns: Sequence[T]) -> Sequence[float | T]:
         """d of each row, of the sliding ones where they are; ``turns``: as ``turns`` returns it."""
         found: list[float | T] = list(self.d)

@@ -48,7 +48,7 @@ def listings(
 def lines(answer: Answer) -> Iterator[str]:
     """The table, with the chosen solution marked by ``*``, angles in degrees, and the tool's pose."""
     if answer.choice:
-        yield from _closed_form_lines(answer.choice)
+        yield from _closed_form_lines(answer.choice, _units(answer))
     if answer.search and (answer.success or not answer.choice):
         yield from _numerical_lines(answer.search, _units(answer))
     if answer.reason:
@@ -56,17 +56,17 @@ def lines(answer: Answer) -> Iterator[str]:
     yield from _tool_lines(answer)
 
 
-def _closed_form_lines(choice: Choice) -> Iterator[str]:
+def _closed_form_lines(choice: Choice, units: Sequence[JointUnit]) -> Iterator[str]:
     yield (
         f"{choice.postures} of 4 arm postures reach the wrist centre"
         + (", with any angle of joint 1" if choice.on_axis else "")
         + f" (the paper's region {choice.region})"
     )
-    yield f"  no  {'branch':<19}{_heads([DEG] * 6)}"
+    yield f"  no  {'branch':<19}{_heads(units)}"
     for candidate in choice.candidates:
         chosen = candidate is choice.chosen
         singular = [SINGULAR[bit] for bit in SINGULAR if candidate.singular & bit]
-        words = ". ".join((_verdict(candidate, chosen), *singular))
+        words = ". ".join((_verdict(candidate, chosen, units), *singular))
         yield f"{_mark(chosen, candidate.number)}{candidate.branch!s:<19}{_row(candidate.angles_rad)}  {words}"
 
 

@@ -84,7 +84,14 @@ class _Setup:
         low, high = np.radians(ends).T
         solver = PoseSolver(arm)
         driven = np.array([joint.motor is not None for joint in arm.joints])
-        return cls(arm, solver, Ranges(low, high), np.array(solver.home_rad), driven, not solver.refusals)
+        return cls(
+            arm,
+            solver,
+            Ranges(low, high, solver.ranges.slides),
+            np.array(solver.home_rad),
+            driven,
+            not solver.refusals,
+        )
 
     def moved(self, angles: Array) -> Array:
         """The posture with the driven joints at ``angles`` and the others at their home angles."""
@@ -210,7 +217,8 @@ def _solve(
     """All that the pose asks for, (joints,) in rad; the choice only if it came of the closed form."""
     if not setup.closed_form or target.fixed != WHOLE:
         return _searched(setup, target, previous, where), None
-    choice = choose(setup.solver.geometry, target.matrix, setup.ranges, previous)
+    geometry = setup.solver.geometry.holding(previous.tolist())
+    choice = choose(geometry, target.matrix, setup.ranges, previous)
     usable = [candidate for candidate in choice.candidates if candidate.usable]
     if not usable:
         return _searched(setup, target, previous, where, choice), None
@@ -269,7 +277,7 @@ def _needs(setup: _Setup, needed: Array) -> str:
 
 def _branch(setup: _Setup, posture: Array, before: Branch | None) -> Branch:
     """The branch at a via point; if the arm is between two, it still counts as on the one before."""
-    here = branch_of(setup.solver.geometry, posture)
+    here = branch_of(setup.solver.geometry.holding(posture.tolist()), posture)
     return here.after(before) if before else here
 
 
