@@ -19,7 +19,7 @@ from unittest.mock import patch
 from armtempo.basics.errors import LinkError
 from armtempo.link import Client, greet
 from armtempo.link.board_messages import Sample
-from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.follow import MotionFollower, RunEnd
 from armtempo.link.session import Session
 from armtempo_shared import motion, wire
 
@@ -39,6 +39,8 @@ _IMPORTED_LATER = (
     "armtempo_board.app.memory_shares",
     "armtempo_board.app.arm_setup",
     "armtempo_board.app.store_commands",
+    "armtempo_board.app.sequence_start",
+    "armtempo_board.storage.sequence_file",
 )
 _FOR_LATER = (*_IMPORTED_LATER, "gc", "os")
 """What the program finds where it imports later, as it did at first."""
@@ -132,10 +134,10 @@ class Pipe:
         """Power up: a new program on the same flash."""
         with board_modules():
             # the program imports these when it needs them
-            from armtempo_board.app import arm_setup, store_commands  # noqa: F401
+            from armtempo_board.app import arm_setup, sequence_start, store_commands  # noqa: F401
             from armtempo_board.app.app import App
             from armtempo_board.motion import arm_check  # noqa: F401
-            from armtempo_board.storage import store  # noqa: F401  the program imports them when it needs them
+            from armtempo_board.storage import sequence_file, store  # noqa: F401
 
             self._later = {name: sys.modules[name] for name in _FOR_LATER}
             self.port = stand_in.Port()
@@ -266,14 +268,14 @@ def ready(pipe: Pipe) -> tuple[Client, bytes]:
     return board, data
 
 
-def started(pipe: Pipe) -> Follower:
+def started(pipe: Pipe) -> MotionFollower:
     """A run of ``feed`` that has just begun on a board made ready for it."""
     board, data = ready(pipe)
     run = board.start("feed", wire.record_crc(data)).run
-    return Follower(board, run)
+    return MotionFollower(board, run)
 
 
-def follow(follower: Follower) -> tuple[list[Sample], RunEnd]:
+def follow(follower: MotionFollower) -> tuple[list[Sample], RunEnd]:
     """All samples of the run, and how it ended."""
     samples = list(follower.samples())
     assert follower.ended

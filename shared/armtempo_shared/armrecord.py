@@ -79,10 +79,8 @@ BACKLASH = (
     ("steps", "H"),  # of the motor, that turn only the motor after a reversal; 0: none
     ("on_motor", "B"),  # the encoder is on the motor, so that it counts these steps
     ("spare", "B"),
-    (
-        "pace",
-        "I",
-    ),  # the n-th of them comes 64 * pace * sqrt(n) ticks after the reversal, until half of them are made
+    # the n-th of them comes 64 * pace * sqrt(n) ticks after the reversal, until half of them are made
+    ("pace", "I"),
 )
 
 

@@ -250,7 +250,8 @@ COMMANDS: "dict[str, str]" = {
 }
 """What each command does and what its answer says."""
 EVENTS: "dict[str, str]" = {
-    "sample": "One sample of run `run`, `index` counting from 0. `ticks`: motion clock, `path`: the motion's own "
+    "sample": "One sample of run `run`; `index` counts from 0 since the last `start`, through all "
+    "runs of a sequence. `ticks`: motion clock, `path`: the motion's own "
     "time. `flags` 1: taken while braking. Tail: per joint commanded steps and encoder counts (two i32).",
     "done": "The run ended without a fault, at its end or after a stop; sent after its last sample. `lost`: samples "
     "that were overwritten before they were sent. Tail as in `sample`.",

@@ -17,8 +17,8 @@ import numpy as np
 from armtempo.encoding import encoded_motion
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.robot import stored_motion
 from armtempo.robot.connect import connect
+from armtempo.robot.store import store
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import motion
 
@@ -76,11 +76,9 @@ def main() -> None:
             for segments in (7, 60, 500):
                 data = motion_of(arm, segments, 1.0), motion_of(arm, segments, 2.0)
                 size = f"motion of {len(data[0])} bytes"
-                show(f"{size}, new", wear, lambda data=data: stored_motion.store(client, "feed", data[0]))
+                show(f"{size}, new", wear, lambda data=data: store(client, [("feed", data[0])]))
                 show(f"{size}, other content", wear, lambda data=data: client.upload("feed", data[1]))
-                show(
-                    f"{size}, the same", wear, lambda data=data: stored_motion.store(client, "feed", data[1])
-                )
+                show(f"{size}, the same", wear, lambda data=data: store(client, [("feed", data[1])]))
                 show("default, new", wear, lambda: client.set_default("feed"))
                 show("default, the same", wear, lambda: client.set_default("feed"))
                 show("renamed default", wear, lambda: client.rename("feed", "food"))

@@ -3,7 +3,7 @@
     python -m tests.benchmark.selftest_heap MICROPYTHON FOLDER
 
 MICROPYTHON as for tests/benchmark/firmware.py. The firmware with the program is built in FOLDER (new), and run by QEMU;
-the parts are sent to its prompt and loaded up to the start of their motion; of what they time, QEMU counts the
+the parts are run at its prompt and loaded up to the start of their motion; of what they time, QEMU counts the
 instructions (``selftest.board_part`` has them). QEMU has no watchdog, DWT, random numbers,
 backup SRAM, nor DMA for these timers, and cannot write the flash, so what goes beyond that runs on no emulator.
 """
@@ -40,16 +40,15 @@ class Beyond:
 sys.modules["os"] = Beyond(os, urandom=bytes)
 sys.modules["machine"] = Beyond(machine, unique_id=lambda: bytes(12))
 backup_sram.find = lambda: 0x20020000
-def feed():
-    pass
-def ways(engine):
-    return {"": (stm.EXTI, 0, 0, 0)}
-def cycles():
-    return time.ticks_us()
-def enable():
-    return 1, 1, 1
+import stm, time
+from armtempo_board.selftest import common
+common.feed = lambda: None
+common.cycles = time.ticks_us
+common.enable = lambda: (1, 1, 1)
+from armtempo_board.selftest import estop
+estop.triggers = lambda engine: {"": (stm.EXTI, 0, 0, 0)}
 def idle(engine, *_):
-    raise OSError("{'free': %d, 'largest': %d}" % (free(), largest()))
+    raise OSError("{'free': %d, 'largest': %d}" % (common.free(), common.largest()))
 from armtempo_board.motion.engine import Engine
 Engine.start = idle
 from armtempo_board.hardware.inputs import Inputs
@@ -57,22 +56,22 @@ Inputs.estop_active = lambda _: False
 """
 
 
-def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
-    """By title: the files of the part, and its arguments."""
+def parts(record: bytes) -> dict[str, tuple[str, dict[str, object]]]:
+    """By title: the part, and its arguments."""
     _, joints, _ = armrecord.unpack(record)
     moved, gentle = motion.back_in_turn(joints), motion.gentle(joints)
     common: dict[str, object] = {"record": RECORD, "idle_us": 0}
     starts = {"motion": moved.record.hex(), "start_steps": moved.start_steps, "rates": moved.rates}
     stops: dict[str, object] = {**starts, "motions": [starts["motion"]] * 2, "waits_us": [0]}
     del stops["motion"]
-    found: dict[str, tuple[list[str], dict[str, object]]] = {
+    found: dict[str, tuple[str, dict[str, object]]] = {
         "encoders": (
-            ["engine", "encoders"],
+            "encoders",
             {**common, "motion": gentle.record.hex(), "start_steps": gentle.start_steps},
         ),
-        "pulses": (["engine", "capture", "pulses"], {**common, **starts, "most": 2000}),
+        "pulses": ("pulses", {**common, **starts, "most": 2000}),
         "stops": (
-            ["engine", "estop"],
+            "estop",
             {**common, **stops},
         ),
     }
@@ -80,9 +79,9 @@ def parts(record: bytes) -> dict[str, tuple[list[str], dict[str, object]]]:
         rates = [round(rate_part.stated(count) / rate_part.KEPT)] * count
         tried = {"motion": motion.at_rates(rates, 0.4).hex(), "rates": [motion.limit(rate) for rate in rates]}
         tried = {**common, **tried, "frames": rate_part.frames()}
-        found[f"rates, {count}"] = (["engine", "rates"], tried)
-        found[f"watched, {count}"] = (["engine", "capture", "rates"], {**tried, "watch": ("A", 0)})
-    return {**found, "cycles": (["cycles"], {"motion": motion.evaluated().hex()})}
+        found[f"rates, {count}"] = ("rates", tried)
+        found[f"watched, {count}"] = ("rates", {**tried, "watch": ("A", 0)})
+    return {**found, "cycles": ("cycles", {"motion": motion.evaluated().hex()})}
 
 
 def main(micropython: Path, folder: Path) -> None:
@@ -109,19 +108,18 @@ def main(micropython: Path, folder: Path) -> None:
             with prompt.at_prompt(f"socket://127.0.0.1:{port}") as there:
                 there.at_end = "pass"
                 time.sleep(BOOT_S)
-                for title, (files, arguments) in parts(record).items():
+                for title, (part, arguments) in parts(record).items():
                     there.enter(soft_reset=title != "encoders")
-                    print(f"{title:<10}", _said(there, files, arguments))
+                    print(f"{title:<10}", _said(there, part, arguments))
         finally:
             process.kill()
 
 
-def _said(there: prompt.Prompt, files: list[str], arguments: dict[str, object]) -> str:
-    folder = Path(prompt.__file__).with_name("on_board")
-    texts = [(folder / f"{name}.py").read_text() for name in ("common", *files)]
-    texts.append(STAND_INS)
+def _said(there: prompt.Prompt, part: str, arguments: dict[str, object]) -> str:
+    call = f"import json\nfrom armtempo_board.selftest import {part} as part\n"
+    call += f"print(json.dumps(part.measure(**{arguments!r})))\n"
     try:
-        took = there._run(files[-1], f"{''.join(texts)}\ntell(measure(**{arguments!r}))\n").values
+        took = there._run(part, STAND_INS + call).values
         return (
             str({what: round(_INSTRUCTIONS_A_US * took_us, 1) for what, took_us in took.items()})
             + " instructions"

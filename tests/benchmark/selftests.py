@@ -14,7 +14,7 @@ from pathlib import Path
 
 from armtempo import connect
 
-from tests.system.test_selftest import board, is_enabled
+from tests.system.logged_boards import board, is_enabled
 
 
 def main(times: int) -> None:

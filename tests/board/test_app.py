@@ -22,7 +22,10 @@ SCRIPTS = Path(__file__).parent / "scripts"
 BASICS = SCRIPTS / "probes" / "app_basics.py"
 SUBJECTS = [
     *(SCRIPTS / "cases" / f"app_{name}.py" for name in ("commands", "once", "runs", "faults", "start")),
-    *(SCRIPTS / "cases" / f"app_{name}.py" for name in ("sequence_start", "sequences", "programs")),
+    *(
+        SCRIPTS / "cases" / f"app_{name}.py"
+        for name in ("sequence_start", "sequences", "sequence_ahead", "programs")
+    ),
 ]
 
 

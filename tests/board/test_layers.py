@@ -14,6 +14,7 @@ from tests import interpreters, sources
 
 BOARD = interpreters.ROOT / "board" / "armtempo_board"
 BELOW = {
+    "selftest": {"app", "storage", "motion", "stepgen", "hardware", ""},
     "app": {"link", "storage", "motion", "hardware", ""},
     "link": {""},
     "storage": {""},

@@ -46,6 +46,11 @@ def arm(name: str, *joints: Joint) -> Arm:
     return Arm(name, tuple(named))
 
 
+def with_encoder(joint: Any, **changes: Any) -> Any:
+    """A joint with these values of its encoder changed."""
+    return replace(joint, encoder=replace(joint.encoder, **changes))
+
+
 ONE = arm("turntable", joint(20, 150, 0))
 PLANAR_2 = arm("planar 2", joint(0, 200, 0), joint(0, 150, 0))
 PLANAR_3 = arm("planar 3", joint(0, 200, 0), joint(0, 150, 0), joint(0, 50, 0))
@@ -232,12 +237,12 @@ DOOR = '\n[input.door]\npin = "PD3"\nactive = "high"\ndebounce_ms = 0\n'
 ALL = GRIPPER + PUMP + FAN + PART + DOOR
 
 
-def write(folder: Path, *tables: str, board: str = "") -> Path:
-    """The shipped arm's file with these tables after it."""
-    path = folder / "wired.toml"
-    text = shipped.arm_path().read_text(encoding="utf-8")
-    path.write_text(f'board = "{board}"\n{text}' if board else text, encoding="utf-8")
-    path.write_text(path.read_text(encoding="utf-8") + "".join(tables), encoding="utf-8")
+def write(folder: Path, *tables: str, board: str = "", like: str = "paper") -> Path:
+    """A shipped arm's file with these tables after it."""
+    path = folder / "arm.toml"
+    head = f'board = "{board}"\n' if board else ""
+    text = shipped.find(like).path.read_text(encoding="utf-8")
+    path.write_text("".join((head, text, *tables)), encoding="utf-8")
     return path
 
 

@@ -143,7 +143,7 @@ def make_sequence(
                     if run > 1 or sample.index not in drop:
                         file.append(sample, None if passed in lost_rows else number)
         end = SequenceState(state, 0, 4, 0, cycles, "pick")
-        file.repetition.end_rows(end, code, {"parts": cycles}, 0.5 * len(passes))
+        file.repetition.end_rows(end, code, {"parts": cycles}, 0.5 * len(passes), ())
     return path
 
 

@@ -224,6 +224,17 @@ def test_a_typing_error_names_the_file_that_is_meant(run: Run, tmp_path: Path) -
     for wrong in ("first.jsn", "firts.json"):
         said = run("run", wrong, code=2).output
         assert f"{wrong}: no such file; did you mean 'first.json'?" in said
+    assert "'': no such file" in run("run", "", code=2).output
+    (tmp_path / "folder.json").mkdir()
+    assert "mean 'folder.json'" not in run("run", "folder.json", code=2).output
+
+
+def test_what_is_not_planned_yet_is_not_called_damaged(run: Run, tmp_path: Path) -> None:
+    for name, cure in (("job.toml", "armtempo plan"), ("pick.py", "armtempo program")):
+        (tmp_path / name).write_text("x = 1\n", encoding="utf-8")
+        said = run("run", name, code=2).output
+        assert f"{name}: is not a plan" in said
+        assert cure in said
 
 
 def test_angles_without_commas_are_shown_with_them(run: Run) -> None:

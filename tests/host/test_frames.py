@@ -16,7 +16,7 @@ from armtempo.cli import main
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import frame, shipped, workspace
+from armtempo.model import frame, workspace
 from armtempo.model.arm import Arm
 from armtempo.model.frame import ArmFrame
 from armtempo.model.job import Job
@@ -27,6 +27,8 @@ from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
+
+from tests.host import arms
 
 FRAMES = """
 [frame.tray]
@@ -42,10 +44,8 @@ PAPER = Arm.paper()
 
 
 def arm_file(folder: Path, more: str = FRAMES, name: str = "paper") -> Path:
-    """A shipped arm file with more after it."""
-    path = folder / "arm.toml"
-    path.write_text(shipped.find(name).path.read_text(encoding="utf-8") + more, encoding="utf-8")
-    return path
+    """A shipped arm file with frames after it."""
+    return arms.write(folder, more, like=name)
 
 
 def pose(position: list[float], turn: Rotation) -> np.ndarray:
@@ -106,6 +106,11 @@ def test_frames_may_be_in_each_other_in_any_order(tmp_path: Path) -> None:
         ),
         ("[frame.a]\nposition_mm = [0, 0, 0]\nframe = 3", "frame.a.frame = 3 is not allowed"),
         ("[frame]\na = 3", "frame.a = 3 is not allowed"),
+        ("[frame.a]\nposition_mm = [0, 0, 0]\nrpy_degs = [0, 0, 0]", "unknown key; did you mean 'rpy_deg'"),
+        (
+            "[frame.a]\nmatrix = [[1, 0, 0, 0], [0, 1], [0, 0, 1, 0], [0, 0, 0, 1]]",
+            "frame.a.matrix row 2 = [0, 1] is not",
+        ),
         ("[[frame]]\nname = 'a'", "frame"),
     ],
 )
@@ -303,6 +308,11 @@ def test_fk_shows_the_tool_in_a_frame_and_ik_takes_it_back(tmp_path: Path) -> No
         (["home", "--position", "0", "0", "50"], "give a posture as WHERE, or a pose by --position"),
         ([], "give a posture as WHERE, or a pose by --position"),
         (["--position", "0", "0", "5", "--rpy", "0", "0", "0", "--yaw", "3"], "do not describe a pose"),
+        (["--position", "0", "0", "5", "--quaternion", "1", "1", "0", "0"], "this quaternion has length"),
+        (["--position", "0", "0", "5", "--pitch", "0", "--frame", "tray"], "pitch alone cannot be given"),
+        (["home", "--tool", "pen"], "no tool 'pen'"),
+        (["home", "--tool", ""], "the name is empty"),
+        (["home", "--holds", "cup"], "no load 'cup'"),
         (["home", "--rpy", "0", "0", "0"], "do not describe a pose"),
     ],
 )
@@ -319,6 +329,7 @@ def test_goto_refuses_a_wrong_pose_before_a_port_is_opened(
     ("words", "said"),
     [
         (["--frame", "trya", "--axis", "x", "--by", "1"], "no frame 'trya'; did you mean 'tray'"),
+        (["--holds", "cup", "--axis", "x", "--by", "1"], "no load 'cup'"),
         (["--frame", "tray", "--joint", "1", "--by", "1"], "--frame says whose x, y or z is meant"),
         (["--frame", "tray", "--axis", "tool-x", "--by", "1"], "--frame says whose x, y or z is meant"),
     ],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from armtempo.encoding import encoded_sequence
 from armtempo.report import verdict
 from armtempo.report.evaluation import evaluate
 from armtempo.report.verdict import BAD, GOOD, OPEN
-from armtempo.robot import goto, recording
+from armtempo.robot import goto
 from click.testing import CliRunner
 
 from tests.host import made_runs
@@ -151,17 +152,18 @@ class Stored:
 
 def test_what_is_recorded_of_a_stored_sequence_is_that_of_its_plan() -> None:
     plan = made_runs.small_sequence()
-    planned = recording.of_sequence(plan)
-    board: Any = Stored()
-    stored = recording.of_stored_sequence(board, "pick", plan.arm)
-    assert stored.legs == planned.legs
-    assert [(row.step, row.leg) for row in stored.rows] == [(row.step, row.leg) for row in planned.rows]
+    planned = encoded_sequence.of_plan(plan)
+    board = Stored()
+    stored = encoded_sequence.of_board("pick", plan.arm, board.fetch)
+    assert stored.records == planned.records
+    assert stored.start_deg == pytest.approx(planned.start_deg, abs=1e-6)
+    assert [replace(row, words="") for row in stored.rows] == [replace(row, words="") for row in planned.rows]
     assert [row.words for row in stored.rows] == [
         *("repeat for ever", "run pick-1", "run pick-2", "count parts", "end of repeat")
     ]
     board.records["pick"] = board.records["pick"][:-1]
     with pytest.raises(ArmtempoError, match="sequence 'pick' on the board"):
-        recording.of_stored_sequence(board, "pick", plan.arm)
+        encoded_sequence.of_board("pick", plan.arm, board.fetch)
 
 
 def test_a_sequence_is_run_and_gone_to_as_a_motion_is(tmp_path: Path) -> None:

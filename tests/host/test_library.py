@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 from armtempo.basics import errors
 from armtempo.encoding import encoded_sequence
+from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.kinematics import PoseSolver
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample
 from armtempo.model import shipped
-from armtempo.robot import sequence_run
-from armtempo.robot.connection import Connection
+from armtempo.robot import arm_state
 from armtempo.simulator import LaunchOptions, launch
 from numpy.typing import ArrayLike
 
@@ -41,10 +41,11 @@ def test_the_button_starts_an_uploaded_sequence_only_where_asked(
 ) -> None:
     defaults: list[str] = []
     client: Any = SimpleNamespace(set_default=defaults.append)
-    monkeypatch.setattr(Connection, "configure", lambda board, arm: None)
+    monkeypatch.setattr(arm_state, "configure", lambda *_: None)
     sequence = armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.Wait(1.0),)))
-    monkeypatch.setattr(encoded_sequence, "of_plan", lambda plan: SimpleNamespace(arm=arm))
-    monkeypatch.setattr(sequence_run, "store", lambda *_: SimpleNamespace(name="pick"))
+    encoded = EncodedSequence("pick", arm, (), (), bytes(4))  # the board takes no row without a step
+    monkeypatch.setattr(encoded_sequence, "of_plan", lambda plan: encoded)
+    monkeypatch.setattr("armtempo.robot.store.store", lambda *_: None)
     board = armtempo.Board(client, "pipe")
     board.upload_sequence(sequence)
     assert defaults == []
@@ -234,7 +235,7 @@ def test_an_arm_and_a_sequence_are_made_in_code() -> None:
         "output gripper closed"
     ]
     record = encoded_sequence.of_plan(planned)  # the board takes no row without a step
-    assert record.plan.rows[-1].step == 6
+    assert record.rows[-1].step == 6
     assert [step.step for step in sequence.steps] == [1, 6]
     with pytest.raises(armtempo.InputError, match="no output 'griper'"):
         armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.SetOutput("griper", 1),)))

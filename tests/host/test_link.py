@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import random
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client, traffic
+from armtempo.link.board_messages import Sample
 from armtempo.link.client import harmless_number
-from armtempo.link.follow import Follower
+from armtempo.link.follow import Followed, MotionFollower, SequenceFollower
 from armtempo.link.session import Session
-from armtempo.robot import stored_motion
+from armtempo.robot import recording, sequence_run, stored_motion
 from armtempo.robot.stop_request import StopRequest
-from armtempo_shared import wire
+from armtempo.robot.store import store
+from armtempo_shared import sequence, wire
 from armtempo_shared.messages import START_SWITCHES_BIT
 
 from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, started
@@ -108,7 +112,7 @@ def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> Non
     board, data = ready(pipe)
     run = board.start("feed", wire.record_crc(data)).run
     pipe.wait_away(45.0)
-    follower = Follower(board, run)
+    follower = MotionFollower(board, run)
     samples = list(follower.samples())
     assert follower.ended
     missing = set(range(500)) - {sample.index for sample in samples}
@@ -123,7 +127,7 @@ def test_what_arrived_is_not_lost_though_the_board_has_let_it_go(tmp_path: Path)
     pipe = Pipe(tmp_path / "flash")
     pipe.run_samples = 250
     follower = started(pipe)
-    pipe.wait_away(18.0, buffer=4096)
+    pipe.wait_away(17.0, buffer=4096)
     assert [sample.index for sample in follower.samples()] == list(range(250))
 
 
@@ -152,7 +156,7 @@ def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) 
         board.start("feed", wire.record_crc(data))
     run = board.start("feed", wire.record_crc(data), wire.START_HOMING).run
     assert board.status().known == 7
-    samples = list(Follower(board, run).samples())
+    samples = list(MotionFollower(board, run).samples())
     assert samples[0].positions.commanded_steps == (7, 7, 7)
     assert board.status().known == 1
     assert pipe.app.controller.board.engine.homing == 0b111
@@ -274,7 +278,7 @@ def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     board, old = ready(pipe)
     run = board.start("feed", wire.record_crc(old)).run
     pipe.disturb(Noise(f"to {kind}", 0.05, (kind,)), Noise(f"from {kind}", 0.05, (kind,)))
-    follower = Follower(board, run)
+    follower = MotionFollower(board, run)
     indices: list[int] = []
     new = random_motion(random.Random(6))
     said = ""
@@ -291,6 +295,91 @@ def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     assert not said or "messages arrived damaged (" in said
     assert indices == sorted(set(indices))
     assert (tmp_path / "flash" / "feed.atm").read_bytes() in (old, new)
+
+
+# the runs of a sequence, one after the other: the same follower
+
+
+def sequence_of(pipe: Pipe, times: int) -> tuple[Client, MotionKey]:
+    """A board with a sequence that runs ``feed`` so many times without a pause."""
+    board, data = ready(pipe)
+    board.home([7, 7, 7])
+    ends: Any = pipe._later["armtempo_board.motion.endpoints"]
+    ends.at_end = ends.at_start  # the next motion begins there
+    rows = [(sequence.REPEAT, 0, 0, times, 1), (sequence.MOVE, 0, 0, 0, 2), (sequence.END, 0, 1, 0, 3)]
+    record = sequence.pack(wire.record_crc(ARM), rows, [("feed", wire.record_crc(data))])
+    board.upload("again", record)
+    return board, MotionKey("again", wire.record_crc(record))
+
+
+def sequence_samples(
+    board: Client, key: MotionKey, at_7: Callable[[], None] = lambda: None
+) -> SequenceFollower:
+    """Run it; each sample arrives once, those of each motion numbered from 0. ``at_7``: called with sample 7."""
+    found: list[tuple[int, int]] = []
+
+    def take(event: Followed) -> None:
+        if isinstance(event, Sample):
+            found.append((event.run, event.index))
+            if len(found) == 8:
+                at_7()
+
+    followed = sequence_run.run(board, key, StopRequest(), take=take)
+    assert followed.end.ending == "finished"
+    assert found == [(run, index) for run in range(1, followed.end.cycle + 1) for index in range(4)]
+    return followed
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_sequence_gives_every_sample_of_every_motion(tmp_path: Path, noise: float) -> None:
+    """Also the last one of a motion that the next one follows at once; on a line that damages bytes, too (seed 3)."""
+    pipe = Pipe(tmp_path / "flash")
+    pipe.run_samples = 4
+    board, key = sequence_of(pipe, 12)
+    pipe.disturb(Noise("to 3", noise), Noise("from 3", noise))
+    assert sequence_samples(board, key).lost == ()
+
+
+def test_a_sequence_whose_cable_was_out_lacks_no_sample(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    pipe.run_samples = 4
+    board, key = sequence_of(pipe, 6)
+    assert sequence_samples(board, key, lambda: pipe.unplug_for(1.5)).lost == ()
+    assert [text.split()[0] for text in pipe.told] == ["the", "connected"]
+
+
+def test_the_samples_of_a_sequence_are_not_fetched_as_a_motions(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    pipe.run_samples = 4
+    board, key = sequence_of(pipe, 2)
+    board.start(key.name, key.crc)
+    pipe.wait(0.1)
+    while board.status().moving:
+        pipe.wait(0.1)
+    nothing: Any = None
+    with pytest.raises(LinkError, match="that of a sequence"):
+        recording.fetch(board, nothing, tmp_path / "runs", "pipe")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_what_replaces_a_sequence_takes_its_motions_along(tmp_path: Path) -> None:
+    board, data = ready(Pipe(tmp_path / "flash"))
+    record = sequence.pack(
+        wire.record_crc(ARM), [(sequence.MOVE, 0, 0, 0, 1)], [("s-1", wire.record_crc(data))]
+    )
+    counted: list[tuple[float, float]] = []
+    key = store(board, [("s-1", data), ("s", record)], lambda *at: counted.append(at))
+    whole = len(data) + len(record)
+    assert key == MotionKey("s", wire.record_crc(record))
+    assert counted == sorted(counted)
+    assert counted[-1] == (whole, whole)
+    with pytest.raises(
+        LinkError, match=rf"the board has another sequence 's' \(checksum {key.crc:08x}\)"
+    ) as caught:
+        store(board, [("s", data)])
+    assert "--force" in caught.value.hint
+    store(board, [("s", data)], replace=True)
+    assert [(entry.name, entry.sequence) for entry in board.stored()] == [("feed", False), ("s", False)]
 
 
 # the log of a link's traffic: written, read, replayed in place of a board

@@ -14,7 +14,7 @@ from armtempo.basics.errors import LinkError, NoAnswerError, OtherBoardError
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
-from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.follow import MotionFollower, RunEnd
 from armtempo.link.transport import SerialTransport
 from armtempo.robot import stored_motion
 from armtempo.robot.board import Board
@@ -124,7 +124,7 @@ def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     board, data = ready(pipe)
     run = board.start("feed", wire.record_crc(data)).run
     indices = []
-    follower = Follower(board, run)
+    follower = MotionFollower(board, run)
     for sample in follower.samples():
         indices.append(sample.index)
         if sample.index in (20, 40):

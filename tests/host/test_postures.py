@@ -14,31 +14,26 @@ from armtempo.cli import main
 from armtempo.cli.posture import NamedPosture
 from armtempo.encoding import encode
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import arm_json, shipped, taught
+from armtempo.model import arm_json, taught
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import planner, via_points
 from click.testing import CliRunner
 
+from tests.host import arms
+
 PARK = "\n[posture.park]\nangles_deg = [0, -60, 40]\n"
 POSE = "\n[posture.over]\nposition_mm = {}\ntolerance_mm = 0.01\n"
-
-
-def written(tmp_path: Path, more: str) -> Path:
-    """The shipped arm file with more after it."""
-    path = tmp_path / "arm.toml"
-    path.write_text(shipped.arm_path().read_text() + more)
-    return path
 
 
 def with_pose(tmp_path: Path, angles_deg: list[float]) -> Path:
     """The shipped arm with the posture "over": the position of the tool at these angles."""
     position = forward(Arm.paper(), angles_deg)[:3, 3].round(4).tolist()
-    return written(tmp_path, POSE.format(position))
+    return arms.write(tmp_path, POSE.format(position))
 
 
 def test_a_posture_is_read_and_found_by_name(tmp_path: Path) -> None:
-    arm = Arm.load(written(tmp_path, PARK + "[posture.up]\nangles_deg = [10, -30, 0]\n"))
+    arm = Arm.load(arms.write(tmp_path, PARK + "[posture.up]\nangles_deg = [10, -30, 0]\n"))
     assert [posture.name for posture in arm.postures] == ["park", "up"]
     assert arm.posture("park").where == (0.0, -60.0, 40.0)
     assert arm.posture("home").where == arm.home_deg
@@ -64,12 +59,12 @@ def test_a_posture_is_read_and_found_by_name(tmp_path: Path) -> None:
 )
 def test_a_posture_that_cannot_be_is_refused_by_name(tmp_path: Path, more: str, said: str) -> None:
     with pytest.raises(InputError) as refused:
-        Arm.load(written(tmp_path, "\n" + more + "\n"))
+        Arm.load(arms.write(tmp_path, "\n" + more + "\n"))
     assert said in str(refused.value)
 
 
 def test_a_pose_that_the_arm_cannot_take_is_refused_before_a_port_is_opened(tmp_path: Path) -> None:
-    path = written(tmp_path, POSE.format([0.0, 0.0, -500.0]))
+    path = arms.write(tmp_path, POSE.format([0.0, 0.0, -500.0]))
     result = CliRunner().invoke(main, ["goto", "over", "--arm", str(path), "--port", "nowhere"])
     assert result.exit_code == 2
     assert "posture 'over'" in result.output
@@ -108,7 +103,7 @@ def test_a_pose_means_the_same_angles_in_a_job_and_for_goto(tmp_path: Path) -> N
 
 
 def test_a_job_with_an_unknown_posture_says_which_is_meant(tmp_path: Path) -> None:
-    arm = Arm.load(written(tmp_path, PARK))
+    arm = Arm.load(arms.write(tmp_path, PARK))
     file = tmp_path / "job.toml"
     file.write_text('name = "x"\n[[via]]\nposture = "parc"\n[[via]]\nposture = "home"\n')
     with pytest.raises(InputError, match=r"via P0.*no posture 'parc'; did you mean 'park'"):
@@ -124,7 +119,7 @@ def test_a_job_with_an_unknown_posture_says_which_is_meant(tmp_path: Path) -> No
 
 
 def test_a_new_posture_is_put_behind_and_the_rest_stays(tmp_path: Path) -> None:
-    path = written(tmp_path, "# the end")
+    path = arms.write(tmp_path, "# the end")
     before = path.read_text()
     arm = Arm.load(path)
     taught.save(path, arm, "park", [0.0, -60.0, 40.5], replace=False)

@@ -158,7 +158,7 @@ def test_a_folder_that_the_disk_has_no_room_for_is_not_left_behind(
         with monkeypatch.context() as change:
             change.setattr(place, name, no_space)
             with pytest.raises(ArmtempoError, match="cannot be written: No space"):
-                recording.new_run(tmp_path / "runs", recording.of_motion(motion), "port", board)
+                recording.new_run(tmp_path / "runs", motion, "port", board)
         assert list((tmp_path / "runs").iterdir()) == []
 
 

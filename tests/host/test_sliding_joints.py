@@ -299,7 +299,7 @@ def test_lists_of_positions_say_nothing_of_degrees() -> None:
     turning = neutral.replace("150.0", "15.0")
     assert Job.of_table(toml_table.parse(turning, "a"), two).via == ((0.0, 1.0), (15.0, 2.0))
     both = turning + "via_deg = [[0.0, 1.0], [15.0, 2.0]]\n"
-    with pytest.raises(InputError, match=r"via_joints = .* left out beside via_deg"):
+    with pytest.raises(InputError, match="leave it out beside via_deg"):
         Job.of_table(toml_table.parse(both, "a"), two)
     with pytest.raises(InputError, match="within the range of z, 0 to 200 mm"):
         Job.of_table(toml_table.parse(neutral.replace("150.0", "250.0"), "a"), LIFT)

@@ -21,7 +21,7 @@ from armtempo.kinematics.forward import forward as of_geometry
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.of_arm import forward, inverse, inverse_many
 from armtempo.kinematics.solver import PoseSolver
-from armtempo.model import shipped, taught_tool
+from armtempo.model import taught_tool
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Dynamics, Joint, Load
@@ -37,6 +37,7 @@ from armtempo.splines.trajectory import Trajectory
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+from tests.host import arms
 from tests.host.arms import FIVE, FOUR, OFFSET_WRIST, SIX, THREE
 
 TOOL = """
@@ -204,21 +205,23 @@ def test_the_bound_of_a_links_speed_holds_for_the_tool(seed: int) -> None:
 
 
 def arm_file(folder: Path, more: str = TOOL) -> Path:
-    """The AR4 with more after it."""
-    path = folder / "arm.toml"
-    path.write_text(shipped.find("ar4").path.read_text(encoding="utf-8") + more, encoding="utf-8")
-    return path
+    """The AR4 with tools."""
+    return arms.write(folder, more, like="ar4")
 
 
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ("[tool.nothing]\nposition_mm = [0, 0, 0]", "tool.nothing: 'nothing' means no tool"),
+        ("[tool.nothing]\nposition_mm = [0, 0, 0]", "arm.toml: tool.nothing: 'nothing' means no tool"),
         ("[tool.a]\nmass_kg = 1", "tool.a.position_mm is missing"),
         ("[tool.a]\nposition_mm = [0, 0, 0]\nmass_kg = -1", "tool.a.mass_kg = -1 is not allowed"),
         ("[tool.a]\nposition_mm = [0, 0, 0]\napproach = [0, 0, 1]", "tool.a.approach does not say how"),
         ("[tool.a]\nposition_mm = [0, 0, 0]\nframe = 'b'", "tool.a.frame: unknown key"),
         ("[tool.a]\nposition_mm = [0, 0, 0]\ncentre_mm = [1]", "tool.a.centre_mm = [1] is not allowed"),
+        (
+            "[tool.a]\nposition_mm = [0, 0, 0]\ncentre_mm = [0, 0, 1e300]",
+            "centre_mm = [0, 0, 1e+300] is not allowed",
+        ),
         ("[tool.'a b']\nposition_mm = [0, 0, 0]", "tool.a b: the name is not allowed"),
         ("[tool]\na = 3", "tool.a = 3 is not allowed"),
     ],
@@ -243,6 +246,8 @@ angles_deg = [20, 10, -10, 5, 40, 8]
 
 def test_a_job_chooses_its_tool_and_a_plan_is_old_without_it(tmp_path: Path) -> None:
     arm = Arm.load(arm_file(tmp_path))
+    with pytest.raises(InputError, match="did you mean 'tool'"):
+        Job.of_table(toml_table.parse(f'tol = "gripper"\n{JOB}', "job.toml"), arm)
     assert arm.tools[0].centre_mm == (7.5, -4.0, 35.0)
     assert json_codec.decode(Arm, json_codec.encode(arm.with_tool("pen")), "arm") == arm.with_tool("pen")
     there = forward(arm.with_tool("gripper"), [20, 10, -10, 5, 40, 8])[:3, 3].tolist()

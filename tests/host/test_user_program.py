@@ -19,7 +19,7 @@ from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
-from armtempo.robot import sequence_run
+from armtempo.robot import programs
 from armtempo_board.app.cell import CellError
 from armtempo_shared.program import ProgramRecord
 
@@ -62,6 +62,8 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("cell.wait('parts')\n", 2, "no input 'parts'"),
         ("cell.count('a b')\n", 2, "not a valid name"),
         ("cell.run('my motion')\n", 2, "not a valid name"),
+        ("cell.run('')\n", 2, "'' is not a valid name"),
+        ("cell.set('', 1)\n", 2, "no output ''"),
         ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
     ],
 )
@@ -87,6 +89,9 @@ def test_other_refusals(tmp_path: Path) -> None:
     counts = "".join(f"cell.count('n{number}')\n" for number in range(9))
     with pytest.raises(InputError, match="9 counters"):
         UserProgram.load(written(counts, tmp_path), ARM)
+    for deep in ("x = " + "-" * 5000 + "1\n", "x = 1" + " + 1" * 3000 + "\n"):
+        with pytest.raises(InputError, match="nested too deep"):
+            UserProgram.load(written(deep, tmp_path), ARM)
 
 
 def test_marks_keep_the_lines_and_the_meaning(tmp_path: Path) -> None:
@@ -178,13 +183,12 @@ def test_a_board_without_the_memory_for_it_gets_nothing(tmp_path: Path) -> None:
     found = UserProgram.load(written("cell.goto('home')\n", tmp_path), ARM)
     encoded = encoded_program.of_program(found, ARM)
     with pytest.raises(LinkError, match=f"needs {encoded.heap_bytes} bytes") as raised:
-        sequence_run.store(Small(encoded.heap_bytes - 1), encoded)  # type: ignore[arg-type]
+        programs.check_memory(Small(encoded.heap_bytes - 1), encoded)  # type: ignore[arg-type]
     assert "armtempo flash" in raised.value.hint
     with pytest.raises(LinkError) as raised:
-        sequence_run.store(Small(100_000, features=0), encoded)  # type: ignore[arg-type]
+        programs.check_memory(Small(100_000, features=0), encoded)  # type: ignore[arg-type]
     assert "armtempo flash" in raised.value.hint
-    with pytest.raises(AttributeError, match="stored"):
-        sequence_run.store(Small(encoded.heap_bytes), encoded)  # type: ignore[arg-type]
+    programs.check_memory(Small(encoded.heap_bytes), encoded)  # type: ignore[arg-type]
 
 
 # armtempo.testing

@@ -12,8 +12,8 @@ from armtempo.encoding import encode, encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
-from armtempo.robot import stored_motion
 from armtempo.robot.connect import connect
+from armtempo.robot.store import store
 from armtempo.simulator import LaunchOptions, launch, wear
 
 from tests import scripted
@@ -77,7 +77,7 @@ def test_status_shows_erasures_and_moves_add_none(tmp_path: Path) -> None:
     port = f"sim:{tmp_path / 'board'}"
     with connect(port) as board:
         board.home(ARM)
-        stored_motion.store(board.client, "feed", way("feed", [0.0, 0.0, 0.0], [1.0, 0.5, 0.5]).data)
+        store(board.client, way("feed", [0.0, 0.0, 0.0], [1.0, 0.5, 0.5]).records)
         before = board.state().erasures
         assert set(before) == {"1", "2"}
         board.jog(ARM.driven[0].name, by_deg=0.5)

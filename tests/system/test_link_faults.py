@@ -18,7 +18,7 @@ from armtempo.basics.errors import BoardError
 from armtempo.encoding import encode, encoded_motion
 from armtempo.link import Opening, open_board, traffic
 from armtempo.link.board_messages import Done, Event, Sample
-from armtempo.link.follow import Follower
+from armtempo.link.follow import MotionFollower
 from armtempo.link.session import Session
 from armtempo.link.traffic import FROM_BOARD, TO_BOARD, Chunk
 from armtempo.link.transport import SerialTransport
@@ -27,6 +27,7 @@ from armtempo.planning import point_to_point
 from armtempo.report import run_folder, run_reader
 from armtempo.robot import arm_state, stored_motion
 from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.store import store
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared import limits, wire
 from armtempo_shared.messages import MAX_COMMAND
@@ -147,10 +148,10 @@ def test_samples_wait_for_a_host_that_does_not_read() -> None:
     ):
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
-        stored = stored_motion.store(board, "slow", encoded_motion.of_trajectory(motion, arm).data)
+        stored = store(board, [("slow", encoded_motion.of_trajectory(motion, arm).data)])
         started = board.start(stored.name, stored.crc)
         assert started.duration_s > 50.0
-        follower = Follower(board, started.run)
+        follower = MotionFollower(board, started.run)
         time.sleep(AWAY_S)
         indices = [sample.index for sample in follower.samples()]
     assert follower.ended
@@ -217,7 +218,7 @@ def _recorded(path: Path) -> Recording:
     ):
         arm_state.configure(board, commandline.ARM, replace=True)
         arm_state.home(board, commandline.ARM)
-        stored = stored_motion.store(board, "go", data)
+        stored = store(board, [("go", data)])
         with StopRequest() as stop:
             stored_motion.replay(board, stored, stop, lambda sample, _: made.samples.append(sample))
         board.status()

@@ -25,6 +25,7 @@ from armtempo.planning import planner, point_to_point
 from armtempo.planning.jog.jog_motion import move_of
 from armtempo.robot import arm_state, goto, homing, jog, stored_motion
 from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.store import store
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.wire import ERROR_CODES
@@ -62,7 +63,7 @@ def swing_deg(degree: int) -> float:
     with launch(LaunchOptions(arm=arm)) as process, open_board(process.port) as board, StopRequest() as stop:
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
-        stored = stored_motion.store(board, "feed", encode.motion_record(trajectory, arm))
+        stored = store(board, [("feed", encode.motion_record(trajectory, arm))])
         stored_motion.replay(board, stored, stop, lambda sample, _: samples.append(sample))
     commanded_deg = trajectory(np.array([sample.ticks / TICK_HZ for sample in samples]))[:, 0]
     seen_deg = np.array([sample.positions.counts[0] for sample in samples]) * 360 / FINE_COUNTS
@@ -91,7 +92,7 @@ def run(
     ):
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
-        stored = stored_motion.store(board, "move", short_motion(arm))
+        stored = store(board, [("move", short_motion(arm))])
         with StopRequest() as stop:
             end = stored_motion.replay(board, stored, stop)
         return end, board.status()
@@ -152,7 +153,7 @@ def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float)
         arm_state.home(board, arm)
         for here, there in (places, places[::-1]):
             record = encode.motion_record(point_to_point.straight("move", here, there, arm), arm)
-            end = stored_motion.replay(board, stored_motion.store(board, "move", record, replace=True), stop)
+            end = stored_motion.replay(board, store(board, [("move", record)], replace=True), stop)
             assert not end.fault
             positions = board.status().positions
             assert abs(positions.commanded_steps[0] - there[0] * arm.driven[0].steps_per_deg) <= 0.5
@@ -185,7 +186,7 @@ def test_hang_makes_the_watchdog_bite() -> None:
     ):
         arm_state.configure(board, commandline.ARM, replace=True)
         arm_state.home(board, commandline.ARM)
-        stored = stored_motion.store(board, "move", short_motion(commandline.ARM))
+        stored = store(board, [("move", short_motion(commandline.ARM))])
         board.start(stored.name, stored.crc)
         before = board.info
         assert before is not None

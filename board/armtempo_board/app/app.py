@@ -73,7 +73,7 @@ class App:
                 try:
                     program.execute(self, run_once)
                 finally:
-                    _forget_modules()
+                    _forget_programs()
 
     def leave_requested(self) -> int:
         """Whether a host has asked for the REPL, and the reply was sent."""
@@ -137,8 +137,8 @@ class App:
 
 if features.SEQUENCES:
 
-    def _forget_modules() -> None:
-        """Give back the memory of what only programs need; the next one imports it again."""
+    def _forget_programs() -> None:
+        """Give back the memory of the modules that only programs need; the next one imports them again."""
         for name in _OF_PROGRAMS:
             if name in sys.modules:
                 del sys.modules[name]

@@ -98,7 +98,7 @@ class Controller:
     def _collect(self) -> None:
         board = self.board
         while board.engine.next_sample(board.raw):
-            board.samples.add(board.raw, SAMPLE_BRAKING if self._braking else 0)
+            board.samples.add(board.raw, self.run_number, SAMPLE_BRAKING if self._braking else 0)
 
     def _end(self) -> None:
         self._collect()
@@ -210,6 +210,7 @@ class Controller:
             if kind != MOTION:
                 self._new_sequence(kind, name, crc, rate, flags)
                 self.sequence.begin()
+                board.samples.clear()
                 return
         self.begin_motion(name, crc, rate, flags, unknown)
 
@@ -262,7 +263,8 @@ class Controller:
 
     def start_loaded(self, motion: "MotionHead", flags: int) -> None:
         """Start the motion that the engine has loaded; ``flags`` as for ``begin``."""
-        self.board.samples.clear()
+        if not self.sequence:  # the last sample of its motion before may still be to be sent
+            self.board.samples.clear()
         self.done = False
         self.duration_ticks = self.board.engine.rates.duration_ticks
         self.run_number += 1

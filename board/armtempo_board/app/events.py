@@ -65,7 +65,8 @@ class Events:
         if index < 0 or not link.room(size):
             return False
         at = link.payload()
-        pack_into(self._sample_layout, link.out, at, self._controller.run_number, index, 0, 0, 0)
+        run = samples.run(index, self._controller.run_number)
+        pack_into(self._sample_layout, link.out, at, run, index, 0, 0, 0)
         samples.take(index, link.out, at + self._slot_at)
         link.event(self._sample, size)
         return True

@@ -1,7 +1,7 @@
-"""Samples of the current or last run, kept in one fixed buffer until the host has them.
+"""Samples since the last start, of a motion or of a sequence with all its motions, kept until the host has them.
 
-A sample is kept as the ``sample`` event carries it after run and index: ticks and path (8 bytes each), flags (1), then
-commanded steps and encoder counts of each joint (4 and 4).
+A slot has the lowest byte of the run's number, then what the ``sample`` event carries after run and index: ticks and
+path (8 bytes each), flags (1), commanded steps and encoder counts of each joint (4 and 4).
 """
 
 from micropython import const
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from array import array
 
 _BYTES_PER_JOINT = const(8)
+_RUN_BYTES = const(1)
+_RUN_MASK = const(0xFF)  # far more runs than have samples in the buffer at once
 
 
 class SampleBuffer:
@@ -27,13 +29,14 @@ class SampleBuffer:
 
     def configure(self, joints: int) -> None:
         """Use samples of ``joints`` joints from now on."""
-        self.size = self.flags_at + 1 + _BYTES_PER_JOINT * joints
+        self.size = self.flags_at + 1 + _BYTES_PER_JOINT * joints  # in the event
+        self._slot = _RUN_BYTES + self.size
         self._joints = joints
-        self._capacity = len(self._buffer) // self.size
+        self._capacity = len(self._buffer) // self._slot
         self.clear()
 
     def clear(self) -> None:
-        """A new run begins."""
+        """A motion or a sequence begins."""
         self.first = 0  # index of the oldest sample kept
         self.next = 0  # index of the next sample
         self.sent = 0  # samples before this one have been sent at least once
@@ -41,13 +44,15 @@ class SampleBuffer:
         self._again = 0  # the next one to be sent again,
         self._again_end = 0  # up to here
 
-    def add(self, raw: "array[int]", flags: int) -> None:
-        """Store a sample: ``raw`` as filled by the engine; ``flags`` of the sample event."""
+    def add(self, raw: "array[int]", run: int, flags: int) -> None:
+        """Store a sample of a run: ``raw`` as filled by the engine; ``flags`` of the sample event."""
         if self.next - self.first == self._capacity:
             self.lost += self.first == self.sent
             self.first += 1
             self.sent = max(self.sent, self.first)
-        at = self.next % self._capacity * self.size
+        at = self.next % self._capacity * self._slot
+        self._buffer[at] = run & _RUN_MASK
+        at += _RUN_BYTES
         flags_at = at + self.flags_at
         sample_to_wire(self._buffer, raw, pack_offsets(at, flags_at + 1), self._joints)
         self._buffer[flags_at] = flags
@@ -74,9 +79,14 @@ class SampleBuffer:
             return self._again
         return self.sent if self.sent < self.next else -1
 
+    def run(self, index: int, latest: int) -> int:
+        """Number of the run of the sample ``index`` (from ``waiting``); ``latest``: of the latest run."""
+        return latest - (latest - self._buffer[index % self._capacity * self._slot] & _RUN_MASK)
+
     def take(self, index: int, target: bytearray, at: int) -> None:
         """Copy the sample ``index`` (from ``waiting``) to target[at:]; it counts as sent."""
-        copy(target, self._buffer, pack_offsets(at, index % self._capacity * self.size), self.size)
+        slot_at = index % self._capacity * self._slot
+        copy(target, self._buffer, pack_offsets(at, slot_at + _RUN_BYTES), self.size)
         if index == self.sent:
             self.sent += 1
         else:

@@ -21,12 +21,9 @@ from armtempo_board.memory import Memory
 from armtempo_board.motion import crossing
 from armtempo_board.motion.following_error import FollowingError
 from armtempo_board.motion.joint_drive import JointDrive
+from armtempo_board.motion.rate_control import RateControl
 from armtempo_board.stepgen import step_queue
 from armtempo_board.stepgen.step_queue import emit
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from typing import Any
 
 _TAP_ENTRIES = const(64)
 _TAP_ROOM = const(56)  # of them: ``emit`` writes one entry more
@@ -56,10 +53,8 @@ _QUEUE_AT = const(11)
 
 
 class BacklashDrive(JointDrive):
-    """As ``JointDrive``; ``backlash``: the joint's row of ``armrecord.BACKLASH``."""
+    """As ``JointDrive``; ``backlash``: the joint's row of ``armrecord.BACKLASH``; ``rates``: of the engine."""
 
-    rates: "Any" = None
-    """The motion's ``RateControl``; given before the first motion."""
     _left = 0  # of the play in front of the motor, in steps, by the matches
 
     def __init__(
@@ -70,7 +65,9 @@ class BacklashDrive(JointDrive):
         ring_words: "memoryview",
         memory: Memory,
         backlash: "dict[str, int]",
+        rates: RateControl,
     ) -> None:
+        self._rates = rates
         self._play = backlash["steps"]
         self._is_side_known = False
         self._is_crossing = False
@@ -221,7 +218,7 @@ class BacklashDrive(JointDrive):
             return 0
         generator, ring = self.generator, self.ring
         until_kiticks = now_kiticks + self.lookahead_kiticks
-        self.rates.last_until(now_kiticks + isr.kiticks_until(ring.timer, self._crossing, crossing.END))
+        self._rates.last_until(now_kiticks + isr.kiticks_until(ring.timer, self._crossing, crossing.END))
         self.can_queue_more = generator.prepare(until_kiticks)
         turns = generator.at_reversal and (
             not self._crossing[crossing.LEFT] or generator.next_kiticks() <= until_kiticks

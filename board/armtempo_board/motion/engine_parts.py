@@ -56,15 +56,14 @@ class EngineParts:
         registers.apply(registers.TIMERS)
         rings = engine_memory.rings([row["max_rate"] for row in joints])
         arm = head, joints
+        self.clock = MotionClock()
+        self.rates = RateControl(self.clock, len(joints))
         self.drives = [
-            _drive(n, arm, self.sampler, ring, engine_memory.memory, backlash) for n, ring in enumerate(rings)
+            _drive(n, arm, self.sampler, ring, engine_memory.memory, backlash, self.rates)
+            for n, ring in enumerate(rings)
         ]
         self.encoders = [fitted[rows.index(row)] if row in rows else NoEncoder() for row in joints]
         slots = [isr.RAW_ENCODERS + rows.index(row) if row in rows else 0 for row in joints]
-        self.clock = MotionClock()
-        self.rates = RateControl(self.clock, len(joints))
-        for drive in self.drives if backlash else ():
-            drive.rates = self.rates  # type: ignore[attr-defined]
         self.readings = Readings(self.sampler, self.clock, self.drives, self.encoders, slots)
         self.following = [FollowingError(row) for row in joints]
         self.inputs = Inputs(head, joints, self.sampler)
@@ -81,9 +80,10 @@ def _drive(
     ring: "memoryview",
     memory: "Memory",
     backlash: "Rows",
+    rates: RateControl,
 ) -> JointDrive:
     if features.BACKLASH and backlash and backlash[number]["steps"]:
         from armtempo_board.motion.backlash_drive import BacklashDrive  # here, as few arms need its memory
 
-        return BacklashDrive(number, arm, sampler, ring, memory, backlash[number])
+        return BacklashDrive(number, arm, sampler, ring, memory, backlash[number], rates)
     return JointDrive(number, arm, sampler, ring, memory)

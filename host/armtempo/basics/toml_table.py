@@ -78,6 +78,11 @@ class Table:
         value = reprlib.repr(self._values[key])
         return InputError(f"{self.file}: {name} = {value} is not allowed", f"give {allowed}")
 
+    def misplaced(self, key: str, cure: str) -> InputError:
+        """The error for a key that may not be given beside the others."""
+        value = reprlib.repr(self._values[key])
+        return InputError(f"{self.file}: {self.place}{key} = {value} is not allowed here", cure)
+
     def _misspelt(self, key: str) -> str:
         """A note about a similar key in the table; "" if there is none."""
         near = misspelt(key, [other for other in self._values if other not in self._asked])
@@ -157,11 +162,15 @@ class Table:
             raise self.fail(key, "a text on one line, without control characters")
         return value
 
-    def numbers(self, key: str, count: int, default: Any = _REQUIRED) -> tuple[float, ...]:
-        """A list of ``count`` finite numbers."""
-        allowed = f"a list of {count} numbers"
+    def numbers(
+        self, key: str, count: int, default: Any = _REQUIRED, *, most: float = math.inf
+    ) -> tuple[float, ...]:
+        """A list of ``count`` finite numbers from -``most`` to ``most``."""
+        allowed = f"a list of {count} numbers" + (f" from {-most:g} to {most:g}" if most < math.inf else "")
         value = self._get(key, default, allowed)
         if not isinstance(value, list | tuple) or len(value) != count or not all(map(_is_number, value)):
+            raise self.fail(key, allowed)
+        if any(abs(number) > most for number in value):
             raise self.fail(key, allowed)
         return tuple(float(number) for number in value)
 

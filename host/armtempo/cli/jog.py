@@ -78,7 +78,7 @@ def jog(
         raise InputError("--frame says whose x, y or z is meant", "for example --frame tray --axis x --by 10")
     arm = resolve.named_arm(given.arm_path)
     if arm is not None:  # a wrong name is reported before a port is opened
-        arm.with_tool(tool).frame(BASE if frame in (None, TOOL) else frame)
+        arm.with_tool(tool).holding(holds).frame(BASE if frame in (None, TOOL) else frame)
     with resolve.board(given, arm) as board:
         prepare(board, resolve.arm_of_board(board, arm).with_tool(tool).holding(holds), given.replace_arm)
         made_for = board.arm

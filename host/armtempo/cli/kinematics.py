@@ -101,12 +101,12 @@ def _poses(matrix: str | None, poses: Path | None, typed: TypedPose) -> list[Pos
         raise InputError(
             "no pose, or more than one, is given", "give one of --matrix, --position and --poses"
         )
-    typed.check()
+    if (pose := typed.pose()) is not None:
+        return [pose]
     if poses is not None:
         return pose_file.read(poses)
-    if matrix is not None:
-        return [pose_file.parse(matrix, "--matrix", (12, 16))]
-    return [typed.pose]
+    assert matrix is not None
+    return [pose_file.parse(matrix, "--matrix", (12, 16))]
 
 
 def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:

@@ -20,6 +20,16 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
+def not_empty(ctx: click.Context, param: click.Parameter, name: str | None) -> str | None:
+    """The name that an option gives; BadParameter for "", which code takes for none.
+
+    An unset variable of a script would else go unseen.
+    """
+    if name is not None and not name.strip():
+        raise click.BadParameter("the name is empty; give one, or leave the option out", ctx, param)
+    return name
+
+
 class TakesNumbers(click.Command):
     """A command whose arguments may begin with a minus sign: "-10,20" is a posture, not an option; "--speed" is one."""
 
@@ -105,11 +115,15 @@ frame = click.option(
     help="Frame of the arm file in which poses are.  [default: base]",
 )
 tool = click.option(
-    "--tool", metavar="NAME", help="Tool of the arm file that is on the arm: poses and axes are of its point."
+    "--tool",
+    metavar="NAME",
+    callback=not_empty,
+    help="Tool of the arm file that is on the arm: poses and axes are of its point.",
 )
 holds = click.option(
     "--holds",
     metavar="NAME",
+    callback=not_empty,
     help="Load of the arm file that the tool holds: it keeps to the workspace, too.",
 )
 job = click.option(

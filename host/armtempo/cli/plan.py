@@ -56,8 +56,18 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
     metavar="N|auto",
     help="Overrides the job's segments between via points: 1 to 64, or auto.",
 )
-@click.option("--tool", metavar="NAME", help="Overrides the job's tool: a tool of the arm file.")
-@click.option("--holds", metavar="NAME", help="Overrides the job's load: a load of the arm file.")
+@click.option(
+    "--tool",
+    metavar="NAME",
+    callback=options.not_empty,
+    help="Overrides the job's tool: a tool of the arm file.",
+)
+@click.option(
+    "--holds",
+    metavar="NAME",
+    callback=options.not_empty,
+    help="Overrides the job's load: a load of the arm file.",
+)
 @click.option(
     "--polish/--no-polish", default=None, help="Finish the search with a gradient solver; overrides the job."
 )

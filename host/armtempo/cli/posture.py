@@ -23,7 +23,7 @@ from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
 from armtempo.model.sequence_plan import SequencePlan
-from armtempo.model.tool_pose import BASE
+from armtempo.model.tool_pose import BASE, Pose
 from armtempo.planning import point_to_point, via_points
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
@@ -56,10 +56,9 @@ def goto(
     All joints move together, within their limits; with --line the tool moves in a straight line. The arm must be
     homed. Ctrl-C, or 'armtempo stop' in another terminal, brakes.
     """
-    typed = TypedPose(**pose)
-    if bool(where) == (typed.position is not None):
+    typed = TypedPose(**pose).pose()
+    if bool(where) == (typed is not None):
         raise InputError("give a posture as WHERE, or a pose by --position", "armtempo goto home")
-    typed.check()
     if where and frame != BASE:
         raise InputError("--frame is the frame of --position", "leave it out with WHERE")
     if len(where) > 1:
@@ -67,13 +66,19 @@ def goto(
             f"{len(where)} values for one posture",
             f"write them as one, with commas: armtempo goto {','.join(where)}",
         )
-    wanted = NamedPosture.of(where[0], given.arm_path, given.altered) if where else None
-    named = wanted.arm if wanted else resolve.named_arm(given.arm_path)
-    if named is not None:  # a wrong name is reported before a port is opened
-        named.with_tool(tool).frame(frame)
+    wanted = typed or NamedPosture.of(where[0], given.arm_path, given.altered)
+    named = wanted.arm if isinstance(wanted, NamedPosture) else resolve.named_arm(given.arm_path)
+    if named is not None:  # what is wrong is reported before a port is opened
+        named.with_tool(tool).holding(holds)
+        if isinstance(wanted, Pose):
+            named.in_base(wanted, frame)
     with resolve.board(given, named) as board:
         arm = resolve.arm_of_board(board, named).with_tool(tool).holding(holds)
-        target = wanted.angles_deg(arm, job_path) if wanted else arm.in_base(typed.pose, frame)
+        target: Array | Pose = (
+            wanted.angles_deg(arm, job_path)
+            if isinstance(wanted, NamedPosture)
+            else arm.in_base(wanted, frame)
+        )
         board.configure(arm, replace=given.replace_arm)
         try:
             with ProgressBar("moving") as progress:

@@ -147,12 +147,19 @@ def is_file(what: str) -> bool:
         return True
     if path.suffix != ".json" and is_name(what):
         return False
-    beside = [str(path.with_name(one.name)) for one in path.parent.glob("*.json")]
+    beside = [str(path.parent / one.name) for one in path.parent.glob("*.json") if one.is_file()]
     near = did_you_mean(what, beside)
     raise InputError(
-        f"{what}: no such file{near}",
+        f"{what or repr(what)}: no such file{near}",
         "check the path; 'armtempo plan' makes one, 'armtempo list' shows the board's",
     )
+
+
+_NO_PLANS = {
+    ".toml": "plan it first: 'armtempo plan' writes the file to give here",
+    ".py": "if it is a program, run it with 'armtempo program'",
+}
+"""What to do with files of jobs, sequences and programs."""
 
 
 def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan | SequencePlan:
@@ -160,6 +167,8 @@ def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan 
     and does not fit."""
     from armtempo import pipeline
 
+    if path.suffix in _NO_PLANS:
+        raise InputError(f"{path}: is not a plan", _NO_PLANS[path.suffix])
     if via_table.is_recording(path):
         plan = as_recorded(path, load_arm(arm_path), path.stem)
         for note in plan.notes:

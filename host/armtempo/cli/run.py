@@ -10,7 +10,7 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import options, programs, resolve, results, sequences
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.run_progress import RunProgress, repetition_line
-from armtempo.encoding.encoded_motion import EncodedMotion
+from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.report import text_summary
@@ -66,7 +66,7 @@ def _refuse_repeat(repeat: int) -> None:
 
 def run_and_report(
     board: Board,
-    motion: Plan | EncodedMotion | str,
+    motion: Plan | Encoded | str,
     repeat: int,
     out: Path,
     as_json: bool = False,

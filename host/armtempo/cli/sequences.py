@@ -19,12 +19,12 @@ from armtempo.cli import resolve, results
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.state import counted
 from armtempo.link.board_messages import SequenceState
+from armtempo.link.follow import where
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share
 from armtempo.model.steps import position, whole_cycles
 from armtempo.report import text_summary
 from armtempo.robot.board import Board
-from armtempo.robot.sequence_run import where
 from armtempo.robot.stop_request import Stopped
 
 

@@ -14,11 +14,11 @@ from armtempo.basics.text import aligned
 from armtempo.cli import options, posture, programs, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_sequence
 from armtempo.encoding.encoded_motion import EncodedMotion
+from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.robot.board import Board
 from armtempo.robot.board_state import record_crc
 
@@ -40,25 +40,23 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
         programs.upload_and_report(file, as_default, force, given)
         return
     plan = resolve.load_plan(file, given.arm_path, given.altered)
-    sequence = isinstance(plan, SequencePlan)
-    if sequence and name is not None:
-        raise InputError("--name: the name of a sequence is in its file", "change it there and plan it again")
-    motion = plan if isinstance(plan, SequencePlan) else encoded_motion.of_plan(plan, name)
-    with resolve.board(given, motion.arm) as board:
-        board.configure(motion.arm, replace=given.replace_arm)
+    encoded = encoded_sequence.encoded(plan, name)
+    with resolve.board(given, encoded.arm) as board:
+        board.configure(encoded.arm, replace=given.replace_arm)
         with ProgressBar("uploading") as progress:
-            if isinstance(motion, SequencePlan):
-                board.upload_sequence(motion, as_default, progress, force)
-            else:
-                board.upload(motion, default=as_default, progress=progress, replace=force)
+            board.upload(encoded, default=as_default, progress=progress, replace=force)
         virtual = board.info.virtual
-    if isinstance(motion, SequencePlan):
-        size, stored = {"motions": len(motion.legs)}, f"sequence and {len(motion.legs)} motions stored"
+    sequence = isinstance(encoded, EncodedSequence)
+    if isinstance(encoded, EncodedSequence):
+        size, stored = (
+            {"motions": len(encoded.motions)},
+            f"sequence and {len(encoded.motions)} motions stored",
+        )
     else:
-        size, stored = {"size_bytes": len(motion.data)}, f"{len(motion.data)} bytes stored"
+        size, stored = {"size_bytes": len(encoded.data)}, f"{len(encoded.data)} bytes stored"
     where = " on a virtual board" if virtual else ""
-    values = {"name": motion.name, "sequence": sequence, **size, "virtual": virtual}
-    results.show(given.as_json, values, [f"{motion.name}: {stored}{where}"])
+    values = {"name": encoded.name, "sequence": sequence, **size, "virtual": virtual}
+    results.show(given.as_json, values, [f"{encoded.name}: {stored}{where}"])
 
 
 @click.command("list")

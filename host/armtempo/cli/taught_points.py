@@ -1,9 +1,10 @@
-"""Points that are taught one by one, and what becomes of them: the via points of a job, or a frame."""
+"""Points that are taught one by one, and what becomes of them: the via points of a job, a frame, or a tool."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -18,6 +19,8 @@ from armtempo.model import frame, taught, taught_frame, taught_tool, tool
 from armtempo.model.arm import Arm
 from armtempo.model.parts import NOTHING
 from armtempo.model.pose import to_rpy_deg
+from armtempo.model.taught_frame import ThreePoints
+from armtempo.model.taught_tool import Tip
 from armtempo.planning import via_points
 
 TAKE, UNDO = "p", "u"
@@ -84,8 +87,51 @@ class JobPoints(TaughtPoints):
         )
 
 
-class NewFrame:
-    """The frame that is taught, and the arm file that gets it."""
+class NewTable:
+    """A table of an arm file that is taught by points."""
+
+    kind: str
+    points: tuple[str, ...]
+    """What each of them is."""
+
+    def __init__(self, file: Path, arm: Arm, name: str, replace_old: bool) -> None:
+        """Raise InputError for a name that is taken, before anything moves."""
+        taught.check_free(file, (self.kind, name), replace_old)
+        self._file = file
+        self._arm = arm
+        self._name = name
+        self._replace = replace_old
+        self._step_error_mm = 0.5 * sum(resolution.step_mm for resolution in figures.resolutions(arm))
+        """By how much half a step of each joint moves the tool at most."""
+
+    def problem(self, points_deg: Sequence[Sequence[float]]) -> str:
+        """Why the first points, postures (N, J), cannot be used; "" if they can."""
+        try:
+            self._check(points_deg)
+        except InputError as error:
+            return f"{error.problem}; {error.hint}"
+        return ""
+
+    def _check(self, points_deg: Sequence[Sequence[float]]) -> None:
+        raise NotImplementedError
+
+    def save(self, points_deg: Sequence[Sequence[float]]) -> None:
+        """Write the table that all points, postures (N, J), give; InputError if they give none."""
+        raise NotImplementedError
+
+    def _write(self, values: Mapping[str, Any], accuracy: str) -> None:
+        taught.save_table(self._file, (self.kind, self._name), values, self._replace)
+        written = ", ".join(f"{key} {value}" for key, value in values.items())
+        results.echo(f"{self._file}: {self.kind} {self._name!r}: {written}")
+        results.echo(accuracy)
+
+    def _poses(self, points_deg: Sequence[Sequence[float]]) -> Array:
+        """Of the tool, (N, 4, 4)."""
+        return np.array([forward(self._arm, angles) for angles in points_deg])
+
+
+class NewFrame(NewTable):
+    """The frame through three points of the tool."""
 
     kind = frame.KIND
     points = taught_frame.POINTS
@@ -93,49 +139,33 @@ class NewFrame:
     def __init__(self, file: Path, arm: Arm, name: str, level: bool, replace_old: bool) -> None:
         """Raise InputError for a name that is not allowed or taken, before anything moves."""
         frame.check_name(name)
-        taught.check_free(file, (frame.KIND, name), replace_old)
-        self._file = file
-        self._arm = arm
-        self._name = name
+        super().__init__(file, arm, name, replace_old)
         self._level = level
-        self._replace = replace_old
-        self._step_error_mm = 0.5 * sum(resolution.step_mm for resolution in figures.resolutions(arm))
-        """By how much half a step of each joint moves the tool at most."""
 
-    def problem(self, points_deg: Sequence[Sequence[float]]) -> str:
-        """Why the first points of a frame, (1 to 3, J), cannot be its points; "" if they can."""
-        points_mm = self._points_mm(points_deg)
-        try:
-            taught_frame.check_apart(points_mm, self._step_error_mm)
-            if len(points_mm) == len(taught_frame.POINTS):
-                taught_frame.of_points(points_mm, self._step_error_mm, self._level)
-        except InputError as error:
-            return f"{error.problem}; {error.hint}"
-        return ""
+    def _check(self, points_deg: Sequence[Sequence[float]]) -> None:
+        if len(points_deg) == len(self.points):
+            self._found(points_deg)
+        else:
+            taught_frame.check_apart(self._poses(points_deg)[:, :3, 3], self._step_error_mm)
 
-    def _points_mm(self, points_deg: Sequence[Sequence[float]]) -> Array:
-        return np.array([forward(self._arm, angles)[:3, 3] for angles in points_deg])
+    def _found(self, points_deg: Sequence[Sequence[float]]) -> ThreePoints:
+        return taught_frame.of_points(self._poses(points_deg)[:, :3, 3], self._step_error_mm, self._level)
 
     def save(self, points_deg: Sequence[Sequence[float]]) -> None:
-        """Write the frame through the tool's points at postures, (3, J); InputError if they give none."""
-        arm, name, step_error_mm = self._arm, self._name, self._step_error_mm
-        found = taught_frame.of_points(self._points_mm(points_deg), step_error_mm, self._level)
-        values = taught_frame.values(arm, name, found.matrix)
-        taught.save_table(self._file, (frame.KIND, name), values, self._replace)
+        """As of ``NewTable``."""
+        found = self._found(points_deg)
         tilt = "made level, it was tilted" if self._level else "it is tilted"
-        results.echo(
-            f"{self._file}: frame {name!r}: {', '.join(f'{key} {value}' for key, value in values.items())}"
-        )
-        results.echo(
+        self._write(
+            taught_frame.values(self._arm, self._name, found.matrix),
             f"the points are {found.apart_mm[0]:.4g} and {found.apart_mm[1]:.4g} mm from the origin, "
             f"{found.angle_deg:.3g} degrees apart; {tilt} by {found.tilt_deg:.3g} degrees; half a step of each joint "
-            f"is up to {step_error_mm:.2g} mm at the tool, which turns the axes by up to {found.axes_error_deg:.2g} "
-            "degrees"
+            f"is up to {self._step_error_mm:.2g} mm at the tool, which turns the axes by up to "
+            f"{found.axes_error_deg:.2g} degrees",
         )
 
 
-class NewTool:
-    """The tool whose point is taught, and the arm file that gets it."""
+class NewTool(NewTable):
+    """The tool whose point touches one tip in four postures."""
 
     kind = tool.KIND
     points = taught_tool.POINTS
@@ -143,39 +173,25 @@ class NewTool:
     def __init__(self, file: Path, arm: Arm, name: str, replace_old: bool) -> None:
         """Raise InputError for a name that is not allowed or taken, before anything moves."""
         tool.check_name(name)
-        taught.check_free(file, (tool.KIND, name), replace_old)
-        self._file = file
-        self._arm = arm.with_tool(NOTHING)
-        self._name = name
-        self._replace = replace_old
-        self._step_error_mm = 0.5 * sum(resolution.step_mm for resolution in figures.resolutions(self._arm))
+        super().__init__(file, arm.with_tool(NOTHING), name, replace_old)
 
-    def problem(self, points_deg: Sequence[Sequence[float]]) -> str:
-        """Why postures (1 to 4, J) do not give the tool's point; "" if they do, or are still too few."""
-        try:
-            if len(points_deg) == len(self.points):
-                taught_tool.of_postures(self._flanges(points_deg), self._step_error_mm)
-        except InputError as error:
-            return f"{error.problem}; {error.hint}"
-        return ""
+    def _check(self, points_deg: Sequence[Sequence[float]]) -> None:
+        if len(points_deg) == len(self.points):
+            self._found(points_deg)
 
-    def _flanges(self, points_deg: Sequence[Sequence[float]]) -> Array:
-        return np.array([forward(self._arm, angles) for angles in points_deg])
+    def _found(self, points_deg: Sequence[Sequence[float]]) -> Tip:
+        return taught_tool.of_postures(self._poses(points_deg), self._step_error_mm)
 
     def save(self, points_deg: Sequence[Sequence[float]]) -> None:
-        """Write the tool whose point is at one tip in postures (4, J); InputError if they give none."""
-        found = taught_tool.of_postures(self._flanges(points_deg), self._step_error_mm)
-        place = (tool.KIND, self._name)
+        """As of ``NewTable``."""
+        found = self._found(points_deg)
         old = next((each for each in self._arm.tools if each.name == self._name), None)
         turns = to_rpy_deg(old.matrix) if old else (0.0, 0.0, 0.0)
-        values = taught_tool.values(taught.table_of(self._file, place), turns, found.position_mm)
-        taught.save_table(self._file, place, values, self._replace)
-        results.echo(
-            f"{self._file}: tool {self._name!r}: {', '.join(f'{key} {value}' for key, value in values.items())}"
-        )
-        results.echo(
+        before = taught.table_of(self._file, (self.kind, self._name))
+        self._write(
+            taught_tool.values(before, turns, found.position_mm),
             f"the postures meet within {found.apart_mm:.2g} mm; half a step of each joint may move the point by up to "
-            f"{found.error_mm:.2g} mm"
+            f"{found.error_mm:.2g} mm",
         )
 
 
@@ -191,7 +207,7 @@ def postures_deg(arm: Arm, names: Sequence[str], points: Sequence[str]) -> list[
 class NamedPoints(TaughtPoints):
     """The points of a frame, or the postures for a tool, which are taken in this order."""
 
-    def __init__(self, arm: Arm, where: Callable[[], Array], new: NewFrame | NewTool) -> None:
+    def __init__(self, arm: Arm, where: Callable[[], Array], new: NewTable) -> None:
         super().__init__(arm, where)
         self._new = new
 

@@ -1,4 +1,4 @@
-"""``armtempo teach``: stores the arm's position as a posture in its file, as via points of a job, or as a frame."""
+"""``armtempo teach``: a posture, frame or tool of the arm file, or the via points of a job, by the arm's position."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ from armtempo.robot.board import Board
 @options.tool
 @click.option("--by-hand", is_flag=True, help="Switch the motors' current off and follow the encoders.")
 @click.option(
-    "--replace", "replace_old", is_flag=True, help="Replace the posture, frame or job file of that name."
+    "--replace",
+    "replace_old",
+    is_flag=True,
+    help="Replace the posture, frame, tool or job file of that name.",
 )
 @options.gamepad
 @options.arm_of_board

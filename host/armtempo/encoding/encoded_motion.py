@@ -13,6 +13,7 @@ from armtempo.basics.errors import InputError
 from armtempo.encoding import decode, encode
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequenceRow
 from armtempo.planning import brake_time, point_to_point
 from armtempo.splines.trajectory import Trajectory
 
@@ -42,6 +43,21 @@ class EncodedMotion:
     def key(self) -> MotionKey:
         """Its identification on the board."""
         return MotionKey(self.name, record_crc(self.data))
+
+    @property
+    def motions(self) -> tuple[EncodedMotion, ...]:
+        """Itself: what a sequence runs are several."""
+        return (self,)
+
+    @property
+    def rows(self) -> tuple[SequenceRow, ...]:
+        """None; those of a sequence say what it does."""
+        return ()
+
+    @property
+    def records(self) -> tuple[tuple[str, bytes], ...]:
+        """What the board stores: name and record."""
+        return ((self.name, self.data),)
 
     @property
     def start_deg(self) -> Array:

@@ -37,6 +37,11 @@ class EncodedProgram:
         return MotionKey(self.program.name, record_crc(self.data))
 
     @property
+    def records(self) -> tuple[tuple[str, bytes], ...]:
+        """What the board stores, the motions first: names and records."""
+        return (*((motion.name, motion.data) for motion in self.motions), (self.program.name, self.data))
+
+    @property
     def heap_bytes(self) -> int:
         """Heap that it needs on the board."""
         return program.needed_bytes(len(self.program.marked.encode()))

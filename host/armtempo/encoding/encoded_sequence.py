@@ -1,38 +1,70 @@
-"""A sequence for the board: its record, and those of its motions."""
+"""A sequence for the board: its record, and those of its motions; and what encodes either kind of plan."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from armtempo_shared import sequence, sequence_check
-from armtempo_shared.sequence import ACTIVE, FAULT_THEN, NEXT_THEN, SequenceData
+from armtempo_shared.sequence import ACTIVE, FAULT_THEN, NEXT_THEN, SequenceData, SequenceError
 from armtempo_shared.wire import record_crc
 
+from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.encoding import encode, encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.model.arm import Arm
-from armtempo.model.sequence_plan import SequencePlan, rows_of
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan, SequenceRow, rows_of
 
 
 @dataclass(frozen=True, eq=False)
 class EncodedSequence:
-    """A sequence that the board stores and runs."""
+    """A sequence that the board stores and runs, with the host's data about it."""
 
-    plan: SequencePlan
+    name: str
+    """Name on the board."""
+    arm: Arm
     motions: tuple[EncodedMotion, ...]
+    rows: tuple[SequenceRow, ...]
     data: bytes
     """The sequence record (layout: ``armtempo_shared.sequence``)."""
-
-    @property
-    def arm(self) -> Arm:
-        """The arm that it was planned for."""
-        return self.plan.arm
+    plan: SequencePlan | None = None
+    """The plan, if known."""
 
     @property
     def key(self) -> MotionKey:
         """Its identification on the board."""
-        return MotionKey(self.plan.name, record_crc(self.data))
+        return MotionKey(self.name, record_crc(self.data))
+
+    @property
+    def records(self) -> tuple[tuple[str, bytes], ...]:
+        """What the board stores, the motions first: names and records."""
+        return (*((motion.name, motion.data) for motion in self.motions), (self.name, self.data))
+
+    @property
+    def start_deg(self) -> Array | None:
+        """Start posture, degrees (J,); None if nothing moves."""
+        first = next((row.number for row in self.rows if row.op == sequence.MOVE), None)
+        return None if first is None else self.motions[first].start_deg
+
+
+Encoded = EncodedMotion | EncodedSequence
+"""What a host stores, runs and records."""
+
+
+def encoded(plan: Plan | SequencePlan, name: str | None = None) -> Encoded:
+    """Encode the plan of a motion or sequence; ``name``: of the motion on the board, default from the job's name.
+
+    Raises InputError for an invalid name, or one for a sequence, and as ``of_plan``.
+    """
+    if isinstance(plan, Plan):
+        return encoded_motion.of_plan(plan, name)
+    if name is not None:
+        raise InputError(
+            f"name {name!r}: the name of a sequence is in its file", "change it there and plan it again"
+        )
+    return of_plan(plan)
 
 
 def of_plan(plan: SequencePlan) -> EncodedSequence:
@@ -41,16 +73,35 @@ def of_plan(plan: SequencePlan) -> EncodedSequence:
     keys = [(motion.name, motion.key.crc) for motion in motions]
     data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys, plan.counters)
     sequence_check.check(SequenceData(data))
-    return EncodedSequence(plan, motions, data)
+    return EncodedSequence(plan.name, plan.arm, motions, plan.rows, data, plan)
+
+
+def of_board(name: str, arm: Arm, fetch: Callable[[str], bytes]) -> EncodedSequence:
+    """A sequence of the board, whose records ``fetch`` reads; raises InputError if one is damaged or does not fit."""
+    data = fetch(name)
+    try:
+        record = SequenceData(data)
+    except SequenceError as error:
+        raise InputError(
+            f"sequence {name!r} on the board: {error}", "plan it again and 'armtempo upload --force' it"
+        ) from error
+    names = [record.motion(index)[0] for index in range(record.motions)]
+    motions = tuple(encoded_motion.of_record(leg, fetch(leg), arm) for leg in names)
+    return EncodedSequence(name, arm, motions, described(record, arm), data)
 
 
 _THEN = {NEXT_THEN: "next", FAULT_THEN: "fault"}
 
 
-def describe(record: SequenceData, arm: Arm) -> tuple[str, ...]:
-    """What each row of a stored sequence does."""
+def described(record: SequenceData, arm: Arm) -> tuple[SequenceRow, ...]:
+    """The rows of a stored sequence, each with what it does."""
     outputs, inputs = [output.name for output in arm.outputs], [one.name for one in arm.inputs]
-    return tuple(_describe_row(record, record.row(index), outputs, inputs) for index in range(record.rows))
+    rows = []
+    for index in range(record.rows):
+        op, number, value, amount, step = row = record.row(index)
+        words = _describe_row(record, row, outputs, inputs)
+        rows.append(SequenceRow(op, number, value, amount, step, words))
+    return tuple(rows)
 
 
 def _describe_row(

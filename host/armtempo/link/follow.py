@@ -1,19 +1,35 @@
-"""Receiving the samples of a run: in order, each once, missing ones requested again, to its end."""
+"""Receiving the samples of what was started: in order, each once, missing ones requested again, to its end."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from armtempo.basics.errors import LinkError
-from armtempo.link.board_messages import Done, Event, Fault, Notice, Positions, Sample
+from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
+
+from armtempo.basics.errors import LinkError, OtherBoardError
+from armtempo.link.board_messages import (
+    Done,
+    Event,
+    Fault,
+    Notice,
+    Positions,
+    RowBegun,
+    Sample,
+    SequenceState,
+)
 from armtempo.link.client import Client
+from armtempo.model.steps import position
 
 ACKNOWLEDGE_S = 0.25
 """Interval of acknowledgements; they also show the board that the host is alive."""
 CHECK_S = 0.5
-"""The board is asked for its status after this time without an event."""
+"""During a motion the board is asked for its status after this time without an event."""
+LOOK_S = 0.1
+"""Interval at which it is asked for the state of a sequence or program."""
 GAP_S = 0.05
 """A missing sample is requested again after this time."""
 RESEND = 16
@@ -22,8 +38,16 @@ MOST_REPEATS = 40
 """Requests without progress (of motion clock or resent samples) after which no more progress is expected."""
 
 
+_LATE_TICKS = TICK_HZ // 1000
+"""Most ticks from the time of a sample to its reading."""
+SequenceWatcher = Callable[[SequenceState], object]
+"""Called with the state of a sequence or program at each change."""
+Followed = Sample | RowBegun | Notice
+"""What a follower passes on."""
+
+
 class Gap(NamedTuple):
-    """A range of samples that never arrived."""
+    """A range of samples that never arrived, counted from the start, in a sequence through all its motions."""
 
     first: int
     """Index of the first one."""
@@ -56,69 +80,102 @@ class RunEnd:
         return sum(gap.number for gap in self.lost)
 
 
-class Follower:
-    """Receives the samples of run number ``run``."""
+def number_in_run(sample: Sample) -> int:
+    """Number of a sample in its run by its time, from 0: one every SAMPLE_TICKS, and one at the end."""
+    return -(-max(sample.ticks - _LATE_TICKS, 0) // SAMPLE_TICKS)
 
-    def __init__(self, client: Client, run: int) -> None:
-        self._end: RunEnd | None = None
+
+class _Progress:
+    """Notices that a value which should increase does not."""
+
+    def __init__(self) -> None:
+        self._last, self._times = -1, 0
+
+    def stuck(self, value: int) -> bool:
+        """Whether it has been the same MOST_REPEATS times."""
+        self._times = self._times + 1 if value == self._last else 0
+        self._last = value
+        return self._times >= MOST_REPEATS
+
+
+class Follower(ABC):
+    """Receives the samples and other events of what was started.
+
+    Its subclasses say when it has ended: a motion by an event, a sequence by its state.
+    """
+
+    settle_s = 0.0
+    """Events other than samples may come for this time after the end."""
+
+    def __init__(self, client: Client) -> None:
+        self.ended = False
+        """Whether it has ended and every sample has arrived or is lost."""
+        self.heard_s = client.session.clock()
+        """When the board has said something new."""
         self._client = client
-        self._run = run
         self._held: dict[int, Sample] = {}
+        self._others: deque[RowBegun | Notice] = deque()
         self._next = 0  # index of the next sample
         self._oldest = 0  # the board has no samples before this one
         self._total = 0  # number of samples that the board took, by its last answer
         self._received = 0
         self._lost: list[Gap] = []
-        self._last: Done | Fault | None = None
-        self._notices: list[str] = []
-        self._asked_s = client.session.clock()
-        # Last value that should increase (motion clock, sample index), and how often it did not
-        self._progress = (
-            -1,
-            0,
-        )
+        self._asked_s = self.heard_s
+        self._resent = _Progress()
 
     @property
-    def ended(self) -> bool:
-        """Whether the run has ended and every sample has arrived or is lost."""
-        return self._end is not None
+    def lost(self) -> tuple[Gap, ...]:
+        """Samples that are lost, so far."""
+        return tuple(self._lost)
 
-    @property
-    def end(self) -> RunEnd:
-        """How the run ended; raises LinkError before its end."""
-        if self._end is None:
-            raise LinkError("the run has not ended yet", "read all samples first")
-        return self._end
-
-    def samples(self, between: Callable[[], None] = lambda: None) -> Iterator[Sample]:
-        """The samples in order, until the run has ended and each has arrived or is lost.
+    def events(self, between: Callable[[], None] = lambda: None) -> Iterator[Followed]:
+        """The samples in order, and other events when they arrive, until the end and all samples.
 
         ``between`` is called between two messages; it may tell the board to stop. Raises LinkError if the
         connection breaks; a later call continues from there.
         """
-        while self._last is None:
+        while not self._at_end():
             between()
-            event = self._client.session.poll(CHECK_S)
+            wait_s = self._wait_s()
+            event = self._client.session.poll(wait_s) if wait_s > 0 else None
             if event is None:
                 between()  # a stop request ends the wait
-                self._ask_status()
+                self._look()
+                self.heard_s = self._client.session.clock()
             else:
                 self._take(event)
             yield from self._ready()
             self._keep_up()
         yield from self._collect_rest()
-        self._end = self._run_end(self._last)
+        self.ended = True
+
+    @abstractmethod
+    def _at_end(self) -> bool:
+        """Whether it is known that nothing moves any more."""
+
+    @abstractmethod
+    def _wait_s(self) -> float:
+        """How long an event may take until ``_look``."""
+
+    @abstractmethod
+    def _look(self) -> None:
+        """Ask the board."""
+
+    @abstractmethod
+    def _is_mine(self, sample: Sample) -> bool:
+        """Whether it is of what is followed."""
 
     def _take(self, event: Event) -> None:
-        if isinstance(event, Sample) and event.run == self._run:
-            if event.index >= self._next:
+        self.heard_s = self._client.session.clock()
+        if isinstance(event, Sample):
+            if event.index >= self._next and self._is_mine(event):
                 self._held[event.index] = event
-        elif isinstance(event, Done | Fault) and event.run == self._run:
-            self._last = event
-        elif isinstance(event, Notice):
-            self._notices.append(event.text)
+        elif isinstance(event, RowBegun | Notice):
+            self._others.append(event)
 
-    def _ready(self) -> Iterator[Sample]:
+    def _ready(self) -> Iterator[Followed]:
+        while self._others:  # a row before the samples of its motion
+            yield self._others.popleft()
         while True:
             if self._next in self._held:
                 self._received += 1
@@ -151,14 +208,17 @@ class Follower:
         self._oldest = max(self._oldest, kept.first)
         self._total = kept.first + kept.count
 
-    def _collect_rest(self) -> Iterator[Sample]:
+    def _collect_rest(self) -> Iterator[Followed]:
         """After the end: request missing samples until each has arrived or is lost."""
+        settled_s = self._client.session.clock() + self.settle_s
         self._request(0)
         while True:
-            while (event := self._client.session.poll(0.0)) is not None:
+            while (
+                event := self._client.session.poll(max(0.0, settled_s - self._client.session.clock()))
+            ) is not None:
                 self._take(event)
             yield from self._ready()
-            if self._stuck(self._next):
+            if self._resent.stuck(self._next):
                 self._oldest = self._total
             elif self._next < self._total:
                 self._request(RESEND)
@@ -166,7 +226,50 @@ class Follower:
                 self._request(0)  # the last acknowledgement
                 return
 
-    def _ask_status(self) -> None:
+
+class MotionFollower(Follower):
+    """Follows the motion of run number ``run``."""
+
+    def __init__(self, client: Client, run: int) -> None:
+        super().__init__(client)
+        self._run = run
+        self._last: Done | Fault | None = None
+        self._notices: list[str] = []
+        self._clock = _Progress()
+
+    @property
+    def end(self) -> RunEnd:
+        """How the run ended; raises LinkError before its end."""
+        if not self.ended or self._last is None:
+            raise LinkError("the run has not ended yet", "read all samples first")
+        last = self._last
+        fault, joint = (last.code, last.joint) if isinstance(last, Fault) else (0, 255)
+        notices = tuple(self._notices)
+        return RunEnd(
+            fault, joint, last.ticks, last.path_ticks, last.positions, self._received, self.lost, notices
+        )
+
+    def samples(self, between: Callable[[], None] = lambda: None) -> Iterator[Sample]:
+        """The samples alone, see ``events``."""
+        return (event for event in self.events(between) if isinstance(event, Sample))
+
+    def _at_end(self) -> bool:
+        return self._last is not None
+
+    def _wait_s(self) -> float:
+        return CHECK_S
+
+    def _is_mine(self, sample: Sample) -> bool:
+        return sample.run == self._run
+
+    def _take(self, event: Event) -> None:
+        super()._take(event)
+        if isinstance(event, Done | Fault) and event.run == self._run:
+            self._last = event
+        elif isinstance(event, Notice):
+            self._notices.append(event.text)
+
+    def _look(self) -> None:
         status = self._client.status()
         self._asked_s = self._client.session.clock()
         if status.run == self._run and not status.moving:
@@ -176,21 +279,68 @@ class Follower:
                 self._last = Done(
                     status.run, status.ticks, status.path_ticks, 0, status.samples_lost, status.positions
                 )
-        elif self._stuck(status.ticks):
+        elif self._clock.stuck(status.ticks):
             raise LinkError(
                 "the board says that it moves, but its motion clock does not advance",
                 "press its reset button, then 'armtempo home'",
             )
 
-    def _stuck(self, value: int) -> bool:
-        """Whether ``value``, which should increase, has been the same MOST_REPEATS times."""
-        before, times = self._progress
-        self._progress = (value, times + 1 if value == before else 0)
-        return self._progress[1] >= MOST_REPEATS
 
-    def _run_end(self, last: Done | Fault) -> RunEnd:
-        fault, joint = (last.code, last.joint) if isinstance(last, Fault) else (0, 255)
-        lost, notices = tuple(self._lost), tuple(self._notices)
-        return RunEnd(
-            fault, joint, last.ticks, last.path_ticks, last.positions, self._received, lost, notices
-        )
+class SequenceFollower(Follower):
+    """Follows a sequence or program by its name in the board's state, whose motions have runs after number ``before``.
+
+    Its samples have the numbers that they have in their motion's run.
+    """
+
+    settle_s = LOOK_S
+
+    def __init__(self, client: Client, name: str, before: int, watcher: SequenceWatcher) -> None:
+        super().__init__(client)
+        self._name = name
+        self._before = self._run = before
+        self._first = 0  # index of the first sample of ``_run``
+        self._watcher = watcher
+        self._state: SequenceState | None = None
+        self._looked_s = -LOOK_S
+
+    @property
+    def end(self) -> SequenceState:
+        """How it ended; raises LinkError before its end."""
+        if not self.ended or self._state is None:
+            raise LinkError("the sequence has not ended yet", "read all samples first")
+        return self._state
+
+    def _at_end(self) -> bool:
+        return self._state is not None and self._state.ending != "running"
+
+    def _wait_s(self) -> float:
+        return self._looked_s + LOOK_S - self._client.session.clock()
+
+    def _is_mine(self, sample: Sample) -> bool:
+        return sample.run > self._before
+
+    def _ready(self) -> Iterator[Followed]:
+        for event in super()._ready():
+            if isinstance(event, Sample):
+                if event.run != self._run:
+                    self._run, self._first = event.run, event.index - number_in_run(event)
+                event = replace(event, index=event.index - self._first)
+            yield event
+
+    def _look(self) -> None:
+        state = self._client.sequence()
+        self._looked_s = self._client.session.clock()
+        if state.name != self._name or state.ending == "none":
+            last = f"; last known state: {where(self._state)}" if self._state else ""
+            raise OtherBoardError(
+                f"the board has restarted during the run: positions are unknown{last}",
+                "move the arm to its home posture and run 'armtempo home'",
+            )
+        if state != self._state:
+            self._state = state
+            self._watcher(state)
+
+
+def where(state: SequenceState) -> str:
+    """Describe step and cycle."""
+    return f"in {position(state.step, state.cycle)}"

@@ -144,30 +144,23 @@ class Session:
         Raises BoardError if the board refuses, NoAnswerError after ``silence_timeout_s`` without a byte or
         ``answer_timeout_s`` without an answer, LinkError if the port breaks.
         """
+        _, number, *_ = entry = wire.COMMAND[name]
         with self.lock:
-            return self._command(
-                name, wire.encode(wire.COMMAND[name], values, tail), silence_timeout_s, answer_timeout_s
-            )
-
-    def _command(
-        self, name: str, payload: bytes, silence_timeout_s: float, answer_timeout_s: float
-    ) -> Answer:
-        number = wire.COMMAND[name][1]
-        sequence = self._next_sequence()
-        data = wire.frame(sequence, number, payload)
-        begin_s = self._heard_s = self.clock()
-        while True:
-            self._write(data)
-            reply = self._reply(self.clock() + REPEAT_INTERVAL_S, sequence, number)
-            if reply is not None:
-                return _answer(name, reply)
-            now_s = self.clock()
-            # On a disturbed line every frame may be lost
-            silent = now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
-            waited_s = now_s - max(begin_s, self._connected_s)
-            if silent or waited_s >= answer_timeout_s:
-                raise self._no_answer(name, waited_s)
-            self.repeats += 1
+            sequence = self._next_sequence()
+            data = wire.frame(sequence, number, wire.encode(entry, values, tail))
+            begin_s = self._heard_s = self.clock()
+            while True:
+                self._write(data)
+                reply = self._reply(self.clock() + REPEAT_INTERVAL_S, sequence, number)
+                if reply is not None:
+                    return _answer(name, reply)
+                now_s = self.clock()
+                # On a disturbed line every frame may be lost
+                silent = now_s - self._heard_s >= silence_timeout_s and not self.frames_bad
+                waited_s = now_s - max(begin_s, self._connected_s)
+                if silent or waited_s >= answer_timeout_s:
+                    raise self._no_answer(name, waited_s)
+                self.repeats += 1
 
     def open_again(self) -> None:
         """Open the port after ``transport.close``; incomplete frames are dropped."""

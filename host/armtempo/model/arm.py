@@ -340,7 +340,7 @@ class Arm:
                 f"write {neutral} = [...], in the order of the joints: {self.positions_text}",
             )
         if table.has(name) and table.has(neutral):
-            raise table.fail(neutral, f"left out beside {name}, which says the same")
+            raise table.misplaced(neutral, f"leave it out beside {name}, which says the same")
         return neutral if table.has(neutral) else name
 
     @property

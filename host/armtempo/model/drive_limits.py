@@ -102,13 +102,9 @@ def kept(joints: Sequence[Joint], coupling: Matrix, driver: Driver) -> list[Limi
     Those of the tables or of the hardware, less what the motors that turn a joint need to cross their backlash.
     """
     limits = _of_hardware(joints, coupling, driver)
-    rows = _rows(joints, coupling)
+    of_motors = [*zip(_rows(joints, coupling), crossings(joints, coupling, driver), strict=True)]
     for number, of_joint in enumerate(limits):
-        turning = [
-            crossing
-            for row, crossing in zip(rows, crossings(joints, coupling, driver), strict=True)
-            if crossing and row[number]
-        ]
+        turning = [crossing for row, crossing in of_motors if crossing and row[number]]
         if turning:
             limits[number] = replace(
                 of_joint,

@@ -43,11 +43,11 @@ class ArmFrame:
         object.__setattr__(self, "matrix", rows_of(pose.checked(self.matrix, where)))
 
 
-def check_name(name: str) -> None:
-    """Raise InputError for a name that no frame may have."""
+def check_name(name: str, place: str = "") -> None:
+    """Raise InputError, which begins with ``place``, for a name that no frame may have."""
     if name in _RESERVED:
-        raise InputError(f"{KIND}.{name}: {name!r} is {_RESERVED[name]}", "choose another name for the frame")
-    outputs_file.check_name(f"{KIND}.{name}", name)
+        raise InputError(f"{place}{KIND}.{name}: {name!r} is {_RESERVED[name]}", "choose another name")
+    outputs_file.check_name(f"{place}{KIND}.{name}", name)
 
 
 def read(top: Table) -> tuple[ArmFrame, ...]:
@@ -58,6 +58,7 @@ def read(top: Table) -> tuple[ArmFrame, ...]:
 
 
 def _frame(name: str, table: Table) -> ArmFrame:
+    check_name(name, f"{table.file}: ")
     if table.has("approach"):
         raise InputError(
             f"{table.file}: {table.place}approach does not say how a frame is turned about its own z axis",
@@ -66,10 +67,7 @@ def _frame(name: str, table: Table) -> ArmFrame:
     parent = table.text("frame", BASE)
     found = tool_pose.given(table, f"{table.file}: frame.{name}")
     table.done()
-    try:
-        return ArmFrame(name, found.matrix, parent)
-    except InputError as error:
-        raise InputError(f"{table.file}: {error.problem}", error.hint) from None
+    return ArmFrame(name, found.matrix, parent)
 
 
 def check(frames: Sequence[ArmFrame], where: str) -> None:

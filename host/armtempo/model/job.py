@@ -237,6 +237,7 @@ def tool_named(top: Table, arm: Arm) -> str:
 
 
 def _of_the_arm(top: Table, key: str, find: Callable[[str], object]) -> str:
+    top.known(key)
     name = top.text(key) if top.has(key) else ""
     try:
         find(name)
@@ -319,15 +320,15 @@ def _stops(table: Table) -> bool:
     """Whether the motion stops at this via point."""
     stops = table.boolean("stop", False)
     if table.has("dwell_s") and not stops:
-        raise table.fail("dwell_s", "given with stop = true only")
+        raise table.misplaced("dwell_s", "leave it out, or give stop = true too")
     return stops
 
 
 def _stop(table: Table, via: int, count: int) -> Stop:
     dwell_s = table.number("dwell_s", 0.0, least=0.0, most=MOST_DWELL_S)
     if via in (0, count - 1):
-        raise table.fail(
-            "stop", "left out at the first and the last via point: the motion rests there anyway"
+        raise table.misplaced(
+            "stop", "leave it out at the first and the last via point: the motion rests there anyway"
         )
     return Stop(via, dwell_s)
 
@@ -344,7 +345,7 @@ def _via(table: Table, name: str, arm: Arm, segment: ToolSegment | None) -> tupl
         )
     in_frame = forms[0] in ("matrix", "position_mm") or any(table.has(key) for key in POINTS)
     if table.has("frame") and not in_frame:
-        raise table.fail("frame", "left out, as nothing of this via point is given in a frame")
+        raise table.misplaced("frame", "leave it out: nothing of this via point is given in a frame")
     if forms == ["posture"]:
         name = table.text("posture")
         _done(table, segment)

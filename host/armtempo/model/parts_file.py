@@ -74,7 +74,7 @@ def joint(table: Table, number: int) -> Joint:
     if linkage and number == 1:
         raise table.fail("parallel_linkage", "false for joint 1, which has no joint before it")
     if linkage and unit is not DEG:
-        raise table.fail("parallel_linkage", "left out of a sliding joint")
+        raise table.misplaced("parallel_linkage", "leave it out: this joint slides")
     motor = _motor(table.table("motor"), unit)
     limits = _limits(table.table("limits"), unit)
     if motor is not None and limits is None:
@@ -180,7 +180,7 @@ def _locked(table: Table, unit: JointUnit) -> tuple[float, float]:
     table.known(unit.key("range_deg"), "limits")
     for key in ("motor", home):
         if table.has(key):
-            raise table.fail(key, f"left out if {fixed} locks the joint")
+            raise table.misplaced(key, f"leave it out: {fixed} locks the joint")
     return angle - _LOCKED_DEG, angle + _LOCKED_DEG
 
 

@@ -202,7 +202,7 @@ class _Reader:
             target = self.posture(table, "goto")
         line = table.boolean("line", False)
         if table.has("speed_mm_s") and not line:
-            raise table.fail("speed_mm_s", "given with line = true only")
+            raise table.misplaced("speed_mm_s", "leave it out, or give line = true too")
         speed = tool_segment.limit(table, "speed_mm_s")
         return [Goto(target, line=line, speed_mm_s=speed, where=_place(table), step=step)]
 
@@ -262,7 +262,7 @@ class _Reader:
             table.number("timeout_s", 0.0, least=0.001, most=MOST_S) if table.has("timeout_s") else 0.0
         )
         if table.has("on_timeout") and not timeout_s:
-            raise table.fail("on_timeout", "given together with timeout_s only")
+            raise table.misplaced("on_timeout", "leave it out, or give timeout_s too")
         then = table.choice("on_timeout", ON_TIMEOUT, STOP)
         return [WaitInput(name, active, timeout_s, then, where=place, step=step)]
 
@@ -308,7 +308,7 @@ def only(table: Table, *keys: str) -> None:
     """Raise InputError for a key of another kind of step."""
     for key in (*_KINDS, "to", "active", "timeout_s", "on_timeout"):
         if table.has(key) and key not in keys:
-            raise table.fail(key, f"none next to {keys[0]}")
+            raise table.misplaced(key, f"leave it out beside {keys[0]}")
 
 
 def _place(table: Table) -> str:

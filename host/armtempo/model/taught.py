@@ -17,7 +17,7 @@ from armtempo.model import posture as named
 from armtempo.model.arm import Arm
 
 _HEADER = re.compile(r"\s*\[\[?[\w.\"' -]+\]\]?\s*(#.*)?")
-_LIST = r"(?m)^(\s*{key}\s*=\s*)(\[[^\]]*\])"
+_LIST = r"(?m)^(\s*{key}\s*=\s*)\[[^\]]*\]"
 _POSTURE = "posture"
 _MARK = "\ufeff"
 _HEAD = """\
@@ -158,9 +158,8 @@ def _replaced(table: list[str], values: Mapping[str, str], end: str) -> list[str
     text = "".join(table)
     keys = tomllib.loads(text.replace("\r\n", "\n"))
     if keys.keys() == values.keys():
-        for key, value in values.items():  # a text stays: it is the same
-            before, found, rest = _around(text, key)
-            text = f"{before}{value}{rest}" if found else text
+        for key, value in values.items():  # texts and numbers are the same as before
+            text = re.sub(_LIST.format(key=key), rf"\g<1>{value}", text, count=1)
         return [text]
     plain = [
         number for number, line in enumerate(table) if line.strip() and not line.lstrip().startswith("#")
@@ -168,14 +167,6 @@ def _replaced(table: list[str], values: Mapping[str, str], end: str) -> list[str
     first, last = (plain[0], plain[-1]) if plain else (0, -1)
     comments = [line for line in table[first : last + 1] if line.lstrip().startswith("#")]
     return [*table[:first], *comments, *_lines(values, end), *table[last + 1 :]]
-
-
-def _around(text: str, key: str) -> list[str]:
-    """What is before the list of a key, the list, and what is after it; without it the text and twice ""."""
-    found = re.search(_LIST.format(key=key), text)
-    if not found:
-        return [text, "", ""]
-    return [text[: found.end(1)], found[2], text[found.end() :]]
 
 
 def _content(text: str) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from armtempo.basics.toml_section import key
 from armtempo.basics.toml_table import Table
 from armtempo.model import frame, outputs_file, pose, tool_pose
 from armtempo.model.parts import NOTHING
+from armtempo.model.parts_file import MAX_LENGTH_MM
 from armtempo.model.tool_pose import Rows, rows_of
 
 KIND = "tool"
@@ -45,11 +46,11 @@ class ArmTool:
         return float(sum(row[3] ** 2 for row in self.matrix[:3]) ** 0.5)
 
 
-def check_name(name: str) -> None:
-    """Raise InputError for a name that no tool may have."""
+def check_name(name: str, place: str = "") -> None:
+    """Raise InputError, which begins with ``place``, for a name that no tool may have."""
     if name == NOTHING:
-        raise InputError(f"{KIND}.{NOTHING}: {NOTHING!r} means no tool", "choose another name")
-    outputs_file.check_name(f"{KIND}.{name}", name)
+        raise InputError(f"{place}{KIND}.{name}: {name!r} means no tool", "choose another name")
+    outputs_file.check_name(f"{place}{KIND}.{name}", name)
 
 
 def read(top: Table) -> tuple[ArmTool, ...]:
@@ -58,6 +59,7 @@ def read(top: Table) -> tuple[ArmTool, ...]:
 
 
 def _tool(name: str, table: Table) -> ArmTool:
+    check_name(name, f"{table.file}: ")
     if table.has("approach"):
         raise InputError(
             f"{table.file}: {table.place}approach does not say how a tool is turned about its own z axis",
@@ -66,5 +68,9 @@ def _tool(name: str, table: Table) -> ArmTool:
     matrix = tool_pose.given(table, f"{table.file}: {KIND}.{name}").matrix
     middle = tuple(0.5 * row[3] for row in matrix[:3])
     return toml_section.read(
-        ArmTool, table, name=name, matrix=matrix, centre_mm=table.numbers("centre_mm", 3, middle)
+        ArmTool,
+        table,
+        name=name,
+        matrix=matrix,
+        centre_mm=table.numbers("centre_mm", 3, middle, most=MAX_LENGTH_MM),
     )

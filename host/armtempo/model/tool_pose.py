@@ -40,6 +40,7 @@ SMALLEST, LARGEST_MM, LARGEST_DEG = 1e-6, 1000.0, 180.0
 """Bounds of tolerances."""
 ORIENTATIONS = ("rpy_deg", "quaternion", "approach")
 """Keys that give an orientation in one piece; position_mm goes with one of them, with single angles, or alone."""
+_KEYS = ("matrix", "position_mm", *ORIENTATIONS, *(f"{name}_deg" for name in WHOLE))
 
 
 @checked
@@ -157,6 +158,7 @@ def from_table(table: Table, where: str) -> Pose:
 
 def given(table: Table, where: str) -> Pose:
     """As ``from_table``, without tolerances."""
+    table.known(*(key for key in _KEYS if not table.has(key)))  # a misspelt one may be meant for them
     return _matrix(table, where) if table.has("matrix") else _positioned(table, where)
 
 
@@ -164,7 +166,7 @@ def _matrix(table: Table, where: str) -> Pose:
     entries = table.array("matrix", "the 4 rows of a pose, lengths in mm")
     if len(entries) != 4:
         raise table.fail("matrix", "4 rows of 4 numbers")
-    rows = Table({f"row {n}": row for n, row in enumerate(entries, 1)}, table.file, "matrix ")
+    rows = Table({f"row {n}": row for n, row in enumerate(entries, 1)}, table.file, f"{table.place}matrix ")
     matrix = np.array([rows.numbers(f"row {n}", 4) for n in range(1, 5)])
     return Pose.of_matrix(pose.checked(matrix, f"{where}.matrix"))
 

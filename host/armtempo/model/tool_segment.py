@@ -88,13 +88,13 @@ def read(table: Table, via: int) -> ToolSegment | None:
     line = table.boolean("line", arc is not None or circle is not None)
     if via == 0:
         key = next(key for key in KEYS if table.has(key))
-        raise table.fail(key, "not allowed at the first via point")
+        raise table.misplaced(key, "leave it out: the motion begins at the first via point")
     if (arc or circle) and not line:
         raise table.fail("line", "true with arc_through_mm and circle_through_mm")
     if arc and circle:
-        raise table.fail("circle_through_mm", "left out with arc_through_mm")
+        raise table.misplaced("circle_through_mm", "leave it out, or arc_through_mm")
     if table.has("blend_mm") and not line:
-        raise table.fail("blend_mm", "given with line = true only")
+        raise table.misplaced("blend_mm", "leave it out, or give line = true too")
     return ToolSegment(
         via,
         line,

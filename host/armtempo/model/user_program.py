@@ -69,10 +69,19 @@ class UserProgram:
             line = getattr(error, "lineno", None) or 1
             problem = getattr(error, "msg", str(error))
             raise InputError(f"{path}, line {line}: {problem}", "correct the line") from None
+        except RecursionError:
+            raise _too_deep(path) from None
         reader = _Reader(path, arm, _cell_name(tree, path))
         reader.read(tree)
-        marked = _Marks(source, reader.cell).marked(tree)
+        try:
+            marked = _Marks(source, reader.cell).marked(tree)
+        except RecursionError:
+            raise _too_deep(path) from None
         return cls(path.stem, path, source, marked, reader.postures, reader.motions, reader.counters)
+
+
+def _too_deep(path: Path) -> InputError:
+    return InputError(f"{path}: an expression or block is nested too deep", "split it into several lines")
 
 
 def _cell_name(tree: ast.Module, path: Path) -> str:
@@ -123,10 +132,10 @@ class _Reader:
     def _check(self, node: ast.Call, name: str) -> None:
         given = self._arguments(node, name)
         first = next(iter(given.values()), None)
-        text = first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else ""
+        if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
+            return
+        text = first.value
         try:
-            if not text:
-                return
             if name == "goto":
                 self.arm.posture(text)
                 self.postures.setdefault(text, node.lineno)

@@ -12,6 +12,7 @@
     layout.py      header with stop, banner, scene, tabs, and what is always in view
     problem.py     what is wrong, and the button that helps
     move_tab.py, job_tab.py, run_tab.py, sequence_tab.py, board_tab.py
+    job_plan.py    the part of the job's tab that makes and plays the plan
     floor.py, homing.py, teaching.py  dialogs of the tab where the arm is moved
     job_editor.py  the job that is edited and planned, and its file
     sequence_editor.py  the sequence that is edited, and its file

@@ -1,37 +1,31 @@
-"""The job: its file, a table of via points with what is required on the way to each, options, the plan, its curves."""
+"""The job: its file, a table of via points with what is required on the way to each, its options, its plan."""
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from nicegui import run, ui
+from nicegui import ui
 
-from armtempo import pipeline
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.solver import moved_tool_deg
 from armtempo.model import via_table
-from armtempo.model.job import DEGREES, PATHS, TIMINGS, Job
+from armtempo.model.job import DEGREES, PATHS, TIMINGS
 from armtempo.panel import words
-from armtempo.panel.charts import CurveChart
 from armtempo.panel.fields import Fields
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.job_editor import ANGLES, OPTIONS, POSE, WAY_KEYS, Via
-from armtempo.panel.panel_board import Needs
+from armtempo.panel.job_plan import JobPlan
 from armtempo.panel.panel_page import named
 
 if TYPE_CHECKING:
-    from armtempo.model.plan import Plan
     from armtempo.panel.panel_page import PanelPage
     from armtempo.panel.press import Press
 
-_POINTS = 200
-_PLAY_S = 0.05
 _CHOICES = {"path": PATHS, "timing": TIMINGS, "degree": DEGREES}
 _SWITCHES = ("line", "stop")
 
@@ -43,8 +37,6 @@ class JobTab:
         self._page = page
         self._operator = page.operator
         self._jobs = page.operator.jobs
-        self._planning = self._cancelled = False
-        self._played: Plan | None = None
         self._open: set[int] = set()
         """Via points whose keys are shown."""
         self._shown = self._jobs.version
@@ -57,12 +49,7 @@ class JobTab:
         ui.label(words.DRAG_HINT).classes("armtempo-note")
         self._offered = ui.column()
         self._options()
-        self._plan_row()
-        self._play_row()
-        self._charts = [
-            CurveChart(page.operator.arm, title, order)
-            for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
-        ]
+        self._plan = JobPlan(page)
         self._draw_vias()
         page.on_look(self._look)
         # Texts typed while the connection was broken have not arrived
@@ -244,7 +231,7 @@ class JobTab:
         if self._jobs.vias[number].form == ANGLES:
             self._edit(self._jobs.set_angles, number, posture_deg.tolist())
 
-    # options and the plan
+    # options
 
     @ui.refreshable_method
     def _options(self) -> None:
@@ -258,13 +245,13 @@ class JobTab:
         value, label = self._jobs.option(key), words.OPTIONS[key]
         choices: Any = _CHOICES.get(key)
         arm = self._operator.arm
-        named = {
+        of_arm = {
             "holds": [load.name for load in arm.loads],
             "frame": [frame.name for frame in arm.frames],
             "tool": [tool.name for tool in arm.tools],
         }
-        if key in named:
-            choices = named[key]
+        if key in of_arm:
+            choices = of_arm[key]
             if not choices:
                 return
         if choices is None:
@@ -279,85 +266,6 @@ class JobTab:
         chosen.on_value_change(lambda event: self._edit(self._jobs.set_option, key, str(event.value or "")))
         self._choices.add(chosen.set_value, partial(self._jobs.option, key))
 
-    def _plan_row(self) -> None:
-        page = self._page
-        with ui.row():
-            page.button(words.PLAN, self._plan, Needs.CONTROL, self._why_no_plan, look=" icon=insights")
-            self._stop = ui.button(words.CANCEL, on_click=self._cancel).props("flat no-caps")
-            self._stop.set_visibility(False)
-            self._result = ui.label("").props('role="status"')
-        self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
-        self._bar.set_visibility(False)
-
-    def _why_no_plan(self) -> str:
-        return words.BUSY.format(what=words.PLAN) if self._planning else ""
-
-    def _plan(self, press: Press) -> Awaitable[None]:
-        self._operator.check(self._page.client, press, Needs.CONTROL)
-        try:
-            job = self._jobs.job()
-        except InputError as error:
-            raise InputError(words.of_job(error.problem), words.of_job(error.hint)) from None
-        return self._make_plan(job, self._jobs.version)
-
-    async def _make_plan(self, job: Job, version: int) -> None:
-        try:
-            self._show_planning(True)
-            plan = await run.io_bound(pipeline.plan, self._operator.arm, job, self._progress)
-            if plan is not None:  # it is None if the panel ends meanwhile
-                self._jobs.planned(plan, version)
-        except ArmtempoError as error:
-            ui.notify(words.of_job(str(error)), type="negative", multi_line=True, timeout=8000)
-        except asyncio.CancelledError:
-            pass
-        finally:
-            self._show_planning(False)
-
-    def _show_planning(self, planning: bool) -> None:
-        self._planning, self._cancelled = planning, False
-        self._bar.set_visibility(planning)
-        self._stop.set_visibility(planning)
-        self._page.refresh()
-
-    def _progress(self, done: float, whole: float) -> None:
-        if self._cancelled:
-            raise InputError(words.CANCELLED, words.PLAN_AGAIN)
-        self._bar.value = done / whole if whole else 0.0
-
-    def _cancel(self) -> None:
-        self._cancelled = True
-
-    # the plan on the model
-
-    def _play_row(self) -> None:
-        with ui.row().classes("no-wrap full-width"):
-            play = ui.button(icon="play_arrow", on_click=self._play).props("outline dense")
-            named(play, words.PLAY)
-            self._page.control(play, None, self._why_no_play)
-            self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time)
-            named(self._slider, words.PLAY_TIME)
-            self._page.control(self._slider, None, self._why_no_play)
-            self._time = ui.label("").classes("armtempo-percent")
-
-    def _why_no_play(self) -> str:
-        return "" if self._played else words.NO_PLAN
-
-    def _show_time(self) -> None:
-        if (plan := self._played) is not None:
-            time_s = plan.total_s * self._slider.value / 1000
-            self._time.set_text(f"{time_s:.2f} s")
-            self._page.show_ghost(plan.trajectory(time_s))
-            for chart in self._charts:
-                chart.mark(time_s)
-
-    async def _play(self) -> None:
-        if (plan := self._played) is None:
-            return
-        for time_s in np.arange(0.0, plan.total_s, _PLAY_S):
-            self._slider.set_value(round(1000 * float(time_s) / plan.total_s))
-            await asyncio.sleep(_PLAY_S)
-        self._slider.set_value(1000)
-
     def _look(self) -> None:
         """Show what has changed, also on another page."""
         jobs = self._jobs
@@ -371,23 +279,7 @@ class JobTab:
                 self._choices.look()
             self._draw_vias()
         self._file.look()
-        self._result.set_text(self._describe_plan())
-        plan = jobs.plan
-        if plan is None or plan is self._played:
-            return
-        self._played = plan
-        times = np.linspace(0.0, plan.total_s, _POINTS)
-        for order, chart in enumerate(self._charts):
-            chart.show(times, plan.trajectory(times, order))
-
-    def _describe_plan(self) -> str:
-        plan = self._jobs.plan
-        if plan is None:
-            return words.NO_PLAN
-        if self._jobs.plan_is_old:
-            return words.PLAN_IS_OLD
-        bound = max(search.floor_s for search in plan.searches)
-        return words.MOTION_TIME.format(total=plan.total_s, bound=bound)
+        self._plan.look()
 
 
 def _shown_keys(via: Via) -> list[str]:

@@ -1,10 +1,10 @@
 """The time law of every move by hand: from rest to rest as fast as speed, acceleration and jerk allow.
 
-Way s(u) and time t(u) are uniform quintic B-splines. While the differences h of the time's control points are equal,
-t = h u, and the differences of the distance's, over h, are the control points of the speed: those of a "double S", the
-fastest speed f(t) under the limits, minus a constant c with which the speed begins at 0. Their first and second
-differences, over h and h², are the control points of acceleration and jerk. As f keeps the limits, so do they, and
-the splines between them. Where f'' is constant over five of them, the speed is f itself.
+Distance s(u) and time t(u) are uniform quintic B-splines. While the differences h of the time's control points are
+equal, t = h u, and the differences of the distance's, over h, are the control points of the speed: those of a "double
+S", the fastest speed f(t) under the limits, minus a constant c with which the speed begins at 0. Their first and second
+differences, over h and h², are the control points of acceleration and jerk. As f keeps the limits, so do they, and the
+splines between them. Where f'' is constant over five of them, the speed is f itself.
 
 A higher limit of the speed never makes the distance shorter: f never falls with it, and h is the same, or, where f does
 not reach the acceleration, f is the same function of t / h. At constant speed intervals may be of any length, as

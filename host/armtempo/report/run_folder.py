@@ -228,9 +228,16 @@ class Repetition:
         self.duration_s = ticks / limits.TICK_HZ
         self.commanded_steps, self.counts = positions.commanded_steps, positions.counts
 
-    def end_rows(self, state: SequenceState, fault: str, counters: dict[str, int], duration_s: float) -> None:
+    def end_rows(
+        self,
+        state: SequenceState,
+        fault: str,
+        counters: dict[str, int],
+        duration_s: float,
+        lost: tuple[Gap, ...],
+    ) -> None:
         """Store the end of a sequence."""
-        self.state, self.fault, self.duration_s = state.ending, fault, duration_s
+        self.state, self.fault, self.duration_s, self.lost = state.ending, fault, duration_s, lost
         self.ended = {"step": state.step, "cycle": state.cycle, "counters": counters}
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError
-from armtempo.encoding import planned_for
+from armtempo.encoding import encoded_sequence, planned_for
 from armtempo.encoding.encode import arm_record
+from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
@@ -48,6 +49,15 @@ class Connection:
             return
         planned_for.check_frames(f"plan {plan.name!r}", plan.arm, plan.frames, self.arm)
         self.configure(self.arm)  # it may have postures and frames that the plan's arm has not
+
+    def encoded(self, what: Plan | SequencePlan | Encoded, name: str | None = None) -> Encoded:
+        """Encode a plan for the board, which is set up for its arm; ``name``: as ``encoded_sequence.encoded``."""
+        if not isinstance(what, Plan | SequencePlan):
+            self.configure(what.arm)
+            return what
+        found = encoded_sequence.encoded(what, name)
+        self.configure_for(what)
+        return found
 
     @contextmanager
     def stoppable(self, given: StopRequest | None) -> Iterator[StopRequest]:

@@ -14,6 +14,7 @@ from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding.encoded_sequence import Encoded, EncodedSequence
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.model.arm import Arm
@@ -26,7 +27,7 @@ from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import SampleSink, put_once, raise_fault, replay
 from armtempo.splines.trajectory import Trajectory
 
-Where = Plan | EncodedMotion | SequencePlan | Path | str | ArrayLike
+Where = Plan | SequencePlan | Encoded | Path | str | ArrayLike
 """A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
 (or of its file) or sequence."""
 _NAME = "goto"
@@ -138,7 +139,7 @@ def posture_deg(where: Where, arm: Arm) -> Array:
     """
     if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
         where = load_plan(where)
-    if isinstance(where, Plan | SequencePlan | EncodedMotion):
+    if isinstance(where, Plan | SequencePlan | EncodedMotion | EncodedSequence):
         start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
         return point_to_point.posture(start_deg, where.arm)
     if isinstance(where, str):

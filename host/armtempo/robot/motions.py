@@ -6,16 +6,17 @@ import math
 from pathlib import Path
 from typing import cast
 
-import numpy as np
 from armtempo_shared.messages import RESUME
 
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_sequence
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding.encoded_sequence import Encoded, EncodedSequence
 from armtempo.link.board_messages import SequenceState
+from armtempo.link.follow import SequenceWatcher
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
@@ -28,11 +29,10 @@ from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
-from armtempo.robot.recording import RunContent, Watcher
-from armtempo.robot.sequence_run import SequenceWatcher
+from armtempo.robot.recording import Watcher
 from armtempo.robot.speed import change_speed, permille
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.store import BoardStore, stored_name
+from armtempo.robot.store import BoardStore, store, stored_name
 
 MOST_REPETITIONS = 99
 """Their files are numbered with two digits."""
@@ -162,7 +162,7 @@ class Motions:
 
     def run(
         self,
-        motion: Plan | SequencePlan | EncodedMotion | Path | str,
+        motion: Plan | SequencePlan | Encoded | Path | str,
         repeat: int = 1,
         out: Path | str = "runs",
         progress: Progress | None = None,
@@ -183,7 +183,9 @@ class Motions:
             raise InputError(f"repeat: {repeat} is not in the range 1<=x<={MOST_REPETITIONS}", "change it")
         if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
             motion = load_plan(motion)
-        if isinstance(motion, SequencePlan) or (isinstance(motion, str) and self._is_sequence(motion)):
+        if isinstance(motion, SequencePlan | EncodedSequence) or (
+            isinstance(motion, str) and self._is_sequence(motion)
+        ):
             if repeat != 1 or progress is not None or watcher is not None:
                 raise InputError(
                     "run: a sequence takes no repeat, progress or watcher",
@@ -191,14 +193,14 @@ class Motions:
                 )
             self.run_sequence(motion, stop=stop, out=out)
             return Run.load(cast(Path, self._last_folder))
-        encoded = self._encoded(motion)
+        encoded = self._motion(motion)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._board.stoppable(stop) as wanted:
-            self._bring_to_start(encoded, wanted)
-            folder = self._recorded(recording.of_motion(encoded), Path(out))
+            store(self._board.client, encoded.records)
+            self._take_start(encoded, wanted)
+            folder = self._recorded(encoded, Path(out))
             seen.begin(encoded, folder)
-            for _ in recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen):
-                pass
+            recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen)
         return Run.load(folder.path)
 
     def _is_sequence(self, name: str) -> bool:
@@ -207,7 +209,7 @@ class Motions:
 
     def run_sequence(
         self,
-        sequence: SequencePlan | str,
+        sequence: SequencePlan | EncodedSequence | str,
         watcher: SequenceWatcher = lambda _: None,
         stop: StopRequest | None = None,
         replace: bool = False,
@@ -221,44 +223,43 @@ class Motions:
         the sequence ends as ``timed_out`` or raises BoardError, as its step says. After Stopped,
         ``client.sequence()`` has the last state.
         """
+        client = self._board.client
         with self._board.stoppable(stop) as wanted:
-            key = self._sequence(sequence, wanted, replace)
+            if isinstance(sequence, str):
+                key = self._stored_sequence(sequence)
+            else:
+                encoded = self._store.upload(sequence, replace=replace)
+                key = encoded.key
+                self._take_start(encoded, wanted)
             if out is None:
-                return sequence_run.run(self._board.client, key, wanted, watcher)
-            client = self._board.client
-            content = (
-                recording.of_stored_sequence(client, sequence, self._board.known_arm())
-                if isinstance(sequence, str)
-                else recording.of_sequence(sequence)
-            )
-            folder = self._recorded(content, Path(out))
+                end = sequence_run.run(client, key, wanted, watcher).end
+                sequence_run.raise_failure(client, end)
+                return end
+            if isinstance(sequence, str):
+                encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
+            folder = self._recorded(encoded, Path(out))
             self._last_sequence = folder.path
-            with folder.begin_repetition(with_rows=True) as file:
-                events = recording.RowRecorder(client, file, content.rows)
-                return sequence_run.run(client, key, wanted, watcher, events)
+            return recording.sequence(client, key, folder, wanted, watcher)
 
-    def _sequence(self, sequence: SequencePlan | str, stop: StopRequest, replace: bool) -> MotionKey:
-        """Store the sequence if it is a plan, and move a virtual arm to its start; returns its key."""
-        if isinstance(sequence, str):
-            found = self._board.client.find(stored_name(sequence))
-            if found is None or not found.sequence:
-                raise InputError(f"the board has no sequence {sequence!r}", "see 'armtempo list'")
-            if self._board.arm is not None:
-                self._board.start.home_virtual_arm(self._board.arm)
-            return MotionKey(found.name, found.crc)
-        key = self._store.upload_sequence(sequence, replace=replace)
-        self._board.start.take(
-            sequence.arm,
-            None if sequence.start_deg is None else np.array(sequence.start_deg),
-            f"sequence {sequence.name!r}",
-            "move it there with 'armtempo goto' and the sequence's file",
-            stop,
-        )
-        return key
+    def _stored_sequence(self, name: str) -> MotionKey:
+        """The key of a sequence on the board; a virtual arm is at home."""
+        found = self._board.client.find(stored_name(name))
+        if found is None or not found.sequence:
+            raise InputError(f"the board has no sequence {name!r}", "see 'armtempo list'")
+        if self._board.arm is not None:
+            self._board.start.home_virtual_arm(self._board.arm)
+        return MotionKey(found.name, found.crc)
 
-    def _recorded(self, content: RunContent, out: Path) -> RunFolder:
+    def _take_start(self, encoded: Encoded, stop: StopRequest) -> None:
+        """Move a virtual arm to its start; raises LinkError if a real arm is not there."""
+        name, advice = repr(encoded.name), "move it there with 'armtempo goto'"
+        if not isinstance(encoded, EncodedMotion):
+            name, advice = f"sequence {name}", f"{advice} and the sequence's file"
+        self._board.start.take(encoded.arm, encoded.start_deg, name, advice, stop)
+
+    def _recorded(self, encoded: Encoded, out: Path) -> RunFolder:
         """A new run folder in ``out``, that of ``last_run``."""
-        folder = recording.new_run(out, content, self._board.port, self._board.client)
+        folder = recording.new_run(out, encoded, self._board.port, self._board.client)
         self._last_folder = folder.path
         return folder
 
@@ -279,7 +280,7 @@ class Motions:
         ``motion``: the motion of that run; None: the motion that the button starts. Waits for the end of a
         run that is still in progress. Raises LinkError if the board has no samples.
         """
-        encoded = self._encoded(self._default() if motion is None else motion)
+        encoded = self._motion(self._default() if motion is None else motion)
         folder = recording.fetch(self._board.client, encoded, Path(out), self._board.port)
         self._last_folder = folder.path
         return Run.load(folder.path)
@@ -317,17 +318,19 @@ class Motions:
         """Continue along the path at the speed before the pause; raises BoardError if nothing moves."""
         change_speed(self._board.client, RESUME)
 
-    def _encoded(self, motion: Plan | EncodedMotion | Path | str) -> EncodedMotion:
+    def _motion(self, what: Plan | EncodedMotion | Path | str) -> EncodedMotion:
         """The motion for a board that is set up for its arm."""
-        if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
-            motion = Plan.load(motion)
-        if isinstance(motion, str):
-            return self._store.read(motion)
-        if isinstance(motion, Plan):
-            self._board.configure_for(motion)
-            return encoded_motion.of_plan(motion)
-        self._board.configure(motion.arm)
-        return motion
+        plan = (
+            load_plan(what)
+            if isinstance(what, Path) or (isinstance(what, str) and what.endswith(".json"))
+            else what
+        )
+        found = self._store.read(plan) if isinstance(plan, str) else self._board.encoded(plan)
+        if isinstance(found, EncodedMotion):
+            return found
+        raise InputError(
+            f"{what} is a sequence, not a motion", "record it with 'armtempo run' or run_sequence"
+        )
 
     def _default(self) -> str:
         for entry in self._board.client.stored():
@@ -337,12 +340,6 @@ class Motions:
             "no motion given, and no default motion is set for the board's button",
             "give the motion's name: armtempo fetch NAME; 'armtempo list' shows the names",
         )
-
-    def _bring_to_start(self, motion: EncodedMotion, stop: StopRequest) -> None:
-        """Store the motion; move a virtual arm to its start; raises LinkError if a real arm is not there."""
-        stored_motion.store(self._board.client, motion.name, motion.data)
-        advice = "move it there with 'armtempo goto'"
-        self._board.start.take(motion.arm, motion.start_deg, repr(motion.name), advice, stop)
 
     def _posture_deg(self) -> Array:
         return arm_state.posture_deg(self._board.client, self._board.known_arm())

@@ -6,33 +6,36 @@ from collections.abc import Callable
 from pathlib import Path
 
 from armtempo.basics.arguments import checked_as
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_program
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.encoding.encoded_program import EncodedProgram
-from armtempo.link.board_messages import Event, Notice, SequenceState
+from armtempo.link import Client
+from armtempo.link.board_messages import Notice, SequenceState
+from armtempo.link.follow import Followed, SequenceWatcher
 from armtempo.model.arm import Arm
 from armtempo.model.job import is_name
 from armtempo.model.user_program import UserProgram
 from armtempo.robot import sequence_run
 from armtempo.robot.connection import Connection
-from armtempo.robot.sequence_run import Events, SequenceWatcher
 from armtempo.robot.stop_request import StopRequest
+from armtempo.robot.store import store
 
 Listener = Callable[[str], object]
 """Called with each line that a program prints, and with the traceback of a failure."""
 
 
-class _Notices(Events):
-    """Passes on the board's texts."""
-
-    def __init__(self, listener: Listener) -> None:
-        self._listener = listener
-
-    def take(self, event: Event) -> None:
-        if isinstance(event, Notice):
-            self._listener(event.text)
+def check_memory(client: Client, encoded: EncodedProgram) -> None:
+    """Raise LinkError if the board has too little memory for a program."""
+    client.need("sequences", f"program {encoded.key.name!r}")
+    free = client.hello().free_heap  # 0: a virtual board on CPython
+    if 0 < free < encoded.heap_bytes:
+        raise LinkError(
+            f"program {encoded.key.name!r} needs {encoded.heap_bytes} bytes of the board's memory, with this arm "
+            f"{free} are free",
+            "make it shorter; with the program in the firmware more is free: 'armtempo flash'",
+        )
 
 
 @checked_as("Board")
@@ -79,7 +82,8 @@ class Programs:
         if not isinstance(program, EncodedProgram):
             program = self.encode(program, self._board.known_arm())
         self._board.configure(program.arm)
-        key = sequence_run.store(self._board.client, program, progress, replace)
+        check_memory(self._board.client, program)
+        key = store(self._board.client, program.records, progress, replace)
         if default:
             self._board.client.set_default(key.name)
         return key
@@ -107,6 +111,12 @@ class Programs:
                 key = self.upload(program, replace=replace)
             if self._board.arm is not None:
                 self._board.start.home_virtual_arm(self._board.arm)
-            return sequence_run.run(
-                self._board.client, key, wanted, watcher, _Notices(listener), program=True
-            )
+            client = self._board.client
+
+            def take(event: Followed) -> None:
+                if isinstance(event, Notice):
+                    listener(event.text)
+
+            end = sequence_run.run(client, key, wanted, watcher, take, program=True).end
+            sequence_run.raise_failure(client, end, program=True)
+            return end

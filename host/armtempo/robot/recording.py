@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from armtempo_shared.limits import TICK_HZ
-from armtempo_shared.sequence import MOVE, SequenceData, SequenceError
+from armtempo_shared.sequence import MOVE
 
-from armtempo.basics.errors import InputError, LinkError
+from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion, encoded_sequence
-from armtempo.encoding.encoded_motion import EncodedMotion
+from armtempo.encoding import encoded_motion
+from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
-from armtempo.link.board_messages import Event, RowBegun, Sample, SequenceState
-from armtempo.link.follow import Follower, RunEnd
+from armtempo.link.board_messages import RowBegun, Sample, SequenceState
+from armtempo.link.follow import Followed, MotionFollower, RunEnd, SequenceWatcher, number_in_run
 from armtempo.model import arm_json
-from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import SequenceRow
 from armtempo.report import run_folder
-from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Recording, Repetition, RunFolder, RunRow
+from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder, RunRow
+from armtempo.robot import sequence_run
 from armtempo.robot.goto import move_once
-from armtempo.robot.sequence_run import Events
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
 
-ACKNOWLEDGED = 8
-"""Received samples of a sequence are acknowledged to the board after this many."""
 _END_S = 1e-3
 """A run that ended earlier than its motion by more than this was stopped."""
 
@@ -69,63 +66,16 @@ class ProgressWatcher(Watcher):
         self._inner.end(repetition)
 
 
-@dataclass(frozen=True, eq=False)
-class RunContent:
-    """What is run: the records of its legs, and the rows that run them."""
-
-    name: str
-    arm: Arm
-    legs: tuple[tuple[str, bytes], ...]
-    """Name on the board and record of each."""
-    rows: tuple[RunRow, ...] = ()
-    """Of a sequence."""
-    plan: Plan | SequencePlan | None = None
-    """None if only the board had it."""
-
-
-def of_motion(motion: EncodedMotion) -> RunContent:
-    """A motion: a run of one leg."""
-    return RunContent(motion.name, motion.arm, ((motion.name, motion.data),), plan=motion.plan)
-
-
-def of_sequence(plan: SequencePlan) -> RunContent:
-    """A planned sequence."""
-    legs = tuple((motion.name, motion.data) for motion in encoded_sequence.of_plan(plan).motions)
-    rows = tuple(_row(row.op, row.number, row.step, row.words) for row in plan.rows)
-    return RunContent(plan.name, plan.arm, legs, rows, plan)
-
-
-def of_stored_sequence(client: Client, name: str, arm: Arm) -> RunContent:
-    """A sequence on the board; raises InputError if its record is damaged or of another version."""
-    try:
-        record = SequenceData(client.fetch(name))
-    except SequenceError as error:
-        raise InputError(
-            f"sequence {name!r} on the board: {error}", "plan it again and 'armtempo upload --force' it"
-        ) from error
-    names = [record.motion(index)[0] for index in range(record.motions)]
-    rows = [record.row(index) for index in range(record.rows)]
-    described = zip(rows, encoded_sequence.describe(record, arm), strict=True)
-    return RunContent(
-        name,
-        arm,
-        tuple((leg, client.fetch(leg)) for leg in names),
-        tuple(_row(op, number, step, words) for (op, number, _, _, step), words in described),
-    )
-
-
-def _row(op: int, number: int, step: int, words: str) -> RunRow:
-    return RunRow(step, number + 1 if op == MOVE else 0, words)
-
-
-def new_run(parent: Path, content: RunContent, port: str, client: Client) -> RunFolder:
+def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFolder:
     """A new run folder with everything that is needed to repeat the run."""
-    arm, plan = content.arm, content.plan
+    name, arm, plan = encoded.name, encoded.arm, encoded.plan
     where = {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
-    names = tuple(name for name, _ in content.legs)
-    with run_folder.new_folder(parent, content.name) as path:
-        folder = RunFolder(path, content.name, run_folder.scales(arm), where, legs=names, rows=content.rows)
-        folder.write_legs(data for _, data in content.legs)
+    legs = tuple((motion.name, motion.data) for motion in encoded.motions)
+    rows = tuple(map(_row, encoded.rows))
+    with run_folder.new_folder(parent, name) as path:
+        names = tuple(leg for leg, _ in legs)
+        folder = RunFolder(path, name, run_folder.scales(arm), where, legs=names, rows=rows)
+        folder.write_legs(data for _, data in legs)
         if plan is None:
             arm_json.save(arm, path / run_folder.ARM)
         else:
@@ -134,30 +84,39 @@ def new_run(parent: Path, content: RunContent, port: str, client: Client) -> Run
     return folder
 
 
-class RowRecorder(Events):
-    """Records a running sequence: its rows and samples."""
+def _row(row: SequenceRow) -> RunRow:
+    return RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words)
 
-    def __init__(self, client: Client, recording: Recording, rows: Sequence[RunRow]) -> None:
-        self._client = client
-        self._recording = recording
-        self._rows = rows
-        self._begun_s = client.session.clock()
-        self._run, self._row = 0, -1  # number of the motion's run that was reported last, and its row
 
-    def take(self, event: Event) -> None:
-        if isinstance(event, RowBegun):
-            self._recording.begin_row(event, self._client.session.clock() - self._begun_s)
-            if event.row < len(self._rows) and self._rows[event.row].leg:
-                self._run, self._row = event.run, event.row
-        elif isinstance(event, Sample):
-            self._recording.append(event, self._row if event.run == self._run else None)
-            if self._recording.repetition.samples % ACKNOWLEDGED == 0:
-                self._client.samples(event.index + 1)
+def sequence(
+    client: Client, key: MotionKey, folder: RunFolder, stop: StopRequest, watcher: SequenceWatcher
+) -> SequenceState:
+    """Run a stored sequence, and record its rows and samples in the run folder; returns its last state.
 
-    def end(self, state: SequenceState) -> None:
-        taken_s = self._client.session.clock() - self._begun_s
-        code = fault_name(state.code)
-        self._recording.repetition.end_rows(state, code, self._client.counters(), taken_s)
+    Raises BoardError if a fault ends it, or the board refuses one of its motions.
+    """
+    clock = client.session.clock
+    begun_s = clock()
+    row_of_run: dict[int, int] = {}  # of each run that was reported and may have more samples
+    with folder.begin_repetition(with_rows=True) as file:
+
+        def take(event: Followed) -> None:
+            if isinstance(event, RowBegun):
+                file.begin_row(event, clock() - begun_s)
+                if event.row < len(folder.rows) and folder.rows[event.row].leg:
+                    row_of_run[event.run] = event.row
+            elif isinstance(event, Sample):
+                file.append(event, row_of_run.get(event.run))
+                for run in [run for run in row_of_run if run < event.run]:
+                    del row_of_run[run]
+
+        followed = sequence_run.run(client, key, stop, watcher, take)
+        end = followed.end
+        file.repetition.end_rows(
+            end, fault_name(end.code), client.counters(), clock() - begun_s, followed.lost
+        )
+        sequence_run.raise_failure(client, end)
+    return end
 
 
 def repeat(
@@ -167,10 +126,10 @@ def repeat(
     times: int,
     stop: StopRequest,
     watcher: Watcher,
-) -> Iterator[Repetition]:
+) -> None:
     """Replay a stored motion ``times`` times into the run folder, and backwards in between.
 
-    Yields each repetition when it has ended. A stop request ends the series; a fault raises BoardError.
+    A stop request ends the series; a fault raises BoardError.
     """
     back = encoded_motion.way_back(motion) if times > 1 else b""
     for number in range(times):
@@ -180,7 +139,6 @@ def repeat(
             return
         end = _recorded(client, motion, folder, stop, watcher)
         watcher.end(folder.repetitions[-1])
-        yield folder.repetitions[-1]
         raise_fault(end)
 
 
@@ -204,7 +162,7 @@ def _recorded(
 def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> RunFolder:
     """Write the samples that the board kept of its last run (of ``motion``) into a new run folder.
 
-    Waits for the end of a run in progress. Raises LinkError if the board has no samples.
+    Waits for the end of a run in progress. Raises LinkError if the board has no samples, or they are of a sequence.
     """
     status = client.status()
     if not status.run or not (status.moving or status.samples_kept):
@@ -212,10 +170,16 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
             "the board has no samples: nothing ran since it started, or they were fetched",
             "fetch samples before the next run and before a reset; 'armtempo run' starts a new run",
         )
-    follower = Follower(client, status.run)
-    folder = new_run(folder_in, of_motion(motion), port, client)
+    follower = MotionFollower(client, status.run)
+    samples = follower.samples()
+    first = next(samples, None)
+    if first is not None and first.index != number_in_run(first):
+        raise LinkError(
+            "the last run was that of a sequence, whose samples are not kept", "record it with 'armtempo run'"
+        )
+    folder = new_run(folder_in, motion, port, client)
     with folder.begin_repetition() as file:
-        for sample in follower.samples():
+        for sample in chain([first] if first else [], samples):
             file.append(sample)
         end = follower.end
         cut = end.path_ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from armtempo_shared import program
-from armtempo_shared.sequence import KIND_BYTES, MAGIC
+from armtempo_shared import program, sequence, wire
+from armtempo_shared.sequence import KIND_BYTES, SequenceData, SequenceError
 
 from armtempo.basics.arguments import checked_as
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion, encoded_sequence
+from armtempo.encoding import encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding.encoded_sequence import Encoded
+from armtempo.link import Client
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
-from armtempo.robot import sequence_run, stored_motion
+from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.robot.connection import Connection
+
+_KINDS = {sequence.MAGIC[:KIND_BYTES]: "sequence", program.MAGIC[:KIND_BYTES]: "program"}
+"""What records of other kinds than motions begin with."""
 
 
 @checked_as("Board")
@@ -30,31 +35,24 @@ class BoardStore:
 
     def upload(
         self,
-        motion: Plan | EncodedMotion | Path | str,
+        motion: Plan | SequencePlan | Encoded | Path | str,
         name: str | None = None,
         default: bool = False,
         progress: Progress | None = None,
         replace: bool = False,
-    ) -> EncodedMotion:
-        """Store a motion, unless the board already has it; ``progress`` counts bytes.
+    ) -> Encoded:
+        """Store a motion, or a sequence with its motions, unless the board already has it; ``progress`` counts bytes.
 
-        ``motion``: a plan or its file. ``name``: on the board; default: from the job's name. ``default``: let
-        the board's button start it. ``replace``: replace another motion of this name; if that was the
-        default, the button starts nothing. Raises LinkError if there is such a motion and ``replace`` is
+        ``motion``: a plan or its file. ``name``: of a motion on the board; default: from the job's name.
+        ``default``: let the board's button start it. ``replace``: replace something else of this name; if that was
+        the default, the button starts nothing. Raises LinkError if there is something else and ``replace`` is
         false, or the board is set up for another arm.
         """
-        if isinstance(motion, Path | str):
-            motion = Plan.load(motion)
-        if isinstance(motion, Plan):
-            self._board.configure_for(motion)
-            encoded = encoded_motion.of_plan(motion, name)
-        else:
-            self._board.configure(motion.arm)
-            encoded = motion
-        stored_motion.store(self._board.client, encoded.name, encoded.data, progress, replace)
+        found = self._board.encoded(load_plan(motion) if isinstance(motion, Path | str) else motion, name)
+        store(self._board.client, found.records, progress, replace)
         if default:
-            self._board.client.set_default(encoded.name)
-        return encoded
+            self._board.client.set_default(found.name)
+        return found
 
     def upload_sequence(
         self,
@@ -63,13 +61,8 @@ class BoardStore:
         progress: Progress | None = None,
         replace: bool = False,
     ) -> MotionKey:
-        """Store a planned sequence and its motions; arguments and errors as in ``upload``."""
-        encoded = encoded_sequence.of_plan(sequence)
-        self._board.configure_for(sequence)
-        key = sequence_run.store(self._board.client, encoded, progress, replace)
-        if default:
-            self._board.client.set_default(key.name)
-        return key
+        """As ``upload``; returns the sequence's name and checksum."""
+        return self.upload(sequence, None, default, progress, replace).key
 
     def list(self) -> tuple[StoredMotion, ...]:
         """The stored motions and sequences."""
@@ -82,10 +75,8 @@ class BoardStore:
         does not fit the arm.
         """
         data = self._board.client.fetch(stored_name(name))
-        if data.startswith(MAGIC[:KIND_BYTES]):
-            raise InputError(f"{name!r} is a sequence, not a motion", f"run it with: armtempo run {name}")
-        if data.startswith(program.MAGIC[:KIND_BYTES]):
-            raise InputError(f"{name!r} is a program, not a motion", f"run it with: armtempo run {name}")
+        if kind := _KINDS.get(data[:KIND_BYTES]):
+            raise InputError(f"{name!r} is a {kind}, not a motion", f"run it with: armtempo run {name}")
         return encoded_motion.of_record(name, data, self._board.known_arm() if arm is None else Arm.of(arm))
 
     def remove(self, name: str) -> None:
@@ -99,6 +90,70 @@ class BoardStore:
     def set_default(self, name: str) -> None:
         """Set the motion, sequence or program that the board's button starts; "" for none."""
         self._board.client.set_default(stored_name(name) if name else name)
+
+
+def store(
+    client: Client,
+    records: Sequence[tuple[str, bytes]],
+    progress: Progress | None = None,
+    replace: bool = False,
+) -> MotionKey:
+    """Store records that the board does not have, each under its name; returns the key of the last one.
+
+    That is a motion, or the sequence or program of the motions before it, so that what is stored is always complete.
+    Motions of an earlier sequence of its name that are no longer needed are removed. Raises LinkError if the board has
+    something else under one of the names and ``replace`` is false; a program replaces one of its name.
+    """
+    keys = [MotionKey(name, wire.record_crc(data)) for name, data in records]
+    (name, data), whole = records[-1], sum(len(data) for _, data in records)
+    kind = _KINDS.get(data[:KIND_BYTES])
+    if kind:
+        client.need("sequences", f"{kind} {name!r}")
+    kept = {entry.name: entry for entry in client.stored()}
+    old = kept.get(name)
+    legs = _legs_of(client, old) if old and old.sequence else {}
+    if old and old.program and kind == "program":
+        legs[name] = old.crc
+    for key in keys if not replace else ():
+        found = kept.get(key.name)
+        if found and found.crc not in (0, key.crc, legs.get(key.name)):
+            raise _has_another(found)
+    done = 0
+    for key, (_, data) in zip(keys, records, strict=True):
+        if key.name not in kept or kept[key.name].crc != key.crc:
+            client.upload(key.name, data, _from(done, whole, progress))
+        done += len(data)
+        if progress is not None:
+            progress(done, whole)
+    for leg in legs.keys() - {key.name for key in keys}:
+        if leg in kept and kept[leg].crc == legs[leg]:
+            client.remove(leg)
+    return keys[-1]
+
+
+def _from(done: int, whole: int, progress: Progress | None) -> Progress | None:
+    """The progress of a part of ``whole`` bytes, of which ``done`` were before it."""
+    return None if progress is None else lambda at, _: progress(done + at, whole)
+
+
+def _has_another(found: StoredMotion) -> LinkError:
+    kind = "sequence" if found.sequence else "program" if found.program else "motion"
+    button = ", which its button starts" if found.default else ""
+    lasting = f"{found.duration_s:.3f} s, " if found.joints else ""
+    return LinkError(
+        f"the board has another {kind} {found.name!r}{button} ({lasting}checksum {found.crc:08x})",
+        "replace it with --force, or store this one under another name: 'armtempo upload --name' for a motion, else "
+        "the name in its file",
+    )
+
+
+def _legs_of(client: Client, old: StoredMotion) -> dict[str, int]:
+    """Names and checksums of the motions of a stored sequence; empty if it cannot be read."""
+    try:
+        found = SequenceData(client.fetch(old.name))
+        return dict(found.motion(index) for index in range(found.motions))
+    except SequenceError:
+        return {}
 
 
 def stored_name(name: str) -> str:

@@ -1,25 +1,24 @@
-"""Store a motion; start, follow and stop one."""
+"""Start, follow and stop what the board runs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack, suppress
-from typing import Self, TypeVar
+from contextlib import suppress
+from typing import TypeVar
 
 from armtempo_shared import wire
 from armtempo_shared.messages import ONCE_NAME, PERMILLE
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
-from armtempo.basics.progress import Progress
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
-from armtempo.link.follow import CHECK_S, Follower, RunEnd
+from armtempo.link.follow import CHECK_S, Followed, Follower, MotionFollower, RunEnd
 from armtempo.link.refusal import refusal
 from armtempo.link.session import RECONNECT_S, OnLoss
 from armtempo.robot.stop_request import StopRequest
 
-_End = TypeVar("_End")
+_Follower = TypeVar("_Follower", bound=Follower)
 SampleSink = Callable[[Sample, float], object]
 """Called with each sample and the duration of the motion in seconds."""
 
@@ -30,28 +29,6 @@ FREEZE_S = 2.0
 """Longest time that freezing takes."""
 LOCK_S = 1.0
 """A request from another thread waits this long for its turn to talk to the board."""
-
-
-def store(
-    client: Client, name: str, data: bytes, progress: Progress | None = None, replace: bool = False
-) -> MotionKey:
-    """Upload a motion record under ``name``, unless the board already has it.
-
-    Raises LinkError if the board has another motion of this name, unless ``replace`` is true, or that motion is
-    damaged.
-    """
-    key = MotionKey(name, wire.record_crc(data))
-    found = client.find(name)
-    if found is not None and found.crc == key.crc:
-        return key
-    if found is not None and (found.joints or found.sequence or found.program) and not replace:
-        button = ", which its button starts" if found.default else ""
-        raise LinkError(
-            f"the board has another motion {name!r}{button} ({found.duration_s:.3f} s, checksum {found.crc:08x})",
-            "replace it with --force, or store this one under another name with 'armtempo upload --name'",
-        )
-    client.upload(name, data, progress)
-    return key
 
 
 def put_once(client: Client, data: bytes) -> MotionKey:
@@ -71,76 +48,54 @@ def replay(
     Any error here stops the board. Raises BoardError if the board refuses to start, LinkError if it cannot be
     reached any more, Stopped if the stop was requested before the start.
     """
-    with Supervision(client, stop) as run:
+    motion_s = 0.0
+
+    def start() -> MotionFollower:
+        nonlocal motion_s
         started = client.start(motion.name, motion.crc, flags)
         motion_s = started.duration_s * client.rate / PERMILLE
-        follower = Follower(client, started.run)
+        return MotionFollower(client, started.run)
 
-        def follow() -> RunEnd:
-            for sample in follower.samples(run.brake):
-                run.heard()
-                sink(sample, motion_s)
-            return follower.end
+    def take(event: Followed) -> None:
+        if isinstance(event, Sample):
+            sink(event, motion_s)
 
-        try:
-            return run.follow(follow)
-        except OtherBoardError as error:
-            raise LinkError(
-                f"{error.problem}; what happened after the last sample is not known",
-                f"{error.hint}",
-            ) from error
+    try:
+        return follow(client, stop, start, take).end
+    except OtherBoardError as error:
+        raise LinkError(
+            f"{error.problem}; what happened after the last sample is not known", f"{error.hint}"
+        ) from error
 
 
-class Supervision:
-    """What stops a run, and what to do if the link is lost meanwhile: a context around its start and ``follow``.
+def follow(
+    client: Client, stop: StopRequest, start: Callable[[], _Follower], take: Callable[[Followed], object]
+) -> _Follower:
+    """Start something and follow it to its end; a stop request makes the board brake. Any error stops the board.
 
-    If the cable is pulled or the board falls silent, it is waited for up to RECONNECT_S, or
-    STOPPING_RECONNECT_S if the stop is wanted. Raises Stopped if the stop was wanted before.
+    ``take`` is called with its samples and other events. If the cable is pulled or the board falls silent, it is
+    waited for up to RECONNECT_S, or STOPPING_RECONNECT_S if the stop is wanted; a sequence goes on meanwhile. Raises
+    Stopped if the stop was wanted before, LinkError if the board cannot be reached any more, and what ``start`` raises.
     """
-
-    def __init__(self, client: Client, stop: StopRequest) -> None:
-        self.brake = Brake(client, stop)
-        """To be called often by what follows the run: sends a requested stop."""
-        self._client = client
-        self._stop = stop
-        self._heard_s = client.session.clock()
-        self._ends = ExitStack()
-
-    def __enter__(self) -> Self:
-        session = self._client.session
-        with ExitStack() as ends:
-            ends.enter_context(session.on_loss(OnLoss(stopping=lambda: self._stop.wanted)))
-            ends.enter_context(self._stop.waking(session.wake))
-            self._stop.check()
-            self._ends = ends.pop_all()
-        return self
-
-    def __exit__(self, *failure: object) -> None:
-        self._ends.close()
-
-    def heard(self) -> None:
-        """To be called whenever the board has told something new."""
-        self._heard_s = self._client.session.clock()
-
-    def follow(self, follow: Callable[[], _End]) -> _End:
-        """The result of ``follow``, which is called again after the link was lost; any other error stops the run.
-
-        Raises LinkError if the board cannot be reached any more, and what ``follow`` raises.
-        """
-        session = self._client.session
-        self.heard()
+    session = client.session
+    brake = Brake(client, stop)
+    with session.on_loss(OnLoss(stopping=lambda: stop.wanted)), stop.waking(session.wake):
+        stop.check()
+        follower = start()
         while True:
             try:
-                return follow()
+                for event in follower.events(brake):
+                    take(event)
+                return follower
             except OtherBoardError:
                 raise
             except NoAnswerError as error:  # silent although its port exists: treated like a pulled cable
-                if not self._stop.wanted:  # otherwise the stop continues until it is abandoned
-                    if session.clock() - self._heard_s > RECONNECT_S:
+                if not stop.wanted:  # otherwise the stop continues until it is abandoned
+                    if session.clock() - follower.heard_s > RECONNECT_S:
                         raise
                     session.reconnect(error)
             except BaseException as error:
-                _stop_after(self._client, error)
+                _stop_after(client, error)
                 raise
 
 

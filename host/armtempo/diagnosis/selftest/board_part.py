@@ -15,9 +15,9 @@ _CORE_HZ = 2 * TICK_HZ
 _TOLERANCE = 0.002
 """Tolerance of the ratio of two clocks from one crystal: reading both takes some microseconds of 50 ms."""
 EMITTED = {2: 700, 512: 8770}
-"""Instructions of the ring interrupt's ``emit`` by edges, as ``on_board/cycles.py`` calls it; counted in the tests."""
+"""Instructions of the ring interrupt's ``emit`` by edges, as ``board: selftest/cycles.py`` calls it; tests count."""
 TURN = {"byte_code": 252, "machine_code": 22}
-"""Instructions of a turn of the small loops of ``on_board/cycles.py``, as MicroPython 1.29 compiles them.
+"""Instructions of a turn of the small loops of ``board: selftest/cycles.py``, as MicroPython 1.29 compiles them.
 
 Counted by ``python -m tests.benchmark.selftest_heap``.
 """
@@ -33,7 +33,7 @@ _OTHER_FIRMWARE = (
 
 
 def judge(found: dict[str, Any], board_id: str) -> Iterator[Measurement]:
-    """Lines about ``found`` of ``on_board/identity.py``."""
+    """Lines about ``found`` of ``board: selftest/identity.py``."""
     yield Measurement(
         BOARD, "firmware", f"MicroPython {found['version']}, {found['machine']}", "", Level.NOTE
     )
@@ -128,7 +128,7 @@ def _flash(found: dict[str, Any] | None) -> Iterator[Measurement]:
 
 
 def judge_cycles(found: dict[str, float]) -> Iterator[Measurement]:
-    """Lines about ``found`` of ``on_board/cycles.py``: figures, without a verdict."""
+    """Lines about ``found`` of ``board: selftest/cycles.py``: figures, without a verdict."""
     for name, words in (
         ("byte_code", "a turn of a small loop in byte code"),
         ("machine_code", "the same in machine code"),

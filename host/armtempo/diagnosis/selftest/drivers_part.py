@@ -10,11 +10,11 @@ from armtempo.diagnosis.selftest.result import Measurement, judged, left_out
 
 DRIVERS = "drivers"
 _STILL = 2
-"""Counts, as in ``on_board/encoders.py``."""
+"""Counts, as in ``board: selftest/encoders.py``."""
 
 
 def judge(found: dict[str, Any]) -> Iterator[Measurement]:
-    """The line about ``found`` of ``on_board/drivers.py``."""
+    """The line about ``found`` of ``board: selftest/drivers.py``."""
     if found["active"] is None:
         yield left_out(
             DRIVERS,
@@ -57,7 +57,7 @@ def _off(active: int, state: Sequence[int]) -> bool:
 
 
 def judge_encoders(found: dict[str, Any]) -> Iterator[Measurement]:
-    """Lines about ``found`` of ``on_board/encoders.py``; the first determines whether more pulses are made."""
+    """Lines about ``found`` of ``board: selftest/encoders.py``; the first determines whether more pulses are made."""
     turned = {number: counts for number, counts in enumerate(found["turned"], 1) if counts is not None}
     moved = [
         f"joint {number} turned {counts} counts" for number, counts in turned.items() if abs(counts) > _STILL

@@ -132,7 +132,7 @@ def at_rates(rates: Sequence[int], duration_s: float) -> bytes:
 
 
 def evaluated() -> bytes:
-    """The record of the motion of ``on_board/cycles.py``: about 1000 steps of one joint."""
+    """The record of the motion of ``board: selftest/cycles.py``: about 1000 steps of one joint."""
     return at_rates([20_000], 0.1)
 
 

@@ -9,14 +9,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from io import StringIO
-from pathlib import Path
 from typing import Any
 
 import serial
 
 from armtempo.basics.errors import LinkError
 
-_FOLDER = Path(__file__).with_name("on_board")
 _SILENCE_S = 20.0
 """Longest time without a byte from running code; longer than the board's watchdog."""
 _READ_S = 5.0
@@ -35,8 +33,8 @@ machine.WDT(timeout=100)
 time.sleep(2)
 {RESET}"""
 """The same by the watchdog, which is not fed; by ``RESET`` if that fails."""
-_DROP = " [globals().pop(name) for name in [name for name in globals() if name not in before]]\n"
-"""Delete the names that a part defined, and ``before``, so that a program that continues has its heap."""
+_PARTS = "armtempo_board.selftest"
+"""Package of the board program with the parts."""
 PARTS = ("drivers", "identity", "cycles", "encoders", "pulses", "estop", "rates", "keep")
 """The board stores the number of the running one, from 1, over a reset."""
 
@@ -55,10 +53,12 @@ class SilentError(LinkError):
 
 @dataclass(frozen=True)
 class Measured:
-    """Result of a part: values, and bulk data."""
+    """Result of a part."""
 
     values: dict[str, Any]
     bulk: bytes
+    noted: int
+    """Number of an earlier part that hung; 0 for none."""
 
 
 class Prompt:
@@ -74,13 +74,10 @@ class Prompt:
         with _as_link_error("start"):
             self._port.enter_raw_repl(soft_reset, timeout_overall=_ENTER_S)
 
-    def measure(self, *parts: str, **arguments: Any) -> Measured:
-        """Send files of ``on_board``, call ``measure`` of the last one with these arguments, and drop them."""
-        part = parts[-1]
-        text = "".join((_FOLDER / f"{name}.py").read_text(encoding="utf-8") for name in ("common", *parts))
-        number = PARTS.index(part) + 1
-        call = f"noted = note({number})\ntry: tell(measure(**{arguments!r}))\nfinally:\n note(0)\n{_DROP}"
-        return self._run(part, f"before = list(globals())\n{text}\n{call}")
+    def measure(self, part: str, **arguments: Any) -> Measured:
+        """Run a part of the board program with these arguments."""
+        call = f"run({PARTS.index(part) + 1}, {part!r}, {arguments!r})"
+        return self._run(part, f"from {_PARTS}.run import run\ntry: {call}\nfinally: del run\n")
 
     def rates(self) -> dict[str, float]:
         """Kilobytes per second, from the board and to it."""
@@ -106,8 +103,8 @@ class Prompt:
             raise PartError(f"self-test, {part}: {last}", _cure(part))
         lines = output.splitlines()
         bulk = b"".join(unhexlify(line[1:].strip()) for line in lines if line.startswith(_BULK))
-        values = next((line for line in reversed(lines) if line.startswith(b"{")), b"{}")
-        return Measured(json.loads(values), bulk)
+        values = json.loads(next((line for line in reversed(lines) if line.startswith(b"{")), b"{}"))
+        return Measured(values, bulk, values.pop("noted", 0))
 
 
 @contextmanager

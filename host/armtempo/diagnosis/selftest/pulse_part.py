@@ -22,7 +22,7 @@ _LONGEST_TURN_US = 4000
 """The capture keeps 4096 samples; after a longer turn some are lost."""
 _SLOWEST_STOP_US = 30.0
 STOPS = tuple(f"{pin} by {how}" for pin in ("E-stop", "limit switch") for how in ("software", "an edge"))
-"""The stops of ``on_board/estop.py``."""
+"""The stops of ``board: selftest/estop.py``."""
 CYCLES_PER_US = 168
 _SHORTED = "look for a short between the two pins, and take what is connected off one after the other"
 
@@ -56,7 +56,7 @@ def errors_us(measured: Measured, motion: TestMotion) -> dict[str, Any]:
 def judge(
     measured: Measured, motion: TestMotion, joints: Sequence[dict[str, Any]], forward: bool
 ) -> Iterator[Measurement]:
-    """Lines about ``measured`` of ``on_board/pulses.py``, which ran ``motion``."""
+    """Lines about ``measured`` of ``board: selftest/pulses.py``, which ran ``motion``."""
     values = measured.values
     how = "forward together" if forward else "back alone"
     if values["fault"]:
@@ -159,7 +159,7 @@ def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
 
 
 def judge_stops(values: dict[str, Any]) -> Iterator[Measurement]:
-    """Lines about ``values`` of ``on_board/estop.py``."""
+    """Lines about ``values`` of ``board: selftest/estop.py``."""
     for how in STOPS:
         if took := values["cycles"].get(how):
             yield _stops(how, took)

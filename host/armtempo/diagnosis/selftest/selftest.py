@@ -149,15 +149,15 @@ def _check_drivers(prompt: Prompt, found: SelfTest) -> None:
     """
     prompt.enter(soft_reset=False)
     drivers = _drivers(prompt)
-    if drivers_part.is_on(drivers):
+    if drivers_part.is_on(drivers.values):
         raise LinkError(
             "the drivers are on (ENABLE, PE12, is active)",
             "support the arm, then press the board's reset button, which switches them off, and run the self-test "
             "again; if they are still on, look for a short at PE12",
         )
     prompt.at_end = RESET
-    if 0 < drivers["noted"] <= len(PARTS):
-        found.add([_hung(PARTS[drivers["noted"] - 1])])
+    if 0 < drivers.noted <= len(PARTS):
+        found.add([_hung(PARTS[drivers.noted - 1])])
 
 
 def _hung(part: str) -> Measurement:
@@ -167,15 +167,15 @@ def _hung(part: str) -> Measurement:
     )  # fmt: skip
 
 
-def _drivers(prompt: Prompt) -> dict[str, Any]:
-    return prompt.measure("drivers", record=_ARM_RECORD).values
+def _drivers(prompt: Prompt) -> Measured:
+    return prompt.measure("drivers", record=_ARM_RECORD)
 
 
 def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
     """Run all parts, even after failures, until the board stops answering."""
     try:
         prompt.enter(soft_reset=True)
-        drivers = found.data[DRIVERS] = _drivers(prompt)
+        drivers = found.data[DRIVERS] = _drivers(prompt).values
         found.add(drivers_part.judge(drivers))
         work(0.1, 1)
         if measured := _part(prompt, found, board_part.BOARD, "identity"):
@@ -198,11 +198,11 @@ def _at_prompt(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         found.add([_failed(error.part, error)])
 
 
-def _part(prompt: Prompt, found: SelfTest, part: str, *files: str, **arguments: Any) -> Measured | None:
-    """Run a part; returns its result, None (with a line) after an exception."""
+def _part(prompt: Prompt, found: SelfTest, part: str, name: str, **arguments: Any) -> Measured | None:
+    """Run ``name`` of the board's parts; returns its result, None (with a line of ``part``) after an exception."""
     stage(part)
     try:
-        measured = prompt.measure(*files, **arguments)
+        measured = prompt.measure(name, **arguments)
     except PartError as error:
         found.add([_failed(part, error)])
         return None
@@ -218,7 +218,7 @@ def _is_still(prompt: Prompt, found: SelfTest) -> bool:
     """Whether no encoder turns with the first steps; otherwise ENABLE is wired or configured wrong, and the
     test ends."""
     arguments = _arguments(motion.gentle(found.data[DRIVERS]["joints"]), found)
-    measured = _part(prompt, found, "encoders", "engine", "encoders", **arguments)
+    measured = _part(prompt, found, "encoders", "encoders", **arguments)
     if measured is None:
         return False
     lines = list(drivers_part.judge_encoders(measured.values))
@@ -238,7 +238,7 @@ def _move(prompt: Prompt, found: SelfTest, work: Progress) -> None:
         work(done, 1)
         moved = motion.make(joints) if forward else motion.back_in_turn(joints)
         arguments = {**_arguments(moved, found), "rates": moved.rates, "most": _MOST_EDGES}
-        if measured := _part(prompt, found, pulse_part.PULSES, "engine", "capture", "pulses", **arguments):
+        if measured := _part(prompt, found, pulse_part.PULSES, "pulses", **arguments):
             found.add(pulse_part.judge(measured, moved, joints, forward))
             found.add([_still_off(measured.values, found)])
             if forward:
@@ -256,7 +256,7 @@ def _move_long(prompt: Prompt, found: SelfTest) -> None:
     duration_s = _SIMULATED_LONG_S if found.simulated else _LONG_S
     moved = motion.long(found.data[DRIVERS]["joints"], duration_s)
     arguments = {**_arguments(moved, found), "rates": moved.rates, "most": 0}
-    if measured := _part(prompt, found, pulse_part.PULSES, "engine", "capture", "pulses", **arguments):
+    if measured := _part(prompt, found, pulse_part.PULSES, "pulses", **arguments):
         found.add([pulse_part.judge_long(measured.values, motion.long_steps(duration_s), duration_s)])
         found.add([_still_off(measured.values, found)])
 
@@ -269,7 +269,7 @@ def _stop(prompt: Prompt, found: SelfTest, arguments: dict[str, Any], work: Prog
     for begin in range(0, count, _BATCH):
         work(0.6 + 0.1 * begin / count, 1)
         arguments["waits_us"] = waits_us[begin : begin + _BATCH]
-        measured = _part(prompt, found, pulse_part.SAFETY, "engine", "estop", **arguments)
+        measured = _part(prompt, found, pulse_part.SAFETY, "estop", **arguments)
         if measured is None:
             return
         before = all_of
@@ -353,10 +353,9 @@ class _Trials:
             "rates": [motion.limit(rate) for rate in rates],
             "frames": rate_part.frames(),
             "idle_us": _SIMULATED_TURN_US if self._found.simulated else 0,
-            "watch": (port, rate_part.watch_us(duration_s)) if port else (),
+            "watch": (port, rate_part.watch_us(duration_s)) if port else None,
         }
-        files = ("engine", *(("capture",) if port else ()), "rates")
-        measured = _part(self._prompt, self._found, rate_part.PART, *files, **arguments)
+        measured = _part(self._prompt, self._found, rate_part.PART, "rates", **arguments)
         return None if measured is None else measured.values
 
 

@@ -9,14 +9,13 @@ import random
 import sys
 
 sys.path.insert(0, __file__.rsplit("/", 2)[0] + "/rigs/bare")
-sys.path.append(__file__.rsplit("/", 5)[0] + "/host/armtempo/diagnosis/selftest/on_board")
 
 import machine
 import stand_in
 import stm
 from arm_rows import HEAD, row
+from armtempo_board.selftest.common import largest
 from armtempo_shared import armrecord, engine_memory, motion, wire
-from common import largest
 
 
 class Time:

@@ -113,3 +113,15 @@ def arrive(app, host, at):
 
 def runs(app):
     return app.controller.board.engine.calls.count("start")
+
+
+def counters_of(host):
+    """{name: value} of the counters, and that after the last there is none."""
+    found = {}
+    count = host.ask("counter", (0,))[1][0]
+    for index in range(count):
+        _, fields, name = host.ask("counter", (index,))
+        assert fields[0] == count
+        found[name] = fields[1]
+    assert host.ask("counter", (count,)) == host.ask("counter", (255,)) == ("ok", (count, 0), "")
+    return found

@@ -1,6 +1,14 @@
 """Cost of work in cycles of the processor."""
 
+import gc
+
 import micropython
+
+from armtempo_board.selftest.common import cost, count_cycles, cycles, feed
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
 
 
 @micropython.viper
@@ -12,7 +20,7 @@ def counting(turns: int) -> int:
     return total
 
 
-def plain(turns):
+def plain(turns: int) -> int:
     """The same in byte code."""
     total = 0
     for turn in range(turns):
@@ -20,7 +28,7 @@ def plain(turns):
     return total
 
 
-def emitted(entries):
+def emitted(entries: int) -> int:
     """Cycles of the ring interrupt's ``emit`` for ``entries`` edges of a long cubic."""
     from array import array
 
@@ -39,24 +47,25 @@ def emitted(entries):
     return cost(step_queue.emit, 1, state, array("i", [0] * 18), times=1)
 
 
-def evaluated(motion):
+def evaluated(motion: bytes) -> "tuple[int, int]":
     """(cycles, edges) of the evaluator for all steps of a motion from step 0, with a ring."""
     from array import array
+
+    from armtempo_shared import engine_memory
+    from armtempo_shared.motion import Motion
 
     from armtempo_board.hardware import isr
     from armtempo_board.memory import Memory
     from armtempo_board.stepgen.step_generator import StepGenerator
-    from armtempo_shared import engine_memory
-    from armtempo_shared.motion import Motion
 
     generator = StepGenerator(Memory(list(engine_memory.GENERATOR_PARTS)))
     state = array("i", [0] * isr.STATE_WORDS)
     state[isr.MASK] = 1023
     isr.set_places(state, array("i", [0] * 1025), generator.queue)
-    motion = Motion(motion)
+    record = Motion(motion)
     gc.collect()
     before = cycles()
-    generator.load(motion, 0, 0, 168, 20000)
+    generator.load(record, 0, 0, 168, 20000)
     edges = 0
     while generator.waits() or not generator.ended:
         generator.prepare(1 << 28)
@@ -64,11 +73,11 @@ def evaluated(motion):
     return (cycles() - before) & 0xFFFFFFFF, edges
 
 
-def nothing():
+def nothing() -> None:
     """For the cost of reading the counter."""
 
 
-def measure(motion):
+def measure(motion: str) -> "dict[str, Any]":
     """Cycles of each, without the reading of the counter."""
     from binascii import unhexlify
 
@@ -76,7 +85,7 @@ def measure(motion):
     count_cycles()
     gc.collect()
     empty = cost(nothing)
-    found = {"empty": empty}
+    found: "dict[str, Any]" = {"empty": empty}
     found["byte_code"] = (cost(plain, 1100) - cost(plain, 100)) / 1000
     found["machine_code"] = (cost(counting, 1100) - cost(counting, 100)) / 1000
     found["edges"] = min([emitted(512) for _ in range(3)]) - min([emitted(2) for _ in range(3)])

@@ -1,9 +1,23 @@
 """The times of the edges on the STEP pins in a motion."""
 
-from binascii import hexlify
+from binascii import hexlify, unhexlify
+
+import stm
+from machine import mem32
+from micropython import const
+
+from armtempo_board.selftest.bare_engine import load, make_engine, serve
+from armtempo_board.selftest.capture import begin, captured, end
+from armtempo_board.selftest.common import count_cycles, cycles, enable, feed, free
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+_WORDS = const(32)  # of bulk data in a line
 
 
-def directions(joints):
+def directions(joints: "list[dict[str, int]]") -> "list[int]":
     """Levels of the joints' DIR pins."""
     from armtempo_board.hardware import pins
 
@@ -14,10 +28,10 @@ def directions(joints):
     return found
 
 
-def measure(record, motion, start_steps, rates, idle_us, most):
+def measure(
+    record: str, motion: str, start_steps: "list[int]", rates: "list[int]", idle_us: int, most: int
+) -> "dict[str, Any]":
     """Run the motion (a record in hex) once; up to ``most`` edges are sent as bulk data, 4 bytes each, by port."""
-    from binascii import unhexlify
-
     feed()
     count_cycles()
     captures, steps = captured(record, len(start_steps), most)
@@ -49,13 +63,13 @@ def measure(record, motion, start_steps, rates, idle_us, most):
         off = enable()
         engine.close()
     for capture in captures:
-        data = memoryview(capture.edges)[: min(capture.state[_COUNT], most)]
-        for at in range(0, len(data), 32):
-            print("#" + hexlify(data[at : at + 32]).decode())
+        data = memoryview(capture.edges)[: min(capture.count(), most)]
+        for at in range(0, len(data), _WORDS):
+            print("#" + hexlify(data[at : at + _WORDS]).decode())  # type: ignore[arg-type]
     return {
         "fault": engine.fault,
         "ports": [capture.name for capture in captures],
-        "counts": [capture.state[_COUNT] for capture in captures],
+        "counts": [capture.count() for capture in captures],
         "steps": steps,
         "directions": turned,
         "turns": turns,

@@ -1,22 +1,30 @@
 """Whether the encoders do not turn while the arm's pins step: otherwise a driver is on in spite of ENABLE."""
 
+from array import array
+from binascii import unhexlify
+
+from armtempo_shared import armrecord
+
+from armtempo_board.buffers import COMMANDED
+from armtempo_board.selftest.bare_engine import load, make_engine, serve
+from armtempo_board.selftest.common import enable, feed
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
 _STILL = 2  # counts by which an encoder at an edge may change
 
 
-def measure(record, motion, start_steps, idle_us):
+def measure(record: str, motion: str, start_steps: "list[int]", idle_us: int) -> "dict[str, Any]":
     """Counts of each encoder (None: there is none), and the counts due for its joint's steps.
 
     The motion ends as soon as one turns.
     """
-    from array import array
-    from binascii import unhexlify
-
-    from armtempo_board.buffers import COMMANDED
-
     feed()
     engine, joints = make_engine(record, encoders=True)
     sample = array("i", [0] * (COMMANDED + 2 * len(joints)))
-    ends = [None] * len(joints)
+    ends: "list[Any]" = [None] * len(joints)
     try:
         load(engine, unhexlify(motion), start_steps)
         engine.snapshot(sample)

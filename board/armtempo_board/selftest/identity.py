@@ -1,12 +1,28 @@
 """What the board is: firmware, clocks, flash, heap."""
 
+import time
+
 import micropython
+import stm
+from machine import mem32
+from micropython import const
+
+from armtempo_board.selftest.common import cost, count_cycles, cycles, feed, free, largest
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
 
 _FLASH_FILE = "/flash/selftest.tmp"
 _BLOCK = 4096
+_CNT = const(9)  # word of the counter in a timer
+_LONGEST = const(1)  # of the gaps
+_FRAGMENT = const(1)  # of statvfs
+_FREE_BLOCKS = const(3)
+_NUMBERS = const(3)  # of a version
 
 
-def clocks():
+def clocks() -> "dict[str, int]":
     """Cycles, ticks of TIM2 and microseconds of SysTick in about 50 ms. TIM2 has no interrupt, DMA or output here."""
     rcc = stm.RCC + stm.RCC_APB1ENR
     mem32[rcc] = mem32[rcc] | 1
@@ -15,30 +31,31 @@ def clocks():
     mem32[stm.TIM2 + stm.TIM_ARR] = 0xFFFFFFFF
     mem32[stm.TIM2 + stm.TIM_EGR] = 1
     mem32[stm.TIM2 + stm.TIM_CR1] = 1
-    first = cycles(), mem32[stm.TIM2 + stm.TIM_CNT], time.ticks_us()
+    at = stm.TIM2 + stm.TIM_CNT
+    first_cycle, first_tick, first_us = cycles(), mem32[at], time.ticks_us()
     time.sleep_ms(50)
-    last = cycles(), mem32[stm.TIM2 + stm.TIM_CNT], time.ticks_us()
+    last_cycle, last_tick, last_us = cycles(), mem32[at], time.ticks_us()
     mem32[stm.TIM2 + stm.TIM_CR1] = 0
     return {
-        "cycles": (last[0] - first[0]) & 0xFFFFFFFF,
-        "tim2": (last[1] - first[1]) & 0xFFFFFFFF,
-        "us": time.ticks_diff(last[2], first[2]),
+        "cycles": (last_cycle - first_cycle) & 0xFFFFFFFF,
+        "tim2": (last_tick - first_tick) & 0xFFFFFFFF,
+        "us": time.ticks_diff(last_us, first_us),
     }
 
 
 @micropython.viper
-def read_often(words: ptr32, times: int):
+def read_often(words: ptr32, times: int) -> object:
     """Read a word again and again."""
     for _ in range(times):
         words[0]
 
 
-def reading(words):
+def reading(words: "Any") -> int:
     """Cycles in which a word is read 1000 times."""
     return cost(read_often, words, 1100) - cost(read_often, words, 100)
 
 
-def backup_access():
+def backup_access() -> "float | None":
     """Cycles by which reading a word of the backup SRAM takes longer than one of the heap."""
     from array import array
 
@@ -49,16 +66,16 @@ def backup_access():
 
 
 @micropython.viper
-def note_gap(gaps: ptr32, timer: ptr32):
+def note_gap(gaps: ptr32, timer: ptr32) -> object:
     """An interrupt: keep the longest time between two, in ticks. TIM2 counts."""
-    now = timer[9]
+    now = timer[_CNT]
     passed = (now - gaps[0]) & 0x3FFFFFFF
     gaps[0] = now
-    if passed > gaps[1]:
-        gaps[1] = passed
+    if passed > gaps[_LONGEST]:
+        gaps[_LONGEST] = passed
 
 
-def flash():
+def flash() -> "dict[str, Any] | None":
     """``write_file``, with the longest time in which no interrupt came (one is due every 0.5 ms), in microseconds."""
     from array import array
 
@@ -67,26 +84,26 @@ def flash():
     gaps = array("i", [0, 0])
     at = stm.TIM2
     mem32[at + stm.TIM_CR1] = 1
-    watch = pyb.Timer(7, freq=2000, callback=lambda _: note_gap(gaps, at))
+    watch = pyb.Timer(7, freq=2000, callback=lambda _: note_gap(gaps, at))  # type: ignore[arg-type]
     try:
         time.sleep_ms(2)
-        gaps[1] = 0
+        gaps[_LONGEST] = 0
         found = write_file()
         time.sleep_ms(2)
     finally:
         watch.deinit()
         mem32[at + stm.TIM_CR1] = 0
     if found:
-        found["stall_us"] = gaps[1] // 84
+        found["stall_us"] = gaps[_LONGEST] // 84
     return found
 
 
-def write_file():
+def write_file() -> "dict[str, Any] | None":
     """Milliseconds to write and read a file of 4 KB, None if there is no room; nothing is left of it."""
     import os
 
     space = os.statvfs("/flash")
-    if space[3] * space[1] < 4 * _BLOCK:
+    if space[_FREE_BLOCKS] * space[_FRAGMENT] < 4 * _BLOCK:
         return None
     data = bytes(range(256)) * (_BLOCK // 256)
     begin = time.ticks_ms()
@@ -108,7 +125,7 @@ def write_file():
     }
 
 
-def measure():
+def measure() -> "dict[str, Any]":
     """The figures of this board."""
     import os
     import sys
@@ -118,11 +135,12 @@ def measure():
 
     feed()
     count_cycles()
+    _, _, _, _, name = os.uname()
     return {
-        "machine": os.uname()[4],
-        "version": ".".join([str(part) for part in sys.implementation.version[:3]]),
+        "machine": name,
+        "version": ".".join([str(part) for part in sys.implementation.version[:_NUMBERS]]),
         "unique_id": hexlify(machine.unique_id()).decode(),
-        "freq": list(machine.freq()),
+        "freq": list(machine.freq()),  # type: ignore[call-overload]
         "acr": mem32[stm.FLASH + stm.FLASH_ACR],
         "clocks": clocks(),
         "heap": free(),

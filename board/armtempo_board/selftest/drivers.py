@@ -1,10 +1,16 @@
 """Whether the drivers are off: ENABLE against its level in the arm record."""
 
+from armtempo_board.selftest.common import enable
 
-def measure(record):
-    """``record``: file of the arm record. ``noted``: what the previous part stored."""
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+
+def measure(record: str) -> "dict[str, Any]":
+    """``record``: file of the arm record."""
     active = None
-    joints = []
+    joints: "list[dict[str, int]]" = []
     try:
         with open(record, "rb") as file:
             data = file.read()
@@ -21,5 +27,4 @@ def measure(record):
         "driven": driven,
         "level": level,
         "joints": joints,
-        "noted": noted,
     }

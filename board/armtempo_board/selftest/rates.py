@@ -1,47 +1,67 @@
 """Whether the joints keep up with a step rate: a motion that reaches it, in the program's own loop, with a host."""
 
+import time
+from array import array
+from binascii import unhexlify
+
+from armtempo_shared import codes
+
+from armtempo_board.app.app import App
+from armtempo_board.buffers import COMMANDED
+from armtempo_board.selftest import capture
+from armtempo_board.selftest.bare_engine import load, make_engine
+from armtempo_board.selftest.common import count_cycles, cycles, enable, feed
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
 _COMMAND_MS = 20
 
 
 class Host:
     """In the place of the serial port: a command every 20 ms, and nobody who reads what the board says."""
 
-    def __init__(self, frames):
-        self._frames = frames
+    def __init__(self, frames: "list[bytes]") -> None:
+        self._hello, *self._commands = frames
         self._left = b""
         self._then_ms = time.ticks_ms()
         self.sent = 0
 
-    def readinto(self, buffer, size):
+    def readinto(self, buffer: bytearray, size: int) -> "int | None":
         """What has been received, as of a port."""
         if not self._left and time.ticks_diff(time.ticks_ms(), self._then_ms) >= _COMMAND_MS:
             self._then_ms = time.ticks_ms()
-            self._left = self._frames[2 - self.sent % 2 if self.sent else 0]
+            other = self.sent % 2
+            self._left = self._commands[1 - other] if self.sent else self._hello
             self.sent += 1
         piece = self._left[:size]
         self._left = self._left[size:]
         buffer[: len(piece)] = piece
         return len(piece) or None
 
-    def write(self, data, start, size):
+    def write(self, data: bytes, start: int, size: int) -> int:
         """All is taken."""
         return size
 
 
-def measure(record, motion, rates, frames, idle_us, watch=()):
+def measure(
+    record: str,
+    motion: str,
+    rates: "list[int]",
+    frames: "list[str]",
+    idle_us: int,
+    watch: "tuple[str, int] | None" = None,
+) -> "dict[str, Any]":
     """The first joints of the arm, one for each of ``rates``, from step 0 on: fault, turns of the loop, the longest.
 
     ``frames``: hello, then two commands that take turns. ``watch``: a port, and the microsecond at which its capture
     ends: the steps on its pins in the 4 ms before are measured.
     """
-    from binascii import unhexlify
-
-    from armtempo_board.app.app import App
-    from armtempo_shared import codes
-
     feed()
     count_cycles()
-    captures = captured(record, len(rates), 0, watch[0])[0] if watch else []
+    port, until_us = watch or ("", 0)
+    captures = capture.captured(record, len(rates), 0, port)[0] if watch else []
     host = Host([unhexlify(frame) for frame in frames])
     app = App(host, "/none")  # no arm is stored there: no pin is touched
     engine, _ = make_engine(record, rates=rates, engine_memory=app.controller.board.engine_memory)
@@ -49,16 +69,16 @@ def measure(record, motion, rates, frames, idle_us, watch=()):
     engine.skip_check = True  # a rate is tried that is not allowed
     longest = 0
     try:
-        motion = load(engine, unhexlify(motion), [0] * len(rates))
+        loaded = load(engine, unhexlify(motion), [0] * len(rates))
         if captures:
-            begin(captures)
-        app.controller.start_loaded(motion, 0)
+            capture.begin(captures)
+        app.controller.start_loaded(loaded, 0)
         begun_us = time.ticks_us()
         then = cycles()
         while app.controller.running:
             app.run_once()
-            if captures and time.ticks_diff(time.ticks_us(), begun_us) > watch[1]:
-                end(captures)
+            if captures and time.ticks_diff(time.ticks_us(), begun_us) > until_us:
+                capture.end(captures)
             if idle_us:
                 time.sleep_us(idle_us)
             now = cycles()
@@ -68,7 +88,7 @@ def measure(record, motion, rates, frames, idle_us, watch=()):
     finally:
         engine.freeze()
         if captures:
-            end(captures)
+            capture.end(captures)
         off = enable()
         engine.close()
     fault = app.controller.board.fault()
@@ -84,12 +104,8 @@ def measure(record, motion, rates, frames, idle_us, watch=()):
     }
 
 
-def hand_over(controller, engine, joints):
+def hand_over(controller: "Any", engine: "Any", joints: int) -> None:
     """The controller has this engine, as when it takes an arm."""
-    from array import array
-
-    from armtempo_board.buffers import COMMANDED
-
     controller.board.engine = engine
     controller.board.joints = joints
     controller.board.raw = array("i", [0] * (COMMANDED + 2 * joints))

@@ -1,12 +1,26 @@
-"""Prefix of parts that make steps: the engine for the board's arm, without its drivers."""
+"""An engine for the board's arm without its drivers, for the parts that make steps."""
 
+import time
+
+import stm
 from armtempo_shared import armrecord
+from machine import mem32
+
+from armtempo_board.selftest.common import enable
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+    from armtempo_shared.motion import Motion
+
+    from armtempo_board.motion.engine import Engine
 
 
 class NoPin:
     """Replaces ENABLE, so that the engine cannot switch the drivers on."""
 
-    def value(self, level=None):
+    def value(self, level: "int | None" = None) -> int:
         """Nothing."""
         return 0
 
@@ -15,7 +29,13 @@ _SEEN_TICKS = 168  # 2 us: two samples of a capture at 1 MHz
 _RANGE = 1 << 24  # steps; with the drivers off a joint can go anywhere
 
 
-def make_engine(record, switches=False, rates=None, encoders=False, engine_memory=None):
+def make_engine(
+    record: str,
+    switches: bool = False,
+    rates: "list[int] | None" = None,
+    encoders: bool = False,
+    engine_memory: "Any" = None,
+) -> "tuple[Engine, list[dict[str, int]]]":
     """(engine, rows of its joints); it only steps the pins of this arm, and the arm's E-stop stops it.
 
     ``switches``: with E-stop and limit switch 1 for the first joint, whatever the arm has. ``rates``: of this number of
@@ -47,13 +67,13 @@ def make_engine(record, switches=False, rates=None, encoders=False, engine_memor
     else:
         memory_shares.resize(engine_memory, len(joints))
     engine = Engine(EngineParts(head, joints, engine_memory))
-    engine.inputs.enable_pin = NoPin()
+    engine.inputs.enable_pin = NoPin()  # type: ignore[assignment]
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         pull_inactive(engine)
     return engine, joints
 
 
-def pulls(pin, level):
+def pulls(pin: str, level: int) -> "tuple[int, int, int]":
     """(register, value to pull an input to a level, value for the other level) of its pull resistor."""
     from armtempo_board.hardware import pins
 
@@ -64,7 +84,7 @@ def pulls(pin, level):
     return at, down_up[level], down_up[1 - level]
 
 
-def pull_inactive(engine):
+def pull_inactive(engine: "Any") -> None:
     """Pull the E-stop's input to its inactive level, in case it is not wired; a switch is stronger.
 
     Raises ValueError if it is pressed.
@@ -80,14 +100,14 @@ def pull_inactive(engine):
         raise ValueError("the E-stop is pressed, or wired for the other level")
 
 
-def serve(engine, idle_us):
+def serve(engine: "Engine", idle_us: int) -> None:
     """A turn of the loop. ``idle_us``: its duration in simulated time."""
     engine.service()
     if idle_us:
         time.sleep_us(idle_us)
 
 
-def load(engine, motion, start_steps):
+def load(engine: "Any", motion: bytes, start_steps: "list[int]") -> "Motion":
     """Declare the joints at the motion's start and load it; returns it. ValueError if the drivers are not off."""
     from armtempo_shared.motion import Motion
 
@@ -95,6 +115,6 @@ def load(engine, motion, start_steps):
     if not output or driven != level or level == engine.inputs.on_level:
         raise ValueError("ENABLE is not inactive: no steps are made")
     engine.home((1 << len(start_steps)) - 1, start_steps)
-    motion = Motion(motion)
-    engine.load(motion)
-    return motion
+    found = Motion(motion)
+    engine.load(found)
+    return found

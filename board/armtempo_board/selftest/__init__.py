@@ -1,0 +1,1 @@
+"""The board measures itself: parts that a host runs at the prompt, with the program in the firmware (``run.py``)."""

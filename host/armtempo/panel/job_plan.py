@@ -1,0 +1,142 @@
+"""The plan of the panel's job: made, cancelled, played on the model, with its curves."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from nicegui import run, ui
+
+from armtempo import pipeline
+from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.model.job import Job
+from armtempo.panel import words
+from armtempo.panel.charts import CurveChart
+from armtempo.panel.panel_board import Needs
+from armtempo.panel.panel_page import named
+
+if TYPE_CHECKING:
+    from armtempo.model.plan import Plan
+    from armtempo.panel.panel_page import PanelPage
+    from armtempo.panel.press import Press
+
+_POINTS = 200
+_PLAY_S = 0.05
+
+
+class JobPlan:
+    """Its part of the job's tab, on one page; the plan is the panel's."""
+
+    def __init__(self, page: PanelPage) -> None:
+        self._page = page
+        self._operator = page.operator
+        self._jobs = page.operator.jobs
+        self._planning = self._cancelled = False
+        self._played: Plan | None = None
+        self._plan_row()
+        self._play_row()
+        self._charts = [
+            CurveChart(page.operator.arm, title, order)
+            for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
+        ]
+
+    def _plan_row(self) -> None:
+        page = self._page
+        with ui.row():
+            page.button(words.PLAN, self._plan, Needs.CONTROL, self._why_no_plan, look=" icon=insights")
+            self._stop = ui.button(words.CANCEL, on_click=self._cancel).props("flat no-caps")
+            self._stop.set_visibility(False)
+            self._result = ui.label("").props('role="status"')
+        self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
+        self._bar.set_visibility(False)
+
+    def _why_no_plan(self) -> str:
+        return words.BUSY.format(what=words.PLAN) if self._planning else ""
+
+    def _plan(self, press: Press) -> Awaitable[None]:
+        self._operator.check(self._page.client, press, Needs.CONTROL)
+        try:
+            job = self._jobs.job()
+        except InputError as error:
+            raise InputError(words.of_job(error.problem), words.of_job(error.hint)) from None
+        return self._make_plan(job, self._jobs.version)
+
+    async def _make_plan(self, job: Job, version: int) -> None:
+        try:
+            self._show_planning(True)
+            plan = await run.io_bound(pipeline.plan, self._operator.arm, job, self._progress)
+            if plan is not None:  # it is None if the panel ends meanwhile
+                self._jobs.planned(plan, version)
+        except ArmtempoError as error:
+            ui.notify(words.of_job(str(error)), type="negative", multi_line=True, timeout=8000)
+        except asyncio.CancelledError:
+            pass
+        finally:
+            self._show_planning(False)
+
+    def _show_planning(self, planning: bool) -> None:
+        self._planning, self._cancelled = planning, False
+        self._bar.set_visibility(planning)
+        self._stop.set_visibility(planning)
+        self._page.refresh()
+
+    def _progress(self, done: float, whole: float) -> None:
+        if self._cancelled:
+            raise InputError(words.CANCELLED, words.PLAN_AGAIN)
+        self._bar.value = done / whole if whole else 0.0
+
+    def _cancel(self) -> None:
+        self._cancelled = True
+
+    # on the model
+
+    def _play_row(self) -> None:
+        with ui.row().classes("no-wrap full-width"):
+            play = ui.button(icon="play_arrow", on_click=self._play).props("outline dense")
+            named(play, words.PLAY)
+            self._page.control(play, None, self._why_no_play)
+            self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time)
+            named(self._slider, words.PLAY_TIME)
+            self._page.control(self._slider, None, self._why_no_play)
+            self._time = ui.label("").classes("armtempo-percent")
+
+    def _why_no_play(self) -> str:
+        return "" if self._played else words.NO_PLAN
+
+    def _show_time(self) -> None:
+        if (plan := self._played) is not None:
+            time_s = plan.total_s * self._slider.value / 1000
+            self._time.set_text(f"{time_s:.2f} s")
+            self._page.show_ghost(plan.trajectory(time_s))
+            for chart in self._charts:
+                chart.mark(time_s)
+
+    async def _play(self) -> None:
+        if (plan := self._played) is None:
+            return
+        for time_s in np.arange(0.0, plan.total_s, _PLAY_S):
+            self._slider.set_value(round(1000 * float(time_s) / plan.total_s))
+            await asyncio.sleep(_PLAY_S)
+        self._slider.set_value(1000)
+
+    def look(self) -> None:
+        """Show a plan that is new, also by another page."""
+        self._result.set_text(self._describe_plan())
+        plan = self._jobs.plan
+        if plan is None or plan is self._played:
+            return
+        self._played = plan
+        times = np.linspace(0.0, plan.total_s, _POINTS)
+        for order, chart in enumerate(self._charts):
+            chart.show(times, plan.trajectory(times, order))
+
+    def _describe_plan(self) -> str:
+        plan = self._jobs.plan
+        if plan is None:
+            return words.NO_PLAN
+        if self._jobs.plan_is_old:
+            return words.PLAN_IS_OLD
+        bound = max(search.floor_s for search in plan.searches)
+        return words.MOTION_TIME.format(total=plan.total_s, bound=bound)
