@@ -13,8 +13,11 @@ from armtempo.diagnosis import drives
 from armtempo.encoding import encode, engine_heap
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
+from armtempo.model.job import Job
+from armtempo.model.parts import Limits
+from armtempo.planning import planner
 from armtempo_shared import armrecord, engine_memory
-from armtempo_shared.limits import TICK_HZ
+from armtempo_shared.limits import MAX_STEP_RATE, TICK_HZ
 
 PAPER = Arm.paper()
 SEED = 20265
@@ -89,6 +92,7 @@ def test_an_arm_without_a_step_of_it_is_sent_as_before() -> None:
     [(10.0, 0.05, "to cross it takes"), (3.0, 3000.0, "until they are made the motor reaches")],
 )
 def test_what_cannot_be_crossed_is_refused(play_deg: float, acceleration: float, said: str) -> None:
+    """When it is planned, before anything is sent, and when it is sent."""
     arm = with_backlash(0.0, play_deg)
     limits = replace(
         PAPER.table_joints[1].limits,
@@ -96,8 +100,23 @@ def test_what_cannot_be_crossed_is_refused(play_deg: float, acceleration: float,
         speed_deg_s=400.0,  # type: ignore[type-var]
     )
     joints = [replace(joint, limits=limits) if joint.name == "joint 2" else joint for joint in arm.joints]
-    with pytest.raises(InputError, match=f"joint 2: backlash_deg = .*{said}"):
-        encode.arm_record(replace(arm, joints=tuple(joints)))
+    arm = replace(arm, joints=tuple(joints))
+    for refuses in (encode.arm_record, lambda arm: planner.plan(arm, Job.paper(arm))):
+        with pytest.raises(InputError, match=f"joint 2: backlash_deg = .*{said}"):
+            refuses(arm)
+
+
+def test_the_crossing_counts_for_the_step_rate() -> None:
+    """A speed that leaves too little for it is refused when it is planned, too."""
+    (joint, *others) = with_backlash(10.0).joints
+    assert joint.motor is not None
+    most_deg_s = MAX_STEP_RATE / joint.motor.steps_per_deg
+    limits = Limits(1.001 * most_deg_s, 50.0, 150.0)
+    arm = replace(PAPER, joints=(replace(joint, limits=limits), *others))
+    assert arm.driven[0].limits.speed_deg_s < most_deg_s
+    for refuses in (encode.arm_record, lambda arm: planner.plan(arm, Job.paper(arm))):
+        with pytest.raises(InputError, match=r"joint 1 at its speed limit of .* steps/s"):
+            refuses(arm)
 
 
 def test_check_names_it_and_the_memory_grows() -> None:

@@ -92,7 +92,7 @@ def test_a_ratio_that_a_word_cannot_hold_is_refused() -> None:
 def test_a_speed_in_the_wrong_unit_is_refused_with_the_step_rate() -> None:
     joint = replace(ARM.joints[1], limits=Limits(40_000.0, 30.0, 120.0))
     arm = replace(ARM, joints=(ARM.joints[0], joint, *ARM.joints[2:]))
-    with pytest.raises(InputError, match=r"joint 2: speed_deg_s = 40000 means 3555556 steps/s"):
+    with pytest.raises(InputError, match=r"joint 2 at its speed limit of 40000 deg/s needs 3555556 steps/s"):
         encode.arm_record(arm)
 
 

@@ -14,7 +14,7 @@ from armtempo import pipeline
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.cli.taught_points import NamedPoints, NewTool
+from armtempo.cli.taught_points import NamedPoints
 from armtempo.encoding import encode, planned_for
 from armtempo.kinematics import dynamics
 from armtempo.kinematics.forward import forward as of_geometry
@@ -33,6 +33,7 @@ from armtempo.planning import via_points, workspace_check
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.planning.tool import Tool
+from armtempo.robot.teaching import NewTool
 from armtempo.splines.trajectory import Trajectory
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation

@@ -5,12 +5,15 @@ from __future__ import annotations
 import itertools
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import armtempo
+import numpy as np
 import pytest
 from armtempo.basics.errors import BoardError
 from armtempo.cli import state
+from armtempo.encoding import encode
 from armtempo.robot.stop_request import Stopped, StopRequest
 from armtempo.simulator import LaunchOptions, edgelog, launch
 
@@ -18,6 +21,7 @@ from tests import interpreters
 from tests.host.test_user_program import HEAD, example
 from tests.system import commandline
 from tests.system.sequences import ARM, FOLDER, GRIPPER, SHIPPED, part_lies_there
+from tests.system.test_virtual_arm import step_signs
 
 INTERPRETERS = [name for name in interpreters.AVAILABLE if name != "micropython-arm"]
 
@@ -28,7 +32,12 @@ def options(interpreter: str, **more: object) -> LaunchOptions:
 
 @pytest.mark.parametrize("name", INTERPRETERS[-1:])
 def test_pick_and_place(name: str, tmp_path: Path) -> None:
-    """The example; a part lies there always, so it is stopped after the first one."""
+    """The example; a part lies there always, so it is stopped after the first one. Joints have backlash, which the
+    steps on the pins cross."""
+    joints = [
+        replace(joint, motor=joint.motor and replace(joint.motor, backlash_deg=0.3)) for joint in ARM.joints
+    ]
+    arm = replace(ARM, joints=tuple(joints))
     path = example("pick_place.py", tmp_path)
     stop, said = StopRequest(), []
 
@@ -40,9 +49,9 @@ def test_pick_and_place(name: str, tmp_path: Path) -> None:
     edges = tmp_path / "edges"
     with (
         launch(options(name, faults=[part_lies_there()], edge_log=edges)) as process,
-        armtempo.connect(process.port, ARM) as board,
+        armtempo.connect(process.port, arm) as board,
     ):
-        board.home(ARM)
+        board.home(arm)
         board.goto([5.0, -58.0, 42.0])  # the part lies there from this motion on
         with pytest.raises(Stopped):
             board.run_program(path, listen, stop=stop)
@@ -52,8 +61,14 @@ def test_pick_and_place(name: str, tmp_path: Path) -> None:
         (listed,) = board.list()
         assert listed.program
         assert not listed.sequence
+        stands_deg = board.posture_deg()
     assert said == ["part 1"]
     (power,) = edgelog.read(edges)
+    for joint, row, at_deg in zip(arm.driven, encode.backlash(arm), stands_deg, strict=True):
+        signs, moved = step_signs(power, joint), (at_deg - joint.home_deg) * joint.steps_per_deg
+        assert np.count_nonzero(np.diff(signs)) > 1, joint.name
+        crossed = row["steps"] * (signs[-1] - signs[0]) / 2
+        assert signs.sum() - crossed == pytest.approx(moved, abs=0.6), joint.name
     widths = [width for width, _ in itertools.groupby(p.high_ticks for p in power.pulses[GRIPPER]) if width]
     opened, closed = widths[0], max(widths)
     assert widths[:3] == [opened, closed, opened]

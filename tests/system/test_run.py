@@ -73,11 +73,16 @@ def test_stored_motion_keeps_its_place_in_a_sim_folder(tmp_path: Path) -> None:
 
 
 def test_a_sim_folder_keeps_where_the_arm_stands(tmp_path: Path) -> None:
+    """One with backlash: who declares where it stands is told that the side of its play is unknown, until it moves."""
+    text = shipped.files()["ar4"].read_text()
+    (tmp_path / "ar4.toml").write_text(text.replace("motor = {", "motor = { backlash_deg = 0.1,", 1))
+
     def sim(*arguments: str) -> str:
-        return armtempo(*arguments, "--arm", "ar4", "--port", "sim:flash", folder=tmp_path)
+        return armtempo(*arguments, "--arm", "ar4.toml", "--port", "sim:flash", folder=tmp_path)
 
     kept = tmp_path / "flash-position.json"
-    sim("home", "1,2,3,4,5,6")
+    done = commandline.run("home", "1,2,3,4,5,6", "--arm", "ar4.toml", "--port", "sim:flash", folder=tmp_path)
+    assert "joint 1: the first move may lose up to the backlash" in done.errors.replace("\n", " ")
     moved = kept.read_text()
     assert re.search(r"joint 1 +1\.00° .*encoder 1\.00°", sim("status"))
     assert kept.read_text() == moved

@@ -29,6 +29,7 @@ from armtempo.robot.store import store
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
 from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.wire import ERROR_CODES
+from numpy.typing import NDArray
 
 from tests import scripted
 from tests.system import commandline
@@ -135,8 +136,8 @@ def test_a_fault_ends_the_run_by_its_name(fault: InjectedFault, ends: str, joint
     ("compensated_deg", "lost_deg"), [(0.5, 0.0), pytest.param(0.0, 0.5, marks=pytest.mark.long)]
 )
 def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float) -> None:
-    """There and back, by an encoder on the joint: it stands as far from its command after both, and after a jog that
-    is shorter than the backlash."""
+    """There and back, by an encoder on the joint: it stands as far from its command after both, though the board gets
+    other limits in between, and after a jog that is shorter than the backlash."""
     plain = commandline.ARM.joints[0]
     assert plain.encoder is not None
     assert plain.motor is not None
@@ -147,6 +148,7 @@ def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float)
         model=replace(plain.model, backlash_deg=0.5, scatter_deg=0.0),
     )
     places = np.array(arm.home_deg), TARGET_DEG
+    slower = replace(arm, safety=replace(arm.safety, link_timeout_ms=arm.safety.link_timeout_ms + 1))
     off_deg = []
     with launch(LaunchOptions(arm=arm)) as process, open_board(process.port) as board, StopRequest() as stop:
         arm_state.configure(board, arm, replace=True)
@@ -155,6 +157,8 @@ def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float)
             record = encode.motion_record(point_to_point.straight("move", here, there, arm), arm)
             end = stored_motion.replay(board, store(board, [("move", record)], replace=True), stop)
             assert not end.fault
+            arm = slower
+            arm_state.configure(board, arm, replace=True)  # which declares the encoder, too
             positions = board.status().positions
             assert abs(positions.commanded_steps[0] - there[0] * arm.driven[0].steps_per_deg) <= 0.5
             off_deg.append(positions.counts[0] * 360 / FINE_COUNTS - there[0])
@@ -287,14 +291,46 @@ def test_six_joints_by_their_switches(tmp_path: Path, monkeypatch: pytest.Monkey
     assert np.add(HOMED_FROM, moved_deg) == pytest.approx(list(found.home_deg), abs=0.1)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("start", [6.0, -8.0])
+def test_homing_crosses_the_backlash(tmp_path: Path, start: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By its pulses the joint ends at home, too, which is a little off the switch, or far."""
+    found, log = switched_arm(tmp_path), tmp_path / "log"
+    (joint,) = found.joints[:1]
+    assert joint.motor is not None
+    motor, model = (
+        replace(joint.motor, backlash_deg=1.0),
+        replace(joint.model, backlash_deg=1.0, scatter_deg=0.0),
+    )
+    found = first_joint(found, motor=motor, model=model, home_deg=start)
+    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(homing, "SLOW", 0.2)
+    with launch(LaunchOptions(arm=found, edge_log=log)) as virtual, open_board(virtual.port) as board:
+        arm_state.configure(board, found, replace=True)
+        with StopRequest() as stop:
+            homing.home_to_switches(board, found, stop)
+    (cycle,) = edgelog.read(log)
+    signs = step_signs(cycle, found.driven[0])
+    play = found.driven[0].steps_per_deg
+    motor_steps, joint_steps = 0, 0.0
+    for sign in signs:
+        motor_steps += sign
+        joint_steps = min(max(joint_steps, motor_steps - play / 2), motor_steps + play / 2)
+    assert joint_steps / play == pytest.approx(0.0, abs=0.1)
+
+
 def _moved_deg(cycle: edgelog.PowerCycle, joint: DrivenJoint) -> float:
     """How far the pulses have moved a joint's motor since power-up."""
+    return float(step_signs(cycle, joint).sum()) / joint.steps_per_deg
+
+
+def step_signs(cycle: edgelog.PowerCycle, joint: DrivenJoint) -> NDArray[np.int64]:
+    """Of each step of a joint's motor since power-up, whether the joint's angle becomes larger (1) or smaller (-1)."""
     pins, channel = engine_pins.table(), joint.motor.channel - 1
     ticks, levels = cycle.pins[pins["STEP"][channel][0]]
     turns, to = cycle.pins[pins["DIR"][channel]]
     at = np.searchsorted(turns, ticks[levels == 1], side="right")
-    signs = np.where(np.concatenate(([1 - to[0]], to))[at] == 1, 1, -1)
-    return float(signs.sum()) * joint.motor.direction / joint.steps_per_deg
+    return joint.motor.direction * np.where(np.concatenate(([1 - to[0]], to))[at] == 1, 1, -1)
 
 
 def test_switch_with_a_broken_wire(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from armtempo_shared import armrecord, codes
 from armtempo_shared.messages import ARM_RECORD_NAME
 from pyb import Pin, Timer
 
+from armtempo_board import features
 from armtempo_board.app import memory_shares
 from armtempo_board.app.board import NEVER_MS
 from armtempo_board.buffers import COMMANDED
@@ -85,16 +86,22 @@ def _take(board: "Board", record: "Record") -> None:
     if crc == board.arm_crc:
         return
     all_but_limits, stops = _facts(record)
-    known, steps = 0, []
+    known, steps, sides = 0, [], []
     if board.engine and all_but_limits == board.all_but_limits:  # the same arm: positions stay known
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
+        if features.BACKLASH and backlash:
+            from armtempo_board.motion import backlash_drive  # here, as few arms need its memory
+
+            sides = backlash_drive.sides(board.engine.drives)
     _drop_engine(board)
     memory_shares.resize(board.engine_memory, len(joints), armrecord.backlash_count(backlash))
     board.make_engine(head, joints, backlash)
     board.all_but_limits = all_but_limits
     if known:
         board.engine.home(known, steps)
+        if sides:
+            backlash_drive.take_sides(board.engine.drives, sides)
     board.silence_ms = head["link_timeout_ms"] if stops else NEVER_MS
     board.joints = len(joints)
     board.arm_crc = crc

@@ -280,7 +280,10 @@ class Controller:
 
     def _withdraw_assumed(self) -> None:
         if self._assumed:
-            self.board.engine.known &= ~self._assumed
+            engine = self.board.engine
+            if features.BACKLASH:
+                engine.withdrawn |= engine.known & self._assumed
+            engine.known &= ~self._assumed
             self._assumed = 0
 
     def stop(self, now: int) -> None:

@@ -120,13 +120,24 @@ class BacklashDrive(JointDrive):
         if self._following:
             self.extra_counts = self._following.expected(steps - self._declared_ahead)
 
-    def declare(self, steps: int, was_known: int) -> None:
-        """As of ``JointDrive``; the encoder is declared with it. If the position was not known, nor is the side."""
-        super().declare(steps, was_known)
+    def declare(self, steps: int, were_counted: int) -> None:
+        """As of ``JointDrive``; the encoder is declared with it. If not all steps were counted, the side is unknown."""
+        super().declare(steps, were_counted)
         self._declared_ahead = self._motor_ahead
         self.extra_counts = 0
-        if not was_known:
+        if not were_counted:
             self._is_side_known = False
+
+    def side(self) -> "tuple[int, int] | None":
+        """In which direction the motor pushes, and how many steps before it does; None if that is not known."""
+        return (self._direction, self._left) if self._is_side_known else None
+
+    def take_side(self, direction: int, left: int) -> None:
+        """As ``side`` was in an engine before this one; the position is declared."""
+        self._is_side_known = True
+        self._direction = direction
+        left = self._left = self._base_steps = min(left, self._play)
+        self._motor_ahead = self._declared_ahead = -left if direction > 0 else left - self._play
 
     def settle(self) -> None:
         """As of ``JointDrive``; the last step may be one that crosses the play."""
@@ -294,3 +305,16 @@ class BacklashDrive(JointDrive):
         ring.state[_ROOM] = ring.entries - isr.SPARE_ENTRIES
         emit(_THIS_RING, ring.state, ring.timer)
         return codes.UNDERRUN if ring.run() else 0
+
+
+def sides(drives: "list[JointDrive]") -> "list[tuple[int, int] | None]":
+    """Of all joints, ``BacklashDrive.side``; None without backlash."""
+    return [drive.side() if isinstance(drive, BacklashDrive) else None for drive in drives]
+
+
+def take_sides(drives: "list[JointDrive]", found: "list[tuple[int, int] | None]") -> None:
+    """Give the drives what ``sides`` found, as far as they have backlash."""
+    for drive, side in zip(drives, found):
+        if side and isinstance(drive, BacklashDrive):
+            direction, left = side
+            drive.take_side(direction, left)

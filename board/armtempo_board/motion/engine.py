@@ -78,15 +78,23 @@ class Engine:
         self._watched_joint = self._background_task = 0
         self._homing = 0  # one bit per joint whose switches end a homing motion
         self._in_service = False  # service() or refill() is running, or did not reach its end
+        if features.BACKLASH:
+            self.withdrawn = (
+                0  # one bit per joint whose position only homing has assumed; its steps are counted
+            )
         self.skip_check = False  # the next motion was already checked, and nothing has changed since
 
     # between motions
 
     def home(self, mask: int, steps: "list[int]") -> None:
         """Set the positions of the joints in ``mask`` to ``steps`` (an entry for every joint)."""
+        counted = self.known
+        if features.BACKLASH:
+            counted |= self.withdrawn
+            self.withdrawn &= ~mask
         for number, joint in enumerate(self.drives):
             if mask >> number & 1:
-                joint.declare(steps[number], self.known >> number & 1)
+                joint.declare(steps[number], counted >> number & 1)
                 self._encoders[number].declare(self._following[number].expected(steps[number]))
         self.known |= mask
 
@@ -95,6 +103,8 @@ class Engine:
         self.inputs.enable(on != 0)
         if not on:
             self.known = 0
+            if features.BACKLASH:
+                self.withdrawn = 0
 
     def clear(self) -> bool:
         """Clear the fault, unless its cause persists; returns whether it is cleared."""
@@ -119,6 +129,8 @@ class Engine:
         """Note a switch that may have tripped, and that an E-stop released the drivers."""
         if self.inputs.note_trip() and self.inputs.releases:
             self.known = 0
+            if features.BACKLASH:
+                self.withdrawn = 0
 
     def _take_fault(self) -> None:
         self.fault = self.block[isr.FAULT]

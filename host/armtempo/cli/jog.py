@@ -86,7 +86,7 @@ def jog(
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 made = screen(board, pressed, speed)
-                made.choice.frame = frame or BASE
+                made.choice.choose(frame or BASE)
                 made.loop()
         elif joint is not None and to is not None:
             to_deg, to_mm = by_of_joint(made_for, joint, to)

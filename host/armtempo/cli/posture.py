@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -118,6 +119,7 @@ def home(where: str, switches: bool, joint: str | None, job_path: Path | None, g
         arm = resolve.arm_of_board(board, wanted.arm)
         angles_deg = wanted.angles_deg(arm, job_path)
         board.configure(arm, replace=given.replace_arm)
+        unknown = [stands.name for stands in board.state().joints if not stands.known]
         if switches:
             say = results.progress_printer(given.as_json)
             board.home_to_switches(arm, joint=joint, progress=lambda text, done, whole: say(text))
@@ -126,6 +128,19 @@ def home(where: str, switches: bool, joint: str | None, job_path: Path | None, g
         else:
             board.home(arm, angles_deg)
         print_position(board, given.as_json)
+        if not switches:
+            _remark_on_backlash(arm, unknown)
+
+
+def _remark_on_backlash(arm: Arm, unknown: Collection[str]) -> None:
+    """Of joints whose position was unknown, so that it is unknown on which side of its play a motor is."""
+    pairs = zip(arm.driven, arm.crossings, strict=True)
+    names = [joint.name for joint, crossing in pairs if crossing and joint.name in unknown]
+    if names:
+        results.remark(
+            f"{', '.join(names)}: the first move may lose up to the backlash; to avoid that, jog each of them in one "
+            "direction by more than its backlash, then declare again where it stands"
+        )
 
 
 def is_named(text: str) -> bool:

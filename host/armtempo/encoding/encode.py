@@ -29,7 +29,6 @@ from armtempo.splines.trajectory import Trajectory
 
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
 """Fields of a joint that do not affect its position in steps."""
-_LONGEST_CROSSING_S = 2.0
 _TICKS_PER_US = limits.TICK_HZ / 1e6
 
 
@@ -40,12 +39,12 @@ def arm_record(arm: Arm) -> bytes:
 
 def motor_rows(arm: Arm) -> list[dict[str, Any]]:
     """Rows of ``armrecord.JOINT``; raises as ``arm_record``."""
-    return [_motor(arm, number) for number in range(len(arm.motors))]
+    return [_motor(arm, number, rate) for number, rate in enumerate(step_rates(arm))]
 
 
 def step_rates(arm: Arm) -> list[int]:
-    """The highest step rates of the motors in the arm record, steps/s."""
-    return [_max_rate(arm, number) for number in range(len(arm.motors))]
+    """The highest step rates of the motors in the arm record, steps/s; raises as ``arm_record``."""
+    return [with_margin(rate) for rate in checks.highest_rates(arm)]
 
 
 def move_limits(arm: Arm) -> list[list[int]]:
@@ -159,7 +158,7 @@ def _as_floats(value: Any) -> Any:
     return float(value) if isinstance(value, int | float) else value
 
 
-def _motor(arm: Arm, number: int) -> dict[str, Any]:
+def _motor(arm: Arm, number: int, max_rate: int) -> dict[str, Any]:
     joint = arm.motors[number]
     motor, encoder, switches = joint.motor, joint.encoder, joint.switches
     per_step = joint.counts_per_step
@@ -187,7 +186,7 @@ def _motor(arm: Arm, number: int) -> dict[str, Any]:
         "counts_den": per_step.denominator,
         "min_steps": low,
         "max_steps": high,
-        "max_rate": _max_rate(arm, number),
+        "max_rate": max_rate,
         "following_counts": round(following),
         "limit_low": _switch(switches.low if forward else switches.high),
         "limit_high": _switch(switches.high if forward else switches.low),
@@ -207,6 +206,7 @@ def backlash(arm: Arm) -> list[dict[str, Any]]:
 
     Raises InputError if the board cannot cross one.
     """
+    checks.check_crossings(arm)
     rows = [_backlash(motor, crossing) for motor, crossing in zip(arm.motors, arm.crossings, strict=True)]
     return rows if armrecord.backlash_count(rows) else []
 
@@ -215,45 +215,9 @@ def _backlash(motor: DrivenJoint, crossing: Crossing | None) -> dict[str, Any]:
     steps = round(crossing.play_deg * motor.steps_per_deg) if crossing else 0
     if not crossing or not steps:
         return {"steps": 0, "on_motor": 0, "spare": 0, "pace": 0}
-    _check_crossing(motor, crossing, steps)
     pace = math.sqrt(2.0 / (crossing.acceleration_deg_s2 * motor.steps_per_deg)) * limits.TICK_HZ / 64
     on_motor = motor.encoder is not None and motor.encoder.on == "motor"
     return {"steps": steps, "on_motor": int(on_motor), "spare": 0, "pace": math.ceil(pace)}
-
-
-def _check_crossing(motor: DrivenJoint, crossing: Crossing, steps: int) -> None:
-    what = f"{motor.name}: {motor.unit.key('backlash_deg')} = {crossing.play_deg:g}"
-    if crossing.duration_s > _LONGEST_CROSSING_S:
-        raise InputError(
-            f"{what}: to cross it takes {crossing.duration_s:.2g} s at its limits, more than {_LONGEST_CROSSING_S:g} s",
-            "check the unit, and the joint's limits",
-        )
-    gained = motor.limits.acceleration_deg_s2 * crossing.duration_s
-    rate = (min(motor.limits.speed_deg_s, gained) + crossing.speed_deg_s) * motor.steps_per_deg
-    if rate > limits.MAX_CROSSING_RATE or steps > limits.MAX_BACKLASH_STEPS:
-        raise InputError(
-            f"{what} is {steps} steps, and until they are made the motor reaches {rate:.0f} steps/s; the board makes "
-            f"at most {limits.MAX_BACKLASH_STEPS} and {limits.MAX_CROSSING_RATE} steps/s",
-            f"use fewer microsteps, or lower {motor.unit.key('acceleration_deg_s2')}",
-        )
-
-
-def _max_rate(arm: Arm, number: int) -> int:
-    """A motor's speed limit in steps/s, with a margin for rounding.
-
-    Raises InputError if the board cannot step that fast.
-    """
-    motor, crossing = arm.motors[number], arm.crossings[number]
-    rate = (motor.limits.speed_deg_s + (crossing.speed_deg_s if crossing else 0.0)) * motor.steps_per_deg
-    if rate > limits.MAX_STEP_RATE:
-        raise InputError(
-            (
-                f"{motor.name}: {motor.unit.key('speed_deg_s')} = {motor.limits.speed_deg_s:g} means {rate:.0f} "
-                f"steps/s; the board makes at most {limits.MAX_STEP_RATE}"
-            ),
-            f"check the unit, microsteps and {'mm_per_rev' if motor.slides else 'gear_ratio'}",
-        )
-    return with_margin(rate)
 
 
 def with_margin(rate: float) -> int:

@@ -42,6 +42,11 @@ class SequenceEditor(FileEditor):
         super().__init__(arm, folder)
         self._plan: tuple[int, SequencePlan | None] = (-1, None)
 
+    def take_arm(self, arm: Arm) -> None:
+        """Take another version of the arm, for which it is planned anew."""
+        super().take_arm(arm)
+        self._plan = -1, None
+
     def new_text(self, name: str) -> str:
         """A sequence that goes home."""
         return f'name = "{name}"\n\n[[step]]\ngoto = "home"\n'

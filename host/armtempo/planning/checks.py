@@ -11,6 +11,8 @@ from armtempo_shared import motion
 from armtempo_shared.limits import (
     LONGEST_SPAN_TICKS,
     LONGEST_TICKS,
+    MAX_BACKLASH_STEPS,
+    MAX_CROSSING_RATE,
     MAX_MOTION_BYTES,
     MAX_SEGMENTS,
     MAX_STEP_RATE,
@@ -24,6 +26,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
+from armtempo.model.drive_limits import Crossing
 from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
@@ -32,6 +35,9 @@ from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 ESTIMATED = "(estimated; 'armtempo selftest' measures your board)"
+
+LONGEST_CROSSING_S = 2.0
+"""Of backlash: real gears take tenths of a second; the board's record can hold twice as long."""
 
 TOLERANCE = 1e-9
 """Allowance for rounding: relative excess over a limit, and excess over a range in degrees."""
@@ -50,7 +56,7 @@ limits, ``penalised`` is Eq. (21) of the paper."""
 def limits_of(arm: Arm) -> list[Limits]:
     """The limits of the driven joints.
 
-    Raises InputError unless each is positive, and its speed within the board's step rate.
+    Raises InputError unless each is positive, its speed within the board's step rate, and its backlash small enough.
     """
     limits = []
     for joint in arm.driven:
@@ -66,19 +72,52 @@ def limits_of(arm: Arm) -> list[Limits]:
             f"arm {arm.name!r}: no joint has a motor, so there is nothing to plan",
             "give at least one joint a motor in the arm file",
         )
-    for motor in arm.motors:
-        _check_step_rate(arm, motor)
+    highest_rates(arm)
+    check_crossings(arm)
     return limits
 
 
-def _check_step_rate(arm: Arm, motor: DrivenJoint) -> None:
-    rate = motor.limits.speed_deg_s * motor.steps_per_deg
-    if rate > MAX_STEP_RATE:
+def highest_rates(arm: Arm) -> list[float]:
+    """The step rate of each motor at its speed limit, steps/s, while it crosses its backlash.
+
+    Raises InputError if the board cannot step that fast.
+    """
+    found = []
+    for motor, crossing in zip(arm.motors, arm.crossings, strict=True):
+        speed_deg_s = motor.limits.speed_deg_s + (crossing.speed_deg_s if crossing else 0.0)
+        rate = speed_deg_s * motor.steps_per_deg
+        if rate > MAX_STEP_RATE:
+            raise InputError(
+                f"arm {arm.name!r}: {motor.name} at its speed limit of {speed_deg_s:g} {motor.unit.name}/s needs "
+                f"{rate:.0f} steps/s; the board supports at most {MAX_STEP_RATE} {ESTIMATED}",
+                "check the unit, lower the limit, or use fewer microsteps",
+            )
+        found.append(rate)
+    return found
+
+
+def check_crossings(arm: Arm) -> None:
+    """Raise InputError if the board cannot cross a motor's backlash while its joint moves."""
+    for motor, crossing in zip(arm.motors, arm.crossings, strict=True):
+        if crossing:
+            _check_crossing(arm, motor, crossing)
+
+
+def _check_crossing(arm: Arm, motor: DrivenJoint, crossing: Crossing) -> None:
+    what = f"arm {arm.name!r}: {motor.name}: {motor.unit.key('backlash_deg')} = {crossing.play_deg:g}"
+    if crossing.duration_s > LONGEST_CROSSING_S:
         raise InputError(
-            f"arm {arm.name!r}: {motor.name} at its speed limit of {motor.limits.speed_deg_s:g} "
-            f"{motor.unit.name}/s needs {rate:.0f} "
-            f"steps/s; the board supports at most {MAX_STEP_RATE} {ESTIMATED}",
-            "check the unit, lower the limit, or use fewer microsteps",
+            f"{what}: to cross it takes {crossing.duration_s:.2g} s at its limits, more than {LONGEST_CROSSING_S:g} s",
+            "check the unit, and the joint's limits",
+        )
+    steps = crossing.play_deg * motor.steps_per_deg
+    gained_deg_s = motor.limits.acceleration_deg_s2 * crossing.duration_s
+    rate = (min(motor.limits.speed_deg_s, gained_deg_s) + crossing.speed_deg_s) * motor.steps_per_deg
+    if rate > MAX_CROSSING_RATE or steps > MAX_BACKLASH_STEPS:
+        raise InputError(
+            f"{what} is {steps:.0f} steps, and until they are made the motor reaches {rate:.0f} steps/s; the board "
+            f"makes at most {MAX_BACKLASH_STEPS} and {MAX_CROSSING_RATE} steps/s",
+            f"use fewer microsteps, or lower {motor.unit.key('acceleration_deg_s2')}",
         )
 
 

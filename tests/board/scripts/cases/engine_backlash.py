@@ -9,10 +9,11 @@ the same motion without backlash.
 import random
 
 import cases
-from armtempo_shared import codes
+from armtempo_shared import armrecord, codes
 from armtempo_shared.messages import RESUME
 from brake_motion import record
 from engine_rig import FEWER, TICK_HZ, Rig, arm
+from firmware import external_interrupts
 
 # isort: split
 from armtempo_board.motion.next_motion import NextMotion
@@ -167,9 +168,9 @@ def check_end(rig):
         assert driver.motor == position + driver.declared + driver.ahead(), (number, driver.motor, position)
 
 
-def check_frozen(rig):
+def check_frozen(rig, fault=0):
     """The steps that the pins have made are those of the position and of what the motor has crossed."""
-    assert rig.engine.fault == 0 and rig.engine.known == 7
+    assert rig.engine.fault == fault and rig.engine.known == 7
     for driver, drive, position in zip(rig.drivers[:2], rig.engine.drives, rig.commanded()):
         ahead = driver.motor - position - driver.base()
         assert ahead == drive._motor_ahead and 0 <= -ahead <= driver.play, (position, ahead)
@@ -188,6 +189,23 @@ def case_the_joint_follows():  # on CPython
         assert rig.drivers[2].steps == plain.drivers[2].steps
         for driver, expected in zip(rig.drivers, plain.commanded()):
             assert driver.moved() == expected, (number, driver.moved(), expected)
+
+
+def case_reversals_within_a_crossing():  # not emulated
+    """However often a joint reverses before its play is crossed, it ends where it does without backlash."""
+    random.seed(SEED + 6)
+    seen = 0
+    for number in range(max(4 // FEWER, 1)):
+        motion = some_motion(size=120)
+        plain = made(None)
+        run(plain, motion)
+        rig = made()
+        run(rig, motion)
+        assert [driver.moved() for driver in rig.drivers] == plain.commanded(), number
+        turned = [plain.drivers[1].steps[begin][0] for begin, _ in legs(plain.drivers[1].steps)]
+        for n in range(len(turned) - 2):
+            seen += turned[n + 2] - turned[n] < crossing_ticks(PLAY[1])
+    assert seen, seen
 
 
 def case_a_crossing_keeps_its_limits():  # not emulated
@@ -296,6 +314,28 @@ def case_changes_and_stops():  # not emulated
         place = rig.commanded()
 
 
+def case_an_estop_within_a_crossing():  # not emulated
+    """The next motion crosses what is left of the play."""
+    random.seed(SEED + 7)
+    rig = made(flags=armrecord.FLAG_ESTOP_FITTED)
+    run(rig, straight(20))
+    left = 0
+    for _ in range(6):
+        rig.engine.load(some_motion(rig.commanded()))
+        rig.engine.start()
+        rig.board.at(rig.zero() + random.randrange(TICK_HZ), lambda: external_interrupts.set_level("E15", 0))
+        rig.run_to(2 * TICK_HZ)
+        check_frozen(rig, codes.ESTOP)
+        left += [
+            0 < drive._left < driver.play for driver, drive in zip(rig.drivers, rig.engine.drives[:2])
+        ].count(True)
+        external_interrupts.set_level("E15", 1)
+        rig.turn()
+        assert rig.engine.clear()
+        run(rig, some_motion(rig.commanded()))
+    assert left > 2, left
+
+
 def case_prepared_motions():  # not emulated
     """The next motion is prepared while one runs, as in a sequence."""
     random.seed(SEED + 3)
@@ -351,6 +391,27 @@ def case_the_side_is_forgotten():
         run(rig, straight(50 * way))
         extra = len(rig.drivers[0].steps) - count - 50
         assert extra == (0 if forgets or way > 0 else PLAY[0]), (forgets, way, extra)
+
+
+def case_homing_keeps_the_side():
+    """The positions are unknown between its motions, as the controller has it, but the motors' steps are counted."""
+    for released in (False, True):
+        rig = made()
+        for way in (-400, 300, -90):
+            rig.engine.drivers(0) if released else None
+            for driver in rig.drivers:
+                driver.steps = []
+            before = [driver.joint for driver in rig.drivers]
+            home(rig, [0, 0, 0])
+            rig.engine.load(straight(way))
+            rig.engine.start()
+            rig.run_to(100 * TICK_HZ)
+            rig.engine.withdrawn |= rig.engine.known  # as Controller does
+            rig.engine.known = 0
+            for driver, stood, play in zip(rig.drivers, before, PLAY):
+                extra = 0 if released or stood is None else play
+                assert len(driver.steps) == abs(way) + extra, (released, way, len(driver.steps))
+                assert stood is None or released or driver.joint == stood + way, (way, stood, driver.joint)
 
 
 cases.run(globals())

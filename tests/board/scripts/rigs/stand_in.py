@@ -188,6 +188,7 @@ class Engine:
         self.rates = Rates()
         self.ticks = 0
         self.skip_check = False
+        self.withdrawn = 0
         self.drives = self
         self.unfit = None
         self.has_time = True
