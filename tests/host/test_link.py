@@ -12,7 +12,7 @@ import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client, traffic
-from armtempo.link.board_messages import Sample
+from armtempo.link.board_messages import RowBegun, Sample
 from armtempo.link.client import harmless_number
 from armtempo.link.follow import Followed, MotionFollower, SequenceFollower
 from armtempo.link.session import Session
@@ -346,6 +346,24 @@ def test_a_sequence_whose_cable_was_out_lacks_no_sample(tmp_path: Path) -> None:
     board, key = sequence_of(pipe, 6)
     assert sequence_samples(board, key, lambda: pipe.unplug_for(1.5)).lost == ()
     assert [text.split()[0] for text in pipe.told] == ["the", "connected"]
+
+
+def test_nothing_of_a_run_that_nobody_followed_is_taken_for_the_next_ones(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    pipe.run_samples = 4
+    board, key = sequence_of(pipe, 2)
+    board.start(key.name, key.crc)
+    while board.sequence().ending == "running":
+        pipe.wait(0.1)
+    board.home([7, 7, 7])
+    passed: list[int] = []
+    sequence_run.run(
+        board,
+        key,
+        StopRequest(),
+        take=lambda event: isinstance(event, RowBegun) and passed.append(event.passed),
+    )
+    assert passed == [1, 2, 3, 4, 5]
 
 
 def test_the_samples_of_a_sequence_are_not_fetched_as_a_motions(tmp_path: Path) -> None:

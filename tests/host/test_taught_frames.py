@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli.jog_screen import JogScreen
-from armtempo.cli.taught_points import NamedPoints, NewFrame
+from armtempo.cli.taught_points import NamedPoints
 from armtempo.model import taught, taught_frame
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import via_points
+from armtempo.robot.teaching import NewFrame
 from scipy.spatial.transform import Rotation
 
 from tests.host.test_frames import FRAMES, arm_file, cli, pose

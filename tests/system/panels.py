@@ -244,8 +244,14 @@ def wait_for(page: Any, *words: str, place: str = "armtempo-state") -> None:
         raise AssertionError(f"{words} were waited for; {page.inner_text('body')}") from error
 
 
-def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> str:
-    """Press a button (or ``act``) until a press is in time, which a busy machine may not manage; why it was refused."""
+def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> None:
+    """Press a button (or ``act``); nothing may be wrong with it."""
+    refusal = refusal_of(page, button, act)
+    assert not refusal, refusal
+
+
+def refusal_of(page: Any, button: Any, act: Callable[[], object] | None = None) -> str:
+    """Press a button (or ``act``) until a press is in time and nothing else is under way; why it was refused."""
     refusal = "it was grey"
     for _ in range(30):
         before = page.evaluate("armtempo.number")
@@ -258,16 +264,23 @@ def press(page: Any, button: Any, act: Callable[[], object] | None = None) -> st
         except Exception:  # a time-out: the server had turned it grey already, and takes no event of it
             continue
         refusal = str(page.evaluate("armtempo.answered[1]"))
-        if not refusal.startswith("Not done"):
+        if not refusal.startswith(("Not done", "Wait:")):
             return refusal
+        page.wait_for_timeout(100)  # it turns grey soon after another command has begun
     raise AssertionError(refusal)
 
 
-def answer(page: Any, button: str) -> str:
+def answer(page: Any, button: str) -> None:
+    """Press a button of the dialog, which may not be refused, and wait until that is gone."""
+    refusal = refusal_of_answer(page, button)
+    assert not refusal, refusal
+
+
+def refusal_of_answer(page: Any, button: str) -> str:
     """Press a button of the dialog, and wait until that is gone; why it was refused, which leaves it open."""
     wanted = page.get_by_role("button", name=button, exact=True)
     dialog = page.get_by_role("dialog").filter(has=wanted)  # another one may open in its place
-    refusal = press(page, dialog.get_by_role("button", name=button, exact=True))
+    refusal = refusal_of(page, dialog.get_by_role("button", name=button, exact=True))
     if refusal:
         dialog.get_by_role("button", name="Cancel").click()
     dialog.wait_for(state="detached")

@@ -79,7 +79,7 @@ def jog(
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 made = screen(board, pressed, speed)
-                made.choice.frame = frame or BASE
+                made.choice.choose(frame or BASE)
                 made.loop()
         elif joint is not None and to is not None:
             board.jog_to(joint, to, speed / 100)

@@ -12,6 +12,7 @@ from typing import Self
 import click
 
 from armtempo.basics.errors import ArmtempoError, BoardError, InputError, LinkError, PlanError
+from armtempo.basics.text import did_you_mean
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.frame import TOOL
@@ -65,6 +66,13 @@ class JogChoice:
     def tool_axis(self) -> str | None:
         """The axis as ``Board.jog`` takes it; None if a joint moves."""
         return None if self.joint is not None else axis_of(self.frame, self.axis)
+
+    def choose(self, frame: str) -> None:
+        """Mean the axes of a frame; InputError if it is none to choose from."""
+        if frame not in self.frames:
+            near = did_you_mean(frame, self.frames)
+            raise InputError(f"there is no frame {frame!r}{near}", f"there are {', '.join(self.frames)}")
+        self.frame = frame
 
     def press(self, key: str, joints: int) -> bool:
         """Handle a key that selects something; False if it is another key."""

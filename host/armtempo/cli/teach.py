@@ -15,14 +15,13 @@ from armtempo.cli.options import BoardOptions
 from armtempo.cli.taught_points import (
     JobPoints,
     NamedPoints,
-    NewFrame,
-    NewTool,
     TaughtPoints,
     postures_deg,
     row,
 )
 from armtempo.model import posture, shipped, taught
 from armtempo.robot.board import Board
+from armtempo.robot.teaching import NewFrame, NewTool
 
 
 @click.command("teach")
@@ -102,7 +101,8 @@ def teach(
             else NewTool(file, arm, what[1], replace_old)
         )
         if at is not None:
-            new.save(postures_deg(arm, at.split(","), new.points))
+            for line in new.save(postures_deg(arm, at.split(","), new.points)):
+                results.echo(line)
             return
         _check_terminal()
         with resolve.board(board_options, arm) as board:

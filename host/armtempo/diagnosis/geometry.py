@@ -64,11 +64,15 @@ def _home(arm: Arm) -> list[Finding]:
 def _frames(arm: Arm) -> list[Finding]:
     """Frames whose origin the tool cannot come to."""
     reach_mm = Geometry.of(arm).reach + abs(arm.joints[0].d_mm)
+    reach_mm += max((tool.length_mm for tool in arm.tools), default=0.0)
     found = []
     for each in arm.frames:
         away_mm = float(np.linalg.norm(arm.frame(each.name)[:3, 3]))
         if away_mm > reach_mm:
-            text = f"its origin is {away_mm:.0f} mm from the base, but all links together are {reach_mm:.0f} mm long"
+            text = (
+                f"its origin is {away_mm:.0f} mm from the base, but all links, with the longest tool, are "
+                f"{reach_mm:.0f} mm long"
+            )
             found.append(
                 note(f"frame {each.name}", text, "check its position_mm, and the frame that it is in")
             )

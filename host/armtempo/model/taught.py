@@ -54,10 +54,15 @@ def save_table(path: Path, place: tuple[str, str], values: Mapping[str, Any], re
     replace_text(path, with_table(text, place, values, path), newline="")
 
 
+def names(path: Path, kind: str) -> list[str]:
+    """The names of the tables ``[KIND.NAME]`` of a file; raises InputError if it cannot be read."""
+    return list(_parsed(_text(path), path).get(kind, {}))
+
+
 def check_free(path: Path, place: tuple[str, str], replace: bool) -> None:
     """Raise InputError if the file has the table ``[KIND.NAME]`` already and ``replace`` is false."""
     kind, name = place
-    if name in _parsed(_text(path), path).get(kind, {}) and not replace:
+    if name in names(path, kind) and not replace:
         raise InputError(
             f"{path} already has a {kind} {name!r}",
             "choose another name, or replace it with --replace",

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from nicegui import ui
@@ -21,6 +21,7 @@ from armtempo.kinematics.of_arm import forward
 from armtempo.model import mesh_files
 from armtempo.model.arm import Arm
 from armtempo.model.workspace import FAR_MM
+from armtempo.panel import words
 from armtempo.planning.workspace_check import Bodies
 
 COLOUR, GHOST, RUN, VIA, OBSTACLE = "#4477aa", "#999999", "#ee6677", "#ccbb44", "#aa3377"
@@ -75,7 +76,7 @@ class ArmShape:
 
     @cached_property
     def _geometry(self) -> Geometry:
-        return Geometry.of(self.arm)
+        return Geometry.of(self.arm).bare  # a tool is drawn by itself
 
     def dials(self, angles_deg: Array) -> list[list[float]]:
         """For each driven joint 10 numbers: centre, directions of its zero and of its axis, angle in rad."""
@@ -89,11 +90,28 @@ class ArmShape:
             found.append([round(float(number), 5) for number in numbers])
         return found
 
-    def frame(self, angles_deg: Array) -> list[float]:
-        """The tool's frame: directions of its x, y and z, then its place, 12 numbers."""
+    def tool(self, angles_deg: Array) -> dict[str, Any]:
+        """The tool that is on the arm, for the page's script: its name, "" for none, its frame as ``_columns``, where
+        it begins and its radius."""
+        tool = self.arm.tool
         pose = forward(self.arm, np.asarray(angles_deg))
-        pose[:3, 3] /= self.reach_mm
-        found: list[float] = pose[:3].T.ravel().round(5).tolist()
+        flange = pose if tool is None else pose @ np.linalg.inv(tool.matrix)
+        radius_mm = tool.radius_mm if tool is not None and tool.radius_mm else _THICK[1] * self.reach_mm / 2
+        return {
+            "name": "" if tool is None else words.plain(tool.name),
+            "frame": self._columns(pose),
+            "from": (flange[:3, 3] / self.reach_mm).round(5).tolist(),
+            "radius": round(radius_mm / self.reach_mm, 5),
+        }
+
+    def frames(self) -> list[tuple[str, list[float]]]:
+        """The names of the arm's frames, and each as ``_columns``."""
+        return [(words.plain(one.name), self._columns(self.arm.frame(one.name))) for one in self.arm.frames]
+
+    def _columns(self, pose: Array) -> list[float]:
+        """A frame for the page's script: directions of its x, y and z, then its place, 12 numbers."""
+        columns = pose[:3].T / np.array([[1.0], [1.0], [1.0], [self.reach_mm]])
+        found: list[float] = columns.ravel().round(5).tolist()
         return found
 
     @cached_property
@@ -206,6 +224,7 @@ class ArmScene:
             self._ghost = self._body(GHOST, GHOST, _GHOST_OPACITY)
         self._walls: list[Object3D] = []
         self.draw_workspace()
+        self.draw_frames()
         self._dots: list[tuple[Object3D, Object3D]] = []
         """A ball for each via point, and its name."""
         self.look("free")
@@ -246,6 +265,10 @@ class ArmScene:
                 middle = axes[:3, :3] @ ((low + high) / 2) + axes[:3, 3]
                 box.material(OBSTACLE, _OBSTACLE_OPACITY).move(*middle.tolist())
                 self._walls.append(box.rotate_R(axes[:3, :3].tolist()))
+
+    def draw_frames(self) -> None:
+        """The arm's frames as it has them now, each with its name."""
+        ui.run_javascript(f"armtempo.named = {json.dumps(self._shape.frames())}")
 
     @property
     def parts(self) -> str:

@@ -47,6 +47,10 @@ class FileEditor(ABC):
     def check(self, text: str, file: Path) -> None:
         """Raise InputError if the text is not valid for ``file``."""
 
+    def take_arm(self, arm: Arm) -> None:
+        """Take another version of the arm."""
+        self.arm = arm
+
     # files
 
     def files(self) -> list[str]:

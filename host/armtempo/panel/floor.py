@@ -37,8 +37,6 @@ def _ask(page: PanelPage) -> None:
         if height.value is None:
             raise InputError(words.NO_HEIGHT, words.GIVE_HEIGHT)
         page.operator.arm_changed(_with_floor(page.operator.arm, float(height.value)))
-        page.shape.arm = page.operator.arm
-        page.scene.draw_workspace()
 
     with page.ask(words.FLOOR_HINT, words.STORE, store).place:
         height = ui.number(words.FLOOR_HEIGHT, value=0.0).props("dense outlined")

@@ -13,6 +13,7 @@ from tomlkit.items import Array
 
 from armtempo.basics import toml_table
 from armtempo.basics.errors import ArmtempoError, InputError
+from armtempo.encoding import planned_for
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import tool_segment
 from armtempo.model.arm import Arm
@@ -138,6 +139,23 @@ class JobEditor(FileEditor):
             return [{ANGLES: row} for row in self._values["via_deg"]]
         return list(self._values.get("via", []))
 
+    def take_arm(self, arm: Arm) -> None:
+        """Take another version of the arm; a plan that it makes old is old."""
+        before = [via.angles_deg for via in self.vias]
+        super().take_arm(arm)
+        self._solved = -1, []
+        if before != [via.angles_deg for via in self.vias] or self._moved_since(arm):
+            self.version += 1
+
+    def _moved_since(self, arm: Arm) -> bool:
+        """Whether a frame or the tool of the plan has changed."""
+        try:
+            if self.plan is not None:
+                planned_for.check_surroundings(self.plan.name, self.plan, arm)
+        except InputError:
+            return True
+        return False
+
     # the plan
 
     def planned(self, plan: Plan, version: int) -> None:
@@ -146,7 +164,7 @@ class JobEditor(FileEditor):
 
     @property
     def plan_is_old(self) -> bool:
-        """Whether the job was changed after it was planned."""
+        """Whether the job was changed after it was planned, or a posture, frame or tool that it names."""
         return self.plan is not None and self._planned != self.version
 
     # changes

@@ -66,7 +66,7 @@ class JobPlan:
     async def _make_plan(self, job: Job, version: int) -> None:
         try:
             self._show_planning(True)
-            plan = await run.io_bound(pipeline.plan, self._operator.arm, job, self._progress)
+            plan = await run.io_bound(pipeline.plan, self._jobs.arm, job, self._progress)
             if plan is not None:  # it is None if the panel ends meanwhile
                 self._jobs.planned(plan, version)
         except ArmtempoError as error:

@@ -52,6 +52,7 @@ class JobTab:
         self._plan = JobPlan(page)
         self._draw_vias()
         page.on_look(self._look)
+        page.on_arm(self._options.refresh)  # the frames and tools to choose
         # Texts typed while the connection was broken have not arrived
         ui.context.client.on_connect(self._connected)
 
@@ -174,7 +175,7 @@ class JobTab:
 
     async def _paste(self) -> None:
         def take(press: Press) -> None:
-            found = via_table.of_text(str(text.value or ""), words.PASTED, self._operator.arm)
+            found = via_table.of_text(str(text.value or ""), words.PASTED, self._jobs.arm)
             poses = [dict(pose) for pose in found.poses]
             self._file.change(
                 lambda: self._jobs.set_vias(poses or [{ANGLES: row} for row in found.via_deg.tolist()]), press

@@ -97,6 +97,10 @@ def _views(page: PanelPage) -> None:
             words.VIEWS, value="free", on_change=lambda event: page.scene.look(str(event.value))
         )
         named(views.props("dense no-caps unelevated"), words.VIEW)
+        frames = ui.switch(words.FRAMES_SHOWN, value=True).props("dense")
+        frames.on_value_change(
+            lambda event: ui.run_javascript(f"armtempo.show_frames({json.dumps(event.value)})")
+        )
     page.speeds = ui.label("").classes("armtempo-speed-scale")
     page.speeds.set_visibility(False)
     ui.label(words.UNKNOWN).classes("armtempo-unknown")
@@ -245,7 +249,7 @@ def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
         "state": operator.presses.state,
         "links": poses if live.known else None,
         "dials": shape.dials(angles),
-        "tool": shape.frame(angles) if live.known else None,
+        "tool": shape.tool(angles) if live.known else None,
         "ghost": poses if not live.known else None if target is None else shape.poses(target),
         "unknown": not live.known,
         "freeze": operator.can_freeze,

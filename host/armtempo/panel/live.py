@@ -111,8 +111,8 @@ class LiveArm:
         self.sequence: SequenceState | None = None
         """State of the sequence that was started last."""
         self._seen = (-1, 0)
-        self._jogs: tuple[Array, dict[JogMove, str]] = (np.empty(0), {})
-        """Angles, (J,), and the answers of ``why_no_jog`` for them."""
+        self._jogs: tuple[Arm, Array, dict[JogMove, str]] = (arm, np.empty(0), {})
+        """The arm, its angles, (J,), and the answers of ``why_no_jog`` for them."""
 
     @property
     def age_s(self) -> float:
@@ -131,12 +131,12 @@ class LiveArm:
 
     def why_no_jog(self, move: JogMove) -> str:
         """Why this jog is not possible now; "" if it is."""
-        here = self.angles_deg
-        if not np.array_equal(here, self._jogs[0]):
-            self._jogs = here, {}
-        known = self._jogs[1]
+        arm, here = self.arm, self.angles_deg
+        if arm is not self._jogs[0] or not np.array_equal(here, self._jogs[1]):
+            self._jogs = arm, here, {}
+        known = self._jogs[2]
         if move not in known:
-            known[move] = jog_motion.problem(self.arm, tuple(map(float, here)), move)
+            known[move] = jog_motion.problem(arm, tuple(map(float, here)), move)
         return known[move]
 
     def take_event(self, event: Event) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Awaitable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from nicegui import ui
@@ -18,7 +18,7 @@ from armtempo.kinematics.of_arm import forward
 from armtempo.model.frame import TOOL
 from armtempo.model.pose import checked, from_rpy, to_rpy_deg
 from armtempo.model.tool_pose import BASE
-from armtempo.panel import arm_scene, floor, homing, teaching, words
+from armtempo.panel import arm_scene, floor, homing, teach_points, teaching, words
 from armtempo.panel.hold import SHOWN_S
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import PanelPage, named
@@ -57,6 +57,7 @@ class MoveTab:
         _outputs(page)
         _inputs(page)
         page.on_look(self._look)
+        page.on_arm(self._changed)
 
     def _look(self) -> None:
         """Take the ghost away where the arm has arrived."""
@@ -73,26 +74,20 @@ class MoveTab:
     def _jogs(self) -> None:
         page = self._page
         with ui.row().classes("armtempo-choices"):
-            own = {frame.name: words.plain(frame.name) for frame in page.operator.arm.frames}
-            frames = ui.toggle({**FRAMES, **own}, value=JOINTS)
-            named(frames.props("dense no-caps unelevated"), words.FRAME)
+            self._frames = ui.toggle(self._frame_names(), value=JOINTS)
+            named(self._frames.props("dense no-caps unelevated"), words.FRAME)
+            self._frames.on_value_change(page.refresh)
             steps = ui.toggle(STEPS, value=HOLD, on_change=lambda event: setattr(self, "_step", event.value))
             named(steps.props("dense no-caps unelevated"), words.STEP_OF_JOG)
-        with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value=JOINTS):
+            self._tool_choice()
+        with self._jogs_of(JOINTS):
             for number, joint in enumerate(page.operator.arm.driven):
                 low, high = joint.range_deg
                 with ui.element("div").classes("armtempo-jog"):
                     self._pair(joint.name, JogMove(math.inf, joint=number))
                     ui.label("").classes("armtempo-number").props(f'id="armtempo-angle-{number + 1}"')
                     ui.label(f"{low:g}° … {high:g}°").classes("armtempo-note")
-        for frame in (BASE, TOOL, *own):
-            with ui.column().classes("armtempo-jogs").bind_visibility_from(frames, "value", value=frame):
-                for axis in AXES:
-                    with ui.element("div").classes("armtempo-jog"):
-                        name = {BASE: axis, TOOL: f"{words.OWN} {axis}"}.get(frame, f"{frame} {axis}")
-                        move = JogMove(math.inf, axis=axis_of(frame, axis))
-                        self._pair(name, move)
-                        self._pair(f"⟳ {name}", replace(move, about=True))
+        self._tool_jogs()
         with ui.element("div").classes("armtempo-slide"):
             ui.label(words.SPEED_OF_JOG).classes("text-caption")
             slider = ui.slider(min=1, max=100, value=page.jog_percent)
@@ -105,15 +100,76 @@ class MoveTab:
 
             slider.on_value_change(lambda event: set_percent(event.value))
 
-    def _pair(self, name: str, move: JogMove) -> None:
-        """Minus, name, plus."""
-        self._jog(replace(move, by=-move.by), "−", name)
-        ui.label(words.plain(name)).classes("armtempo-name ellipsis")
-        self._jog(move, "+", name)
+    def _frame_names(self) -> dict[str, str]:
+        """What can be jogged."""
+        return {**FRAMES, **{one.name: words.plain(one.name) for one in self._operator.arm.frames}}
 
-    def _jog(self, move: JogMove, sign: str, name: str) -> None:
+    def _jogs_of(self, frame: str) -> ui.column:
+        """The place of the jogs along the axes of a frame, in view while that is chosen."""
+        place = ui.column().classes("armtempo-jogs")
+        return place.bind_visibility_from(self._frames, "value", value=frame)
+
+    @ui.refreshable_method
+    def _tool_jogs(self) -> None:
+        """Along and about the axes of each frame that there is."""
+        for frame in list(self._frame_names())[1:]:
+            with self._jogs_of(frame):
+                for axis in AXES:
+                    with ui.element("div").classes("armtempo-jog"):
+                        name = {BASE: axis, TOOL: f"{words.OWN} {axis}"}.get(frame, f"{frame} {axis}")
+                        move = JogMove(math.inf, axis=axis_of(frame, axis))
+                        self._pair(name, move, frame)
+                        self._pair(f"⟳ {name}", replace(move, about=True), frame)
+
+    def _tool_choice(self) -> None:
+        """The tool that is jogged, which all pages share."""
         page, operator = self._page, self._operator
-        why_not = partial(operator.live.why_no_jog, move)
+        choice = ui.select(self._tool_names(), value=operator.tool, label=words.TOOL)
+        named(choice.props("dense outlined").classes("armtempo-option"), words.TOOL)
+        page.control(choice, Needs.IDLE)
+
+        def choose(press: Press, wanted: Any) -> None:
+            names = [*self._tool_names()]
+            number = wanted.get("value") if isinstance(wanted, dict) else None
+            try:
+                if type(number) is int and 0 <= number < len(names):
+                    operator.choose_tool(page.client, press, names[number])
+            finally:
+                look()
+
+        def look() -> None:
+            choice.set_visibility(len(self._tool_names()) > 1)
+            if choice.value != operator.tool:
+                choice.set_value(operator.tool)
+
+        page.on_press(choice, "update:model-value", choose)
+        page.on_arm(lambda: choice.set_options(self._tool_names(), value=operator.tool))
+        page.on_look(look)
+
+    def _tool_names(self) -> dict[str, str]:
+        tools = self._operator.arm.tools
+        return {"": words.NO_TOOL, **{one.name: words.plain(one.name) for one in tools}}
+
+    def _changed(self) -> None:
+        """Show the postures and frames that the arm has now."""
+        names = self._frame_names()
+        self._frames.set_options(names, value=self._frames.value if self._frames.value in names else JOINTS)
+        self._tool_jogs.refresh()
+        self._posture_buttons.refresh()
+
+    def _pair(self, name: str, move: JogMove, frame: str = JOINTS) -> None:
+        """Minus, name, plus."""
+        self._jog(replace(move, by=-move.by), "−", name, frame)
+        ui.label(words.plain(name)).classes("armtempo-name ellipsis")
+        self._jog(move, "+", name, frame)
+
+    def _jog(self, move: JogMove, sign: str, name: str, frame: str) -> None:
+        page, operator = self._page, self._operator
+
+        def why_not() -> str:
+            """What is not in view is not asked for: it takes some time."""
+            return operator.live.why_no_jog(move) if self._frames.value == frame else ""
+
         made = page.hold_button(sign, partial(self._begin, move), why_not, "unelevated", f"{name} {sign}")
         made.classes("armtempo-touch")
 
@@ -159,9 +215,10 @@ class MoveTab:
                 ]
             with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="pose"):
                 self._pose = {name: _number(name, 0.0) for name in words.POSE_FIELDS}
-                names = {BASE: words.IN_BASE} | {each.name: words.plain(each.name) for each in arm.frames}
-                self._frame = ui.select(names, value=BASE).props("dense outlined")
-                named(self._frame, words.FRAME_OF_POSE).set_visibility(bool(arm.frames))
+                self._frame = ui.select({BASE: words.IN_BASE}, value=BASE).props("dense outlined")
+                named(self._frame, words.FRAME_OF_POSE)
+                self._offer_frames()
+                page.on_arm(self._offer_frames)
                 if len(arm.driven) < len(words.POSE_FIELDS):
                     ui.label(words.FEW_JOINTS.format(joints=len(arm.driven))).classes("armtempo-note")
             with ui.row():
@@ -174,6 +231,14 @@ class MoveTab:
 
                 page.hold_button(words.GO, begin, look="unelevated", name=f"{words.GO}: {words.TYPED_TARGET}")
         ui.label(words.TARGET_HINT).classes("armtempo-note")
+        teach_points.build(page)
+
+    def _offer_frames(self) -> None:
+        """The frames in which a pose can be typed."""
+        frames = self._operator.arm.frames
+        names = {BASE: words.IN_BASE} | {each.name: words.plain(each.name) for each in frames}
+        self._frame.set_options(names, value=self._frame.value if self._frame.value in names else BASE)
+        self._frame.set_visibility(bool(frames))
 
     @ui.refreshable_method
     def _posture_buttons(self) -> None:
@@ -239,7 +304,7 @@ class MoveTab:
             )
 
     def _teach(self, _: Press) -> None:
-        teaching.ask(self._page, self._posture_buttons.refresh)
+        teaching.ask(self._page)
 
 
 def _number(name: str, value: float) -> ui.number:

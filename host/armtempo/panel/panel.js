@@ -17,8 +17,11 @@ window.armtempo = {
   held: null, // the number of the press of the button that is held
   lines: {}, // three.js objects by name
   dials: [], // ranges of the joints
-  tool: null, // its frame
-  framed: undefined,
+  tool: null, // its frame and shape
+  named: [], // the arm's frames
+  framed: [undefined, undefined], // what was drawn of them
+  frames: null, // three.js objects: of the base, the tool and the named ones
+  frames_shown: true,
   follow: false,
   THREE: null,
   SMOOTH_MS: 100,
@@ -28,7 +31,7 @@ window.armtempo = {
   // the scene is there, some time after the page
   show(parts) {
     this.parts = parts;
-    import("nicegui-scene").then((module) => (this.THREE = module.THREE));
+    import("nicegui-scene").then((module) => ([this.THREE, this.Label] = [module.THREE, module.CSS2DObject]));
     setInterval(() => this.draw(), 50); // as often as the scene is drawn: at each frame it would cost twice as much
   },
 
@@ -96,21 +99,71 @@ window.armtempo = {
     }
   },
 
-  // x, y and z of the base and of the tool: red, green, blue
+  // x, y and z of the base, of the tool and of the arm's frames: red, green, blue; names; and the tool
   axes(scene) {
-    if (!this.THREE || this.tool === this.framed) return;
-    this.framed = this.tool;
-    this.changes += 1;
+    if (!this.THREE || (this.tool === this.framed[0] && this.named === this.framed[1])) return;
     const T = this.THREE;
+    this.changes += 1;
     if (!this.frames) {
-      this.frames = [0.2, 0.12].map((length) => new T.AxesHelper(length));
-      this.frames.forEach((frame) => scene.scene.add(frame));
-      this.frames[1].matrixAutoUpdate = false;
+      this.frames = { base: new T.AxesHelper(0.2), tool: this.frame(0.12), named: new T.Group(), body: this.body() };
+      for (const one of Object.values(this.frames)) scene.scene.add(one);
+      this.show_frames(this.frames_shown);
     }
-    this.frames[1].visible = Boolean(this.tool);
+    if (this.named !== this.framed[1]) {
+      const group = this.frames.named;
+      for (const one of [...group.children]) this.remove(group, one);
+      for (const [name, columns] of this.named) group.add(this.put(this.frame(0.1, name), columns));
+    }
+    if (this.tool && this.tool.name !== this.framed[0]?.name) {
+      this.remove(scene.scene, this.frames.tool);
+      scene.scene.add((this.frames.tool = this.frame(0.12, this.tool.name)));
+    }
+    this.framed = [this.tool, this.named];
+    this.show_frames(this.frames_shown);
+    this.frames.body.visible = false;
     if (!this.tool) return;
-    const columns = [0, 3, 6, 9].map((at) => new T.Vector3(...this.tool.slice(at, at + 3)));
-    this.frames[1].matrix.makeBasis(...columns.slice(0, 3)).setPosition(columns[3]);
+    this.put(this.frames.tool, this.tool.frame);
+    const [begin, end] = [this.tool.from, this.tool.frame.slice(9)].map((place) => new T.Vector3(...place));
+    const body = this.frames.body, along = end.clone().sub(begin), length = along.length();
+    body.visible = length > 1e-4;
+    body.scale.set(this.tool.radius, length, this.tool.radius);
+    body.position.copy(begin).addScaledVector(along, 0.5);
+    if (length) body.quaternion.setFromUnitVectors(new T.Vector3(0, 1, 0), along.normalize());
+  },
+
+  body() {
+    return new this.THREE.Mesh(new this.THREE.CylinderGeometry(1, 1, 1, 20), new this.THREE.MeshPhongMaterial({ color: "#228833" }));
+  },
+
+  frame(length, name) {
+    const found = new this.THREE.AxesHelper(length);
+    found.matrixAutoUpdate = false;
+    if (name) {
+      const text = document.createElement("div");
+      text.textContent = name;
+      text.className = "armtempo-label";
+      found.add(new this.Label(text));
+    }
+    return found;
+  },
+
+  put(frame, columns) {
+    const vectors = [0, 3, 6, 9].map((at) => new this.THREE.Vector3(...columns.slice(at, at + 3)));
+    frame.matrix.makeBasis(...vectors.slice(0, 3)).setPosition(vectors[3]);
+    return frame;
+  },
+
+  remove(parent, frame) {
+    frame.children.forEach((label) => label.element.remove()); // which three.js leaves in the page
+    parent.remove(frame);
+  },
+
+  show_frames(shown) {
+    this.frames_shown = shown;
+    this.changes += 1;
+    if (!this.frames) return;
+    this.frames.base.visible = this.frames.named.visible = shown;
+    this.frames.tool.visible = shown && Boolean(this.tool);
   },
 
   // The scene draws 20 times a second; what has not changed is drawn once a second, which spares a tablet's battery.
@@ -189,19 +242,19 @@ window.armtempo = {
     });
   },
 
-  // The space bar stops from everywhere but where it writes a space; Enter holds a jog button as a finger does.
+  // The space bar stops from everywhere but where it writes a space; Enter holds a jog button as a finger does. A page
+  // that is covered takes no key but those that stop: its server may still hear them.
   key(event) {
-    if (document.body.matches(".lost") && [" ", "Enter"].includes(event.key)) {
-      event.preventDefault(); // what is covered is not pressed by keys either
-      event.stopPropagation();
-      return;
-    }
-    const typing = event.target.matches("textarea, input[type=text]:not([readonly])");
+    const lost = document.body.matches(".lost");
+    const typing = !lost && event.target.matches("textarea, input[type=text]:not([readonly])");
     if (event.key === "Escape" || (event.key === " " && !typing)) {
       event.preventDefault();
       if (event.key === " ") event.stopPropagation();
       else document.querySelector(".q-dialog .armtempo-cancel")?.click(); // a question is answered with no
       if (!event.repeat) emitEvent("armtempo-stop");
+    } else if (event.key === "Enter" && lost) {
+      event.preventDefault();
+      event.stopPropagation();
     } else if (event.key === "Enter" && !event.repeat) this.press(event);
   },
 

@@ -128,10 +128,26 @@ class PanelBoard:
         return self._board is not None
 
     def arm_changed(self, arm: Arm) -> None:
-        """Take another version of the arm that differs in its postures and its workspace alone."""
-        self.arm = self.live.arm = self.jobs.arm = self.sequences.arm = arm
+        """Take another version of the arm that differs in what the board does not know alone: its postures, workspace,
+        frames and tools. The chosen tool stays if it is still there."""
+        self.jobs.take_arm(arm)
+        self.sequences.take_arm(arm)
+        self._put_on(self.tool if self.tool in [one.name for one in arm.tools] else "")
+
+    @property
+    def tool(self) -> str:
+        """The name of the tool that is jogged and moved to poses; "" for none. A job or a sequence names its own."""
+        return self.arm.tool.name if self.arm.tool else ""
+
+    def choose_tool(self, client: str, press: Press, name: str) -> None:
+        """Choose the tool, "" for none; raises InputError as ``check``, or if the arm has no such tool."""
+        self.check(client, press, Needs.IDLE)
+        self._put_on(name)
+
+    def _put_on(self, tool: str) -> None:
+        self.arm = self.live.arm = self.jobs.arm.with_tool(tool)
         if self._board is not None:
-            self._board.arm = arm
+            self._board.arm = self.arm
 
     def _open(self) -> None:
         try:
@@ -190,7 +206,7 @@ class PanelBoard:
             not state.speed_percent,
             [one.known for one in state.joints],
         )
-        return self.holder, self.busy, self.trouble, id(self.jobs.plan), seen
+        return self.holder, self.busy, self.trouble, id(self.jobs.plan), self.arm, seen
 
     def take_control(self, client: str) -> None:
         """Give ``client`` control; a motion of the previous client continues, its held jog ends."""

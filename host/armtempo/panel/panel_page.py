@@ -15,6 +15,7 @@ from nicegui.element import Element
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
 from armtempo.kinematics.chain import chains_mm
+from armtempo.model.arm import Arm
 from armtempo.panel import arm_scene, words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.hold import ButtonHold
@@ -76,14 +77,21 @@ class PanelPage:
     """The tab that is being built; "" for what is in view on every tab."""
     listeners: list[tuple[str, Callable[[], None]]] = field(default_factory=list)
     """Called every LOOK_S while their tab is shown; without a tab, always."""
+    arm_listeners: list[Callable[[], object]] = field(default_factory=list)
+    """Called when the arm has changed: its postures, workspace, frames, tools, or the chosen tool."""
     holds: list[Callable[[Press], None]] = field(default_factory=list)
     """What the hold buttons begin, by number."""
     jog_percent: float = 25.0
     """Speed of jogs and of moves to a target, percent of the limits."""
     picture: Element = field(init=False)
     """The place of the scene."""
+    _arm: Arm = field(init=False)
     speeds: ui.label = field(init=False)
     """What the colours of the planned path mean."""
+
+    def __post_init__(self) -> None:
+        """The controls are built for the arm as it is now."""
+        self._arm = self.operator.arm
 
     @cached_property
     def scene(self) -> ArmScene:
@@ -202,6 +210,10 @@ class PanelPage:
         """Call ``listener`` every LOOK_S; from within a tab, only while that is shown."""
         self.listeners.append((self.built, listener))
 
+    def on_arm(self, listener: Callable[[], object]) -> None:
+        """Call ``listener`` when the arm has changed, also by another page."""
+        self.arm_listeners.append(listener)
+
     def do(self, press: Press, what: str, call: Callable[[], object], needs: Needs = Needs.MOVE) -> None:
         """Start a command of the operator; raises InputError if it is refused."""
         self.operator.do(what, self.client, press, call, needs)
@@ -249,6 +261,12 @@ class PanelPage:
 
     def refresh(self) -> None:
         """Disable controls that cannot be used now, with the reason."""
+        if self.operator.arm is not self._arm:
+            self._arm = self.shape.arm = self.operator.arm
+            self.scene.draw_workspace()
+            self.scene.draw_frames()
+            for changed in self.arm_listeners:
+                changed()
         self.controls = [control for control in self.controls if not control.element.is_deleted]
         for control in self.controls:
             # a held button keeps the keyboard's focus

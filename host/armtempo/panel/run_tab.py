@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlencode
 
 import numpy as np
@@ -41,6 +41,9 @@ class RunTab:
         self._shown = (-1, 0)
         self._drawn_s = 0.0
         self._known: list[PastRun] = []
+        self._chosen: set[str] = set()
+        """Names of the runs to compare; they stay chosen when another run is added to the list."""
+        self._compare: ui.button | None = None
         self._plan = ui.label("").classes("text-subtitle2")
         with ui.row():
             for text, call, needs, icon, look in (
@@ -120,46 +123,47 @@ class RunTab:
 
     @ui.refreshable_method
     def _past(self) -> None:
-        chosen: list[str] = []
-        compare: list[ui.button] = []
-        if not self._known:
+        names = [run.folder.name for run in self._known]
+        self._chosen &= set(names)
+        if not names:
             ui.label(words.NO_RUNS).classes("armtempo-note")
             return
         with ui.element("div").classes("armtempo-runs"):
             for text in ("", *words.RUN_COLUMNS):
                 ui.label(text).classes("text-caption")
-            for run in self._known:
-                box = ui.checkbox(
-                    on_change=lambda event, name=run.folder.name: _choose(chosen, name, event.value, compare)
-                )
-                named(box.props("dense"), f"{words.COMPARE}: {run.folder.name}")
-                for text in (run.folder.name, run.date, run.duration, run.ending):
+            for run, name in zip(self._known, names, strict=True):
+                box = ui.checkbox(value=name in self._chosen, on_change=partial(self._choose, name))
+                named(box.props("dense"), f"{words.COMPARE}: {name}")
+                for text in (name, run.date, run.duration, run.ending):
                     ui.label(words.plain(text))
-                report = _link(ui.button(words.REPORT), f"{_ADDRESS}/{quote(run.folder.name)}/{REPORT_PAGE}")
-                named(report.props("flat dense no-caps"), f"{words.REPORT}: {run.folder.name}")
-        if len(self._known) > 1:
-            compare.append(_link(ui.button(words.COMPARE), _comparison([])).props("outline no-caps"))
+                report = _link(ui.button(words.REPORT), f"{_ADDRESS}/{quote(name)}/{REPORT_PAGE}")
+                named(report.props("flat dense no-caps"), f"{words.REPORT}: {name}")
+        if len(names) > 1:
+            compare = _link(ui.button(words.COMPARE), "").props("outline no-caps")
+            self._page.control(compare, None, self._why_no_comparison)
+            self._compare = compare
+            self._offer()
+
+    def _choose(self, name: str, event: Any) -> None:
+        """Note whether a run is to be compared."""
+        (self._chosen.add if event.value else self._chosen.discard)(name)
+        self._offer()
+
+    def _offer(self) -> None:
+        """The chosen runs, in the address of the comparison."""
+        if self._compare is not None:
+            query = urlencode({"run": sorted(self._chosen)}, doseq=True)
+            self._compare.props["href"] = f"{_ADDRESS}/{COMPARISON}?{query}"
+            self._page.refresh()
+
+    def _why_no_comparison(self) -> str:
+        return "" if len(self._chosen) > 1 else words.CHOOSE_TWO
 
 
 def _link(button: ui.button, address: str) -> ui.button:
     """Open a page of the server in a new tab: the browser does, which keeps a server from it if that takes long."""
     button.props["href"] = address
     return button.props("target=_blank")
-
-
-def _comparison(names: Sequence[str]) -> str:
-    return f"{_ADDRESS}/{COMPARISON}?{urlencode({'run': sorted(names)}, doseq=True)}"
-
-
-def _choose(chosen: list[str], name: str, wanted: bool, compare: list[ui.button]) -> None:
-    """Note whether a run is to be compared, in the address of the comparison."""
-    if wanted:
-        chosen.append(name)
-    elif name in chosen:
-        chosen.remove(name)
-    for button in compare:
-        button.props["href"] = _comparison(chosen)
-        button.update()
 
 
 def build(page: PanelPage) -> None:

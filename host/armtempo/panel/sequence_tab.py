@@ -178,7 +178,7 @@ class SequenceTab:
         """The plan of the present steps."""
         if (plan := self._editor.plan) is None:
             version = self._editor.version
-            plan = pipeline.plan_sequence(self._operator.arm, self._editor.sequence(), self._operator.part)
+            plan = pipeline.plan_sequence(self._editor.arm, self._editor.sequence(), self._operator.part)
             self._editor.planned(plan, version)
         return plan
 

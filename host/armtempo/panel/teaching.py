@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +44,7 @@ def nearest(arm: Arm, wanted: Array, here_deg: Array) -> Array:
     return via_points.nearest(arm, pose, here_deg.tolist())
 
 
-def ask(page: PanelPage, changed: Callable[[], object]) -> None:
+def ask(page: PanelPage) -> None:
     """Store the present posture: under a name in the arm file, or as a via point of the job."""
     operator = page.operator
     angles = taught.digits(operator.arm, [float(angle) for angle in operator.live.angles_deg])
@@ -56,7 +55,7 @@ def ask(page: PanelPage, changed: Callable[[], object]) -> None:
         if any(posture.name == wanted for posture in operator.arm.postures) and not replace.value:
             raise InputError(words.HAS_POSTURE.format(name=wanted), words.REPLACE_HINT)
         taught.save(arm_file(operator.arm), operator.arm, wanted, angles, replace.value)
-        _read_again(page, changed)
+        read_again(page)
         operator.say(words.TAUGHT.format(name=wanted))
 
     def add(press: Press) -> None:
@@ -77,12 +76,12 @@ def ask(page: PanelPage, changed: Callable[[], object]) -> None:
 
                 def remove(press: Press, gone: str = gone) -> None:
                     operator.check(page.client, press, Needs.CONTROL)
-                    _change(page, gone, None, changed)
+                    _change(page, gone, None)
                     asked.dialog.close()
 
                 def rename(press: Press, gone: str = gone) -> None:
                     operator.check(page.client, press, Needs.CONTROL)
-                    _change(page, gone, str(name.value or "").strip(), changed)
+                    _change(page, gone, str(name.value or "").strip())
                     asked.dialog.close()
 
                 page.button(words.RENAME_POSTURE, rename, Needs.CONTROL, look="flat dense")
@@ -91,7 +90,7 @@ def ask(page: PanelPage, changed: Callable[[], object]) -> None:
                 )
 
 
-def _change(page: PanelPage, name: str, new: str | None, changed: Callable[[], object]) -> None:
+def _change(page: PanelPage, name: str, new: str | None) -> None:
     """Remove a posture from the arm file, or give it another name; its other lines and comments stay."""
     file = arm_file(page.operator.arm)
     content = tomlkit.parse(file.read_text(encoding="utf-8"))
@@ -105,13 +104,13 @@ def _change(page: PanelPage, name: str, new: str | None, changed: Callable[[], o
         postures[new] = found
     del postures[name]
     replace_text(file, tomlkit.dumps(content))
-    _read_again(page, changed)
+    read_again(page)
 
 
-def _read_again(page: PanelPage, changed: Callable[[], object]) -> None:
-    """Take the arm with its new postures, which the board does not know."""
+def read_again(page: PanelPage) -> None:
+    """Take the arm with its new postures, frames or tools, which the board does not know."""
     page.operator.arm_changed(Arm.read(arm_file(page.operator.arm)))
-    changed()
+    page.refresh()
 
 
 def arm_file(arm: Arm) -> Path:

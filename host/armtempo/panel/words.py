@@ -57,6 +57,7 @@ JOINTS, OUTPUTS, INPUTS = "Joints", "Outputs", "Inputs"
 OWN = "own"
 FRAME, BASE_FRAME, TOOL_FRAME = "What is jogged", "Tool, base frame", "Tool, own frame"
 FRAME_OF_POSE, IN_BASE = "Frame of the pose", "in the base"
+TOOL, NO_TOOL = "Tool", "no tool"
 STEP_OF_JOG, HOLD = "Length of a jog, mm or degrees", "While held"
 SPEED_OF_JOG = "Speed of jogs and targets"
 JOG_STEP = "step"
@@ -70,12 +71,25 @@ TEACH, TEACH_HINT = "Store…", "Store where the arm is, under a name in the arm
 STORE, NAME_OF_POSTURE, REPLACE = "Store", "Name", "Replace the posture of this name"
 HAS_POSTURE, REPLACE_HINT = "There is a posture {name!r} already", "switch on ‘Replace’, or type another name"
 TAUGHT, ADD_TO_JOB, RENAME_POSTURE = "Stored: {name}", "Add to the job", "Take the name above"
+TEACH_POINTS, TAUGHT_KINDS = "Teach a frame or a tool", {"frame": "Frame", "tool": "Tool"}
+WHAT_IS_TAUGHT, NAME_OF_TAUGHT, BEGIN, LEVEL = "What is taught", "Name of the frame or tool", "Begin", "Level"
+TAUGHT_HINTS = {
+    "frame": "Three points that the tool is brought to: the origin, one on the x axis, one on the side of y. "
+    "Level: its z axis is made vertical.",
+    "tool": "Four postures in which the tool's point touches the same tip, each turned differently by 30° or more.",
+}
+TEACHING = "{kind} {name}:"
+SURE_REPLACE = "The arm file has a {kind} {name!r} already. It stays until the new one is stored."
+TEACH_ANEW, TAKE_POINT, TAKEN, NEXT = "Teach it anew", "Take this point", "  ✓", "  ← bring the arm there"
+ALL_TAKEN, MORE_POINTS = "All points are taken: store them.", "Take all points first."
+OTHER_TOOL = "The other points were taken with another tool: choose that again, or begin anew."
+INTO_RANGE = "move the arm into its ranges"
 BY_HAND = "Guide by hand…"
 SURE_BY_HAND = (
     "The motors' current is switched off: somebody must hold the arm, or it sinks. The encoders are read."
 )
 GUIDING, GUIDED = "Guide the arm. It is held again after:", "The current on"
-VIEW = "View"
+VIEW, FRAMES_SHOWN = "View", "Frames"
 PATH_SPEED = "0 … {fastest:.0f} mm/s"
 LIMIT, IN_PLAN = "limit of {names}", "{name}, planned"
 SPEED_OF_MOTION = "Speed"
@@ -162,7 +176,7 @@ TIME_S, ANGLE, SPEED, ACCELERATION, JERK = (
 SAVED = "Saved: {path}"
 CANCELLED, PLAN_AGAIN = "The planning was cancelled.", "plan again when you like"
 NO_PLAN = "Plan a motion first."
-PLAN_IS_OLD = "The job was changed after it was planned: plan again."
+PLAN_IS_OLD = "The job, or what it names of the arm, was changed after it was planned: plan again."
 
 TO_START, RUN, UPLOAD, REPEAT = "Go to the start", "Run", "Upload", "Repetitions"
 ERROR = "following error, deg"
@@ -171,6 +185,7 @@ PLANNED = "{name}: {total:.3f} s · {file}"
 LEFT = "{name}: {part:.0%}, {left:.0f} s left"
 WRONG_REPEAT, RIGHT_REPEAT = "Repetitions: {times} are not possible", "give 1 to {most}"
 NO_RUNS, UNREADABLE = "Nothing was recorded here yet.", "cannot be read"
+CHOOSE_TWO = "Choose two runs or more."
 RUN_COLUMNS = ("Run", "Date", "Duration", "End", "")
 STORED, PAST_RUNS, REPORT, COMPARE = "Stored motions", "Past runs", "Report", "Compare"
 NO_SEQUENCE_OPEN = "Choose a sequence first."
@@ -181,10 +196,13 @@ STEP_KINDS = {
     "run": "run",
     "output": "set output",
     "holds": "tool holds",
+    "tool": "tool on the arm",
     "wait_s": "wait, s",
     "wait_input": "wait for input",
     "count": "count",
     "repeat": "repeat",
+    "place": "to the place of",
+    "leave": "leave the place of",
     "end": "end of",
     "call": "call",
 }
@@ -195,6 +213,10 @@ STEP_KEYS = {
     "active": "active",
     "timeout_s": "time-out, s",
     "on_timeout": "then",
+    "speed_mm_s": "at most, mm/s",
+    "first_place": "first place",
+    "last_place": "last place",
+    "reverse": "from the last",
 }
 ADD_HERE = "Add where the arm is"
 PLANNING = "Planning…"

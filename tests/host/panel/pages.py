@@ -71,13 +71,13 @@ class Page:
             if one.text and one.visible and all(around.visible for around in one.ancestors())
         ]
 
-    def fire(self, element: Any, event: str, *arguments: Any) -> None:
-        """An event of the browser; what it begins is waited for."""
+    def fire(self, element: Any, event: str, *arguments: Any, is_command: bool = False) -> None:
+        """An event of the browser, for what takes commands alone if it is one; what it begins is waited for."""
         given: Any = list(arguments) if len(arguments) != 1 else arguments[0]
 
         def send() -> None:
             for listener in list(element._event_listeners.values()):
-                if listener.type == event:
+                if listener.type == event and (listener.js_handler or not is_command):
                     sent = GenericEventArguments(sender=element, client=self.client, args=given)
                     handle_event(listener.handler, sent)
 
@@ -97,7 +97,7 @@ class Page:
         reasons = [control.reason for control in self.of.controls if control.element is element]
         assert element.enabled, (_name(element), reasons)
         said = asdict(fakes.press(self.operator))
-        self.fire(element, event, {**said, "made_s": said["made_s"] - late_s}, value)
+        self.fire(element, event, {**said, "made_s": said["made_s"] - late_s}, value, is_command=True)
 
     def done(self) -> None:
         """Wait for the running command."""

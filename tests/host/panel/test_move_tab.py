@@ -15,6 +15,7 @@ from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.frame import ArmFrame
 from armtempo.model.pose import from_rpy
+from armtempo.model.tool_pose import BASE
 from armtempo.panel import teaching, words
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.robot import homing
@@ -61,6 +62,9 @@ def test_a_jog_that_is_not_possible_is_grey_with_the_reason(operator: PanelBoard
     operator.live.state = board_state()
     with pages(operator) as page:
         assert page.named("joint 1 +").enabled
+        assert page.named("⟳ x +").enabled  # what is not in view is not asked for
+        page.named(words.FRAME).value = BASE
+        page.look()
         assert not page.named("⟳ x +").enabled
         reasons = [control.reason for control in page.of.controls if control.element is page.named("⟳ x +")]
         assert "the arm cannot turn the tool about x from here" in reasons[0]
@@ -77,6 +81,8 @@ def test_the_tool_is_jogged_along_the_axes_of_a_frame(operator_of: Callable[[Arm
         page.named(words.FRAME).value = "joints"
         assert _in_view(page.named("joints z +"))
         assert not _in_view(page.named("joint 1 +"))
+        page.named(words.FRAME).value = "tray"
+        page.look()
         turn = page.named("⟳ tray y +")  # about the base's x
         (reason,) = [control.reason for control in page.of.controls if control.element is turn]
         assert "the arm cannot turn the tool about tray-y from here" in reason

@@ -142,5 +142,12 @@ def test_reports_and_comparisons_open_where_the_server_has_them(operator: PanelB
         for name in ("b", "a"):
             page.named(f"{words.COMPARE}: {name}").set_value(True)
         assert page.named(words.COMPARE).props["href"] == f"/runs/{COMPARISON}?run=a&run=b"
+        (operator.runs / "c").mkdir()
+        (operator.runs / "c" / "run.json").write_text("{}")
+        page.look()  # another program's run is added to the list
+        assert page.named(f"{words.COMPARE}: b").value
+        assert page.named(words.COMPARE).props["href"] == f"/runs/{COMPARISON}?run=a&run=b"
+        assert page.named(words.COMPARE).enabled
         page.named(f"{words.COMPARE}: b").set_value(False)
-        assert page.named(words.COMPARE).props["href"] == f"/runs/{COMPARISON}?run=a"
+        page.look()
+        assert not page.named(words.COMPARE).enabled  # with the reason

@@ -52,7 +52,7 @@ def paste(page: Any, text: str) -> str:
     """Paste rows of via points; why they were refused."""
     page.get_by_role("button", name="Paste").click()
     page.get_by_label("Rows of angles").fill(text)
-    return panels.answer(page, "Paste")
+    return panels.refusal_of_answer(page, "Paste")
 
 
 def open_sequence(page: Any, file: str, last: str) -> None:

@@ -16,7 +16,7 @@ from armtempo.panel import words
 
 from tests.system import commandline, panels
 from tests.system.panel.files import MARKUP, SEQUENCE, TABS, open_sequence, paste, show
-from tests.system.panels import Panel, home, press
+from tests.system.panels import Panel, home, refusal_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("panel")]
 _FIELDS = """() => [...document.querySelectorAll('.q-tab-panel input:not([role=combobox])')]
@@ -74,7 +74,7 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         page.wait_for_timeout(300)
         assert field.input_value() == wrong  # not lost as what was typed in the field before it is taken
         control = page.get_by_role("button", name=button, exact=True)
-        shown = press(page, control, partial(control.press, "Enter"))
+        shown = refusal_of(page, control, partial(control.press, "Enter"))
         said = refusal(folder, file, tomlkit.dumps(content))
         said = words.of_job(said) if tab == "Job" else said
         assert said.replace(".0", "") in shown.replace(".0", "")

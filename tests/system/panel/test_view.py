@@ -64,6 +64,20 @@ def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> N
     }"""
     assert page.evaluate(silent, 1000 - page.evaluate("armtempo.LOOK_MS"))
     page.wait_for_selector("body:not(.lost)")  # it hears again
+    keys = """() => {
+      const sent = [], emit = window.emitEvent;
+      window.emitEvent = (name) => sent.push(name);
+      document.body.classList.add('lost');
+      const typed = document.createElement('input');
+      document.body.append(typed);
+      for (const key of ['Enter', ' ', 'Escape'])
+        typed.dispatchEvent(new KeyboardEvent('keydown', {key, bubbles: true, cancelable: true}));
+      typed.remove();
+      document.body.classList.remove('lost');
+      window.emitEvent = emit;
+      return sent;
+    }"""
+    assert page.evaluate(keys) == 2 * ["armtempo-stop"]  # which the server may hear all the same
 
 
 def test_escape_answers_a_question_with_no(page: Any) -> None:
