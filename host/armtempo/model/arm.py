@@ -28,10 +28,12 @@ from armtempo.model import (
     workspace,
 )
 from armtempo.model import frame as frames_of
+from armtempo.model import pallet as pallets_of
 from armtempo.model import posture as named
 from armtempo.model import tool as tool_of
 from armtempo.model.frame import ArmFrame
 from armtempo.model.outputs import Input, Output
+from armtempo.model.pallet import ArmPallet
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
 from armtempo.model.tool import ArmTool
@@ -77,6 +79,8 @@ class Arm:
     """Frames of what is around it; not sent to the board."""
     tools: tuple[ArmTool, ...] = field(default=(), metadata=json_codec.ADDED)
     """What may be on it; the board knows nothing of them."""
+    pallets: tuple[ArmPallet, ...] = field(default=(), metadata=json_codec.ADDED)
+    """What is around it with many places; not sent to the board."""
     tool: ArmTool | None = field(default=None, metadata=json_codec.ADDED)
     """What is on it, so that poses are of its point; None: they are of the frame after the last row. See
     ``with_tool``."""
@@ -99,7 +103,9 @@ class Arm:
             )
         if self.coupling:
             self._check_coupling()
-        frames_of.check(self.frames, self.source or f"arm {self.name!r}")
+        where = self.source or f"arm {self.name!r}"
+        frames_of.check(self.frames, where)
+        pallets_of.check(self.pallets, self.frames, where)
 
     def _check_coupling(self) -> None:
         """Raise InputError for a coupling that is none, or for what the board cannot do with coupled joints."""
@@ -170,6 +176,7 @@ class Arm:
         postures = top.table("posture")
         frames = frames_of.read(top)
         tools = tool_of.read(top)
+        pallets = pallets_of.read(top, frames)
         around = workspace.read(top, frames)
         loads = parts_file.loads(top)
         homing = parts_file.homing(top, [joint.name for joint in joints])
@@ -191,6 +198,7 @@ class Arm:
             coupling=coupling,
             frames=frames,
             tools=tools,
+            pallets=pallets,
         )
         if not postures:
             return arm
@@ -292,6 +300,10 @@ class Arm:
         if name == NOTHING:
             return replace(self, tool=None)
         return replace(self, tool=self.tools[self._number("tool", name, [each.name for each in self.tools])])
+
+    def pallet(self, name: str) -> ArmPallet:
+        """The pallet of that name; raises InputError if the arm has none."""
+        return self.pallets[self._number("pallet", name, [each.name for each in self.pallets])]
 
     def _number(self, what: str, name: str, names: list[str]) -> int:
         if name in names:

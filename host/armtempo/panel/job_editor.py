@@ -151,7 +151,7 @@ class JobEditor(FileEditor):
         """Whether a frame or the tool of the plan has changed."""
         try:
             if self.plan is not None:
-                planned_for.check_frames(self.plan.name, self.plan.arm, self.plan.frames, arm)
+                planned_for.check_surroundings(self.plan.name, self.plan, arm)
         except InputError:
             return True
         return False

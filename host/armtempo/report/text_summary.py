@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES
 
 from armtempo.basics.errors import ArmtempoError
 from armtempo.basics.text import aligned
 from armtempo.diagnosis.figures import findings as coarse_steps
+from armtempo.encoding import flash_use
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.plan import Plan, Search
@@ -93,9 +93,7 @@ def result_lines(results: Iterable[JointResult]) -> list[str]:
 
 def record_bytes(plan: Plan) -> int:
     """Size of the plan's motion record."""
-    trajectory, first = plan.trajectory, plan.trajectory.joints[0]
-    segments = len(first.angle_points_deg) - first.degree
-    return motion.size(first.degree, len(trajectory.joints), trajectory.shared, segments, first.refine)
+    return flash_use.of_trajectory(plan.trajectory)
 
 
 def _widths(plan: Plan) -> tuple[int, ...]:

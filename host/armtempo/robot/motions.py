@@ -12,7 +12,7 @@ from armtempo.basics.arguments import checked_as
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_sequence
+from armtempo.encoding import encoded_sequence, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.encoding.encoded_sequence import Encoded, EncodedSequence
 from armtempo.link.board_messages import SequenceState
@@ -152,11 +152,12 @@ class Motions:
     ) -> Run:
         """Replay a motion ``repeat`` times, 1 to 99, or run a sequence, and record it in a new run folder in ``out``.
 
-        ``motion``: a plan, its file (FILE.json), or the name of a motion or sequence on the board; a sequence
-        takes neither ``repeat`` nor ``progress``. The arm must be homed and at the start; the
-        arm of a virtual board is moved there. Between repetitions it returns along the same path. The speed is
-        that of the last ``speed`` call. ``progress`` counts seconds of motion; ``watcher`` is called with
-        folder, samples and repetitions. If the run ends early, it raises, and ``last_run`` holds the recording.
+        ``motion``: a plan, its file (FILE.json), or the name of a motion or sequence on the board, which is refused
+        if what it was planned with has changed since; a sequence takes neither ``repeat`` nor ``progress``. The arm
+        must be homed and at the start; the arm of a virtual board is moved there. Between repetitions it returns
+        along the same path. The speed is that of the last ``speed`` call. ``progress`` counts seconds of motion;
+        ``watcher`` is called with folder, samples and repetitions. If the run ends early, it raises, and
+        ``last_run`` holds the recording.
         Raises LinkError if the arm is not homed or not at the start, the board has another motion of this name
         (``upload`` can replace it), or is set up for another arm.
         """
@@ -174,6 +175,8 @@ class Motions:
             self._run_sequence(motion, lambda _: None, stop, False, out, watcher or Watcher())
             return Run.load(cast(Path, self._last_folder))
         encoded = self._motion(motion)
+        if isinstance(motion, str):
+            made_with.check_stored(motion, encoded.data, encoded.arm)
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         with self._board.stoppable(stop) as wanted:
             store(self._board.client, encoded.records)
@@ -239,6 +242,7 @@ class Motions:
         if found is None or not found.sequence:
             raise InputError(f"the board has no sequence {name!r}", "see 'armtempo list'")
         if self._board.arm is not None:
+            made_with.check_stored(name, self._board.client.fetch(name), self._board.arm)
             self._board.start.home_virtual_arm(self._board.arm)
         return MotionKey(found.name, found.crc)
 
