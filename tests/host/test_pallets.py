@@ -242,6 +242,8 @@ def test_made_in_code_it_is_checked_too(tmp_path: Path, quick: None) -> None:
     steps = (EachPlace((ToPlace("line"), ToPlace("line", leave=True)), "line", first=3),)
     with pytest.raises(InputError, match="places 3 to 2 of the 2 of pallet 'line'"):
         armtempo.plan_sequence(replace(found, pallets=(pallet,)), Sequence("s", steps))
+    with pytest.raises(InputError, match="nothing is repeated"):
+        armtempo.plan_sequence(replace(found, pallets=(pallet,)), Sequence("s", (EachPlace((), "line"),)))
 
 
 def test_the_solutions_of_all_places_are_near_each_other() -> None:

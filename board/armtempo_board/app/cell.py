@@ -95,7 +95,7 @@ class Cell:
 
         ``posture``: a name, the joints' angles in degrees, or a place of a pallet.
 
-        ``wait`` False: return at once, while the arm moves.
+        A sliding joint is given in mm. ``wait`` False: return at once, while the arm moves.
         """
         target = self._target(posture)
         percent = _percent(speed)
@@ -128,7 +128,7 @@ class Cell:
             self._work.brake()
 
     def posture(self) -> "list[float]":
-        """The joints' angles in degrees, as commanded."""
+        """The joints' angles in degrees, positions of sliding ones in mm, as commanded."""
         return [steps / per_deg for steps, per_deg in zip(self._work.steps(), self._table["per_deg"])]
 
     # places and tools

@@ -42,7 +42,11 @@ class RunProgress(Watcher):
         time_s = sample.path_ticks / TICK_HZ  # the motion's own time
         angles = self._angles_deg(sample)
         errors = angles - self._motion.trajectory(time_s)
-        pairs = (f"{angle:.1f}° ({error:+.2f})" for angle, error in zip(angles, errors, strict=True))
+        signs = (joint.unit.sign for joint in self._motion.arm.driven)
+        pairs = (
+            f"{angle:.1f}{sign} ({error:+.2f})"
+            for angle, error, sign in zip(angles, errors, signs, strict=True)
+        )
         elapsed = time.monotonic() - self._started_s
         self._progress(time_s, duration_s, f"{elapsed:.0f} s{self._speed(sample)}  {'  '.join(pairs)}")
 

@@ -90,7 +90,8 @@ def _ends(arm: Arm) -> list[Finding]:
         if _gap_mm(end.points_mm, near) < near:
             crossing.append(where)
     found = []
-    next_step = "give [workspace] and radius_mm, so that motions are checked for it, or narrow range_deg"
+    ranges = " or ".join(dict.fromkeys(joint.unit.key("range_deg") for joint in arm.driven))
+    next_step = f"give [workspace] and radius_mm, so that motions are checked for it, or narrow {ranges}"
     if below:
         found.append(
             note("ranges", f"from home, the arm goes below its base plane with {', '.join(below)}", next_step)
@@ -104,7 +105,7 @@ def _wide(arm: Arm) -> list[Finding]:
     found = []
     for joint in arm.driven:
         low, high = joint.range_deg
-        if high - low > _FULL_TURN_DEG:
+        if high - low > _FULL_TURN_DEG and not joint.slides:
             text = f"its range of {high - low:g} deg is more than a turn"
             found.append(note(joint.name, text, "make sure that the cables allow it"))
     return found

@@ -145,6 +145,7 @@ VIA_KEYS = {
     "frame": "Frame",
     "posture": "Posture",
     "posture_deg": "Near the angles, deg",
+    "posture_joints": "Near the joints at",
     "tolerance_mm": "Tolerance, mm",
     "tolerance_deg": "Tolerance, deg",
 }

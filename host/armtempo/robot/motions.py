@@ -21,7 +21,7 @@ from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import via_points
-from armtempo.planning.jog.jog_motion import SPEED, move_of
+from armtempo.planning.jog.jog_motion import SPEED, by_of_joint, move_of, number_of_joint
 from armtempo.report.run import Run
 from armtempo.report.run_folder import RunFolder
 from armtempo.robot import arm_state, goto, jog, recording, sequence_run, stored_motion
@@ -87,11 +87,12 @@ class Motions:
     ) -> Array:
         """Move a joint or the tool: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
 
-        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base, "tool-x", … of the tool or
-        "tray-x", … of a frame of the arm: the tool moves along it by ``by_mm``, or turns about it by
-        ``by_deg``; ``speed``: fraction of the speed limits, 0.01 to 1. The jog ends early at the end of a range,
-        or if the tool cannot continue along the line (``last_jog_ends`` says why). Returns the posture in degrees,
-        (J,). Raises LinkError if the position is unknown, InputError if no motion in that direction is possible.
+        A sliding joint: ``joint="lift", by_mm=10``. ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of
+        the base, "tool-x", … of the tool or "tray-x", … of a frame of the arm: the tool moves along it by ``by_mm``,
+        or turns about it by ``by_deg``; ``speed``: fraction of the speed limits, 0.01 to 1. The jog ends early at the
+        end of a range, or if the tool cannot continue along the line (``last_jog_ends`` says why). Returns the
+        posture in degrees and mm, (J,). Raises LinkError if the position is unknown, InputError if no motion in that
+        direction is possible.
         """
         arm = self._board.known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
@@ -101,14 +102,30 @@ class Motions:
         return self._posture_deg()
 
     def jog_to(
-        self, joint: int | str, angle_deg: float, speed: float = SPEED, stop: StopRequest | None = None
+        self,
+        joint: int | str,
+        angle_deg: float | None = None,
+        speed: float = SPEED,
+        stop: StopRequest | None = None,
+        *,
+        position_mm: float | None = None,
     ) -> Array:
-        """Move a joint to an angle; nothing moves if it is there. The rest as in ``jog``."""
+        """Move a joint to an angle, or a sliding one to ``position_mm``; nothing moves if it is there. The rest as in
+        ``jog``."""
         arm = self._board.known_arm()
+        number = number_of_joint(arm, joint)
+        to, other = (angle_deg, position_mm)[:: -1 if arm.driven[number].slides else 1]
+        if to is None or other is not None:
+            name, unit = arm.driven[number].name, arm.driven[number].unit
+            raise InputError(
+                f"{name} moves to a position in {unit.word}",
+                f"give {'position_mm' if arm.driven[number].slides else 'angle_deg'} alone",
+            )
         self._board.start.home_virtual_arm(arm)
-        by_deg = jog.distance_deg(self._posture_deg(), arm, joint, angle_deg)
-        if by_deg:
-            return self.jog(joint, by_deg, speed=speed, stop=stop)
+        distance = jog.distance_deg(self._posture_deg(), arm, joint, to)
+        if distance:
+            by_deg, by_mm = by_of_joint(arm, joint, distance)
+            return self.jog(joint, by_deg, by_mm=by_mm, speed=speed, stop=stop)
         self.last_jog_ends = ""
         return self._posture_deg()
 
@@ -127,8 +144,10 @@ class Motions:
         """
         arm = self._board.known_arm()
         by = math.copysign(math.inf, direction)
-        along = None if turn or joint is not None else by
-        move = move_of(arm, joint, axis, None if along else by, along)
+        by_deg, by_mm = (by, None) if turn else (None, by)
+        if joint is not None:
+            by_deg, by_mm = by_of_joint(arm, joint, by)
+        move = move_of(arm, joint, axis, by_deg, by_mm)
         self._board.start.home_virtual_arm(arm)
         return HeldJog(self._board.client, arm, jog.plan(self._board.client, arm, move, speed))
 
