@@ -22,6 +22,7 @@ TYPE_CHECKING = False  # as in "typing", whose import takes longer than the rest
 __all__ = [
     "Arm",
     "ArmFrame",
+    "ArmPallet",
     "ArmPosture",
     "ArmTool",
     "ArmtempoError",
@@ -31,6 +32,7 @@ __all__ = [
     "Count",
     "Driver",
     "Dynamics",
+    "EachPlace",
     "Encoder",
     "Goto",
     "Hold",
@@ -63,8 +65,10 @@ __all__ = [
     "Stop",
     "StopRequest",
     "Stopped",
+    "ToPlace",
     "ToolSegment",
     "Trajectory",
+    "UseTool",
     "Wait",
     "WaitInput",
     "Watcher",
@@ -104,6 +108,7 @@ if TYPE_CHECKING:
     from armtempo.model.frame import ArmFrame
     from armtempo.model.job import Job, Stop
     from armtempo.model.outputs import Input, Output
+    from armtempo.model.pallet import ArmPallet
     from armtempo.model.parts import (
         Driver,
         Dynamics,
@@ -119,7 +124,20 @@ if TYPE_CHECKING:
     from armtempo.model.posture import ArmPosture
     from armtempo.model.sequence import Sequence
     from armtempo.model.sequence_plan import SequencePlan
-    from armtempo.model.steps import Count, Goto, Hold, Repeat, RunMotion, SetOutput, Step, Wait, WaitInput
+    from armtempo.model.steps import (
+        Count,
+        EachPlace,
+        Goto,
+        Hold,
+        Repeat,
+        RunMotion,
+        SetOutput,
+        Step,
+        ToPlace,
+        UseTool,
+        Wait,
+        WaitInput,
+    )
     from armtempo.model.tool import ArmTool
     from armtempo.model.tool_pose import Pose
     from armtempo.model.tool_segment import ToolSegment
@@ -150,6 +168,7 @@ _HOMES = {
     "armtempo.model.frame": ("ArmFrame",),
     "armtempo.model.job": ("Job", "Stop"),
     "armtempo.model.outputs": ("Input", "Output"),
+    "armtempo.model.pallet": ("ArmPallet",),
     "armtempo.model.parts": (
         "Driver",
         "Dynamics",
@@ -164,12 +183,15 @@ _HOMES = {
     "armtempo.model.posture": ("ArmPosture",),
     "armtempo.model.steps": (
         "Count",
+        "EachPlace",
         "Goto",
         "Hold",
         "Repeat",
         "RunMotion",
         "SetOutput",
         "Step",
+        "ToPlace",
+        "UseTool",
         "Wait",
         "WaitInput",
     ),

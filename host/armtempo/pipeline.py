@@ -102,7 +102,7 @@ def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Pla
     """
     found = load_plan(path, altered)
     if arm is not None:
-        planned_for.check(path, found.arm, found.frames, arm)
+        planned_for.check(path, found, arm)
     return found
 
 

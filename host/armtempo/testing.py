@@ -22,11 +22,11 @@ from typing import Any
 
 import armtempo_board
 import numpy as np
-from armtempo_board.app.cell import Cell, CellError, Ended
+from armtempo_board.app.cell import Cell, CellError, Ended, Place
 from armtempo_shared.program import EACH, MARK
 
 from armtempo.basics.errors import InputError
-from armtempo.encoding import encode, encoded_program
+from armtempo.encoding import encode, encoded_program, planned_for
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
@@ -44,7 +44,8 @@ class ProgramRun:
     """What a program did."""
 
     calls: list[tuple[Any, ...]] = field(default_factory=list)
-    """("goto", name or angles), ("run", motion), ("set", output, value), in order; ``start`` counts as "run"."""
+    """("goto", name or angles), ("run", motion), ("set", output, value), ("tool", name), in order; ``start`` counts as
+    "run", and a place of a pallet has the name "row 1, column 1, layer 1 of pallet 'tray'"."""
     said: list[str] = field(default_factory=list)
     """What it printed."""
     counters: dict[str, int] = field(default_factory=dict)
@@ -82,8 +83,10 @@ def run(
     found = UserProgram.load(program, arm)
     for name in inputs or {}:
         arm.input(name)
-    table = encoded_program.table(arm)
-    work = _Work(found, arm, inputs or {}, _Ends(moves, motion_s, longest_s))
+    places = encoded_program.places_of(arm, found)
+    table = encoded_program.table(arm, found, places)
+    rows = encoded_program.rows(arm, places)
+    work = _Work(found, arm, inputs or {}, _Ends(moves, motion_s, longest_s), rows)
     cell = _Recorded(table, work)
     names = {
         "__name__": "__main__",
@@ -119,9 +122,14 @@ class _Recorded(Cell):
         super().__init__(table, work)
         self._run = work.run
 
-    def goto(self, posture: str | Sequence[float], speed: float = 1.0, wait: bool = True) -> None:
+    def goto(self, posture: str | Place | Sequence[float], speed: float = 1.0, wait: bool = True) -> None:
         super().goto(posture, speed, wait)
-        self._run.calls.append(("goto", posture if isinstance(posture, str) else tuple(posture)))
+        where = posture.name if isinstance(posture, Place) else posture
+        self._run.calls.append(("goto", where if isinstance(where, str) else tuple(where)))
+
+    def tool(self, name: str) -> None:
+        super().tool(name)
+        self._run.calls.append(("tool", name))
 
     def start(self, motion: str, speed: float = 1.0) -> None:
         super().start(motion, speed)
@@ -135,12 +143,20 @@ class _Recorded(Cell):
 class _Work:
     """Does what a cell asks for; see ``armtempo_board.app.cell.Work``."""
 
-    def __init__(self, program: UserProgram, arm: Arm, inputs: Mapping[str, Level], ends: _Ends) -> None:
+    def __init__(
+        self,
+        program: UserProgram,
+        arm: Arm,
+        inputs: Mapping[str, Level],
+        ends: _Ends,
+        places: list[list[int]],
+    ) -> None:
         self.run = ProgramRun(outputs={output.name: output.safe for output in arm.outputs})
         self._program = program
         self._arm = arm
         self._inputs = [inputs.get(entry.name, False) for entry in arm.inputs]
         self._ends = ends
+        self._places = places
         self._now_ms = 0
         self._rests_ms = 0
         self._steps = arm.transmission.whole_steps(arm.home_deg)
@@ -174,7 +190,9 @@ class _Work:
         file = self._program.motion_file(name)
         if not file.is_file():
             raise InputError(f"no motion {name!r}: {file} does not exist", "plan it")
-        motion = Plan.load(file).trajectory
+        plan = Plan.load(file)
+        planned_for.check(file, plan, self._arm)
+        motion = plan.trajectory
         start = self._arm.transmission.whole_steps(motion(0.0))
         off = np.abs(np.subtract(start, self._steps))
         if off.max() > _AT_START_STEPS:
@@ -207,6 +225,9 @@ class _Work:
     def level(self, number: int) -> int:
         level = self._inputs[number]
         return int(level(self.run) if callable(level) else level)
+
+    def place(self, number: int) -> list[int]:
+        return self._places[number]
 
     def count(self, name: str) -> int:
         self.run.counters[name] = self.run.counters.get(name, 0) + 1

@@ -9,10 +9,11 @@ from typing import Any
 
 from armtempo import optimise
 from armtempo.basics import toml_section
+from armtempo.model.pallet import ArmPallet
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
 from armtempo.model.tool import ArmTool
 from armtempo.optimise.task import Number, Parameter
-from armtempo_board.app.cell import Cell
+from armtempo_board.app.cell import Cell, Pallet
 
 FOLDER = Path(__file__).parent
 
@@ -77,8 +78,17 @@ def _value(value: Any) -> str:
 
 def _cell() -> str:
     """The calls of a user's program."""
+    return _calls(Cell, "cell")
+
+
+def _pallet() -> str:
+    """Those of its pallets."""
+    return _calls(Pallet, "tray")
+
+
+def _calls(of: type, called: str) -> str:
     lines = ["| call | what it does |", "|---|---|"]
-    for name, call in vars(Cell).items():
+    for name, call in vars(of).items():
         if name.startswith("_") or not inspect.isfunction(call) or name in ("at", "each"):
             continue
         given = [
@@ -89,7 +99,7 @@ def _cell() -> str:
         ]
         asked = "await " if inspect.iscoroutinefunction(call) else ""
         said = " ".join((inspect.getdoc(call) or "").split())
-        lines.append(f"| `{asked}cell.{name}({', '.join(given)})` | {said} |")
+        lines.append(f"| `{asked}{called}.{name}({', '.join(given)})` | {said} |")
     return "\n".join(lines) + "\n"
 
 
@@ -102,8 +112,9 @@ TABLES = {
         "keys of encoder": _keys(Encoder, "encoder"),
         "keys of load": _keys(Load, "[load.NAME]"),
         "keys of tool": _keys(ArmTool, "[tool.NAME]"),
+        "keys of pallet": _keys(ArmPallet, "[pallet.NAME]"),
     },
-    "programs.md": {"cell": _cell},
+    "programs.md": {"cell": _cell, "pallet": _pallet},
     "virtual-board.md": {"keys of model": _keys(JointModel, "model")},
 }
 

@@ -19,6 +19,7 @@ steps / 2**28, times in ticks / 2**16.
     144     H[32]  the same at 32 times for all other changes of speed
     208     q[]    per joint: n + k angle control points; its n * R + k time control points,
                    or, with a shared axis, those once after the last joint
+    ...            what the host keeps with it, see armtempo.encoding.made_with; the board does not read it
     end     I      crc32 over all before it
 
 With e = 0, the times of ramps are equidistant; else those in the first and in the last duration / 2 ** e, and those
@@ -81,7 +82,7 @@ class MotionError(ValueError):
 
 
 def size(degree: int, joints: int, shared: bool, segments: int, refine: int) -> int:
-    """Bytes of a whole motion record."""
+    """Bytes of a motion record, without what the host keeps with it."""
     axes = 1 if shared else joints
     points = joints * (segments + degree) + axes * (segments * refine + degree)
     return HEAD_SIZE + 8 * points + 4
@@ -175,7 +176,7 @@ class MotionHead:
         self.shared = bool(flags & SHARED_AXIS)
         self.ramps = bytes(head[_RAMPS_AT:HEAD_SIZE])
         self.can_brake = any(self.ramps)
-        if length != size(self.degree, self.joints, self.shared, self.segments, self.refine):
+        if length < size(self.degree, self.joints, self.shared, self.segments, self.refine):
             raise MotionError("length does not fit the header")
 
     def ramp(self, at: int, duration: int, to_rest: bool) -> int:

@@ -9,6 +9,7 @@ Little endian::
     10      H      bytes S of the source
     12      T      the table, in JSON (below)
     ...     S      the source, in UTF-8; the host has put its marks into it (``MARK``)
+    ...     i[]    places of pallets: per place the steps of each joint above it, then those at it
     end     I      crc32 over all before it
 
 The table has
@@ -20,6 +21,8 @@ The table has
 - ``motions``: {name: crc32} of the motions that were uploaded with it;
 - ``outputs``: {name: [number, value at 0, value at 65535, {state: 0 to 65535}]};
 - ``inputs``: {name: number};
+- ``pallets``: {name: [rows, columns, layers, {tool: number of its first place above, from 0}]};
+- ``tools``: {name: {posture: [steps of each joint]}} of the postures that are others with this tool;
 - ``counters``: [names] that the source counts.
 """
 
@@ -59,12 +62,15 @@ def needed_bytes(source_bytes: int) -> int:
     return HEAP_BYTES + HEAP_PER_BYTE * source_bytes
 
 
-def pack(arm_crc: int, table: "dict[str, Any]", source: str) -> bytes:
-    """A program record; raises ProgramError if it is too large."""
+def pack(
+    arm_crc: int, table: "dict[str, Any]", source: str, places: "list[list[int]] | tuple[()]" = ()
+) -> bytes:
+    """A program record; raises ProgramError if it is too large. ``places``: of each the steps above it and at it."""
     names, text = json.dumps(table).encode(), source.encode()
-    if HEAD_BYTES + len(names) + len(text) + _CRC_BYTES > MAX_MOTION_BYTES:
+    where = b"".join([struct.pack("<%di" % len(place), *place) for place in places])
+    if HEAD_BYTES + len(names) + len(text) + len(where) + _CRC_BYTES > MAX_MOTION_BYTES:
         raise ProgramError("too large")
-    data = struct.pack(_HEAD, MAGIC, arm_crc, len(names), len(text)) + names + text
+    data = struct.pack(_HEAD, MAGIC, arm_crc, len(names), len(text)) + names + text + where
     return data + struct.pack("<I", crc32(data))
 
 
@@ -82,7 +88,8 @@ class ProgramRecord:
         )
         if magic != MAGIC:
             raise ProgramError("no program record of this version")
-        if length != HEAD_BYTES + self._table_bytes + self.source_bytes + _CRC_BYTES:
+        self._places_at = HEAD_BYTES + self._table_bytes + self.source_bytes
+        if length < self._places_at + _CRC_BYTES:
             raise ProgramError("length does not fit the header")
 
     def part(self, offset: int, size: int) -> bytes:
@@ -93,6 +100,12 @@ class ProgramRecord:
         """Its table; raises ValueError if it is none."""
         found: "dict[str, Any]" = json.loads(self.part(HEAD_BYTES, self._table_bytes).decode())
         return found
+
+    def place(self, number: int, joints: int) -> "tuple[int, ...]":
+        """The steps of each joint above a place, then those at it."""
+        layout = "<%di" % (2 * joints)
+        size = struct.calcsize(layout)
+        return struct.unpack(layout, self.part(self._places_at + number * size, size))
 
     def source(self) -> str:
         """The marked source."""

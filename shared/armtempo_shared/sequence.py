@@ -13,6 +13,7 @@ Little endian. It refers to its motions by name and checksum.
     12      10 R   the rows: B op, B number, H value, I amount, H step
     ...     28 M   the motions: 24s name (padded with 0), I crc32 of the motion's record
     ...     24 C   the counters: 24s name (padded with 0)
+    ...            what the host keeps with it, see armtempo.encoding.made_with; the board does not read it
     end     I      crc32 over all before it
 
 If the first pass of a repeat begins at another posture than the others, its rows are before the repeat. ``step`` is
@@ -50,7 +51,7 @@ ENDINGS = ("none", "running", "finished", "stopped", "timed_out", "fault", "refu
 """State of a sequence, or how it ended, by its number on the wire; none: no sequence since the start."""
 NONE, RUNNING, FINISHED, STOPPED, TIMED_OUT, FAULTED, REFUSED = 0, 1, 2, 3, 4, 5, 6
 
-MAX_ROWS, MAX_MOTIONS, MAX_NESTING, MAX_COUNTERS = 500, 64, 4, 8
+MAX_ROWS, MAX_MOTIONS, MAX_NESTING, MAX_COUNTERS = 500, 128, 4, 8
 MAX_WAIT_MS = 3_600_000
 MAX_REPEATS = 1_000_000
 
@@ -109,7 +110,8 @@ class SequenceRecord:
                 raise OtherVersionError("a sequence record of another version")
             raise SequenceError("no sequence record")
         self._counters_at = _HEAD_BYTES + _ROW_BYTES * self.rows + _MOTION_BYTES * self.motions
-        if length != self._counters_at + _COUNTER_BYTES * self.counters + _CRC_BYTES:
+        self.end = self._counters_at + _COUNTER_BYTES * self.counters
+        if length < self.end + _CRC_BYTES:
             raise SequenceError("length does not fit the header")
         if not 1 <= self.rows <= MAX_ROWS or self.motions > MAX_MOTIONS or self.counters > MAX_COUNTERS:
             raise SequenceError("more of something than the board takes")

@@ -387,6 +387,15 @@ def test_check_finds_frames_in_metres_or_out_of_reach(tmp_path: Path) -> None:
     assert "3000 mm from the base" in found["frame far", "note"]
     assert "0.269 mm from that of frame 'far': is it in metres?" in found["frame small", "warning"]
     assert not [each for each in check_arm(Arm.load(arm_file(tmp_path))) if "frame" in each.where]
+    more = "\n[frame.far]\nposition_mm = [3000, 0, 0]\n[tool.pen]\nposition_mm = [0, 0, 0.09]\n"
+    (near,) = [each for each in check_arm(Arm.load(arm_file(tmp_path, more))) if each.where == "tool pen"]
+    assert near.what == "its origin is 0.09 mm from that of the frame after the last row: is it in metres?"
+    assert near.next_step.endswith("position_mm = [0, 0, 90]")
+    far = [
+        [each for each in check_arm(Arm.load(arm_file(tmp_path, text))) if each.where == "frame far"]
+        for text in (more, more.replace("0.09]", "3000]"))
+    ]
+    assert [len(each) for each in far] == [1, 0], "a long tool reaches it"
 
 
 def test_the_library_takes_frames_and_gives_poses_in_them() -> None:

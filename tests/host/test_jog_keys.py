@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from armtempo.basics.errors import InputError
 from armtempo.cli.jog_screen import JogChoice, JogScreen, _StopKeys
 from armtempo.cli.keys import INTERRUPT, WindowsKeys
 from armtempo.model.arm import Arm
@@ -52,6 +53,8 @@ def test_the_axis_has_the_librarys_name() -> None:
     assert choice.tool_axis == "tool-y"
     choice.press("f", 2)
     assert choice.tool_axis == "y"
+    with pytest.raises(InputError, match="no frame 'toll'; did you mean 'tool'"):
+        choice.choose("toll")
 
 
 def test_the_frames_of_the_arm_are_among_those_to_choose_from() -> None:

@@ -106,7 +106,7 @@ def test_a_goto_in_a_line_moves_the_tool_straight_and_slowly(tmp_path: Path) -> 
     assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() / times[1] == pytest.approx(20.0, rel=0.01)
     with pytest.raises(InputError, match="give the sequence a start"):
         planned(tmp_path, line, top="")
-    with pytest.raises(InputError, match="line = true only"):
+    with pytest.raises(InputError, match="give line = true too"):
         planned(tmp_path, 'goto = "a"\nspeed_mm_s = 20')
 
 
@@ -267,9 +267,9 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (['wait_input = "part"\non_timeout = "next"'], "leave it out, or give timeout_s too"),
         (['wait_input = "part"\ntimeout_s = 1\non_timeout = "go"'], "on_timeout = 'go' is not allowed"),
         (["repeat = 0", "wait_s = 1", 'end = "repeat"'], "repeat = 0 is not allowed"),
-        (['repeat = "ever"', "wait_s = 1", 'end = "repeat"'], "repeat = 'ever' is not allowed"),
+        (['repeat = "ever"', "wait_s = 1", 'end = "repeat"'], "repeat = 'ever': arm .* has no pallet .ever."),
         (["repeat = 2", "wait_s = 1"], "repeat without an end"),
-        (["wait_s = 1", 'end = "repeat"'], "end = 'repeat' is not allowed"),
+        (["wait_s = 1", 'end = "repeat"'], "end = 'repeat' is not allowed here; write it after"),
         (["repeat = 2", 'end = "repeat"'], "nothing is repeated"),
         (["repeat = 2"] * 5 + ["wait_s = 1"] + ['end = "repeat"'] * 5, "at most 4 within each other"),
         (['call = "seq.toml"'], "calls itself: seq.toml calls seq.toml"),

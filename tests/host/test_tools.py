@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -14,14 +13,12 @@ from armtempo import pipeline
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.cli.taught_points import NamedPoints
 from armtempo.encoding import encode, planned_for
 from armtempo.kinematics import dynamics
 from armtempo.kinematics.forward import forward as of_geometry
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.of_arm import forward, inverse, inverse_many
 from armtempo.kinematics.solver import PoseSolver
-from armtempo.model import taught_tool
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Dynamics, Joint, Load
@@ -33,10 +30,8 @@ from armtempo.planning import via_points, workspace_check
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.planning.tool import Tool
-from armtempo.robot.teaching import NewTool
 from armtempo.splines.trajectory import Trajectory
 from click.testing import CliRunner
-from scipy.spatial.transform import Rotation
 
 from tests.host import arms
 from tests.host.arms import FIVE, FOUR, OFFSET_WRIST, SIX, THREE
@@ -233,6 +228,12 @@ def test_a_tool_that_cannot_be_is_refused_with_its_key(tmp_path: Path, more: str
     assert said in str(refused.value)
 
 
+def test_two_tools_made_in_code_have_two_names() -> None:
+    pen = ArmTool("pen", tuple(map(tuple, np.eye(4).tolist())))
+    with pytest.raises(InputError, match="two tools are called 'pen'"):
+        replace(Arm.paper(), tools=(pen, pen))
+
+
 JOB = """name = "j"
 path = "through"
 population = 4
@@ -264,10 +265,10 @@ def test_a_job_chooses_its_tool_and_a_plan_is_old_without_it(tmp_path: Path) -> 
         pipeline.load(tmp_path / "plan.json", changed)
     with pytest.raises(InputError, match=r"job.toml: tool: .* no tool 'griper'; did you mean 'gripper'"):
         Job.of_table(toml_table.parse(text.replace("gripper", "griper"), "job.toml"), arm)
-    planned_for.check("x", arm, (), changed)
+    planned_for.check("x", replace(plan, arm=arm), changed)
 
 
-def test_a_sequence_has_one_tool(tmp_path: Path) -> None:
+def test_a_sequence_begins_with_its_tool(tmp_path: Path) -> None:
     arm = Arm.load(arm_file(tmp_path))
     (tmp_path / "job.toml").write_text(f'tool = "gripper"\n{JOB}', encoding="utf-8")
     pipeline.plan(arm, tmp_path / "job.toml").save(tmp_path / "job.json")
@@ -277,7 +278,9 @@ def test_a_sequence_has_one_tool(tmp_path: Path) -> None:
             f'name = "s"\nstart = "home"\n[posture.over]\nposition_mm = {there}\n[[step]]\nrun = "{file}"\n'
         )
         text += '[[step]]\ngoto = "over"\n'
-        with pytest.raises(InputError, match=r"run: it is for tool 'gripper', but the sequence has no tool"):
+        with pytest.raises(
+            InputError, match=r"run: it is for tool 'gripper', but the sequence has no tool here"
+        ):
             planned(arm, text, tmp_path)
         found = planned(arm, f'tool = "gripper"\n{text}', tmp_path)
         assert found.arm.tool == arm.tools[0]
@@ -311,111 +314,3 @@ def test_a_posture_as_a_pose_is_of_the_tool_that_is_on(tmp_path: Path) -> None:
     assert isinstance(
         pipeline.plan(arm, Job("j", via=(arm.home_deg, tuple(found.tolist())))).trajectory, Trajectory
     )
-
-
-# taught from four postures
-
-
-TIP = (15.0, -8.0, 70.0)
-TURNS = ((180, 0, 0), (150, 10, 60), (200, -25, -60), (170, 30, 20))
-
-
-def postures_at(tip: np.ndarray, off_mm: float = 0.0, turns: Any = TURNS) -> dict[str, list[float]]:
-    """Postures of the AR4, by name, with the point of the tool at a tip; ``off_mm``: the last one beside it."""
-    there = np.eye(4)
-    there[:3, 3] = TIP
-    arm = replace(Arm.load("ar4"), tool=ArmTool("x", tuple(map(tuple, there.tolist()))))
-    found = {}
-    for number, rpy in enumerate(turns):
-        place = tip + np.array([off_mm * (number == 3), 0.0, 0.0])
-        pose = Pose.of_angles(
-            place.tolist(), dict(zip(("roll", "pitch", "yaw"), map(float, rpy), strict=True))
-        )
-        found[f"tip{number}"] = via_points.nearest(arm, pose, arm.home_deg).round(4).tolist()
-    return found
-
-
-def taught(folder: Path, more: str, postures: dict[str, list[float]], *options: str) -> Any:
-    """The command's result."""
-    said = "".join(f"\n[posture.{name}]\nangles_deg = {angles}\n" for name, angles in postures.items())
-    path = arm_file(folder, more + said)
-    words = ["teach", "tool", "gripper", "--at", ",".join(postures), "--arm", str(path), *options]
-    return CliRunner().invoke(main, words)
-
-
-PLACE = np.array([330.0, 20.0, 150.0])
-
-
-def test_a_tool_is_taught_from_four_postures_around_a_tip(tmp_path: Path) -> None:
-    result = taught(tmp_path, "", postures_at(PLACE))
-    assert result.exit_code == 0, result.output
-    assert "the postures meet within 0.0" in " ".join(result.output.split())
-    tool = Arm.load(tmp_path / "arm.toml").tools[0]
-    np.testing.assert_allclose(np.array(tool.matrix)[:3, 3], TIP, atol=0.05)
-    matrix = "[[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]"
-    old = f"\n[tool.gripper]\n# mine\nmatrix = {matrix}\nmass_kg = 0.25\n"
-    refused = taught(tmp_path, old, postures_at(PLACE))
-    assert refused.exit_code == 2
-    assert "already has a tool 'gripper'" in " ".join(refused.output.split())
-    result = taught(tmp_path, old, postures_at(PLACE, 1.0), "--replace")
-    assert result.exit_code == 0, result.output
-    apart = float(" ".join(result.output.split()).split("meet within ")[1].split(" mm")[0])
-    assert 0.1 < apart < 1.0, "the residual of a posture 1 mm beside the tip"
-    tool = Arm.load(tmp_path / "arm.toml").tools[0]
-    assert tool.mass_kg == 0.25
-    np.testing.assert_allclose(np.array(tool.matrix)[:3, 0], (0, 1, 0), atol=1e-9)
-    np.testing.assert_allclose(np.array(tool.matrix)[:3, 3], TIP, atol=3.0)
-    assert "# mine" in (tmp_path / "arm.toml").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("postures", "said"),
-    [
-        (lambda: postures_at(PLACE, 60.0), "the postures do not meet in one point: it is up to"),
-        (
-            lambda: postures_at(PLACE, turns=((180, 0, 0), (180, 0, 20), (180, 0, 40), (180, 0, -30))),
-            "the postures turn the tool too little to find its point",
-        ),
-        (lambda: dict([*postures_at(PLACE).items()][:3]), "3 postures give 4: at the first posture"),
-    ],
-)
-def test_postures_that_give_no_tool_are_refused(tmp_path: Path, postures: Any, said: str) -> None:
-    result = taught(tmp_path, "", postures())
-    assert result.exit_code == 2
-    assert said in " ".join(result.output.replace("hint: ", "").replace("armtempo: ", "").split())
-    assert "[tool." not in (tmp_path / "arm.toml").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_random_errors_of_the_postures_move_the_point_by_no_more_than_is_said(seed: int) -> None:
-    rng = np.random.default_rng([seed, 46])
-    worst = 0.0
-    for _ in range(60):
-        around = np.array([*itertools.product((-40.0, 40.0), repeat=2)]) + rng.uniform(-15, 15, (4, 2))
-        turns = Rotation.from_euler("zxy", np.column_stack([rng.uniform(-90, 90, 4), around]), degrees=True)
-        turns = turns.as_matrix()
-        point, tip, error_mm = rng.normal(0, 60, 3), rng.normal(0, 300, 3), 10 ** rng.uniform(-2, 0)
-        flanges = np.tile(np.eye(4), (4, 1, 1))
-        flanges[:, :3, :3] = turns
-        flanges[:, :3, 3] = tip - turns @ point
-        exact = taught_tool.of_postures(flanges, 0.0)
-        np.testing.assert_allclose(exact.position_mm, point, atol=1e-8)
-        assert exact.apart_mm < 1e-8
-        off = rng.normal(size=(4, 3))
-        flanges[:, :3, 3] += error_mm * off / np.linalg.norm(off, axis=1, keepdims=True)
-        found = taught_tool.of_postures(flanges, error_mm)
-        assert found.apart_mm <= 2.0 * error_mm
-        worst = max(worst, np.linalg.norm(found.position_mm - point) / found.error_mm)
-    assert 0.2 < worst < 1.0
-
-
-def test_the_keys_take_the_four_postures(tmp_path: Path) -> None:
-    path = arm_file(tmp_path, "")
-    arm = Arm.load(path)
-    here = iter(postures_at(PLACE).values())
-    points = NamedPoints(arm, lambda: np.array(next(here)), NewTool(path, arm, "gripper", replace_old=False))
-    said = [points.take() for _ in range(4)]
-    assert said[0] == "the first posture taken; next: the second posture"
-    assert said[3] == "the fourth posture taken; next: q writes the tool"
-    points.save()
-    np.testing.assert_allclose(np.array(Arm.load(path).tools[0].matrix)[:3, 3], TIP, atol=0.05)

@@ -5,24 +5,30 @@ from __future__ import annotations
 import ast
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from armtempo import testing
-from armtempo.basics.errors import InputError, LinkError
+from armtempo.basics.errors import InputError, LinkError, PlanError
 from armtempo.deploy import program_files
 from armtempo.encoding import encoded_motion, encoded_program
+from armtempo.kinematics.of_arm import forward
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
+from armtempo.model.tool_pose import Pose
 from armtempo.model.user_program import UserProgram
+from armtempo.model.workspace import KeepOut, Workspace
 from armtempo.robot import programs
 from armtempo_board.app.cell import CellError
-from armtempo_shared.program import ProgramRecord
+from armtempo_shared.program import ProgramRecord, needed_bytes
 
+from tests.host import test_pallets as pallets
 from tests.interpreters import ROOT
 from tests.system.commandline import run as run_command
 from tests.system.commandline import small_plan
@@ -64,6 +70,7 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("cell.run('my motion')\n", 2, "not a valid name"),
         ("cell.run('')\n", 2, "'' is not a valid name"),
         ("cell.set('', 1)\n", 2, "no output ''"),
+        ("cell.tool('')\n", 2, "the name of the tool is empty"),
         ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
     ],
 )
@@ -162,7 +169,7 @@ def test_check_needs_no_board(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["pick_place.py", "pallet.py", "polling.py"])
 def test_the_pages_examples_fit_on_the_chip(name: str, tmp_path: Path) -> None:
     found = UserProgram.load(example(name, tmp_path), ARM)
-    assert encoded_program.of_program(found, ARM).heap_bytes <= CHIP_BYTES
+    assert needed_bytes(len(found.marked.encode())) <= CHIP_BYTES
 
 
 class Small:
@@ -210,12 +217,95 @@ def test_pick_and_place_and_its_own_test(tmp_path: Path, monkeypatch: pytest.Mon
 def test_a_pallet(tmp_path: Path) -> None:
     run = testing.run(example("pallet.py", tmp_path), ARM)
     places = [call[1] for call in run.calls if call[0] == "goto" and call[1] not in ("home", (0, -50, 30))]
-    assert len(set(places)) == 6
-    assert places[0] == (30, -55, 35)
-    assert places[-1] == (38, -52, 31)
+    assert len(set(places)) == 12
+    assert places[:3] == [
+        f"{over}row 1, column 1, layer 1 of pallet 'tray'" for over in ("above ", "", "above ")
+    ]
+    assert run.said[-1] == "row 2, column 3, layer 1 of pallet 'tray' is filled"
     assert run.counters == {"parts": 6}
     assert not run.stopped
-    assert testing.run(example("pallet.py", tmp_path), ARM, moves=4).moves == 4
+
+
+TOOLS = """
+[tool.long]
+position_mm = [0, 0, 400]
+
+[tool.pen]
+position_mm = [0, 0, 10]
+"""
+
+
+def six_joints(folder: Path) -> Arm:
+    """An arm with a pallet, a posture given as a pose, and tools, one of which is too long for the pallet."""
+    return pallets.arm(
+        folder,
+        pallets.SMALL
+        + TOOLS
+        + '[posture.over]\nframe = "tray"\nposition_mm = [5, 5, 50]\nrpy_deg = [180, 0, 0]\n',
+    )
+
+
+def test_places_and_postures_are_of_the_tool(tmp_path: Path) -> None:
+    arm = six_joints(tmp_path)
+    text = (
+        "at = []\nfor tool in ('nothing', 'pen'):\n    cell.tool(tool)\n"
+        "    tray = cell.pallet('tray')\n    tray.reset(1)\n    cell.goto(tray.next())\n    at.append(cell.posture())\n"
+        "    cell.goto('over')\n    at.append(cell.posture())\nprint(at)\ncell.tool('pen')\n"
+    )
+    found = UserProgram.load(written(text, tmp_path), arm)
+    assert (found.pallets, found.tools) == ({"tray": 5}, {"pen": 12})
+    run = testing.run(found.path, arm)
+    at = ast.literal_eval(run.said[0])
+    for number, tool in ((0, "nothing"), (2, "pen")):
+        held = arm.with_tool(tool)
+        for posture, pose in (
+            (at[number], arm.pallet("tray").pose(2, arm.frames)),
+            (at[number + 1], arm.posture("over").where),
+        ):
+            assert isinstance(pose, Pose)
+            np.testing.assert_allclose(forward(held, posture), pose.matrix, atol=0.1)
+    encoded = encoded_program.of_program(found, arm)
+    record = Record(encoded.data)
+    first = record.table()["pallets"]["tray"][3]
+    assert (first, record.table()["pallets"]["tray"][:3]) == ({"": 0, "pen": 3}, [1, 3, 1])
+    steps = record.place(4, 6)
+    np.testing.assert_allclose(arm.transmission.angles_of_steps(steps[6:]), at[2], atol=1e-9)
+    assert 0.0 < encoded_program.off_line_mm(encoded) < 3.0
+    assert record.source() == found.marked
+
+
+def test_a_place_out_of_reach_is_named_with_its_line(tmp_path: Path) -> None:
+    arm = six_joints(tmp_path)
+    found = UserProgram.load(written("cell.tool('long')\ncell.pallet('tray')\n", tmp_path), arm)
+    with pytest.raises(PlanError) as refused:
+        encoded_program.of_program(found, arm)
+    for said in ("pick.py, line 3, with tool 'long': ", "row 1, column 1, layer 1 of pallet 'tray': "):
+        assert said in str(refused.value)
+    with pytest.raises(InputError, match=r"pick.py, line 2: .*has no pallet 'try'; did you mean 'tray'"):
+        UserProgram.load(written("cell.pallet('try')\n", tmp_path), arm)
+    with pytest.raises(InputError, match=r"pick.py, line 2: .*has no tool 'ling'; did you mean 'long'"):
+        UserProgram.load(written("cell.tool('ling')\n", tmp_path), arm)
+    large = replace(arm.pallets[0], columns=400, column_mm=0.1)
+    many = UserProgram.load(written("cell.pallet('tray')\n", tmp_path), arm)
+    with pytest.raises(InputError, match="and 400 places of pallets take more than the 16384 bytes"):
+        encoded_program.of_program(many, replace(arm, pallets=(large,)))
+
+
+def test_a_move_to_a_place_that_would_leave_the_workspace_is_told(tmp_path: Path) -> None:
+    arm = six_joints(tmp_path)
+    there = np.array(arm.pallet("tray").pose(2, arm.frames, above=True).matrix)[:3, 3]
+    box = KeepOut("shelf", tuple(there - 3.0), tuple(there + 3.0))
+    text = "cell.tool('pen')\ncell.goto('over')\ncell.pallet('tray')\n"
+    found = encoded_program.of_program(UserProgram.load(written(text, tmp_path), arm), arm)
+    assert not encoded_program.moves_that_touch(found)
+    problems = encoded_program.moves_that_touch(replace(found, arm=replace(arm, workspace=Workspace((box,)))))
+    place = "row 1, column 2, layer 1 of pallet 'tray'"
+    for said in (
+        f"between above {place} and the place: ",
+        f"with tool 'pen' between above {place} and the place: ",
+    ):
+        assert any(each.startswith(said) for each in problems), problems
+    assert any(each.startswith(f"between posture 'over' and above {place}: ") for each in problems)
 
 
 def test_polling_a_sensor_while_moving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,6 +332,9 @@ def test_what_a_program_raises_passes_and_endless_ones_end(tmp_path: Path) -> No
         testing.run(written("cell.goto([0, 300, 0])\n", tmp_path), ARM)
     with pytest.raises(InputError, match="does not exist"):
         testing.run(written("cell.run('none')\n", tmp_path), ARM)
+    small_plan(tmp_path / "other.json")
+    with pytest.raises(InputError, match="planned for a different arm"):
+        testing.run(written("cell.run('other')\n", tmp_path), "ar4")
     with pytest.raises(InputError, match="no input"):
         testing.run(written("pass\n", tmp_path), ARM, {"parts": True})
     run = testing.run(written("while True:\n    pass\n", tmp_path), ARM, longest_s=1.0)

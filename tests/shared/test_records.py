@@ -274,13 +274,15 @@ def test_other_files_are_no_sequence(magic: bytes, said: str) -> None:
         SequenceData(magic + bytes(60))
 
 
-def test_a_record_ends_where_its_header_says() -> None:
-    """Also one whose checksum holds for what is too much."""
+def test_a_record_has_all_that_its_header_says() -> None:
+    """Also one whose checksum holds for less; the host may keep more at its end."""
     data = sequence.pack(0, [(sequence.WAIT, 0, 0, 100, 1)], [])
-    SequenceData(data)
     longer = data[:-4] + bytes(9)
+    found = SequenceData(longer + struct.pack("<I", crc32(longer)))
+    assert (found.end, found.row(0)) == (len(data) - 4, (sequence.WAIT, 0, 0, 100, 1))
+    shorter = data[:-5]
     with pytest.raises(SequenceError, match="length does not fit the header"):
-        SequenceData(longer + struct.pack("<I", crc32(longer)))
+        SequenceData(shorter + struct.pack("<I", crc32(shorter)))
 
 
 def test_a_motions_name_is_text() -> None:

@@ -86,22 +86,26 @@ def _take(board: "Board", record: "Record") -> None:
     if crc == board.arm_crc:
         return
     all_but_limits, stops = _facts(record)
-    known, steps, sides = 0, [], []
+    if features.BACKLASH:
+        sides = []
+    known, steps = 0, []
     if board.engine and all_but_limits == board.all_but_limits:  # the same arm: positions stay known
         known = board.engine.known
         steps = [board.engine.commanded(joint) for joint in range(board.joints)]
-        if features.BACKLASH and backlash:
-            from armtempo_board.motion import backlash_drive  # here, as few arms need its memory
+        if features.BACKLASH:  # noqa: SIM102  the core is without what is behind a constant alone
+            if backlash:
+                from armtempo_board.motion import backlash_drive  # here, as few arms need its memory
 
-            sides = backlash_drive.sides(board.engine.drives)
+                sides = backlash_drive.sides(board.engine.drives)
     _drop_engine(board)
     memory_shares.resize(board.engine_memory, len(joints), armrecord.backlash_count(backlash))
     board.make_engine(head, joints, backlash)
     board.all_but_limits = all_but_limits
     if known:
         board.engine.home(known, steps)
-        if sides:
-            backlash_drive.take_sides(board.engine.drives, sides)
+        if features.BACKLASH:  # noqa: SIM102
+            if sides:
+                backlash_drive.take_sides(board.engine.drives, sides)
     board.silence_ms = head["link_timeout_ms"] if stops else NEVER_MS
     board.joints = len(joints)
     board.arm_crc = crc

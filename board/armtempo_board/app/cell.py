@@ -51,6 +51,9 @@ if TYPE_CHECKING:
         def level(self, number: int) -> int:
             """Whether an input is active."""
 
+        def place(self, number: int) -> "Sequence[int]":
+            """The steps of each joint above a place of a pallet, then those at it."""
+
         def count(self, name: str) -> int:
             """Increment a counter; returns its value."""
 
@@ -62,6 +65,8 @@ _FULL = 65535  # value of an output at the upper end of its range
 _LONGEST_S = 3600.0
 _LEAST_PERCENT = 1
 _PERCENT = 100
+_NOTHING = "nothing"
+_NAMED = ("pallets", "tools")  # the host sends those that it finds in the text
 
 
 class CellError(Exception):
@@ -80,13 +85,17 @@ class Cell:
     def __init__(self, table: "dict[str, Any]", work: "Work") -> None:
         self._table = table
         self._work = work
+        self._tool = ""
+        self._pallets: "dict[str, Pallet]" = {}
 
     # moving
 
-    def goto(self, posture: "str | Sequence[float]", speed: float = 1.0, wait: bool = True) -> None:
-        """Move to a posture, a name or the joints' angles in degrees, all joints together; ``speed``: 0.01 to 1.
+    def goto(self, posture: "str | Place | Sequence[float]", speed: float = 1.0, wait: bool = True) -> None:
+        """Move to a posture, all joints together; ``speed``: 0.01 to 1.
 
-        ``wait`` False: return at once, while the arm moves.
+        ``posture``: a name, the joints' angles in degrees, or a place of a pallet.
+
+        A sliding joint is given in mm. ``wait`` False: return at once, while the arm moves.
         """
         target = self._target(posture)
         percent = _percent(speed)
@@ -119,8 +128,27 @@ class Cell:
             self._work.brake()
 
     def posture(self) -> "list[float]":
-        """The joints' angles in degrees, as commanded."""
+        """The joints' angles in degrees, positions of sliding ones in mm, as commanded."""
         return [steps / per_deg for steps, per_deg in zip(self._work.steps(), self._table["per_deg"])]
+
+    # places and tools
+
+    def pallet(self, name: str) -> "Pallet":
+        """A pallet of the arm file; what was taken of it counts until the program ends."""
+        if name not in self._pallets:
+            self._pallets[name] = Pallet(self, name, self._found("pallets", "pallet", name))
+        return self._pallets[name]
+
+    def tool(self, name: str) -> None:
+        """Say which tool of the arm file is on the arm, "nothing": none, as at first.
+
+        Postures given as tool poses, and places, are then of its point.
+        """
+        if name == _NOTHING:
+            self._tool = ""
+            return
+        self._found("tools", "tool", name)
+        self._tool = name
 
     # outputs and inputs
 
@@ -216,9 +244,17 @@ class Cell:
         while self._work.moving():
             self._work.serve()
 
-    def _target(self, posture: "str | Sequence[float]") -> "list[int]":
+    def _target(self, posture: "str | Place | Sequence[float]") -> "list[int]":
+        if isinstance(posture, Place):
+            return posture.steps
         if isinstance(posture, str):
-            found: "list[int]" = self._found("postures", "posture", posture)
+            found: "list[int]"
+            if self._tool and posture in self._table["tools"][self._tool]:
+                found = self._table["tools"][self._tool][posture]
+                if not found:
+                    raise CellError("posture %r cannot be reached with tool %r" % (posture, self._tool))
+                return found
+            found = self._found("postures", "posture", posture)
             return found
         per_deg = self._table["per_deg"]
         if len(posture) != len(per_deg):
@@ -228,8 +264,56 @@ class Cell:
     def _found(self, kind: str, word: str, name: str) -> "Any":
         found = self._table[kind]
         if name not in found:
-            raise CellError("the arm has no %s %r; it has %s" % (word, name, _names(found)))
+            has = "the program's text" if kind in _NAMED else "the arm"
+            raise CellError("%s has no %s %r; it has %s" % (has, word, name, _names(found)))
         return found[name]
+
+
+class Place:
+    """A place of a pallet, or what is ``above`` it, for ``Cell.goto``."""
+
+    def __init__(self, name: str, steps: "list[int]", above: "Place | None" = None) -> None:
+        self.name = name
+        self.steps = steps
+        self.above = above or self
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class Pallet:
+    """The places of a pallet: by columns, then rows, then layers."""
+
+    def __init__(self, cell: Cell, name: str, shape: "list[Any]") -> None:
+        self._cell = cell
+        self._name = name
+        self._rows, self._columns, self._layers, self._firsts = shape
+        self._taken = 0
+
+    def left(self) -> int:
+        """Number of places that ``next`` has not given yet."""
+        return int(self._rows * self._columns * self._layers - self._taken)
+
+    def next(self) -> Place:
+        """The next place, for ``goto``, and with ``.above`` what is above it; Error if none is left."""
+        if self.left() <= 0:
+            raise CellError("pallet %r has no place left; reset() begins again" % self._name)
+        cell = self._cell
+        if cell._tool not in self._firsts:
+            raise CellError("pallet %r cannot be reached with tool %r" % (self._name, cell._tool or _NOTHING))
+        found = list(cell._work.place(self._firsts[cell._tool] + self._taken))
+        joints = len(found) // 2
+        rest, column = divmod(self._taken, self._columns)
+        layer, row = divmod(rest, self._rows)
+        name = "row %d, column %d, layer %d of pallet %r" % (row + 1, column + 1, layer + 1, self._name)
+        self._taken += 1
+        return Place(name, found[joints:], Place("above " + name, found[:joints]))
+
+    def reset(self, taken: int = 0) -> None:
+        """Begin again at the first place, or behind the first ``taken`` ones."""
+        if not 0 <= taken <= self._rows * self._columns * self._layers:
+            raise CellError("pallet %r has no %r places" % (self._name, taken))
+        self._taken = taken
 
 
 def _names(found: "Iterable[str]") -> str:

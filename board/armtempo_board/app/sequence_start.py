@@ -2,11 +2,14 @@
 of the one before.
 """
 
+from array import array
+
 from armtempo_shared import codes, sequence
 from armtempo_shared.messages import SEQUENCE
 from armtempo_shared.motion import MotionError
 from armtempo_shared.sequence import SequenceError
 from armtempo_shared.sequence_check import check
+from micropython import const
 
 from armtempo_board.app.sequence_ahead import AheadSequencer
 from armtempo_board.app.sequencer import Sequencer
@@ -15,10 +18,14 @@ from armtempo_board.motion import endpoints
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from armtempo_shared.motion import MotionHead
+
     from armtempo_board.app.sequencer import Runner
     from armtempo_board.storage.sequence_file import SequenceFile
 
-_NONE = -1
+_NONE = const(-1)  # no motion so far
+_ONCE = const(-2)  # of a repeat of one pass, which need not lead back to its start
+_64TH = const(0x3FFFFFFF)  # positions in 1/64 step are compared modulo 2**30, which are small integers
 
 
 def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int) -> Sequencer:
@@ -33,7 +40,7 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int) -> 
         raise Refused(codes.ARM_MISMATCH)
     try:
         check(record)
-        ends = [_Ends(controller, record, index) for index in range(record.motions)]
+        ends = [_ends(_loaded(controller, record, index)) for index in range(record.motions)]
     except (MotionError, SequenceError):
         raise Refused(codes.BAD_RECORD)
     _check_rows(controller, record, ends)
@@ -41,55 +48,60 @@ def sequencer(controller: "Runner", name: str, crc: "int | None", rate: int) -> 
     return kind(controller, record, name.encode(), rate)
 
 
-class _Ends:
-    """Start and end of a motion, and the arm's distance (``away``) from its start."""
-
-    def __init__(self, controller: "Runner", record: "SequenceFile", index: int) -> None:
-        name, crc = record.motion(index)
-        try:
-            motion = controller.load(name, crc)
-        except Refused as refused:
-            is_missing = refused.code in (codes.NOT_FOUND, codes.BAD_CHECKSUM, codes.IS_SEQUENCE)
-            code = codes.LEG_MISSING if is_missing else refused.code
-            raise Refused(code, refused.joint, index + 1)
-        joints = range(motion.joints)
-        self.first = [endpoints.at_start(motion, joint) for joint in joints]
-        self.last = [endpoints.at_end(motion, joint) for joint in joints]
-        self.away = [
-            endpoints.start_offset(motion, joint, controller.board.engine.commanded(joint))
-            for joint in joints
-        ]
-
-    def check_follows(self, before: "_Ends", step: int) -> None:
-        """Raise Refused if its start differs from the end of ``before`` by more than 1/64 step (rounding)."""
-        for joint, start in enumerate(self.first):
-            if abs(start - before.last[joint]) > 1:
-                raise Refused(codes.LEG_ELSEWHERE, joint, step)
+def _loaded(controller: "Runner", record: "SequenceFile", index: int) -> "MotionHead":
+    name, crc = record.motion(index)
+    try:
+        return controller.load(name, crc)
+    except Refused as refused:
+        is_missing = refused.code in (codes.NOT_FOUND, codes.BAD_CHECKSUM, codes.IS_SEQUENCE)
+        code = codes.LEG_MISSING if is_missing else refused.code
+        raise Refused(code, refused.joint, index + 1)
 
 
-def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[_Ends]") -> None:
+def _ends(motion: "MotionHead") -> "array[int]":
+    """Start of each joint, then end of each."""
+    joints = range(motion.joints)
+    found = [endpoints.at_start(motion, joint) & _64TH for joint in joints]
+    return array("i", found + [endpoints.at_end(motion, joint) & _64TH for joint in joints])
+
+
+def _check_follows(ends: "array[int]", before: "array[int]", step: int) -> None:
+    """Raise Refused if the start differs from the end of ``before`` by more than 1/64 step (rounding)."""
+    joints = len(ends) // 2
+    for joint in range(joints):
+        if (ends[joint] - before[joints + joint] + 1) & _64TH > 2:
+            raise Refused(codes.LEG_ELSEWHERE, joint, step)
+
+
+def _check_start(controller: "Runner", motion: "MotionHead") -> None:
+    """Raise Refused if the arm is not at the start of a motion."""
+    for joint in range(motion.joints):
+        away = endpoints.start_offset(motion, joint, controller.board.engine.commanded(joint))
+        if away:
+            raise Refused(codes.WRONG_START, joint, away)
+
+
+def _check_rows(controller: "Runner", record: "SequenceFile", ends: "list[array[int]]") -> None:
     last = _NONE  # the last motion
     firsts: "list[int]" = []  # the first motion in each repeat that has begun
     board = controller.board
     outputs = len(board.outputs.values) if board.outputs else 0
     inputs = board.inputs.count if board.inputs else 0
     for index in range(record.rows):
-        op, number, _, _, step = record.row(index)
+        op, number, _, amount, step = record.row(index)
         if op == sequence.MOVE:
             if last == _NONE:
-                for joint, away in enumerate(ends[number].away):
-                    if away:  # the arm is not at the start
-                        raise Refused(codes.WRONG_START, joint, away)
+                _check_start(controller, _loaded(controller, record, number))
             else:
-                ends[number].check_follows(ends[last], step)
+                _check_follows(ends[number], ends[last], step)
             last = number
             firsts = [number if first == _NONE else first for first in firsts]
         elif op == sequence.REPEAT:
-            firsts.append(_NONE)
+            firsts.append(_ONCE if amount == 1 else _NONE)
         elif op == sequence.END:
             first = firsts.pop()
-            if first != _NONE:
-                ends[first].check_follows(ends[last], step)
+            if first >= 0:
+                _check_follows(ends[first], ends[last], step)
         elif (op == sequence.OUTPUT and number >= outputs) or (
             op == sequence.WAIT_INPUT and number >= inputs
         ):

@@ -48,6 +48,7 @@ class UserProgram(Sequencer):
         counters: "Any" = _Counters(self.table["counters"])
         super().__init__(controller, counters, name + program.SUFFIX.encode(), rate)
         self._source = record.source()
+        self._file = record
         self._app: "Any" = None
         self._run_once: "Callable[[], None]" = self.prepare
         self._served_ms: "Any" = 0
@@ -215,6 +216,10 @@ class UserProgram(Sequencer):
     def level(self, number: int) -> int:
         """Of an input."""
         return int(self._controller.board.inputs.level(number))
+
+    def place(self, number: int) -> "Sequence[int]":
+        """Steps above a place of a pallet, and at it."""
+        return self._file.place(number, self._controller.board.joints)
 
     def count(self, name: str) -> int:
         """Increment a counter."""

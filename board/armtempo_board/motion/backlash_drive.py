@@ -120,12 +120,12 @@ class BacklashDrive(JointDrive):
         if self._following:
             self.extra_counts = self._following.expected(steps - self._declared_ahead)
 
-    def declare(self, steps: int, were_counted: int) -> None:
+    def declare(self, steps: int, was_known: int) -> None:
         """As of ``JointDrive``; the encoder is declared with it. If not all steps were counted, the side is unknown."""
-        super().declare(steps, were_counted)
+        super().declare(steps, was_known)
         self._declared_ahead = self._motor_ahead
         self.extra_counts = 0
-        if not were_counted:
+        if not was_known:
             self._is_side_known = False
 
     def side(self) -> "tuple[int, int] | None":
@@ -274,12 +274,13 @@ class BacklashDrive(JointDrive):
         extra_kiticks = until_kiticks
         if turns or self.can_queue_more or (source[_IN] - source[_OUT]) & _COUNT_MASK >= _FULL:
             extra_kiticks = min(source[_LATEST_KITICKS], until_kiticks)
+        is_all = False  # what was tapped in an earlier call is not: the generator has put more into its queue since
         while True:
             if words[crossing.NEXT] == words[crossing.COUNT]:
                 words[crossing.NEXT] = 0
                 words[crossing.COUNT] = generator.write(self._tap, 0, _TAP_ROOM, self.ring.timer) >> 1
+                is_all = words[crossing.COUNT] < _TAP_STEPS
             # more of the generator's may wait, and come before steps of the play that are after those tapped
-            is_all = words[crossing.COUNT] < _TAP_STEPS
             crossing.merge(
                 words, self._tap_words, queue, extra_kiticks if is_all else until_kiticks - _PAST_KITICKS
             )

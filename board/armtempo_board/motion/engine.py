@@ -79,9 +79,7 @@ class Engine:
         self._homing = 0  # one bit per joint whose switches end a homing motion
         self._in_service = False  # service() or refill() is running, or did not reach its end
         if features.BACKLASH:
-            self.withdrawn = (
-                0  # one bit per joint whose position only homing has assumed; its steps are counted
-            )
+            self.withdrawn = 0  # joints whose position only homing has assumed: their steps count on
         self.skip_check = False  # the next motion was already checked, and nothing has changed since
 
     # between motions

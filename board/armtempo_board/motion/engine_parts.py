@@ -82,8 +82,10 @@ def _drive(
     backlash: "Rows",
     rates: RateControl,
 ) -> JointDrive:
-    if features.BACKLASH and backlash and backlash[number]["steps"]:
-        from armtempo_board.motion.backlash_drive import BacklashDrive  # here, as few arms need its memory
+    if features.BACKLASH:  # noqa: SIM102  the core is without what is behind a constant alone
+        if backlash and backlash[number]["steps"]:
+            # here, as few arms need its memory
+            from armtempo_board.motion.backlash_drive import BacklashDrive
 
-        return BacklashDrive(number, arm, sampler, ring, memory, backlash[number], rates)
+            return BacklashDrive(number, arm, sampler, ring, memory, backlash[number], rates)
     return JointDrive(number, arm, sampler, ring, memory)

@@ -224,6 +224,6 @@ class JointDrive:
         self.generator.close()
         self.ring.stop()
 
-    def declare(self, steps: int, were_counted: int) -> None:
-        """Set the position to ``steps``; nothing moves. ``were_counted``: all steps since it was declared before."""
+    def declare(self, steps: int, was_known: int) -> None:
+        """Set the position to ``steps``; nothing moves. ``was_known``: all steps since it was declared before."""
         self._base = steps

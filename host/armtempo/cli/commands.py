@@ -76,7 +76,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "import-urdf": Entry(
             "exchange:import_urdf",
-            "Make an arm file from a URDF's chain of revolute joints: Denavit-Hartenberg rows and ranges.",
+            "Make an arm file from a URDF's revolute and prismatic joints: Denavit-Hartenberg rows and ranges.",
             "import-urdf robot.urdf -o arm.toml --tip tool0",
         ),
     },
@@ -218,7 +218,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "list": Entry(
             "stored:list_motions",
-            "List the motions and sequences on the board, and their first and last postures.",
+            "List the motions and sequences on the board, their first and last postures, and what is old.",
             "list",
         ),
         "show": Entry("stored:show", "Show a stored motion, read back.", "show pick"),

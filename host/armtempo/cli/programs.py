@@ -104,9 +104,15 @@ def _show_check(encoded: EncodedProgram, as_json: bool) -> None:
         "motions": [*found.motions],
         "not_beside_it": [name for name in found.motions if name not in with_it],
         "counters": [*found.counters],
+        "pallets": {name: len(next(iter(each.values()))) for name, each in encoded.places.items()},
+        "off_line_mm": encoded_program.off_line_mm(encoded),
         "touches": _warn(encoded),
     }
     lines = [f"{found.file}: {len(encoded.data)} bytes, {encoded.heap_bytes} bytes of heap on the board"]
+    lines += [f"pallet {name}: {places} places" for name, places in values["pallets"].items()]
+    if encoded.places:
+        beside = f"{values['off_line_mm']:.2g} mm beside the straight line"
+        lines.append(f"on the way from above a place to it the tool is up to {beside}")
     lines += [f"must be on the board: {name}" for name in values["not_beside_it"]]
     results.show(as_json, values, lines)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from armtempo.basics.text import aligned
 from armtempo.cli import resolve, results
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.state import counted
+from armtempo.encoding import flash_use
 from armtempo.link.board_messages import SequenceState
 from armtempo.link.follow import where
 from armtempo.model.sequence import Sequence, arm_named
@@ -67,6 +69,7 @@ def values(planned: SequencePlan) -> dict[str, Any]:
         "cycles": cycles,
         "total": None if planned.total is None else _share(planned.total),
         "pause_s": PAUSE_S,
+        "flash_bytes": flash_use.of_plan(planned),
         "notes": list(planned.notes),
     }
 
@@ -92,13 +95,21 @@ def lines(planned: SequencePlan) -> list[str]:
         depth += row.op == REPEAT
     width = max(len(words) for _, words, _ in rows)
     found = aligned([(step, words.ljust(width), time) for step, words, time in rows], (4, width + 2, 9))
-    for cycle in planned.cycles:
-        times = f"{cycle.times} times" if cycle.times else "for ever"
-        found.append(f"cycle (step {cycle.step}, {times}): {_made_of(cycle.share)}")
+    for (step, times), cycles in groupby(planned.cycles, lambda cycle: (cycle.step, cycle.times)):
+        shares = [cycle.share for cycle in cycles]
+        if len(shares) == 1:
+            often = f"{times} times" if times else "for ever"
+            found.append(f"cycle (step {step}, {often}): {_made_of(shares[0])}")
+        else:  # of a pallet, each place in its own time
+            each_s = [share.total_s for share in shares]
+            found.append(
+                f"cycle (step {step}, {len(shares)} times): {min(each_s):.3f} to {max(each_s):.3f} s"
+            )
     if planned.total is not None:
         found.append(f"in all: {_made_of(planned.total)}")
     found.extend(f"note: {note}" for note in planned.notes)
     found.extend(text_summary.torque_lines(planned.loaded_legs))
+    found.append(f"on the board: {len(planned.legs)} motions, {flash_use.of_plan(planned)} bytes of flash")
     found.append(f"pause between two motions: about {PAUSE_S:g} s; waits for inputs are not counted")
     return found
 

@@ -14,7 +14,7 @@ from armtempo.basics.text import aligned
 from armtempo.cli import options, posture, programs, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
-from armtempo.encoding import encoded_sequence
+from armtempo.encoding import encoded_program, encoded_sequence, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link.board_messages import StoredMotion
@@ -62,21 +62,22 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
 @click.command("list")
 @options.board(options.arm_of_board)
 def list_motions(given: BoardOptions) -> None:
-    """List the motions and sequences on the board, and their first and last postures.
+    """List the motions and sequences on the board, their first and last postures, and what is old.
 
     The default, which the board's button starts, is marked *.
     """
     with resolve.board(given) as board:
         found = board.list()
-        if given.as_json:
-            results.show_json({"virtual": board.info.virtual, "motions": [_listed(one) for one in found]})
-            return
         arm = _arm_of(board, given.arm_path)
+        if given.as_json:
+            values = [{**_listed(one), "old": _old(board, one, arm)} for one in found]
+            results.show_json({"virtual": board.info.virtual, "motions": values})
+            return
         virtual = "  on a virtual board" if board.info.virtual else ""
         results.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum{virtual}")
         for entry in found:
             results.echo(_row(entry))
-            for line in _ends(board, entry, arm):
+            for line in (*_ends(board, entry, arm), *filter(None, [_old(board, entry, arm)])):
                 results.echo(f"    {line}")
 
 
@@ -116,6 +117,18 @@ def _row(entry: StoredMotion) -> str:
     if not entry.joints:
         return f"{name:<26}{entry.size:>8}  damaged; upload it again or remove it"
     return f"{name:<26}{entry.size:>8}{entry.joints:>8}{entry.duration_s:>10.3f}  {entry.crc:08x}"
+
+
+def _old(board: Board, entry: StoredMotion, arm: Arm | None) -> str:
+    """What has changed in the arm since a motion, sequence or program was planned with it; "" for nothing."""
+    if arm is None:
+        return ""
+    check = encoded_program.check_stored if entry.program else made_with.check_stored
+    try:
+        check(entry.name, board.client.fetch(entry.name), arm)
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:
@@ -160,10 +173,14 @@ def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
         "duration_s": trajectory.duration_s,
         "degree": trajectory.joints[0].degree,
         "timing": "shared" if trajectory.shared else "per-joint",
-        "start_deg": [float(angle) for angle in motion.start_deg],
-        "end_deg": trajectory(trajectory.duration_s).tolist(),
+        motion.arm.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
+        motion.arm.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
         "joints": [
-            {"name": joint.name, "duration_s": spline.duration_s, "top_speed_deg_s": speed}
+            {
+                "name": joint.name,
+                "duration_s": spline.duration_s,
+                f"top_speed_{joint.unit.name}_s": speed,
+            }
             for joint, spline, speed in zip(motion.arm.driven, trajectory.joints, speeds, strict=True)
         ],
     }
@@ -179,7 +196,8 @@ def motion_lines(motion: EncodedMotion, speeds: list[float]) -> list[str]:
     ]
     pairs = zip(motion.arm.driven, trajectory.joints, strict=True)
     lasting = aligned([(joint.name, f"{spline.duration_s:.4f}") for joint, spline in pairs], (12, 9))
-    return found + [f"{row} s, up to {speed:.2f} deg/s" for row, speed in zip(lasting, speeds, strict=True)]
+    rows = zip(lasting, speeds, motion.arm.driven, strict=True)
+    return found + [f"{row} s, up to {speed:.2f} {joint.unit.name}/s" for row, speed, joint in rows]
 
 
 @click.command("remove")

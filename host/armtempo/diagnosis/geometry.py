@@ -64,11 +64,15 @@ def _home(arm: Arm) -> list[Finding]:
 def _frames(arm: Arm) -> list[Finding]:
     """Frames whose origin the tool cannot come to."""
     reach_mm = Geometry.of(arm).reach + abs(arm.joints[0].d_mm)
+    reach_mm += max((tool.length_mm for tool in arm.tools), default=0.0)
     found = []
     for each in arm.frames:
         away_mm = float(np.linalg.norm(arm.frame(each.name)[:3, 3]))
         if away_mm > reach_mm:
-            text = f"its origin is {away_mm:.0f} mm from the base, but all links together are {reach_mm:.0f} mm long"
+            text = (
+                f"its origin is {away_mm:.0f} mm from the base, but all links, with the longest tool, are "
+                f"{reach_mm:.0f} mm long"
+            )
             found.append(
                 note(f"frame {each.name}", text, "check its position_mm, and the frame that it is in")
             )
@@ -86,7 +90,8 @@ def _ends(arm: Arm) -> list[Finding]:
         if _gap_mm(end.points_mm, near) < near:
             crossing.append(where)
     found = []
-    next_step = "give [workspace] and radius_mm, so that motions are checked for it, or narrow range_deg"
+    ranges = " or ".join(dict.fromkeys(joint.unit.key("range_deg") for joint in arm.driven))
+    next_step = f"give [workspace] and radius_mm, so that motions are checked for it, or narrow {ranges}"
     if below:
         found.append(
             note("ranges", f"from home, the arm goes below its base plane with {', '.join(below)}", next_step)
@@ -100,7 +105,7 @@ def _wide(arm: Arm) -> list[Finding]:
     found = []
     for joint in arm.driven:
         low, high = joint.range_deg
-        if high - low > _FULL_TURN_DEG:
+        if high - low > _FULL_TURN_DEG and not joint.slides:
             text = f"its range of {high - low:g} deg is more than a turn"
             found.append(note(joint.name, text, "make sure that the cables allow it"))
     return found

@@ -23,7 +23,7 @@ _TWISTS = [math.pi * part / 12 for part in range(1, 25)]
 
 def findings(arm: Arm) -> list[Finding]:
     """Lengths that may be in metres, angles that may be in radians."""
-    return [*_lengths(arm), *_twists(arm), *_ranges(arm), *_frames(arm)]
+    return [*_lengths(arm), *_twists(arm), *_ranges(arm), *_places(arm)]
 
 
 def position_finding(name: str, position_mm: Array, reach_mm: float) -> Finding | None:
@@ -52,14 +52,19 @@ def _lengths(arm: Arm) -> Iterator[Finding]:
                 )
 
 
-def _frames(arm: Arm) -> Iterator[Finding]:
-    for frame in arm.frames:
-        position = [row[3] for row in frame.matrix[:3]]
+def _places(arm: Arm) -> Iterator[Finding]:
+    """Frames and tools that are hardly away from what they are given in."""
+    places = [
+        (f"frame {one.name}", one.matrix, "the base" if one.frame == BASE else f"frame {one.frame!r}")
+        for one in arm.frames
+    ]
+    places += [(f"tool {one.name}", one.matrix, "the frame after the last row") for one in arm.tools]
+    for where, matrix, of in places:
+        position = [row[3] for row in matrix[:3]]
         away_mm = math.dist(position, (0.0, 0.0, 0.0))
         if 0.0 < away_mm < _SHORT_MM:
-            of = "the base" if frame.frame == BASE else f"frame {frame.frame!r}"
             yield warning(
-                f"frame {frame.name}",
+                where,
                 f"its origin is {away_mm:.3g} mm from that of {of}: is it in metres?",
                 f"if so, write position_mm = [{', '.join(f'{1000 * value:g}' for value in position)}]",
             )
@@ -78,6 +83,8 @@ def _twists(arm: Arm) -> Iterator[Finding]:
 
 def _ranges(arm: Arm) -> Iterator[Finding]:
     for joint in arm.joints:
+        if joint.slides:
+            continue
         low, high = joint.range_deg
         if max(abs(low), abs(high)) > _TURNS_DEG:
             right = f"[{math.radians(low):.4g}, {math.radians(high):.4g}]"

@@ -19,6 +19,7 @@ from armtempo.model import pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.boards import TimerOutput, pin_number
 from armtempo.model.drive_limits import Crossing
+from armtempo.model.joint_unit import REVOLUTE
 from armtempo.model.outputs import SERVO, Output
 from armtempo.model.parts import DrivenJoint
 from armtempo.model.pin_use import Period
@@ -140,6 +141,9 @@ def _identity(arm: Arm) -> int:
             del joint["encoder"]["following_error_deg"]
         if joint["motor"]:
             del joint["motor"]["backlash_deg"]
+        if joint["type"] == REVOLUTE:  # as before there were sliding joints
+            del joint["type"]
+            (joint["motor"] or {}).pop("mm_per_rev", None)
     facts = [joints, _as_floats(arm.coupling)] if arm.coupling else joints
     text = json.dumps(facts, sort_keys=True)
     return crc32(text.encode())
@@ -168,7 +172,7 @@ def _motor(arm: Arm, number: int, max_rate: int) -> dict[str, Any]:
     if max(abs(low), abs(high)) >= 2**30:
         raise InputError(
             f"{joint.name}: its range is {high - low} steps, more than the board can count",
-            "make range_deg narrower, or use fewer microsteps",
+            f"make {joint.unit.key('range_deg')} narrower, or use fewer microsteps",
         )
     forward = (
         arm.transmission.matrix[number, number] > 0.0

@@ -10,7 +10,7 @@ from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.encoding import decode, encode
+from armtempo.encoding import decode, encode, made_with
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequenceRow
@@ -93,7 +93,8 @@ def of_plan(plan: Plan, name: str | None = None) -> EncodedMotion:
         )
     board_name = name or re.sub(r"[^A-Za-z0-9_-]", "-", plan.job.name)[:MAX_NAME]
     encoded = of_trajectory(plan.trajectory, plan.arm)
-    return EncodedMotion(board_name, plan.arm, plan.trajectory, encoded.data, plan)
+    data = made_with.added(encoded.data, made_with.of_plan(plan))
+    return EncodedMotion(board_name, plan.arm, plan.trajectory, data, plan)
 
 
 def of_record(name: str, data: bytes, arm: Arm) -> EncodedMotion:

@@ -11,7 +11,7 @@ from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding import encode, encoded_motion, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
@@ -73,7 +73,9 @@ def of_plan(plan: SequencePlan) -> EncodedSequence:
     keys = [(motion.name, motion.key.crc) for motion in motions]
     data = sequence.pack(record_crc(encode.arm_record(plan.arm)), rows_of(plan), keys, plan.counters)
     sequence_check.check(SequenceData(data))
-    return EncodedSequence(plan.name, plan.arm, motions, plan.rows, data, plan)
+    return EncodedSequence(
+        plan.name, plan.arm, motions, plan.rows, made_with.added(data, made_with.of_plan(plan)), plan
+    )
 
 
 def of_board(name: str, arm: Arm, fetch: Callable[[str], bytes]) -> EncodedSequence:

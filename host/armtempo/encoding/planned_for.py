@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from armtempo.basics.errors import InputError
+from armtempo.encoding import made_with
 from armtempo.encoding.encode import arm_record
 from armtempo.model import frame
 from armtempo.model.arm import Arm
+from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
 
 
-def check(what: Path | str, planned: Arm, frames: Sequence[str], arm: Arm) -> None:
-    """Raise InputError if ``what`` was planned for another arm than ``arm``, or one of its frames is elsewhere now.
-
-    ``planned``: the arm of the plan; ``frames``: those in which the plan's job was given.
-    """
-    where = f"arm {arm.name!r}" + (f" ({arm.source})" if arm.source else "")
-    if arm_record(planned) != arm_record(arm):
+def check(what: Path | str, plan: Plan | SequencePlan, arm: Arm) -> None:
+    """Raise InputError if a plan, named ``what``, is for another arm, or old as in ``check_surroundings``."""
+    if arm_record(plan.arm) != arm_record(arm):
         raise InputError(
-            f"{what} was planned for a different arm than {where}", "plan it again with this arm"
+            f"{what} was planned for a different arm than {_named(arm)}", "plan it again with this arm"
         )
-    check_frames(what, planned, frames, arm)
+    check_surroundings(what, plan, arm)
 
 
-def check_frames(what: Path | str, planned: Arm, frames: Sequence[str], arm: Arm) -> None:
-    """The same for the frames alone."""
-    change = frame.changed(planned.frames, arm.frames, frames)
-    if planned.tool and planned.tool not in (arm.tool, *arm.tools):
-        change = f"tool {planned.tool.name!r} has changed since, or is gone"
-    if change:
-        where = f"arm {arm.name!r}" + (f" ({arm.source})" if arm.source else "")
-        raise InputError(f"{what} is old: {change}, in {where}", "plan it again")
+def check_surroundings(what: Path | str, plan: Plan | SequencePlan, arm: Arm) -> None:
+    """Raise InputError if something that a plan was made with has changed since."""
+    change = frame.changed(plan.arm.frames, arm.frames, plan.frames)
+    if change := change or made_with.changed(made_with.of_plan(plan), arm):
+        raise InputError(f"{what} is old: {change}, in {_named(arm)}", "plan it again")
+
+
+def _named(arm: Arm) -> str:
+    return f"arm {arm.name!r}" + (f" ({arm.source})" if arm.source else "")

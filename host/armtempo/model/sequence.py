@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from armtempo.basics.toml_table import Table
 from armtempo.model import tool_segment
 from armtempo.model.arm import Arm, read_posture
 from armtempo.model.job import Job, held, is_name, name_of, read_angles, tool_named
+from armtempo.model.pallet import ArmPallet
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.steps import (
@@ -26,6 +28,7 @@ from armtempo.model.steps import (
     ON_TIMEOUT,
     STOP,
     Count,
+    EachPlace,
     Goto,
     Hold,
     Repeat,
@@ -33,6 +36,8 @@ from armtempo.model.steps import (
     SetOutput,
     SourceMotion,
     Step,
+    ToPlace,
+    UseTool,
     Wait,
     WaitInput,
 )
@@ -40,7 +45,11 @@ from armtempo.model.steps import (
 LONGEST_NAME = 20
 """Longest name of a sequence: its motions NAME-1, NAME-2, … must fit the board's 24 characters."""
 HOME = "home"
-_KINDS = ("goto", "run", "output", "holds", "wait_s", "wait_input", "count", "repeat", "end", "call")
+_KINDS = (
+    "goto", "run", "place", "leave", "output", "holds", "tool", "wait_s", "wait_input", "count", "repeat", "end", "call"
+)  # fmt: skip
+_OF_PALLETS = ("first_place", "last_place", "reverse")
+"""Keys of a repeat for each place of a pallet."""
 
 
 def is_sequence(path: Path | str) -> bool:
@@ -60,7 +69,7 @@ class Sequence:
     """Start posture; None: the target of its first motion."""
     source: str = ""
     tool: str = ""
-    """The tool of the arm on it in all motions whose job names none; "": the arm's as it is."""
+    """The tool of the arm that is on it at first; "": the arm's as it is."""
 
     def __post_init__(self) -> None:
         """Raise InputError for a name that is invalid on the board."""
@@ -101,7 +110,7 @@ def _numbered(steps: Iterable[Step], numbers: Iterator[int]) -> tuple[Step, ...]
     found: list[Step] = []
     for step in steps:
         number = next(numbers)
-        if isinstance(step, Repeat):
+        if isinstance(step, Repeat | EachPlace):
             step = replace(step, steps=_numbered(step.steps, numbers))
             next(numbers)
         found.append(step if step.step else replace(step, step=number))
@@ -149,22 +158,22 @@ class _Reader:
         top.known("name", "arm", "start", "posture")
         tables = top.tables("step")
         found: list[list[Step]] = [[]]
-        begun: list[tuple[Table, int, int]] = []
+        begun: list[tuple[Table, int, Callable[..., Step]]] = []
         for index, table in enumerate(tables, 1):
             step = self.number or index
             kind = self._kind(table, index)
             if kind == "repeat":
-                begun.append((table, step, self._times(table)))
+                begun.append((table, step, self._repeat(table)))
                 found.append([])
                 if len(begun) > MAX_NESTING:
                     raise table.fail("repeat", f"at most {MAX_NESTING} within each other")
             elif kind == "end":
                 table.choice("end", ("repeat",))
                 if not begun:
-                    raise table.fail("end", "given after a step with repeat")
-                row, number, times = begun.pop()
+                    raise table.misplaced("end", "write it after a step with repeat")
+                row, number, repeat = begun.pop()
                 inner = tuple(found.pop())
-                found[-1].append(Repeat(inner, times, where=_place(row), step=number))
+                found[-1].append(repeat(inner, where=_place(row), step=number))
             else:
                 found[-1].extend(_GETTERS[kind](self, table, step))
             table.done()
@@ -176,7 +185,7 @@ class _Reader:
         return tuple(found[0])
 
     def _kind(self, table: Table, index: int) -> str:
-        table.known(*_KINDS, "to", "active", "timeout_s", "on_timeout")
+        table.known(*_KINDS, "to", "active", "timeout_s", "on_timeout", *_OF_PALLETS)
         kinds = [key for key in _KINDS if table.has(key)]
         if kinds[:1] == ["output"] and set(kinds) <= {"output", "holds", "wait_s"}:
             return "output"
@@ -186,12 +195,38 @@ class _Reader:
         what = " and ".join(kinds) if kinds else "nothing"
         raise InputError(f"{_place(table)}: says {what}", f"give one of {', '.join(_KINDS)} in each step")
 
-    def _times(self, table: Table) -> int:
+    def _repeat(self, table: Table) -> Callable[..., Step]:
+        """The repeat that begins in a step, without its inner steps."""
+        only(table, "repeat", *_OF_PALLETS)
+        times = table.peek("repeat")
+        if isinstance(times, str) and times != FOR_EVER:
+            pallet = self._pallet(table, "repeat", f'"{FOR_EVER}", a whole number, or the name of a pallet')
+            last = table.integer("last_place", pallet.places, least=1, most=pallet.places)
+            first = table.integer("first_place", 1, least=1, most=last)
+            reverse = table.boolean("reverse", False)
+            return partial(EachPlace, pallet=pallet.name, first=first, last=last, reverse=reverse)
         only(table, "repeat")
-        if isinstance(table.peek("repeat"), str):
-            table.choice("repeat", (FOR_EVER,), allowed=f'"{FOR_EVER}", or a whole number')
-            return 0
-        return table.integer("repeat", least=1, most=MAX_REPEATS)
+        if times == FOR_EVER:
+            table.text("repeat")
+            return partial(Repeat, times=0)
+        return partial(Repeat, times=table.integer("repeat", least=1, most=MAX_REPEATS))
+
+    def _pallet(self, table: Table, key: str, allowed: str = "the name of a pallet") -> ArmPallet:
+        name = table.text(key)
+        try:
+            return self.arm.pallet(name)
+        except InputError as error:
+            raise InputError(
+                f"{table.file}: {table.place}{key} = {name!r}: {error.problem}",
+                f"give {allowed}; {error.hint}",
+            ) from None
+
+    def place(self, table: Table, step: int) -> list[Step]:
+        kind = "leave" if table.has("leave") else "place"
+        only(table, kind)
+        name = self._pallet(table, kind).name
+        speed = tool_segment.limit(table, "speed_mm_s")
+        return [ToPlace(name, leave=kind == "leave", speed_mm_s=speed, where=_place(table), step=step)]
 
     def goto(self, table: Table, step: int) -> list[Step]:
         only(table, "goto")
@@ -210,13 +245,14 @@ class _Reader:
         """A posture given by name or as angles."""
         if not isinstance(table.peek(key), str):
             angles = read_angles(table, key, self.arm)
-            return ArmPosture(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
+            return ArmPosture(self.arm.listed(f"{angle:g}" for angle in angles), angles)
         name = table.text(key)
         if name not in self.postures:
             near = did_you_mean(name, self.postures)
             raise InputError(
                 f"{_place(table)}{key} = {name!r}: no such posture{near}",
-                f"known here: {', '.join(sorted(self.postures))}; more with [posture.NAME] angles_deg = [...]",
+                f"known here: {', '.join(sorted(self.postures))}; more with [posture.NAME] "
+                f"{self.arm.list_key('angles_deg')} = [...]",
             )
         return self.postures[name]
 
@@ -247,6 +283,10 @@ class _Reader:
     def holds(self, table: Table, step: int) -> list[Step]:
         only(table, "holds", "output", "to", "wait_s")
         return [Hold(held(table, self.arm), where=_place(table), step=step)]
+
+    def tool(self, table: Table, step: int) -> list[Step]:
+        only(table, "tool")
+        return [UseTool(tool_named(table, self.arm), where=_place(table), step=step)]
 
     def wait(self, table: Table, step: int) -> list[Step]:
         only(table, "output", "to", "wait_s", "holds")
@@ -294,8 +334,11 @@ _Getter = Callable[[_Reader, Table, int], list[Step]]
 _GETTERS: dict[str, _Getter] = {
     "goto": _Reader.goto,
     "run": _Reader.run,
+    "place": _Reader.place,
+    "leave": _Reader.place,
     "output": _Reader.output,
     "holds": _Reader.holds,
+    "tool": _Reader.tool,
     "wait_s": _Reader.wait,
     "wait_input": _Reader.wait_input,
     "count": _Reader.count,
@@ -305,7 +348,7 @@ _GETTERS: dict[str, _Getter] = {
 
 def only(table: Table, *keys: str) -> None:
     """Raise InputError for a key of another kind of step."""
-    for key in (*_KINDS, "to", "active", "timeout_s", "on_timeout"):
+    for key in (*_KINDS, "to", "active", "timeout_s", "on_timeout", *_OF_PALLETS):
         if table.has(key) and key not in keys:
             raise table.misplaced(key, f"leave it out beside {keys[0]}")
 

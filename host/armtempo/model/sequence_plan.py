@@ -93,15 +93,20 @@ class SequencePlan:
     """On the motions that were planned, each with the motion's name."""
     frames: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
     """The frames of the arm in which something of it was given."""
+    tools: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
+    """The tool in each leg, "nothing": none; (): that of ``arm`` in all."""
+    pallets: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
+    """The pallets of the arm that it uses."""
 
     def __repr__(self) -> str:
         return f"<SequencePlan {self.name!r} for {self.arm.name!r}: {len(self.rows)} rows, {len(self.legs)} motions>"
 
     @property
     def loaded_legs(self) -> list[tuple[Arm, Trajectory]]:
-        """Each leg with the arm as it is loaded there."""
-        loads = self.loads or ("",) * len(self.legs)
-        return [(self.arm.holding(load), leg) for load, leg in zip(loads, self.legs, strict=False)]
+        """Each leg with the arm as it is there, with its tool and load."""
+        none = ("",) * len(self.legs)
+        each = zip(self.tools or none, self.loads or none, self.legs, strict=False)
+        return [(self.arm.with_tool(tool).holding(load), leg) for tool, load, leg in each]
 
     @property
     def start_deg(self) -> tuple[float, ...] | None:
@@ -184,5 +189,5 @@ def check_size(rows: int, legs: int, counters: int, where: str) -> None:
     if rows > record.MAX_ROWS or legs > record.MAX_MOTIONS:
         raise InputError(
             f"{where}: {rows} rows and {legs} motions; the board takes {record.MAX_ROWS} and {record.MAX_MOTIONS}",
-            "use repeat, or split it into two sequences",
+            "use repeat, or split it into two sequences; of a pallet, plan some of its layers or rows",
         )

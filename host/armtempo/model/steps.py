@@ -79,6 +79,14 @@ class Hold(Placed):
 
 @checked_fields
 @dataclass(frozen=True)
+class UseTool(Placed):
+    """This tool of the arm is on it from now on; "nothing": none."""
+
+    tool: str
+
+
+@checked_fields
+@dataclass(frozen=True)
 class Wait(Placed):
     """Wait for a time."""
 
@@ -142,7 +150,38 @@ class Repeat(Placed):
             )
 
 
-Step = Goto | RunMotion | SetOutput | Hold | Wait | WaitInput | Count | Repeat
+@checked_fields
+@dataclass(frozen=True)
+class EachPlace(Placed):
+    """Repeat steps for each place of a pallet of the arm."""
+
+    steps: tuple[Step, ...]
+    pallet: str
+    first: int = 1
+    """Number of its first place here: columns are counted first, then rows, then layers."""
+    last: int = 0
+    """Number of its last place here; 0: the last of the pallet."""
+    reverse: bool = False
+    """From the last place to the first, as one empties it."""
+
+    def __post_init__(self) -> None:
+        """Make a tuple of the steps."""
+        object.__setattr__(self, "steps", tuple(self.steps))
+
+
+@checked_fields
+@dataclass(frozen=True)
+class ToPlace(Placed):
+    """Move to the point above the present place of a pallet, and from there to it in a straight line."""
+
+    pallet: str
+    leave: bool = field(default=False, kw_only=True)
+    """Instead: from the place in a straight line to the point above it."""
+    speed_mm_s: float | None = field(default=None, kw_only=True)
+    """Speed limit of the tool on the line."""
+
+
+Step = Goto | RunMotion | SetOutput | Hold | UseTool | Wait | WaitInput | Count | Repeat | EachPlace | ToPlace
 
 
 def _check_wait(wait_s: float) -> None:

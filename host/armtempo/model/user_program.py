@@ -23,6 +23,7 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
+from armtempo.model.parts import NOTHING
 
 _PACKAGE, _CELL = "armtempo_board", "cell"
 _SLEEPS = ("sleep", "sleep_ms")
@@ -32,7 +33,7 @@ _INTERNAL = ("at", "each")
 
 @dataclass(frozen=True)
 class UserProgram:
-    """A program; ``postures``, ``motions``, ``counters``: those that it names in its text, with the first line."""
+    """A program; ``postures``, ``motions`` and so on: those that it names in its text, with the first line."""
 
     name: str
     """Name on the board."""
@@ -42,6 +43,8 @@ class UserProgram:
     postures: dict[str, int]
     motions: dict[str, int]
     counters: dict[str, int]
+    pallets: dict[str, int]
+    tools: dict[str, int]
 
     @property
     def file(self) -> str:
@@ -77,7 +80,8 @@ class UserProgram:
             marked = _Marks(source, reader.cell).marked(tree)
         except RecursionError:
             raise _too_deep(path) from None
-        return cls(path.stem, path, source, marked, reader.postures, reader.motions, reader.counters)
+        named = reader.postures, reader.motions, reader.counters, reader.pallets, reader.tools
+        return cls(path.stem, path, source, marked, *named)
 
 
 def _too_deep(path: Path) -> InputError:
@@ -104,6 +108,8 @@ class _Reader:
     postures: dict[str, int] = field(default_factory=dict)
     motions: dict[str, int] = field(default_factory=dict)
     counters: dict[str, int] = field(default_factory=dict)
+    pallets: dict[str, int] = field(default_factory=dict)
+    tools: dict[str, int] = field(default_factory=dict)
 
     def read(self, tree: ast.Module) -> None:
         """Check all calls."""
@@ -143,6 +149,14 @@ class _Reader:
                 self.motions.setdefault(_valid(text), node.lineno)
             elif name == "count":
                 self.counters.setdefault(_valid(text), node.lineno)
+            elif name == "pallet":
+                self.arm.pallet(text)
+                self.pallets.setdefault(text, node.lineno)
+            elif name == "tool":
+                if not text:
+                    raise InputError("the name of the tool is empty", f"give one, or {NOTHING!r} for none")
+                if self.arm.with_tool(text).tool:
+                    self.tools.setdefault(text, node.lineno)
             elif name in ("wait", "active"):
                 self.arm.input(text)
             elif name == "set":

@@ -91,7 +91,8 @@ class MoveTab:
                 with ui.element("div").classes("armtempo-jog"):
                     self._pair(joint.name, JogMove(math.inf, joint=number))
                     ui.label("").classes("armtempo-number").props(f'id="armtempo-angle-{number + 1}"')
-                    ui.label(f"{low:g}° … {high:g}°").classes("armtempo-note")
+                    sign = joint.unit.sign
+                    ui.label(f"{low:g}{sign} … {high:g}{sign}").classes("armtempo-note")
         self._tool_jogs()
         with ui.element("div").classes("armtempo-slide"):
             ui.label(words.SPEED_OF_JOG).classes("text-caption")
@@ -192,7 +193,7 @@ class MoveTab:
             )
             return
         by = math.copysign(self._step, move.by)
-        by_deg, by_mm = (by, None) if move.unit == "deg" else (None, by)
+        by_deg, by_mm = (by, None) if move.unit(operator.arm) == "deg" else (None, by)
         page.do(
             press,
             words.JOG_STEP,
@@ -216,7 +217,8 @@ class MoveTab:
                 ui.button(words.TAKE_PRESENT, on_click=self._take_present).props("flat dense no-caps")
             with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="angles"):
                 self._angles = [
-                    _number(joint.name, angle) for joint, angle in zip(arm.driven, arm.home_deg, strict=True)
+                    _number(joint.labelled, angle)
+                    for joint, angle in zip(arm.driven, arm.home_deg, strict=True)
                 ]
             with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="pose"):
                 self._pose = {name: _number(name, 0.0) for name in words.POSE_FIELDS}

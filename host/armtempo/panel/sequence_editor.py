@@ -21,15 +21,25 @@ KINDS: dict[str, tuple[str, ...]] = {
     "run": (),
     "output": ("to", "holds", "wait_s"),
     "holds": (),
+    "tool": (),
     "wait_s": (),
     "wait_input": ("active", "timeout_s", "on_timeout"),
     "count": (),
-    "repeat": (),
+    "repeat": ("first_place", "last_place", "reverse"),
+    "place": ("speed_mm_s",),
+    "leave": ("speed_mm_s",),
     "end": (),
     "call": (),
 }
 """Kinds of steps, with their further keys."""
-_FIRST = {"goto": "home", "holds": NOTHING, "wait_s": "1", "repeat": "for ever", "end": "repeat"}
+_FIRST = {
+    "goto": "home",
+    "holds": NOTHING,
+    "tool": NOTHING,
+    "wait_s": "1",
+    "repeat": "for ever",
+    "end": "repeat",
+}
 _STEP = "step"
 
 
@@ -135,17 +145,22 @@ class SequenceEditor(FileEditor):
     def choices(self, key: str, jobs: list[str]) -> list[str]:
         """What a key can name, of the arm and the folder; empty for what is typed. ``jobs``: the folder's."""
         steps = self.steps
+        pallets = [pallet.name for pallet in self.arm.pallets]
         return {
             "goto": ["home", *(posture.name for posture in self.arm.postures)],
             "run": jobs,
             "output": [one.name for one in self.arm.outputs],
             "wait_input": [one.name for one in self.arm.inputs],
             "holds": [NOTHING, *(load.name for load in self.arm.loads)],
+            "tool": [NOTHING, *(tool.name for tool in self.arm.tools)],
             "call": self.files(),
             "count": sorted({step["count"] for step in steps if "count" in step}),
-            "repeat": ["for ever"],
+            "repeat": ["for ever", *pallets],
+            "place": pallets,
+            "leave": pallets,
             "end": ["repeat"],
             "active": ["true", "false"],
+            "reverse": ["true", "false"],
             "on_timeout": list(ON_TIMEOUT),
             "to": [name for one in self.arm.outputs for name, _ in one.states],
         }.get(key, [])

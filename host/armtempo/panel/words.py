@@ -147,6 +147,7 @@ VIA_KEYS = {
     "frame": "Frame",
     "posture": "Posture",
     "posture_deg": "Near the angles, deg",
+    "posture_joints": "Near the joints at",
     "tolerance_mm": "Tolerance, mm",
     "tolerance_deg": "Tolerance, deg",
 }
@@ -198,10 +199,13 @@ STEP_KINDS = {
     "run": "run",
     "output": "set output",
     "holds": "tool holds",
+    "tool": "tool on the arm",
     "wait_s": "wait, s",
     "wait_input": "wait for input",
     "count": "count",
     "repeat": "repeat",
+    "place": "to the place of",
+    "leave": "leave the place of",
     "end": "end of",
     "call": "call",
 }
@@ -212,6 +216,10 @@ STEP_KEYS = {
     "active": "active",
     "timeout_s": "time-out, s",
     "on_timeout": "then",
+    "speed_mm_s": "at most, mm/s",
+    "first_place": "first place",
+    "last_place": "last place",
+    "reverse": "from the last",
 }
 ADD_HERE = "Add where the arm is"
 PLANNING = "Planning…"

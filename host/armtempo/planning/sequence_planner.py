@@ -13,6 +13,7 @@ from armtempo.model import frame
 from armtempo.model import steps as kinds
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
+from armtempo.model.parts import NOTHING
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
@@ -20,7 +21,8 @@ from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
 from armtempo.model.tool import ArmTool
 from armtempo.model.tool_pose import BASE, Pose
-from armtempo.planning import checks, planner, via_points, workspace_check
+from armtempo.planning import checks, pallet_places, planner, via_points, workspace_check
+from armtempo.planning.pallet_places import Place
 from armtempo.splines.trajectory import Trajectory
 
 Angles = tuple[float, ...]
@@ -56,6 +58,8 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
         tuple(compiler.loads),
         tuple(dict.fromkeys(compiler.notes)),
         tuple(dict.fromkeys(compiler.frames)),
+        tuple(compiler.tools) if compiler.changes_tool else (),
+        tuple(dict.fromkeys(name for name, _ in compiler.places)),
     )
 
 
@@ -86,10 +90,17 @@ class _Compiler:
     notes: list[str] = field(default_factory=list)
     frames: list[str] = field(default_factory=list)
     """Those in which poses were given."""
+    tools: list[str] = field(default_factory=list)
+    """The tool in each leg."""
+    changes_tool: bool = False
+    places: dict[tuple[str, str], list[Place]] = field(default_factory=dict)
+    """Of each pallet that is used, and tool."""
+    _present: dict[str, int] = field(default_factory=dict)
+    """Index of the present place of each pallet that a repeat goes through."""
     _holds: str = ""
     """The present load."""
     _known: dict[tuple[object, ...], int] = field(default_factory=dict)
-    _plans: dict[tuple[int, str], Trajectory] = field(default_factory=dict)
+    _plans: dict[tuple[int, str, str], Trajectory] = field(default_factory=dict)
     _motions: dict[int, SourceMotion] = field(default_factory=dict)
     _depth: int = 0
 
@@ -100,12 +111,18 @@ class _Compiler:
         for step in steps:
             if isinstance(step, kinds.Repeat):
                 rows, end = self._repeat(step, end)
+            elif isinstance(step, kinds.EachPlace):
+                rows, end = self._each_place(step, end)
+            elif isinstance(step, kinds.ToPlace):
+                rows, end = self._place(step, end)
             elif isinstance(step, kinds.Goto):
                 rows, end = self._goto(step, end)
             elif isinstance(step, kinds.RunMotion):
                 rows, end = self._run(step, end)
             elif isinstance(step, kinds.Hold):
                 rows = self._hold(step)
+            elif isinstance(step, kinds.UseTool):
+                rows = self._use_tool(step)
             else:
                 rows = [self._still(step)]
             found += rows
@@ -120,13 +137,29 @@ class _Compiler:
         self._holds = step.load
         return []
 
+    @property
+    def _tool(self) -> str:
+        """The name of the present tool."""
+        return self.arm.tool.name if self.arm.tool else NOTHING
+
+    def _use_tool(self, step: kinds.UseTool) -> list[SequenceRow]:
+        """The following motions are planned with the tool, of which the board knows nothing."""
+        try:
+            self.arm = self.arm.with_tool(step.tool)
+        except InputError as error:
+            raise InputError(f"{step.where}{error.problem}", error.hint) from None
+        self.changes_tool = True
+        return []
+
     def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
         """The rows of a repeat; its first pass is separate if it starts at another posture."""
         outermost = not self._depth
         self._depth += 1
         first, end = self.rows(step.steps, before.angles_deg, before.name)
         if not first:
-            raise InputError(f"{step.where}: nothing is repeated", "put steps between repeat and its end")
+            raise InputError(
+                f"{step.where}repeat: nothing is repeated", "put steps between repeat and its end"
+            )
         apart = before.angles_deg is not None and end.angles_deg != before.angles_deg
         rows, last = self.rows(step.steps, end.angles_deg, end.name) if end.angles_deg else (first, end)
         apart = apart or rows != first
@@ -139,13 +172,76 @@ class _Compiler:
         close = SequenceRow(record.END, 0, int(outermost), 0, step.step, "end of repeat")
         return [*(first if apart else ()), begin, *rows, close], last
 
+    def _each_place(self, step: kinds.EachPlace, end: _End) -> tuple[list[SequenceRow], _End]:
+        """The rows of each place, one after the other, as each has its own motions."""
+        places = self._places(step)
+        last = step.last or len(places)
+        if not 1 <= step.first <= last <= len(places):
+            raise InputError(
+                f"{step.where}repeat: places {step.first} to {last} of the {len(places)} of pallet {step.pallet!r}",
+                "give a first that is not behind the last",
+            )
+        if step.pallet in self._present:
+            raise InputError(
+                f"{step.where}repeat: it is within another repeat for pallet {step.pallet!r}",
+                "repeat it once",
+            )
+        if not step.steps:
+            raise InputError(
+                f"{step.where}repeat: nothing is repeated", "put steps between repeat and its end"
+            )
+        outermost = not self._depth
+        self._depth += 1
+        found: list[SequenceRow] = []
+        for index in range(step.first - 1, last)[:: -1 if step.reverse else 1]:
+            self._present[step.pallet] = index
+            rows, end = self.rows(step.steps, end.angles_deg, end.name)
+            found.append(SequenceRow(record.REPEAT, 0, 0, 1, step.step, places[index].name))
+            found += rows
+            found.append(SequenceRow(record.END, 0, int(outermost), 0, step.step, "end of place"))
+        del self._present[step.pallet]
+        self._depth -= 1
+        return found, end
+
+    def _places(self, step: kinds.EachPlace | kinds.ToPlace) -> list[Place]:
+        """The places of a pallet, with the angles above them; PlanError names one that cannot be reached."""
+        try:
+            pallet = self.arm.pallet(step.pallet)
+            if pallet.frame != BASE:
+                self.frames.append(pallet.frame)
+            key = step.pallet, self._tool
+            if key not in self.places:
+                self.places[key] = pallet_places.resolve(self.arm, pallet)
+        except ArmtempoError as error:
+            raise type(error)(f"{step.where}repeat: {error.problem}", error.hint) from error
+        return self.places[key]
+
+    def _place(self, step: kinds.ToPlace, here: _End) -> tuple[list[SequenceRow], _End]:
+        """To the point above a place and down to it, or up from it."""
+        key = "leave" if step.leave else "place"
+        index = self._present.get(step.pallet)
+        if index is None:
+            raise InputError(
+                f"{step.where}{key} = {step.pallet!r}: it is not within a repeat for this pallet",
+                f'put it between repeat = "{step.pallet}" and its end',
+            )
+        place = self._places(step)[index]
+        above = _End(place.above_deg, f"above {place.name}")
+        where = f"{step.where}{key}: "
+        if step.leave:
+            return self._straight_to(above.name, place.above_deg, here, step, where)
+        over = kinds.Goto(ArmPosture(above.name, place.above_deg), where=step.where, step=step.step)
+        rows, end = self._goto(over, here)
+        down, end = self._straight_to(place.name, place.pose, end, step, f"{where}{place.name}: ")
+        return [*rows, *down], end
+
     def _goto(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
         if step.line:
             return self._line(step, here)
         target = self._target(step)
         if here.angles_deg is None or here.angles_deg == target.angles_deg:
             return [], _End(target.angles_deg, target.name)
-        key = (self._holds, here.angles_deg, target.angles_deg)
+        key = (self._tool, self._holds, here.angles_deg, target.angles_deg)
         if key not in self._known:
             found = self._straight(step, here.angles_deg, target.angles_deg)
             self._known[key] = self._add(found, self._holds)
@@ -158,31 +254,34 @@ class _Compiler:
         pose = posture.where if isinstance(posture, ArmPosture) else None
         if isinstance(posture, ArmPosture):
             self._note_frame(posture)
-        target = None if isinstance(pose, Pose) else self._target(step)
+        if isinstance(pose, Pose) and isinstance(posture, ArmPosture):
+            return self._straight_to(posture.name, pose, here, step, f"{step.where}goto: ")
+        target = self._target(step)
+        return self._straight_to(target.name, target.angles_deg, here, step, f"{step.where}goto: ")
+
+    def _straight_to(
+        self, name: str, to: Angles | Pose, here: _End, step: kinds.Goto | kinds.ToPlace, where: str
+    ) -> tuple[list[SequenceRow], _End]:
+        """A straight line of the tool to angles (J,), or to a pose."""
         if here.angles_deg is None:
             raise InputError(
-                f"{step.where}goto: a line needs a known start, and the arm's position is not known here",
+                f"{where}a line needs a known start, and the arm's position is not known here",
                 "give the sequence a start, or put a goto without line before it",
             )
-        if target and target.angles_deg == here.angles_deg:
+        if to == here.angles_deg:
             return [], here
-        key = (self._holds, "line", here.angles_deg, target.angles_deg if target else pose, step.speed_mm_s)
+        key = (self._tool, self._holds, "line", here.angles_deg, to, step.speed_mm_s)
         if key not in self._known:
-            to = target.angles_deg if target else pose
-            assert to is not None
             try:
                 found = planner.straight_line(
                     self.arm, here.angles_deg, to, step.speed_mm_s, self.progress, self._holds
                 )
             except ArmtempoError as error:
-                raise type(error)(f"{step.where}goto: {error.problem}", error.hint) from error
+                raise type(error)(f"{where}{error.problem}", error.hint) from error
             self._known[key] = self._add(found, self._holds)
-        if target:
-            end = _End(target.angles_deg, target.name)
-        else:
-            leg = self.legs[self._known[key]]
-            end = _End(_angles(leg(leg.duration_s)), posture.name if isinstance(posture, ArmPosture) else "")
-        return [_move(self._known[key], step.step, f"line to {end.name}")], end
+        leg = self.legs[self._known[key]]
+        end = _End(_angles(leg(leg.duration_s)) if isinstance(to, Pose) else to, name)
+        return [_move(self._known[key], step.step, f"line to {name}")], end
 
     def _run(self, step: kinds.RunMotion, here: _End) -> tuple[list[SequenceRow], _End]:
         motion = self._motion(step.motion)
@@ -195,7 +294,7 @@ class _Compiler:
                 f"put a step before it that goes there: goto with the same file as run, {motion.name!r}",
             )
         holds = _job(motion).holds or self._holds
-        key = ("run", id(trajectory), holds)
+        key = ("run", id(trajectory), self._tool, holds)
         if key not in self._known:
             self._known[key] = self._add(trajectory, holds)
         return [_move(self._known[key], step.step, f"run {motion.name}")], _End(
@@ -240,17 +339,19 @@ class _Compiler:
     def _planned(self, motion: SourceMotion, where: str) -> Trajectory:
         self.frames.extend(_job(motion).frames)
         # A plan with another load is accepted if it keeps to the workspace
-        for (known, _), found in self._plans.items():
+        for (known, tool, _), found in self._plans.items():
+            if (known, tool) != (id(motion), self._tool):
+                continue
             arm = self.arm.holding(_job(motion).holds or self._holds)
             outwards = _job(motion).start_touches
-            if known == id(motion) and workspace_check.touch_of(arm, found, None, outwards) is None:
+            if workspace_check.touch_of(arm, found, None, outwards) is None:
                 return found
-        found = self._plans[id(motion), self._holds] = self._of(motion.source, where)
+        found = self._plans[id(motion), self._tool, self._holds] = self._of(motion.source, where)
         return found
 
     def _check_arm(self, plan: Plan, where: str) -> None:
         """Raise InputError for a plan for another arm; its postures, and frames that it does not use, may differ."""
-        kept = {key: getattr(self.arm, key) for key in ("postures", "frames", "tools", "tool")}
+        kept = {key: getattr(self.arm, key) for key in ("postures", "frames", "tools", "pallets", "tool")}
         arm = replace(plan.arm, **kept)
         if arm != self.arm:
             raise InputError(
@@ -266,8 +367,8 @@ class _Compiler:
             has, wants = (f"tool {each.name!r}" if each else "no tool" for each in (self.arm.tool, tool))
             changed = ", as it was before it changed" if tool and tool not in self.arm.tools else ""
             raise InputError(
-                f"{where}run: it is for {wants}{changed}, but the sequence has {has}",
-                'write tool = "NAME" before the first step of the sequence, or plan the motion again',
+                f"{where}run: it is for {wants}{changed}, but the sequence has {has} here",
+                'write tool = "NAME" before the first step of the sequence or as a step before it, or plan it again',
             )
 
     def _of(self, source: Job | Plan, where: str) -> Trajectory:
@@ -328,6 +429,7 @@ class _Compiler:
     def _add(self, trajectory: Trajectory, holds: str) -> int:
         self.legs.append(trajectory)
         self.loads.append(holds)
+        self.tools.append(self._tool)
         return len(self.legs) - 1
 
     def _same(self, one: Angles, other: Angles) -> bool:

@@ -47,7 +47,7 @@ class Connection:
         if self.arm is None or arm_record(self.arm) != arm_record(plan.arm):
             self.configure(plan.arm)
             return
-        planned_for.check_frames(f"plan {plan.name!r}", plan.arm, plan.frames, self.arm)
+        planned_for.check_surroundings(f"plan {plan.name!r}", plan, self.arm)
         self.configure(self.arm)  # it may have postures and frames that the plan's arm has not
 
     def encoded(self, what: Plan | SequencePlan | Encoded, name: str | None = None) -> Encoded:

@@ -50,7 +50,7 @@ def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog_motion.SPEE
 
 
 def distance_deg(here_deg: Array, arm: Arm, joint: int | str, to_deg: float) -> float:
-    """The distance of a joint from an angle; 0 for less than half a step. Raises InputError for an unknown joint."""
+    """The distance of a joint from a position; 0 for less than half a step. Raises InputError for an unknown joint."""
     number = jog_motion.number_of_joint(arm, joint)
     found = to_deg - float(here_deg[number])
     return found if abs(found) * arm.driven[number].steps_per_deg >= 0.5 else 0.0

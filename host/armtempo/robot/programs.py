@@ -8,7 +8,7 @@ from pathlib import Path
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_program
+from armtempo.encoding import encoded_program, made_with
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.link import Client
@@ -63,6 +63,7 @@ class Programs:
                     f"{found.path}, line {line}: no motion {name!r}",
                     f"plan it as {found.motion_file(name)}, or store it with 'armtempo upload FILE --name {name}'",
                 )
+            made_with.check_stored(name, self._board.client.fetch(name), arm)
             stored.append(MotionKey(name, kept.crc))
         return encoded_program.of_program(found, arm, motions, tuple(stored))
 
@@ -88,6 +89,18 @@ class Programs:
             self._board.client.set_default(key.name)
         return key
 
+    def _check_stored(self, name: str) -> None:
+        """Raise InputError if a stored program, or a motion that it runs, is not as the arm is now."""
+        arm, client = self._board.arm, self._board.client
+        if arm is None:
+            return
+        data = client.fetch(name)
+        encoded_program.check_stored(name, data, arm)
+        kept = [entry.name for entry in client.stored()]
+        for motion in encoded_program.motions_of(data):
+            if motion in kept:  # the program is told about others when it runs them
+                made_with.check_stored(motion, client.fetch(motion), arm)
+
     def run(
         self,
         program: EncodedProgram | UserProgram | Path | str,
@@ -98,7 +111,8 @@ class Programs:
     ) -> SequenceState:
         """Run a program, or the stored program of that name; returns its last state.
 
-        ``listener`` is called with each line that it prints, ``watcher`` with each new state. The arm must be homed.
+        A stored one is refused if what it or its motions were made with has changed since. ``listener`` is called with
+        each line that it prints, ``watcher`` with each new state. The arm must be homed.
         Raises as ``upload``, and BoardError if a fault ends it; its traceback went to ``listener``.
         """
         with self._board.stoppable(stop) as wanted:
@@ -106,6 +120,7 @@ class Programs:
                 found = self._board.client.find(program)
                 if found is None or not found.program:
                     raise InputError(f"the board has no program {program!r}", "see 'armtempo list'")
+                self._check_stored(program)
                 key = MotionKey(found.name, found.crc)
             else:
                 key = self.upload(program, replace=replace)

@@ -161,8 +161,10 @@ def sample_json(sample: Sample, arm: Arm | None) -> dict[str, Any]:
         gears = arm.transmission
         angles = gears.angles_of_counts(counts).tolist()
         found["joints"] = [joint.name for joint in arm.driven]
-        found["commanded_deg"] = gears.angles_of_steps(steps).tolist()
-        found["angle_deg"] = [
+        if arm.slides:
+            found["units"] = [joint.unit.name for joint in arm.driven]
+        found[arm.list_key("commanded_deg")] = gears.angles_of_steps(steps).tolist()
+        found[arm.list_key("angle_deg")] = [
             angle if seen else None for angle, seen in zip(angles, gears.measured, strict=True)
         ]
     return found

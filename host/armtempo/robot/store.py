@@ -11,7 +11,7 @@ from armtempo_shared.sequence import KIND_BYTES, SequenceData, SequenceError
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_motion, flash_use
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
@@ -102,7 +102,8 @@ def store(
 
     That is a motion, or the sequence or program of the motions before it, so that what is stored is always complete.
     Motions of an earlier sequence of its name that are no longer needed are removed. Raises LinkError if the board has
-    something else under one of the names and ``replace`` is false; a program replaces one of its name.
+    something else under one of the names and ``replace`` is false, or its flash cannot take all; a program replaces
+    one of its name.
     """
     keys = [MotionKey(name, wire.record_crc(data)) for name, data in records]
     (name, data), whole = records[-1], sum(len(data) for _, data in records)
@@ -118,6 +119,8 @@ def store(
         found = kept.get(key.name)
         if found and found.crc not in (0, key.crc, legs.get(key.name)):
             raise _has_another(found)
+    if len(records) > 1:  # one alone is refused by the board
+        _check_flash(client, records, keys, kept)
     done = 0
     for key, (_, data) in zip(keys, records, strict=True):
         if key.name not in kept or kept[key.name].crc != key.crc:
@@ -129,6 +132,33 @@ def store(
         if leg in kept and kept[leg].crc == legs[leg]:
             client.remove(leg)
     return keys[-1]
+
+
+def _check_flash(
+    client: Client,
+    records: Sequence[tuple[str, bytes]],
+    keys: Sequence[MotionKey],
+    kept: dict[str, StoredMotion],
+) -> None:
+    """Raise LinkError if the flash cannot take all records, each of which is written before an old one is removed."""
+    new = [
+        (key.name, len(data))
+        for key, (_, data) in zip(keys, records, strict=True)
+        if key.name not in kept or kept[key.name].crc != key.crc
+    ]
+    free = whole = client.hello().free_flash
+    free -= flash_use.of_names([name for name, _ in new if name not in kept])
+    fits = True
+    for name, size in new:
+        fits = fits and size + flash_use.BLOCK <= free
+        free -= flash_use.in_blocks(size) - (flash_use.in_blocks(kept[name].size) if name in kept else 0)
+    if not fits:
+        raise LinkError(
+            f"{len(new)} records take {whole - free + flash_use.BLOCK} bytes of the board's flash, of which {whole} "
+            "are free; nothing was stored",
+            "remove what is not needed ('armtempo list', 'armtempo remove'), or plan fewer motions, such as for a "
+            "part of the pallet",
+        )
 
 
 def _from(done: int, whole: int, progress: Progress | None) -> Progress | None:

@@ -81,6 +81,7 @@ def follow(
     brake = Brake(client, stop)
     with session.on_loss(OnLoss(stopping=lambda: stop.wanted)), stop.waking(session.wake):
         stop.check()
+        session.events.clear()  # of earlier runs, such as one by the button
         follower = start()
         while True:
             try:

@@ -18,7 +18,7 @@ from armtempo.panel.panel_board import PanelBoard
 from tests.host.panel.fakes import board_state, press
 from tests.host.panel.pages import Page, pages
 from tests.host.test_taught_frames import TILTED, taught_points
-from tests.host.test_tools import PLACE, TIP, postures_at
+from tests.host.test_taught_tools import PLACE, TIP, postures_at
 
 TABLES = """
 [frame.tray]

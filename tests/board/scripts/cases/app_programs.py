@@ -26,7 +26,10 @@ TABLE = {
     "outputs": {"gripper": [1, 0.0, 1.0, {"open": 0, "closed": 65535}]},
     "inputs": {"part": 0},
     "counters": ["parts"],
+    "pallets": {"tray": [2, 1, 2, {"": 0, "long": 4}], "far": [1, 1, 1, {"long": 8}]},
+    "tools": {"long": {"there": [12, 12], "away": []}},
 }
+PLACES = [[10 * number, 20, 10 * number + 1, 21] for number in range(9)]
 
 
 class World:
@@ -43,7 +46,7 @@ class World:
             assert self.host.upload(name, legs[name])[-1][0] == "ok"
         table = dict(TABLE)
         table["motions"] = {name: wire.record_crc(legs[name]) for name in legs}
-        self.data = program.pack(ARM_CRC, table, HEAD + source)
+        self.data = program.pack(ARM_CRC, table, HEAD + source, PLACES)
 
     def start(self):
         """Store it and start it: the answer."""
@@ -190,6 +193,44 @@ def case_without_a_host_texts_take_little_time():
     assert world.turns < 80, world.turns
 
 
+def case_places_of_a_pallet_one_after_the_other_until_it_is_full():
+    def script(world):
+        if world.board.engine.moving:
+            world.board.engine.finish()
+
+    world = World(
+        "tray = cell.pallet('tray')\n"
+        "while tray.left():\n"
+        "    place = cell.pallet('tray').next()\n"
+        "    print(place, place.steps, place.above.steps)\n"
+        "try:\n"
+        "    tray.next()\n"
+        "except cell.Error as error:\n"
+        "    print(error)\n"
+        "tray.reset(3)\n"
+        "cell.tool('long')\n"
+        "place = tray.next()\n"
+        "print(place.above, place.steps, tray.left())\n"
+        "cell.pallet('far').next()\n"
+        "tray.reset()\n"
+        "cell.tool('nothing')\n"
+        "print(tray.next().steps)\n"
+        "cell.goto(tray.next())\n",
+        script,
+    )
+    assert world.run()[0] == "finished"
+    assert sequence_rig.runs(world.app) == 1
+    assert world.said() == [
+        "row 1, column 1, layer 1 of pallet 'tray' [1, 21] [0, 20]",
+        "row 2, column 1, layer 1 of pallet 'tray' [11, 21] [10, 20]",
+        "row 1, column 1, layer 2 of pallet 'tray' [21, 21] [20, 20]",
+        "row 2, column 1, layer 2 of pallet 'tray' [31, 21] [30, 20]",
+        "pallet 'tray' has no place left; reset() begins again",
+        "above row 2, column 1, layer 2 of pallet 'tray' [71, 21] 0",
+        "[1, 21]",
+    ], world.said()
+
+
 def case_what_is_not_possible_is_an_exception_with_words():
     for call, words in (
         ("goto('nowhere')", "the arm has no posture 'nowhere'; it has away, home, there"),
@@ -200,6 +241,11 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("set('gripper', 2)", "output 'gripper': 2 is not within 0.0 to 1.0"),
         ("set('lamp', 1)", "the arm has no output 'lamp'; it has gripper"),
         ("wait('past')", "the arm has no input 'past'; it has part"),
+        ("pallet('try')", "the program's text has no pallet 'try'; it has far, tray"),
+        ("pallet('far').next()", "pallet 'far' cannot be reached with tool 'nothing'"),
+        ("pallet('tray').reset(5)", "pallet 'tray' has no 5 places"),
+        ("tool('short')", "the program's text has no tool 'short'; it has long"),
+        ("tool('long'); cell.goto('away')", "posture 'away' cannot be reached with tool 'long'"),
         ("sleep(-1)", "-1 s is not within 0 to 3600"),
         ("set('gripper', 'closed', wait_s=-1)", "-1 s is not within 0 to 3600"),
         ("goto([0.1, 0])", "goto is refused: too_long, 100"),

@@ -45,6 +45,17 @@ def case_refused_before_anything_moves():
     assert begin(host) == ("error", "no_such_pin", 255, 1)
 
 
+def case_a_repeat_of_one_pass_need_not_lead_back():
+    rows = []
+    for motion in ("there", "back"):
+        rows += [(REPEAT, 0, 0, 1), (MOVE, motion, 0, 0), (END, 0, 1, 0)]
+    app, host = ready(rows)
+    assert begin(host)[0] == "ok"
+    arrive(app, host, 10)
+    arrive(app, host, 0)
+    assert stands(host)[0] == "finished" and stands(host)[4] == 2
+
+
 def case_a_motion_that_is_gone_or_another_is_named():
     app, host = ready([(MOVE, "there", 0, 0), (MOVE, "back", 0, 0)])
     host.ask("remove", (), "there")

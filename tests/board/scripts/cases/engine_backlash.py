@@ -6,6 +6,7 @@ the same motion without backlash.
 
 # all cases: not on CPython
 
+import math
 import random
 
 import cases
@@ -260,6 +261,21 @@ def check_crossing(merged, steps, begin, end, play):
     due = len([None for time in own if time <= crossed])
     assert done >= play + due - 1, (done, play, due)
     return 1
+
+
+def case_a_long_crossing_at_the_highest_rate():  # not emulated
+    """Joint and play together at up to 10000 steps/s, so that the queue is full again and again."""
+    play, rate = 1000, 5000.0
+    swing = rate * 1.5 / (2 * math.pi)
+    angles = [0] * 4 + [swing * (1 - math.cos(math.pi * k / 4)) for k in range(17)] + [0] * 4
+    times = [0.1875 * number for number in range(-2, len(angles) - 2)]
+    for turn_us in (1000, 8000):
+        rig = made([play] * 3, acceleration=rate**2 / play, rows=joints(max_rate=10100), turn_us=turn_us)
+        run(rig, record(control_points=[angles] * 3, time_points=times))
+        steps = rig.drivers[0].steps
+        assert len(legs(steps)) == 3
+        fastest = min([steps[n + 50][0] - steps[n][0] for n in range(len(steps) - 50)])
+        assert 50 * TICK_HZ / 10000 <= fastest < 50 * TICK_HZ / 8000, (turn_us, fastest)
 
 
 def case_a_slow_loop_ends_in_a_fault():  # not emulated

@@ -1,0 +1,41 @@
+"""Flash of the board that records take."""
+
+from __future__ import annotations
+
+from armtempo_shared import motion, sequence
+
+from armtempo.encoding import made_with
+from armtempo.model.sequence_plan import SequencePlan, rows_of
+from armtempo.splines.trajectory import Trajectory
+
+BLOCK = 512
+"""Of the flash; a file takes whole ones."""
+_SUFFIX = ".atm"
+_ENTRY_BYTES, _LETTERS = 32, 13
+"""A file has an entry in its folder, and one for each so many letters of its name."""
+
+
+def in_blocks(size: int) -> int:
+    """Bytes of the whole blocks that a file of ``size`` bytes takes."""
+    return -(-size // BLOCK) * BLOCK
+
+
+def of_names(names: list[str]) -> int:
+    """Bytes that the folder grows by with records of these names."""
+    entries = sum(1 - (-len(name + _SUFFIX) // _LETTERS) for name in names)
+    return in_blocks(_ENTRY_BYTES * entries)
+
+
+def of_plan(plan: SequencePlan) -> int:
+    """Bytes that a sequence and its motions take."""
+    keys = [(leg.name, 0) for leg in plan.legs]
+    record = made_with.added(sequence.pack(0, rows_of(plan), keys, plan.counters), made_with.of_plan(plan))
+    sizes = [*map(of_trajectory, plan.legs), len(record)]
+    return sum(map(in_blocks, sizes)) + of_names([plan.name, *(name for name, _ in keys)])
+
+
+def of_trajectory(trajectory: Trajectory) -> int:
+    """Bytes of a motion's record, without what it was made with."""
+    first = trajectory.joints[0]
+    segments = len(first.angle_points_deg) - first.degree
+    return motion.size(first.degree, len(trajectory.joints), trajectory.shared, segments, first.refine)
