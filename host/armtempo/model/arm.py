@@ -115,6 +115,7 @@ class Arm:
         where = self.source or f"arm {self.name!r}"
         frames_of.check(self.frames, where)
         pallets_of.check(self.pallets, self.frames, where)
+        tool_of.check(self.tools, where)
 
     def _check_coupling(self) -> None:
         """Raise InputError for a coupling that is none, or for what the board cannot do with coupled joints."""

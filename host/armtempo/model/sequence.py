@@ -170,7 +170,7 @@ class _Reader:
             elif kind == "end":
                 table.choice("end", ("repeat",))
                 if not begun:
-                    raise table.fail("end", "given after a step with repeat")
+                    raise table.misplaced("end", "write it after a step with repeat")
                 row, number, repeat = begun.pop()
                 inner = tuple(found.pop())
                 found[-1].append(repeat(inner, where=_place(row), step=number))
