@@ -130,7 +130,7 @@ def test_check_names_a_place_that_is_too_far(tmp_path: Path) -> None:
         for each in geometry.findings(arm(tmp_path, TRAY.replace("row_mm = 15", "row_mm = -1500")))
         if "pallet" in each.where
     )
-    assert "row 2, column 1, layer 1 of pallet 'tray' is 1" in found.what
+    assert "row 2, column 1, layer 2 of pallet 'tray' is 1561 mm from the base" in found.what
 
 
 @pytest.mark.parametrize(
