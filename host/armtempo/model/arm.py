@@ -348,8 +348,7 @@ class Arm:
         neutral = joint_unit.NEUTRAL[name]
         if table.has(name) and self.slides:
             raise InputError(
-                f"{table.file}: {table.place}{name}: {self._sliding} slide, so a list in degrees cannot say "
-                "where they are",
+                f"{table.file}: {table.place}{name}: {self._sliding}, so a list in degrees cannot say where the arm is",
                 f"write {neutral} = [...], in the order of the joints: {self.positions_text}",
             )
         if table.has(name) and table.has(neutral):
@@ -358,7 +357,8 @@ class Arm:
 
     @property
     def _sliding(self) -> str:
-        return " and ".join(joint.name for joint in self.joints if joint.slides)
+        names = [joint.name for joint in self.joints if joint.slides]
+        return f"{' and '.join(names)} {'slides' if len(names) == 1 else 'slide'}"
 
     def listed(self, values: Iterable[str], gap: str = ", ") -> str:
         """Positions of the driven joints (J,) as texts, in one with their units."""

@@ -34,8 +34,6 @@ class JointUnit:
     """In sentences, after a number and a space."""
     sign: str
     """Right after a number."""
-    per_rev: float
-    """Of a turn of a turning joint, in degrees; 0: of a sliding one, as far as its screw or pulley moves it."""
 
     def key(self, name: str) -> str:
         """The key of an arm file for a field of a joint or of a part of it, which is named for turning joints."""
@@ -52,8 +50,8 @@ class JointUnit:
         return f"{round(value, digits) + 0.0:.{digits}f}{self.sign}"
 
 
-DEG = JointUnit("deg", "degrees", "°", 360.0)
-MM = JointUnit("mm", "mm", " mm", 0.0)
+DEG = JointUnit("deg", "degrees", "°")
+MM = JointUnit("mm", "mm", " mm")
 
 
 def of_type(kind: str) -> JointUnit:
