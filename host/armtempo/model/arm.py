@@ -34,6 +34,7 @@ from armtempo.model import pallet as pallets_of
 from armtempo.model import posture as named
 from armtempo.model import tool as tool_of
 from armtempo.model.frame import ArmFrame
+from armtempo.model.joint_unit import DEG, MM
 from armtempo.model.outputs import Input, Output
 from armtempo.model.pallet import ArmPallet
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
@@ -336,6 +337,11 @@ class Arm:
         """The same in words: "degrees", "mm", or "degrees or mm"."""
         return " or ".join(dict.fromkeys(joint.unit.word for joint in self.table_joints))
 
+    @cached_property
+    def position_word(self) -> str:
+        """What a position of any of its joints is called: "angle", or "position" if a joint slides."""
+        return (MM if self.slides else DEG).what
+
     def list_key(self, name: str) -> str:
         """The key of a list of joint positions in files and results, by its name for arms whose joints all turn."""
         return joint_unit.NEUTRAL[name] if self.slides else name
@@ -347,18 +353,14 @@ class Arm:
         """
         neutral = joint_unit.NEUTRAL[name]
         if table.has(name) and self.slides:
+            sliding = " and ".join(joint.name for joint in self.joints if joint.slides)
             raise InputError(
-                f"{table.file}: {table.place}{name}: {self._sliding} slide, so a list in degrees cannot say "
-                "where they are",
+                f"{table.file}: {table.place}{name}: a list in degrees cannot say where {sliding} slides to",
                 f"write {neutral} = [...], in the order of the joints: {self.positions_text}",
             )
         if table.has(name) and table.has(neutral):
             raise table.misplaced(neutral, f"leave it out beside {name}, which says the same")
         return neutral if table.has(neutral) else name
-
-    @property
-    def _sliding(self) -> str:
-        return " and ".join(joint.name for joint in self.joints if joint.slides)
 
     def listed(self, values: Iterable[str], gap: str = ", ") -> str:
         """Positions of the driven joints (J,) as texts, in one with their units."""
@@ -403,8 +405,7 @@ class Arm:
         return tuple(joint.placed(float(angle)) for joint, angle in zip(self.driven, angles, strict=True))
 
     def _size_problem(self, count: int) -> str:
-        what = "positions" if self.slides else "angles"
-        return f"{count} {what}, but {len(self.driven)} joints have a motor"
+        return f"{count} {self.position_word}s, but {len(self.driven)} joints have a motor"
 
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
         """Why the driven joints cannot be at these angles; "" if they can."""

@@ -34,6 +34,8 @@ class JointUnit:
     """In sentences, after a number and a space."""
     sign: str
     """Right after a number."""
+    what: str
+    """What a position of a joint is called."""
     per_rev: float
     """Of a turn of a turning joint, in degrees; 0: of a sliding one, as far as its screw or pulley moves it."""
 
@@ -52,8 +54,8 @@ class JointUnit:
         return f"{round(value, digits) + 0.0:.{digits}f}{self.sign}"
 
 
-DEG = JointUnit("deg", "degrees", "°", 360.0)
-MM = JointUnit("mm", "mm", " mm", 0.0)
+DEG = JointUnit("deg", "degrees", "°", "angle", 360.0)
+MM = JointUnit("mm", "mm", " mm", "position", 0.0)
 
 
 def of_type(kind: str) -> JointUnit:

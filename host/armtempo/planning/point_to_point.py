@@ -53,7 +53,7 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
     found = np.array(arm.placed(found))
     for joint, angle in zip(arm.driven, found, strict=True):
         if problem := joint.range_problem(angle):
-            raise InputError(problem, f"give {'a position' if joint.slides else 'an angle'} within it")
+            raise InputError(problem, "stay within it")
     return found
 
 
