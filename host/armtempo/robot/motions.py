@@ -171,11 +171,11 @@ class Motions:
         """Replay a motion ``repeat`` times, 1 to 99, or run a sequence, and record it in a new run folder in ``out``.
 
         ``motion``: a plan, its file (FILE.json), or the name of a motion or sequence on the board, which is refused
-        if what it was planned with has changed since; a sequence takes neither ``repeat`` nor ``progress`` nor
-        ``watcher``. The arm must be homed and at the start; the arm of a virtual board is moved there. Between
-        repetitions it returns along the same path. The speed is that of the last ``speed`` call. ``progress`` counts
-        seconds of motion; ``watcher`` is called with folder, samples and repetitions. If the run ends early, it raises,
-        and ``last_run`` holds the recording.
+        if what it was planned with has changed since; a sequence takes neither ``repeat`` nor ``progress``. The arm
+        must be homed and at the start; the arm of a virtual board is moved there. Between repetitions it returns
+        along the same path. The speed is that of the last ``speed`` call. ``progress`` counts seconds of motion;
+        ``watcher`` is called with folder, samples and repetitions. If the run ends early, it raises, and
+        ``last_run`` holds the recording.
         Raises LinkError if the arm is not homed or not at the start, the board has another motion of this name
         (``upload`` can replace it), or is set up for another arm.
         """
@@ -186,12 +186,11 @@ class Motions:
         if isinstance(motion, SequencePlan | EncodedSequence) or (
             isinstance(motion, str) and self._is_sequence(motion)
         ):
-            if repeat != 1 or progress is not None or watcher is not None:
+            if repeat != 1 or progress is not None:
                 raise InputError(
-                    "run: a sequence takes no repeat, progress or watcher",
-                    "leave them out; its steps repeat it, 'run_sequence' takes a watcher of its states",
+                    "run: a sequence takes no repeat or progress", "leave them out; its steps repeat it"
                 )
-            self.run_sequence(motion, stop=stop, out=out)
+            self._run_sequence(motion, lambda _: None, stop, False, out, watcher or Watcher())
             return Run.load(cast(Path, self._last_folder))
         encoded = self._motion(motion)
         if isinstance(motion, str):
@@ -225,6 +224,17 @@ class Motions:
         the sequence ends as ``timed_out`` or raises BoardError, as its step says. After Stopped,
         ``client.sequence()`` has the last state.
         """
+        return self._run_sequence(sequence, watcher, stop, replace, out, Watcher())
+
+    def _run_sequence(
+        self,
+        sequence: SequencePlan | EncodedSequence | str,
+        on_state: SequenceWatcher,
+        stop: StopRequest | None,
+        replace: bool,
+        out: Path | str | None,
+        watcher: Watcher,
+    ) -> SequenceState:
         client = self._board.client
         with self._board.stoppable(stop) as wanted:
             if isinstance(sequence, str):
@@ -234,14 +244,15 @@ class Motions:
                 key = encoded.key
                 self._take_start(encoded, wanted)
             if out is None:
-                end = sequence_run.run(client, key, wanted, watcher).end
+                end = sequence_run.run(client, key, wanted, on_state).end
                 sequence_run.raise_failure(client, end)
                 return end
             if isinstance(sequence, str):
                 encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
             folder = self._recorded(encoded, Path(out))
             self._last_sequence = folder.path
-            return recording.sequence(client, key, folder, wanted, watcher)
+            watcher.begin(encoded, folder)
+            return recording.sequence(client, encoded, folder, wanted, watcher, on_state)
 
     def _stored_sequence(self, name: str) -> MotionKey:
         """The key of a sequence on the board; a virtual arm is at home."""
