@@ -22,7 +22,7 @@ from armtempo.model.arm import Arm
 from armtempo.planning.point_to_point import straight
 from armtempo.report.run import Run
 from armtempo.report.run_folder import Repetition
-from armtempo.robot import recording, sequence_run, stored_motion
+from armtempo.robot import recording, running
 from armtempo.robot.recording import Watcher
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import store
@@ -190,7 +190,7 @@ def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pyt
     begin_s = pipe.clock()
     pipe.run_samples = 10_000
     with pytest.raises(LinkError, match="still moves; switch off"):
-        stored_motion.stop(board, now=False)
+        running.stop(board, now=False)
     assert pipe.clock() - begin_s < 15.0
 
 
@@ -200,7 +200,7 @@ def test_what_was_to_stop_before_does_not_start(tmp_path: Path) -> None:
     stop = StopRequest()
     stop.wanted = True
     with pytest.raises(KeyboardInterrupt):
-        stored_motion.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
+        running.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
     assert pipe.app.controller.board.engine.calls.count("start") == 0
 
 
@@ -331,7 +331,7 @@ def sequence_samples(
             if len(found) == 8:
                 at_7()
 
-    followed = sequence_run.run(board, key, StopRequest(), take=take)
+    followed = running.run_sequence(board, key, StopRequest(), take=take)
     assert followed.end.ending == "finished"
     assert found == [(run, index) for run in range(1, followed.end.cycle + 1) for index in range(4)]
     return followed
@@ -394,7 +394,7 @@ def test_nothing_of_a_run_that_nobody_followed_is_taken_for_the_next_ones(tmp_pa
         pipe.wait(0.1)
     board.home([7, 7, 7])
     passed: list[int] = []
-    sequence_run.run(
+    running.run_sequence(
         board,
         key,
         StopRequest(),

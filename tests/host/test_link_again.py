@@ -16,7 +16,7 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import MotionFollower, RunEnd
 from armtempo.link.transport import SerialTransport
-from armtempo.robot import stored_motion
+from armtempo.robot import running
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
@@ -41,7 +41,7 @@ def replay(
         if sample.index == 20:
             at_20()
 
-    return stored_motion.replay(board, stored, stop or StopRequest(), take), indices
+    return running.replay(board, stored, stop or StopRequest(), take), indices
 
 
 @pytest.mark.slow

@@ -203,7 +203,7 @@ def read(client: Client, port: str) -> BoardState:
     """The board's present state, in steps and counts."""
     from armtempo.encoding.engine_heap import EngineHeap
     from armtempo.link.program_version import own_crc
-    from armtempo.robot.stored_motion import fault_name
+    from armtempo.robot.running import fault_name
 
     info, status = client.info, client.status()
     pairs = zip(status.positions.commanded_steps, status.positions.counts, strict=True)

@@ -23,8 +23,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
+from armtempo.robot.running import put_once, raise_fault, replay
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import put_once, raise_fault, replay
 
 HomingProgress = Callable[[str, int, int], object]
 """Called with what happens now or was seen, by joint; how many joints are at home, and how many are homed."""

@@ -24,7 +24,7 @@ from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, by_of_joint, move_of, number_of_joint
 from armtempo.report.run import Run
 from armtempo.report.run_folder import RunFolder
-from armtempo.robot import arm_state, goto, jog, recording, sequence_run, stored_motion
+from armtempo.robot import arm_state, goto, jog, recording, running
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
@@ -244,8 +244,8 @@ class Motions:
                 key = encoded.key
                 self._take_start(encoded, wanted)
             if out is None:
-                end = sequence_run.run(client, key, wanted, on_state).end
-                sequence_run.raise_failure(client, end)
+                end = running.run_sequence(client, key, wanted, on_state).end
+                running.raise_sequence_failure(client, end)
                 return end
             if isinstance(sequence, str):
                 encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
@@ -305,7 +305,7 @@ class Motions:
         For motions that no call of this object waits for, such as one started by the button. To stop ``run``,
         give it a ``StopRequest``.
         """
-        stored_motion.stop(self._board.client, now)
+        running.stop(self._board.client, now)
 
     def request_stop(self, now: bool = False, by: str = "another thread") -> bool:
         """Stop a motion from a thread other than the one that waits for it, where Stopped is raised. Does not wait.
@@ -313,7 +313,7 @@ class Motions:
         ``by``: who asks for the stop, for messages. Returns whether something moved. Raises NoAnswerError if
         the board does not answer.
         """
-        return stored_motion.request_stop(self._board.client, self._board.stops, now, by)
+        return running.request_stop(self._board.client, self._board.stops, now, by)
 
     def speed(self, fraction: float) -> None:
         """Set the speed as a fraction of the planned speed, 0.01 to 1, for the running and all later motions.

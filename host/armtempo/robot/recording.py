@@ -22,10 +22,10 @@ from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequenceRow
 from armtempo.report import run_folder
 from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder, RunRow
-from armtempo.robot import sequence_run
+from armtempo.robot import running
 from armtempo.robot.goto import move_once
+from armtempo.robot.running import fault_name, raise_fault, readable, replay
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
 
 _END_S = 1e-3
 """A run that ended earlier than its motion by more than this was stopped."""
@@ -119,13 +119,13 @@ def sequence(
                 for run in [run for run in row_of_run if run < event.run]:
                     del row_of_run[run]
 
-        followed = sequence_run.run(client, encoded.key, stop, on_state, take)
+        followed = running.run_sequence(client, encoded.key, stop, on_state, take)
         end = followed.end
         file.repetition.end_rows(
             end, fault_name(end.code), client.counters(), clock() - begun_s, followed.lost
         )
         watcher.end(file.repetition)
-        sequence_run.raise_failure(client, end)
+        running.raise_sequence_failure(client, end)
     return end
 
 

@@ -22,9 +22,9 @@ from armtempo.ports import claim, names
 from armtempo.ports.messages import TOPICS, Message
 from armtempo.ports.server import Server
 from armtempo.robot.board_state import BoardState
+from armtempo.robot.running import LOCK_S, fault_name, request_stop
 from armtempo.robot.speed import change_speed
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import LOCK_S, fault_name, request_stop
 
 EVERY_S = 0.5
 """Interval of the published states."""
