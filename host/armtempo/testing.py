@@ -22,7 +22,8 @@ from typing import Any
 
 import armtempo_board
 import numpy as np
-from armtempo_board.app.cell import Cell, CellError, Ended, Place
+from armtempo_board.app.cell import Cell, CellError, Ended
+from armtempo_board.app.pallet import Place
 from armtempo_shared.program import EACH, MARK
 
 from armtempo.basics.errors import InputError

@@ -234,6 +234,25 @@ def test_forces_are_those_of_a_turning_slide() -> None:
     np.testing.assert_allclose(needed.needed_nm[:, 0], mass * (GRAVITY_M_S2 + up) * lead_m, atol=TOLERANCE)
 
 
+def test_a_gantry_as_the_page_has_it_moves_two_belts_by_sum_and_difference() -> None:
+    page = (Path(__file__).parents[2] / "host" / "docs" / "arms.md").read_text(encoding="utf-8")
+    rows, coupling = re.findall(r"```toml\n(.*?)```", page.split("### Rails and gantries")[1], re.DOTALL)[:2]
+    numbers = iter("123")
+    drive = "limits = {{ speed_mm_s = 100, acceleration_mm_s2 = 500, jerk_mm_s3 = 5000 }}\nmotor = {{ channel = {}, "
+    drive += "steps_per_rev = 200, microsteps = 16, mm_per_rev = 40 }}\n"
+    rows = re.sub(r"(?m)^range_mm.*\n", lambda found: found[0] + drive.format(next(numbers)), rows)
+    gantry = arm_of(f'name = "gantry"\n{rows}\n{coupling}')
+    assert gantry.units == "mm"
+    at = [100.0, 50.0, -20.0]
+    pose = armtempo.forward(gantry, at)
+    np.testing.assert_allclose(pose[:3], np.column_stack([np.eye(3), at]), atol=TOLERANCE)
+    np.testing.assert_allclose(gantry.transmission.steps(at), 80.0 * np.array([150.0, 50.0, -20.0]))
+    (found,) = armtempo.inverse(gantry, armtempo.Pose.of_matrix(pose, ()))
+    np.testing.assert_allclose(found.angles_deg[1:], at, atol=1e-6)
+    moved = jog_motion.plan("j", gantry, at, JogMove(30.0, axis="x"))
+    np.testing.assert_allclose(moved.end_deg, [130.0, 50.0, -20.0], atol=1e-3)
+
+
 def test_the_virtual_arm_gets_a_mass_and_a_force_as_their_turning_equals() -> None:
     model = JointModel(holding_torque_nm=0.4, inertia_kg_m2=2.0, gravity_torque_nm=20.0)
     joints = (replace(LIFT.joints[0], model=model), LIFT.joints[1])
@@ -291,7 +310,7 @@ def test_lists_of_positions_say_nothing_of_degrees() -> None:
     assert Job.of_table(toml_table.parse(tables, "a"), LIFT).via == ((0.0, 1.0), (150.0, 2.0))
     for text, key in ((neutral, "via_deg"), (tables, "angles_deg")):
         degrees = text.replace("via_joints", key).replace("joints", key)
-        with pytest.raises(InputError, match=f"{key}: a list in degrees cannot say where z slides") as error:
+        with pytest.raises(InputError, match=f"{key}: z slides, so a list in degrees") as error:
             Job.of_table(toml_table.parse(degrees, "a"), LIFT)
         assert "z in mm, turn in deg" in str(error.value)
     two = Arm("two", tuple(replace(LIFT.joints[1], name=name, motor=replace(LIFT.joints[1].motor, channel=number))
@@ -305,7 +324,7 @@ def test_lists_of_positions_say_nothing_of_degrees() -> None:
         Job.of_table(toml_table.parse(neutral.replace("150.0", "250.0"), "a"), LIFT)
     posture = SMALL.replace('name = "lift"', 'name = "lift"\nposture.up = { joints = [150.0, 10.0] }')
     assert arm_of(posture).posture("up").where == (150.0, 10.0)
-    with pytest.raises(InputError, match=r"posture\.up\.angles_deg: a list in degrees"):
+    with pytest.raises(InputError, match=r"posture\.up\.angles_deg: z slides, so"):
         arm_of(posture.replace("joints = [150", "angles_deg = [150"))
     with pytest.raises(InputError, match="corridor_deg is of arms whose joints all turn"):
         planner.plan(LIFT, Job("a", via=((0.0, 0.0), (100.0, 10.0)), corridor_deg=1.0))

@@ -30,11 +30,18 @@ from armtempo.splines.trajectory import Trajectory
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
 """Fields of a joint that do not affect its position in steps."""
 _TICKS_PER_US = limits.TICK_HZ / 1e6
+_packed: tuple[Arm, bytes] | None = None
+"""The last arm, which never changes, with its record: each motion names that, and a press of a jog waits for it."""
 
 
 def arm_record(arm: Arm) -> bytes:
     """The arm record (layout: ``armtempo_shared.armrecord``); raises InputError if a value does not fit the board."""
-    return armrecord.pack(_head(arm), motor_rows(arm), outputs(arm), inputs(arm), backlash(arm))
+    global _packed
+    packed = _packed
+    if packed is None or packed[0] is not arm:
+        record = armrecord.pack(_head(arm), motor_rows(arm), outputs(arm), inputs(arm), backlash(arm))
+        packed = _packed = arm, record
+    return packed[1]
 
 
 def motor_rows(arm: Arm) -> list[dict[str, Any]]:

@@ -353,14 +353,18 @@ class Arm:
         """
         neutral = joint_unit.NEUTRAL[name]
         if table.has(name) and self.slides:
-            sliding = " and ".join(joint.name for joint in self.joints if joint.slides)
             raise InputError(
-                f"{table.file}: {table.place}{name}: a list in degrees cannot say where {sliding} slides to",
+                f"{table.file}: {table.place}{name}: {self._sliding}, so a list in degrees cannot say where the arm is",
                 f"write {neutral} = [...], in the order of the joints: {self.positions_text}",
             )
         if table.has(name) and table.has(neutral):
             raise table.misplaced(neutral, f"leave it out beside {name}, which says the same")
         return neutral if table.has(neutral) else name
+
+    @property
+    def _sliding(self) -> str:
+        names = [joint.name for joint in self.joints if joint.slides]
+        return f"{' and '.join(names)} {'slides' if len(names) == 1 else 'slide'}"
 
     def listed(self, values: Iterable[str], gap: str = ", ") -> str:
         """Positions of the driven joints (J,) as texts, in one with their units."""

@@ -36,8 +36,6 @@ class JointUnit:
     """Right after a number."""
     what: str
     """What a position of a joint is called."""
-    per_rev: float
-    """Of a turn of a turning joint, in degrees; 0: of a sliding one, as far as its screw or pulley moves it."""
 
     def key(self, name: str) -> str:
         """The key of an arm file for a field of a joint or of a part of it, which is named for turning joints."""
@@ -54,8 +52,8 @@ class JointUnit:
         return f"{round(value, digits) + 0.0:.{digits}f}{self.sign}"
 
 
-DEG = JointUnit("deg", "degrees", "°", "angle", 360.0)
-MM = JointUnit("mm", "mm", " mm", "position", 0.0)
+DEG = JointUnit("deg", "degrees", "°", "angle")
+MM = JointUnit("mm", "mm", " mm", "position")
 
 
 def of_type(kind: str) -> JointUnit:

@@ -19,6 +19,7 @@ LEVELS = ("low", "high")
 NOTHING = "nothing"
 """What an arm holds that holds no load."""
 _LEAST_LIMIT = 0.001
+_TURN_DEG = 360.0
 LEAST_RATIO, MOST_RATIO = 0.1, 10_000.0
 LEAST_MM_PER_REV, MOST_MM_PER_REV = 0.01, 1000.0
 """The finest screw and the largest pulley of a sliding joint."""
@@ -95,7 +96,7 @@ class Motor:
     @property
     def per_rev(self) -> float:
         """Movement of the joint for a turn behind the gear: 360 degrees, or mm_per_rev."""
-        return DEG.per_rev if self.mm_per_rev is None else self.mm_per_rev
+        return _TURN_DEG if self.mm_per_rev is None else self.mm_per_rev
 
     @property
     def steps_per_deg(self) -> float:
@@ -105,7 +106,7 @@ class Motor:
     @property
     def reduction(self) -> float:
         """Degrees of the shaft per degree of the joint, which is the gear ratio, or per mm of a sliding one."""
-        return self.gear_ratio * (DEG.per_rev / self.per_rev)
+        return self.gear_ratio * (_TURN_DEG / self.per_rev)
 
 
 @checked_fields

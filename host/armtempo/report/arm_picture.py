@@ -223,5 +223,6 @@ def _explain(figure: Figure, arm: Arm) -> None:
     )
     figure.legend(handles=lines, loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle(
-        f"{arm.name}: each joint seen along its axis, the others at their home angles; lengths in mm"
+        f"{arm.name}: each joint seen along its axis{', sliding ones from the side' if arm.slides else ''}, "
+        "the others at their home angles; lengths in mm"
     )
