@@ -4,7 +4,7 @@
 
     plan     arm and job -> Plan              planning: via angles, path, time axes, checks
     load     trajectory file -> Plan          model.plan
-    run      Plan -> records -> board         records.encode, link, robot.stored_motion; there evaluator, rings, timers
+    run      Plan -> records -> board         encoding, link, robot.running; there evaluator, rings, timers
              board -> samples -> run folder   link.follow, report.run_folder
     report   run folder -> page and figures   Run.report
 

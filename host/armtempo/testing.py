@@ -22,11 +22,12 @@ from typing import Any
 
 import armtempo_board
 import numpy as np
-from armtempo_board.app.cell import Cell, CellError, Ended, Place
+from armtempo_board.app.cell import Cell, CellError, Ended
+from armtempo_board.app.pallet import Place
 from armtempo_shared.program import EACH, MARK
 
 from armtempo.basics.errors import InputError
-from armtempo.encoding import encode, encoded_program
+from armtempo.encoding import encode, encoded_program, planned_for
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
@@ -190,7 +191,9 @@ class _Work:
         file = self._program.motion_file(name)
         if not file.is_file():
             raise InputError(f"no motion {name!r}: {file} does not exist", "plan it")
-        motion = Plan.load(file).trajectory
+        plan = Plan.load(file)
+        planned_for.check(file, plan, self._arm)
+        motion = plan.trajectory
         start = self._arm.transmission.whole_steps(motion(0.0))
         off = np.abs(np.subtract(start, self._steps))
         if off.max() > _AT_START_STEPS:

@@ -13,7 +13,8 @@ from armtempo.model.pallet import ArmPallet
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
 from armtempo.model.tool import ArmTool
 from armtempo.optimise.task import Number, Parameter
-from armtempo_board.app.cell import Cell, Pallet
+from armtempo_board.app.cell import Cell
+from armtempo_board.app.pallet import Pallet
 
 FOLDER = Path(__file__).parent
 

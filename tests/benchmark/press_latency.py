@@ -22,10 +22,9 @@ import numpy as np
 from armtempo.model.arm import Arm
 from armtempo.robot.connect import connect
 from armtempo.simulator import LaunchOptions, launch
-from armtempo.splines.trajectory import Trajectory
 from armtempo_shared.limits import TICK_HZ
 
-from tests.benchmark.panel_stops import Ear
+from tests.benchmark.panel_stops import Ear, first_step_s
 from tests.benchmark.stop_latency import python_starts
 from tests.system.relay import Cable, Relay
 
@@ -57,14 +56,6 @@ class Times:
                 )
 
 
-def first_step_s(trajectory: Trajectory) -> float:
-    """When the first joint has moved by half a step."""
-    times = np.linspace(0.0, min(trajectory.duration_s, 1.0), 2001)
-    steps = np.array([joint.steps_per_deg for joint in ARM.driven])
-    moved = np.abs(trajectory(times) - trajectory(0.0)) * steps >= 0.5
-    return float(times[np.argmax(moved.any(axis=1))])
-
-
 def began_s(ear: Ear, after_s: float) -> float:
     """When the motion began whose samples come after a time."""
     while ear.sample is None or ear.sample[0] < after_s:
@@ -87,7 +78,7 @@ def by_library(ear: Ear, port: str, times: int) -> None:
                     jog.hold(0.25)
                 at_s = began_s(ear, begin_s)
                 found.began.append(at_s - begin_s)
-                found.stepped.append(at_s - begin_s + first_step_s(jog.motion.trajectory))
+                found.stepped.append(at_s - begin_s + first_step_s(ARM, jog.motion.trajectory))
             found.show(f"held jog, {name}")
 
 

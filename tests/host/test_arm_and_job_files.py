@@ -59,7 +59,7 @@ def test_the_shipped_arm_is_the_papers() -> None:
         ("-10.0, 190.0", "-1e6, 190.0", ["joint[1].range_deg", "at most 36000 either way"]),
         ("holding_torque_nm = 0.65", "holding_torque_nm = -1", ["holding_torque_nm = -1", "at least 0"]),
         ("backlash_deg = 0.05", "backlash_deg = 500", ["backlash_deg = 500", "at most 90"]),
-        ("home_deg = 0.0", 'type = "prismatic"', ["joint[1].type", "sliding ones are not supported"]),
+        ("home_deg = 0.0", 'type = "prismatic"', ["joint[1].range_deg is of a turning joint", "range_mm"]),
         ("home_deg = 0.0", "fixed_deg = 5", ["joint[1].motor", "leave it out: fixed_deg locks the joint"]),
         ("home_deg = 0.0", "parallel_linkage = true", ["joint[1].parallel_linkage", "no joint before it"]),
         ("microsteps = 8", "microstep = 8", ["joint[2].motor.microsteps is missing"]),

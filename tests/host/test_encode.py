@@ -57,6 +57,22 @@ def test_the_record_names_the_arm_it_was_made_for() -> None:
     assert motion.Motion(encode.motion_record(trajectory(False), ARM)).arm_crc == crc
 
 
+def test_the_record_of_an_arm_is_made_once_and_another_one_for_another_arm() -> None:
+    first = encode.arm_record(ARM)
+    assert encode.arm_record(ARM) is first
+    joint = ARM.joints[0]
+    assert joint.motor is not None
+    other = replace(
+        ARM,
+        joints=(
+            replace(joint, motor=replace(joint.motor, microsteps=2 * joint.motor.microsteps)),
+            *ARM.joints[1:],
+        ),
+    )
+    assert encode.arm_record(other) != first
+    assert encode.arm_record(ARM) == first
+
+
 def test_the_arm_record_speaks_steps_and_counts() -> None:
     head, joints, _ = armrecord.unpack(encode.arm_record(ARM))
     assert head["dir_setup_ticks"] == 5 * 84

@@ -10,13 +10,20 @@ from typing import Any
 
 import pytest
 from armtempo.basics.errors import BoardError, InputError, LinkError
-from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding import encoded_sequence
+from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link import Client, traffic
 from armtempo.link.board_messages import RowBegun, Sample
 from armtempo.link.client import harmless_number
 from armtempo.link.follow import Followed, MotionFollower, SequenceFollower
 from armtempo.link.session import Session
-from armtempo.robot import recording, sequence_run, stored_motion
+from armtempo.model.arm import Arm
+from armtempo.planning.point_to_point import straight
+from armtempo.report.run import Run
+from armtempo.report.run_folder import Repetition
+from armtempo.robot import recording, running
+from armtempo.robot.recording import Watcher
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import store
 from armtempo_shared import sequence, wire
@@ -183,7 +190,7 @@ def test_a_board_that_does_not_stop_is_given_up(tmp_path: Path, monkeypatch: pyt
     begin_s = pipe.clock()
     pipe.run_samples = 10_000
     with pytest.raises(LinkError, match="still moves; switch off"):
-        stored_motion.stop(board, now=False)
+        running.stop(board, now=False)
     assert pipe.clock() - begin_s < 15.0
 
 
@@ -193,7 +200,7 @@ def test_what_was_to_stop_before_does_not_start(tmp_path: Path) -> None:
     stop = StopRequest()
     stop.wanted = True
     with pytest.raises(KeyboardInterrupt):
-        stored_motion.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
+        running.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
     assert pipe.app.controller.board.engine.calls.count("start") == 0
 
 
@@ -324,7 +331,7 @@ def sequence_samples(
             if len(found) == 8:
                 at_7()
 
-    followed = sequence_run.run(board, key, StopRequest(), take=take)
+    followed = running.run_sequence(board, key, StopRequest(), take=take)
     assert followed.end.ending == "finished"
     assert found == [(run, index) for run in range(1, followed.end.cycle + 1) for index in range(4)]
     return followed
@@ -338,6 +345,36 @@ def test_a_sequence_gives_every_sample_of_every_motion(tmp_path: Path, noise: fl
     board, key = sequence_of(pipe, 12)
     pipe.disturb(Noise("to 3", noise), Noise("from 3", noise))
     assert sequence_samples(board, key).lost == ()
+
+
+class Counting(Watcher):
+    """Counts what it is told."""
+
+    def __init__(self) -> None:
+        self.samples: list[tuple[int, float]] = []
+        self.ended: list[str] = []
+
+    def on_sample(self, sample: Sample, duration_s: float) -> None:
+        self.samples.append((sample.index, duration_s))
+
+    def end(self, repetition: Repetition) -> None:
+        self.ended.append(repetition.state)
+
+
+def test_a_watcher_sees_a_sequence_as_a_motion(tmp_path: Path) -> None:
+    pipe = Pipe(tmp_path / "flash")
+    pipe.run_samples = 4
+    board, key = sequence_of(pipe, 2)
+    arm = Arm.paper()
+    leg = EncodedMotion("feed", arm, straight("feed", [0.0] * 3, [1.0] * 3, arm), board.fetch("feed"))
+    rows = encoded_sequence.described(sequence.SequenceData(board.fetch(key.name)), arm)
+    encoded = EncodedSequence(key.name, arm, (leg,), rows, board.fetch(key.name))
+    folder = recording.new_run(tmp_path / "runs", encoded, "pipe", board)
+    seen, states = Counting(), list[str]()
+    recording.sequence(board, encoded, folder, StopRequest(), seen, lambda state: states.append(state.ending))
+    assert seen.samples == [(index, leg.trajectory.duration_s) for index in range(4)] * 2
+    assert seen.ended == states[-1:] == ["finished"]
+    assert [row.passed for row in Run.load(folder.path).rows] == [1, 2, 3, 4, 5]
 
 
 def test_a_sequence_whose_cable_was_out_lacks_no_sample(tmp_path: Path) -> None:
@@ -357,7 +394,7 @@ def test_nothing_of_a_run_that_nobody_followed_is_taken_for_the_next_ones(tmp_pa
         pipe.wait(0.1)
     board.home([7, 7, 7])
     passed: list[int] = []
-    sequence_run.run(
+    running.run_sequence(
         board,
         key,
         StopRequest(),

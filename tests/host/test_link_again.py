@@ -16,7 +16,7 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import MotionFollower, RunEnd
 from armtempo.link.transport import SerialTransport
-from armtempo.robot import stored_motion
+from armtempo.robot import running
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
@@ -41,7 +41,7 @@ def replay(
         if sample.index == 20:
             at_20()
 
-    return stored_motion.replay(board, stored, stop or StopRequest(), take), indices
+    return running.replay(board, stored, stop or StopRequest(), take), indices
 
 
 @pytest.mark.slow
@@ -131,6 +131,22 @@ def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
             pipe.unplug_for(1.5)
     assert indices == list(range(pipe.run_samples))
     assert [text.split()[0] for text in pipe.told] == ["the", "connected"] * 2
+
+
+def test_a_sample_comes_once_though_the_board_was_silent_to_whoever_took_it(tmp_path: Path) -> None:
+    """Such as a watcher that changes the speed."""
+    pipe = Pipe(tmp_path / "flash")
+    pipe.run_samples = 30
+    board, stored = prepared(pipe)
+    silent = [NoAnswerError("the board is silent")]
+
+    def speed() -> None:
+        if silent:
+            raise silent.pop()
+
+    end, indices = replay(board, stored, speed)
+    assert indices == list(range(pipe.run_samples))
+    assert end.received == pipe.run_samples
 
 
 @pytest.mark.slow

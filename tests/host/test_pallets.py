@@ -13,6 +13,7 @@ import pytest
 from armtempo.basics import json_codec
 from armtempo.basics.errors import InputError, LinkError, PlanError
 from armtempo.cli import sequences
+from armtempo.diagnosis import geometry
 from armtempo.encoding import encode, encoded_sequence, flash_use, planned_for
 from armtempo.kinematics.of_arm import forward
 from armtempo.link.board_messages import StoredMotion
@@ -120,6 +121,16 @@ def test_its_places_are_along_the_axes_of_its_frame(tmp_path: Path) -> None:
     bare = arm(tmp_path, TRAY[: TRAY.index("[frame")])
     assert encode.arm_record(found) == encode.arm_record(bare), "the board knows nothing of it"
     assert json_codec.decode(Arm, json_codec.encode(found), "arm") == found
+
+
+def test_check_names_a_place_that_is_too_far(tmp_path: Path) -> None:
+    assert not [each for each in geometry.findings(arm(tmp_path)) if "pallet" in each.where]
+    (found,) = (
+        each
+        for each in geometry.findings(arm(tmp_path, TRAY.replace("row_mm = 15", "row_mm = -1500")))
+        if "pallet" in each.where
+    )
+    assert "row 2, column 1, layer 2 of pallet 'tray' is 1561 mm from the base" in found.what
 
 
 @pytest.mark.parametrize(
@@ -242,6 +253,8 @@ def test_made_in_code_it_is_checked_too(tmp_path: Path, quick: None) -> None:
     steps = (EachPlace((ToPlace("line"), ToPlace("line", leave=True)), "line", first=3),)
     with pytest.raises(InputError, match="places 3 to 2 of the 2 of pallet 'line'"):
         armtempo.plan_sequence(replace(found, pallets=(pallet,)), Sequence("s", steps))
+    with pytest.raises(InputError, match="nothing is repeated"):
+        armtempo.plan_sequence(replace(found, pallets=(pallet,)), Sequence("s", (EachPlace((), "line"),)))
 
 
 def test_the_solutions_of_all_places_are_near_each_other() -> None:

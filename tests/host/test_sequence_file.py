@@ -269,7 +269,7 @@ def test_goto_leads_to_where_a_motion_begins(tmp_path: Path) -> None:
         (["repeat = 0", "wait_s = 1", 'end = "repeat"'], "repeat = 0 is not allowed"),
         (['repeat = "ever"', "wait_s = 1", 'end = "repeat"'], "repeat = 'ever': arm .* has no pallet .ever."),
         (["repeat = 2", "wait_s = 1"], "repeat without an end"),
-        (["wait_s = 1", 'end = "repeat"'], "end = 'repeat' is not allowed"),
+        (["wait_s = 1", 'end = "repeat"'], "end = 'repeat' is not allowed here; write it after"),
         (["repeat = 2", 'end = "repeat"'], "nothing is repeated"),
         (["repeat = 2"] * 5 + ["wait_s = 1"] + ['end = "repeat"'] * 5, "at most 4 within each other"),
         (['call = "seq.toml"'], "calls itself: seq.toml calls seq.toml"),

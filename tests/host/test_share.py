@@ -26,7 +26,7 @@ from armtempo.ports.caller import Caller, Ownership, ownership
 from armtempo.ports.claim import PortClaim
 from armtempo.ports.messages import REQUESTS, Field, LineReader, Message, check
 from armtempo.ports.server import Server
-from armtempo.robot import connect, stored_motion
+from armtempo.robot import connect, running
 from armtempo.robot.shared_board import SharedBoard
 from armtempo.robot.sharing import Sharing
 from armtempo_shared import wire
@@ -303,7 +303,7 @@ class Owner:
 def owner(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Owner, PortClaim]]:
     """A program that has a port, with a board that does as it is told."""
     client, failed = Owner(), []
-    monkeypatch.setattr(stored_motion, "send_stop", lambda client, now: client.stop(now) is None)
+    monkeypatch.setattr(running, "send_stop", lambda client, now: client.stop(now) is None)
     monkeypatch.setattr(threading, "excepthook", failed.append)
     shared = Sharing(cast(Any, client), cast(Any, lambda: SimpleNamespace(to_json=dict)), [], lambda: None)
     shared.open("/dev/p")

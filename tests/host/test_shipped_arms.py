@@ -160,6 +160,22 @@ def test_scara_stands_where_its_sketch_says() -> None:
     np.testing.assert_allclose(poses[:, 0, 0], np.cos(one + two + three), atol=1e-9)
 
 
+def test_the_screw_lifts_the_scara_and_the_rail_carries_the_community_arm() -> None:
+    """Else they are the arms without; zDistanceToSteps = 100."""
+    for name, plain, along in (("scara_z", "scara", 2), ("community_rail", "community", 1)):
+        arm, still = Arm.load(name), Arm.load(plain)
+        assert arm.joints[-len(still.joints) :] == still.joints
+        rng = np.random.default_rng(SEED)
+        angles = random_postures(still)
+        slide = rng.uniform(-100.0, 100.0, len(angles))
+        before = np.zeros((len(angles), len(arm.joints) - len(still.joints)))
+        before[:, -1] = slide
+        wanted = tool_poses(still, angles)
+        wanted[:, along, 3] += slide
+        np.testing.assert_allclose(tool_poses(arm, np.hstack([before, angles])), wanted, atol=1e-9)
+    assert Arm.load("scara_z").driven[0].steps_per_deg == 100
+
+
 @pytest.mark.parametrize(
     ("name", "steps_per_deg"),
     [
@@ -224,14 +240,26 @@ def test_a_file_wins_over_a_name_and_a_folder_does_not(
 
 def test_an_unknown_name_names_those_there_are() -> None:
     for look_up in (shipped.find, Arm.load):
-        with pytest.raises(InputError, match="paper, ar4, community, moveo, parol6, scara, thor"):
+        with pytest.raises(
+            InputError, match="paper, ar4, community, community_rail, moveo, parol6, scara, scara_z, thor"
+        ):
             look_up("ar5")
 
 
 def test_the_page_on_arms_lists_them_all() -> None:
     page = (Path(__file__).parents[2] / "host" / "docs" / "arms.md").read_text(encoding="utf-8")
     listed = [line.split("`")[1] for line in page.splitlines() if line.startswith("| `")]
-    assert listed == [shipped.PAPER, "ar4", "parol6", "thor", "moveo", "community", "scara"]
+    assert listed == [
+        shipped.PAPER,
+        "ar4",
+        "parol6",
+        "thor",
+        "moveo",
+        "community",
+        "community_rail",
+        "scara",
+        "scara_z",
+    ]
     assert sorted(listed) == sorted(NAMES)
     for name in NAMES:
         row = next(line for line in page.splitlines() if line.startswith(f"| `{name}`"))

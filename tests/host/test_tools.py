@@ -228,6 +228,12 @@ def test_a_tool_that_cannot_be_is_refused_with_its_key(tmp_path: Path, more: str
     assert said in str(refused.value)
 
 
+def test_two_tools_made_in_code_have_two_names() -> None:
+    pen = ArmTool("pen", tuple(map(tuple, np.eye(4).tolist())))
+    with pytest.raises(InputError, match="two tools are called 'pen'"):
+        replace(Arm.paper(), tools=(pen, pen))
+
+
 JOB = """name = "j"
 path = "through"
 population = 4

@@ -70,6 +70,7 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("cell.run('my motion')\n", 2, "not a valid name"),
         ("cell.run('')\n", 2, "'' is not a valid name"),
         ("cell.set('', 1)\n", 2, "no output ''"),
+        ("cell.tool('')\n", 2, "the name of the tool is empty"),
         ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
     ],
 )
@@ -331,6 +332,9 @@ def test_what_a_program_raises_passes_and_endless_ones_end(tmp_path: Path) -> No
         testing.run(written("cell.goto([0, 300, 0])\n", tmp_path), ARM)
     with pytest.raises(InputError, match="does not exist"):
         testing.run(written("cell.run('none')\n", tmp_path), ARM)
+    small_plan(tmp_path / "other.json")
+    with pytest.raises(InputError, match="planned for a different arm"):
+        testing.run(written("cell.run('other')\n", tmp_path), "ar4")
     with pytest.raises(InputError, match="no input"):
         testing.run(written("pass\n", tmp_path), ARM, {"parts": True})
     run = testing.run(written("while True:\n    pass\n", tmp_path), ARM, longest_s=1.0)

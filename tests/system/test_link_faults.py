@@ -25,7 +25,7 @@ from armtempo.link.transport import SerialTransport
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.report import run_folder, run_reader
-from armtempo.robot import arm_state, stored_motion
+from armtempo.robot import arm_state, running
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import store
 from armtempo.simulator import LaunchOptions, launch
@@ -220,13 +220,13 @@ def _recorded(path: Path) -> Recording:
         arm_state.home(board, commandline.ARM)
         stored = store(board, [("go", data)])
         with StopRequest() as stop:
-            stored_motion.replay(board, stored, stop, lambda sample, _: made.samples.append(sample))
+            running.replay(board, stored, stop, lambda sample, _: made.samples.append(sample))
         board.status()
         board.rename("go", "gone")
         assert [entry.name for entry in board.stored()] == ["gone"]
         assert board.fetch("gone") == data
         board.remove("gone")
-        stored_motion.send_stop(board)  # refused: nothing moves
+        running.send_stop(board)  # refused: nothing moves
     return made
 
 

@@ -23,7 +23,7 @@ from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, JointModel
 from armtempo.planning import planner, point_to_point
 from armtempo.planning.jog.jog_motion import move_of
-from armtempo.robot import arm_state, goto, homing, jog, stored_motion
+from armtempo.robot import arm_state, goto, homing, jog, running
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import store
 from armtempo.simulator import InjectedFault, LaunchOptions, edgelog, launch
@@ -65,7 +65,7 @@ def swing_deg(degree: int) -> float:
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
         stored = store(board, [("feed", encode.motion_record(trajectory, arm))])
-        stored_motion.replay(board, stored, stop, lambda sample, _: samples.append(sample))
+        running.replay(board, stored, stop, lambda sample, _: samples.append(sample))
     commanded_deg = trajectory(np.array([sample.ticks / TICK_HZ for sample in samples]))[:, 0]
     seen_deg = np.array([sample.positions.counts[0] for sample in samples]) * 360 / FINE_COUNTS
     return float(np.max(np.abs(seen_deg - commanded_deg)[1:7]))
@@ -95,13 +95,13 @@ def run(
         arm_state.home(board, arm)
         stored = store(board, [("move", short_motion(arm))])
         with StopRequest() as stop:
-            end = stored_motion.replay(board, stored, stop)
+            end = running.replay(board, stored, stop)
         return end, board.status()
 
 
 def code(end: RunEnd) -> str:
     """Name of the fault that ended a run, or nothing."""
-    return stored_motion.fault_name(end.fault) if end.fault else ""
+    return running.fault_name(end.fault) if end.fault else ""
 
 
 def test_without_a_fault_it_ends_where_it_was_to() -> None:
@@ -155,7 +155,7 @@ def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float)
         arm_state.home(board, arm)
         for here, there in (places, places[::-1]):
             record = encode.motion_record(point_to_point.straight("move", here, there, arm), arm)
-            end = stored_motion.replay(board, store(board, [("move", record)], replace=True), stop)
+            end = running.replay(board, store(board, [("move", record)], replace=True), stop)
             assert not end.fault
             arm = slower
             arm_state.configure(board, arm, replace=True)  # which declares the encoder, too

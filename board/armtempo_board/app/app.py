@@ -35,6 +35,7 @@ if features.SEQUENCES:
         "armtempo_board.app.program_start",
         "armtempo_board.app.user_program",
         "armtempo_board.app.cell",
+        "armtempo_board.app.pallet",
         "armtempo_shared.rest_to_rest",
         "armtempo_shared.shapes",
     )

@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from typing import Any, Protocol
 
+    from armtempo_board.app.pallet import Pallet, Place
+
     class Work(Protocol):
         """What a cell does its work with."""
 
@@ -85,7 +87,7 @@ class Cell:
     def __init__(self, table: "dict[str, Any]", work: "Work") -> None:
         self._table = table
         self._work = work
-        self._tool = ""
+        self.tool_name = ""
         self._pallets: "dict[str, Pallet]" = {}
 
     # moving
@@ -95,7 +97,7 @@ class Cell:
 
         ``posture``: a name, the joints' angles in degrees, or a place of a pallet.
 
-        ``wait`` False: return at once, while the arm moves.
+        A sliding joint is given in mm. ``wait`` False: return at once, while the arm moves.
         """
         target = self._target(posture)
         percent = _percent(speed)
@@ -128,7 +130,7 @@ class Cell:
             self._work.brake()
 
     def posture(self) -> "list[float]":
-        """The joints' angles in degrees, as commanded."""
+        """The joints' angles in degrees, positions of sliding ones in mm, as commanded."""
         return [steps / per_deg for steps, per_deg in zip(self._work.steps(), self._table["per_deg"])]
 
     # places and tools
@@ -136,7 +138,10 @@ class Cell:
     def pallet(self, name: str) -> "Pallet":
         """A pallet of the arm file; what was taken of it counts until the program ends."""
         if name not in self._pallets:
-            self._pallets[name] = Pallet(self, name, self._found("pallets", "pallet", name))
+            shape = self._found("pallets", "pallet", name)
+            from armtempo_board.app.pallet import Pallet  # here, as most programs have none
+
+            self._pallets[name] = Pallet(self, self._work, name, shape)
         return self._pallets[name]
 
     def tool(self, name: str) -> None:
@@ -145,10 +150,10 @@ class Cell:
         Postures given as tool poses, and places, are then of its point.
         """
         if name == _NOTHING:
-            self._tool = ""
+            self.tool_name = ""
             return
         self._found("tools", "tool", name)
-        self._tool = name
+        self.tool_name = name
 
     # outputs and inputs
 
@@ -245,16 +250,18 @@ class Cell:
             self._work.serve()
 
     def _target(self, posture: "str | Place | Sequence[float]") -> "list[int]":
-        if isinstance(posture, Place):
-            return posture.steps
+        found: "list[int]"
         if isinstance(posture, str):
-            found: "list[int]"
-            if self._tool and posture in self._table["tools"][self._tool]:
-                found = self._table["tools"][self._tool][posture]
+            tool = self.tool_name
+            if tool and posture in self._table["tools"][tool]:
+                found = self._table["tools"][tool][posture]
                 if not found:
-                    raise CellError("posture %r cannot be reached with tool %r" % (posture, self._tool))
+                    raise CellError("posture %r cannot be reached with tool %r" % (posture, tool))
                 return found
             found = self._found("postures", "posture", posture)
+            return found
+        if hasattr(posture, "steps"):  # a place
+            found = posture.steps
             return found
         per_deg = self._table["per_deg"]
         if len(posture) != len(per_deg):
@@ -267,53 +274,6 @@ class Cell:
             has = "the program's text" if kind in _NAMED else "the arm"
             raise CellError("%s has no %s %r; it has %s" % (has, word, name, _names(found)))
         return found[name]
-
-
-class Place:
-    """A place of a pallet, or what is ``above`` it, for ``Cell.goto``."""
-
-    def __init__(self, name: str, steps: "list[int]", above: "Place | None" = None) -> None:
-        self.name = name
-        self.steps = steps
-        self.above = above or self
-
-    def __str__(self) -> str:
-        return self.name
-
-
-class Pallet:
-    """The places of a pallet: by columns, then rows, then layers."""
-
-    def __init__(self, cell: Cell, name: str, shape: "list[Any]") -> None:
-        self._cell = cell
-        self._name = name
-        self._rows, self._columns, self._layers, self._firsts = shape
-        self._taken = 0
-
-    def left(self) -> int:
-        """Number of places that ``next`` has not given yet."""
-        return int(self._rows * self._columns * self._layers - self._taken)
-
-    def next(self) -> Place:
-        """The next place, for ``goto``, and with ``.above`` what is above it; Error if none is left."""
-        if self.left() <= 0:
-            raise CellError("pallet %r has no place left; reset() begins again" % self._name)
-        cell = self._cell
-        if cell._tool not in self._firsts:
-            raise CellError("pallet %r cannot be reached with tool %r" % (self._name, cell._tool or _NOTHING))
-        found = list(cell._work.place(self._firsts[cell._tool] + self._taken))
-        joints = len(found) // 2
-        rest, column = divmod(self._taken, self._columns)
-        layer, row = divmod(rest, self._rows)
-        name = "row %d, column %d, layer %d of pallet %r" % (row + 1, column + 1, layer + 1, self._name)
-        self._taken += 1
-        return Place(name, found[joints:], Place("above " + name, found[:joints]))
-
-    def reset(self, taken: int = 0) -> None:
-        """Begin again at the first place, or behind the first ``taken`` ones."""
-        if not 0 <= taken <= self._rows * self._columns * self._layers:
-            raise CellError("pallet %r has no %r places" % (self._name, taken))
-        self._taken = taken
 
 
 def _names(found: "Iterable[str]") -> str:

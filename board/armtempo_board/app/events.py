@@ -22,8 +22,9 @@ class Events:
         self._board = controller.board
         self._link = link
         found = {name: (number, layout) for name, number, layout, _, _ in rows("E")}
-        self._sample, self._sample_layout = found["sample"]
+        self._sample, layout = found["sample"]
         self._slot_at = offset("E", "sample", "ticks")  # of a sample in the buffer
+        self._before_slot = layout[: layout.index("Q")]  # run and index
         self._done = found["done"] + (offset("E", "done", "ticks"),)
         self._fault = found["fault"] + (offset("E", "fault", "ticks"),)
         self._notice_number, _ = found["notice"]
@@ -65,9 +66,8 @@ class Events:
         if index < 0 or not link.room(size):
             return False
         at = link.payload()
-        run = samples.run(index, self._controller.run_number)
-        pack_into(self._sample_layout, link.out, at, run, index, 0, 0, 0)
-        samples.take(index, link.out, at + self._slot_at)
+        run = samples.take(index, link.out, at + self._slot_at, self._controller.run_number)
+        pack_into(self._before_slot, link.out, at, run, index)
         link.event(self._sample, size)
         return True
 

@@ -79,15 +79,15 @@ class SampleBuffer:
             return self._again
         return self.sent if self.sent < self.next else -1
 
-    def run(self, index: int, latest: int) -> int:
-        """Number of the run of the sample ``index`` (from ``waiting``); ``latest``: of the latest run."""
-        return latest - (latest - self._buffer[index % self._capacity * self._slot] & _RUN_MASK)
+    def take(self, index: int, target: bytearray, at: int, latest: int) -> int:
+        """Copy the sample ``index`` (from ``waiting``) to target[at:]; it counts as sent.
 
-    def take(self, index: int, target: bytearray, at: int) -> None:
-        """Copy the sample ``index`` (from ``waiting``) to target[at:]; it counts as sent."""
+        Returns the number of its run; ``latest``: that of the latest run.
+        """
         slot_at = index % self._capacity * self._slot
         copy(target, self._buffer, pack_offsets(at, slot_at + _RUN_BYTES), self.size)
         if index == self.sent:
             self.sent += 1
         else:
             self._again = index + 1
+        return latest - (latest - self._buffer[slot_at] & _RUN_MASK)

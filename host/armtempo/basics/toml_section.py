@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -38,25 +38,29 @@ def keys(part: type[DataclassInstance] | DataclassInstance) -> list[tuple[Field[
     return [(one, one.metadata["key"]) for one in fields(part) if "key" in one.metadata]
 
 
-def read(part: type[Part], table: Table, **others: Any) -> Part:
-    """The part that a table describes; ``others``: fields that the caller reads.
+def read(part: type[Part], table: Table, called: Callable[[str], str] = str, **others: Any) -> Part:
+    """The part that a table describes; ``called``: the key of a field; ``others``: fields that the caller reads.
 
     InputError, naming file, key and value, for anything missing, unknown or not allowed.
     """
-    values = {one.name: _value(table, one, known) for one, known in keys(part)}
+    values = {
+        one.name: _value(table, called(one.name), one, known)
+        for one, known in keys(part)
+        if one.name not in others
+    }
     table.done()
     return part(**others, **values)
 
 
-def _value(table: Table, one: Field[Any], known: Key) -> Any:
+def _value(table: Table, name: str, one: Field[Any], known: Key) -> Any:
     default = () if one.default is MISSING else (one.default,)
     if known.choices:
-        return table.choice(one.name, known.choices, *default)
+        return table.choice(name, known.choices, *default)
     if one.type == "bool":
-        return table.boolean(one.name, one.default)  # type: ignore[arg-type]
+        return table.boolean(name, one.default)  # type: ignore[arg-type]
     if one.type == "int":
-        return table.integer(one.name, *default, least=int(known.least), most=int(known.most))
-    return table.number(one.name, *default, least=known.least, most=known.most)
+        return table.integer(name, *default, least=int(known.least), most=int(known.most))
+    return table.number(name, *default, least=known.least, most=known.most)
 
 
 def check(part: DataclassInstance) -> None:

@@ -76,7 +76,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         ),
         "import-urdf": Entry(
             "exchange:import_urdf",
-            "Make an arm file from a URDF's chain of revolute joints: Denavit-Hartenberg rows and ranges.",
+            "Make an arm file from a URDF's revolute and prismatic joints: Denavit-Hartenberg rows and ranges.",
             "import-urdf robot.urdf -o arm.toml --tip tool0",
         ),
     },

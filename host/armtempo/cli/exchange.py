@@ -36,7 +36,8 @@ from armtempo.new_arm import urdf_reader as reader
     "--tolerance-deg",
     type=float,
     metavar="DEG",
-    help="Leave out lines that change the path by less than DEG. Default for a table with a column time_s: 0.1.",
+    help="Leave out lines that change the path by less than DEG, or as many mm of sliding joints. Default for a "
+    "table with a column time_s: 0.1.",
 )
 @click.option(
     "--own-timing",
@@ -116,7 +117,7 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
         return [*notes, written]
     thinned = (
         f"{found.lines} lines reduced to {len(found.via_deg)} via points: the planned path stays within "
-        f"{found.thinned_to_deg:.2g} deg of the table (proven); 'armtempo plan' computes new times"
+        f"{found.thinned_to_deg:.2g} {found.units} of the table (proven); 'armtempo plan' computes new times"
     )
     return [*notes, thinned, written]
 
@@ -129,7 +130,8 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     type=click.Choice(["csv", "ros"]),
     default="csv",
     show_default=True,
-    help="csv: degrees, one line per time; ros: trajectory_msgs/JointTrajectory in YAML, radians.",
+    help="csv: degrees (sliding joints mm), one line per time; ros: trajectory_msgs/JointTrajectory in YAML, radians "
+    "(metres).",
 )
 @click.option("--rate", type=float, default=100.0, show_default=True, metavar="HZ", help="Points a second.")
 @click.option("--frame-id", default="", help="header.frame_id of the ROS message.")
@@ -189,7 +191,7 @@ def export(
 def import_urdf(
     urdf: Path, out: Path, base: str | None, tip: str | None, meshes: bool, force: bool, as_json: bool
 ) -> None:
-    """Make an arm file from a URDF's chain of revolute joints: Denavit-Hartenberg rows and ranges.
+    """Make an arm file from a URDF's revolute and prismatic joints: Denavit-Hartenberg rows and ranges.
 
     URDF: the robot's description, a .urdf or .xacro file.
 

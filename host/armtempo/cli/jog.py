@@ -16,6 +16,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.frame import TOOL
 from armtempo.model.tool_pose import BASE
 from armtempo.planning.jog.jog_line import axis_of
+from armtempo.planning.jog.jog_motion import by_of_joint
 from armtempo.ports.names import is_sim
 from armtempo.robot.board import Board
 
@@ -24,7 +25,9 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
 
 @click.command("jog")
 @click.option(
-    "--joint", metavar="JOINT", help="Move this joint, by its number (from 1) or name, by --by degrees."
+    "--joint",
+    metavar="JOINT",
+    help="Move this joint, by its number (from 1) or name, by --by degrees, or mm if it slides.",
 )
 @click.option("--axis", type=_AXES, help="Move the tool along this axis by --by mm.")
 @click.option("--about", type=_AXES, help="Turn the tool about this axis by --by degrees.")
@@ -34,7 +37,9 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
     help="Frame whose axes are meant: one of the arm file, or 'tool'.  [default: base]",
 )
 @click.option("--by", type=float, metavar="NUMBER", help="Distance: degrees or mm.")
-@click.option("--to", type=float, metavar="DEG", help="With --joint, the angle to move to, instead of --by.")
+@click.option(
+    "--to", type=float, metavar="NUMBER", help="With --joint, where to move it, in its unit, instead of --by."
+)
 @click.option(
     "--speed",
     type=click.FloatRange(1, 100),
@@ -76,17 +81,22 @@ def jog(
         arm.with_tool(tool).holding(holds).frame(BASE if frame in (None, TOOL) else frame)
     with resolve.board(given, arm) as board:
         prepare(board, resolve.arm_of_board(board, arm).with_tool(tool).holding(holds), given.replace_arm)
+        made_for = board.arm
+        assert made_for is not None  # set by ``prepare``
         if not moves:
             with pressed_keys(board, gamepad) as pressed:
                 made = screen(board, pressed, speed)
                 made.choice.choose(frame or BASE)
                 made.loop()
         elif joint is not None and to is not None:
-            board.jog_to(joint, to, speed / 100)
+            to_deg, to_mm = by_of_joint(made_for, joint, to)
+            board.jog_to(joint, to_deg, speed / 100, position_mm=to_mm)
         else:
-            along = by if axis else None
             named = axis_of(frame, chosen) if frame and chosen else chosen
-            board.jog(joint, None if axis else by, named, along, speed / 100)
+            by_deg, by_mm = (None, by) if axis else (by, None)
+            if joint is not None and by is not None:
+                by_deg, by_mm = by_of_joint(made_for, joint, by)
+            board.jog(joint, by_deg, named, by_mm, speed / 100)
         early = board.last_jog_ends
         if not (early and given.as_json):
             posture.print_position(board, given.as_json)

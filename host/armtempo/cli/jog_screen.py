@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Thread
 from typing import Self
@@ -16,9 +16,11 @@ from armtempo.basics.text import did_you_mean
 from armtempo.cli.keys import END, INTERRUPT, Keys
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.frame import TOOL
+from armtempo.model.joint_unit import DEG, JointUnit
 from armtempo.model.pose import to_rpy_deg
 from armtempo.model.tool_pose import BASE
 from armtempo.planning.jog.jog_line import axis_of
+from armtempo.planning.jog.jog_motion import by_of_joint
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped, StopRequest
 
@@ -92,10 +94,10 @@ class JogChoice:
             return False
         return True
 
-    def describe(self, names: list[str]) -> str:
-        """Describe the choice in a few words."""
+    def describe(self, names: Sequence[str], units: Sequence[JointUnit] = ()) -> str:
+        """Describe the choice in a few words; ``units``: of the joints, (): all in degrees."""
         if self.joint is not None:
-            what, unit = names[self.joint - 1], "°"
+            what, unit = names[self.joint - 1], (units[self.joint - 1] if units else DEG).sign
         else:
             frame = "" if self.frame == BASE else f"{self.frame}'s "
             what = f"tool {'about' if self.about else 'along'} {frame}{self.axis}"
@@ -167,7 +169,9 @@ class JogScreen:
             return
         choice = self.choice
         by = sign * STEPS[choice.step]
-        degrees = choice.joint is not None or choice.about
+        by_deg, by_mm = (by, None) if choice.about else (None, by)
+        if choice.joint is not None:
+            by_deg, by_mm = by_of_joint(self._arm, choice.joint, by)
         self._said = "moving; space stops"
         self._show()
         stop = _StopKeys(self._keys)
@@ -175,9 +179,9 @@ class JogScreen:
             with stop:
                 self._board.jog(
                     choice.joint,
-                    by if degrees else None,
+                    by_deg,
                     choice.tool_axis,
-                    None if degrees else by,
+                    by_mm,
                     SPEEDS[choice.speed] / 100,
                     stop.request,
                 )
@@ -223,12 +227,12 @@ class JogScreen:
         return self._keys.read(within_s) == key
 
     def _show(self, angles_deg: list[float] | None = None) -> None:
-        names = [joint.name for joint in self._arm.driven]
+        names, units = zip(*((joint.name, joint.unit) for joint in self._arm.driven), strict=True)
         try:
             where = self._where(angles_deg or self._board.posture_deg().tolist())
         except LinkError as error:
             where = [error.problem]
-        what, width = self.choice.describe(names), shutil.get_terminal_size().columns - 1
+        what, width = self.choice.describe(names, units), shutil.get_terminal_size().columns - 1
         if len(f"{what} | {self._said}") > width:  # on lines of its own, as its end may matter most
             click.echo(f"{_CLEAR_LINE}{self._said}")
             self._said = ""
@@ -238,7 +242,7 @@ class JogScreen:
     def _where(self, angles_deg: list[float]) -> list[str]:
         """Angles and tool pose, the selected ones first."""
         pose = forward(self._arm, angles_deg)
-        angles = " ".join(f"{angle + 0.0:.2f}" for angle in angles_deg) + "°"
+        angles = self._arm.listed((f"{angle + 0.0:.2f}" for angle in angles_deg), " ")
         position = " ".join(f"{value + 0.0:.1f}" for value in pose[:3, 3]) + " mm"
         turned = "rpy " + " ".join(f"{value + 0.0:.1f}" for value in to_rpy_deg(pose)) + "°"
         return [angles, position, turned] if self.choice.joint is not None else [position, turned, angles]

@@ -55,7 +55,7 @@ from armtempo.model.tool_pose import BASE, Pose
 @click.option(
     "--previous",
     metavar="ANGLES",
-    help="Posture to stay near to, all joints in deg, in quotes; default: the arm's home. "
+    help="Posture to stay near to, all joints in deg (sliding ones in mm), in quotes; default: the arm's home. "
     "With --poses it is the posture of the pose before.",
 )
 @click.option("--numerical", is_flag=True, help="Use the numerical search even if the arm has a closed form.")
@@ -116,8 +116,9 @@ def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
     angles = numbers(previous, "--previous")
     if len(angles) != len(solver.home_rad):
         raise InputError(
-            f"--previous: {len(angles)} angles given, the arm has {len(solver.home_rad)} joints",
-            "give one angle for each joint, base first",
+            f"--previous: {len(angles)} {'positions' if solver.arm.slides else 'angles'} given, the arm has "
+            f"{len(solver.home_rad)} joints",
+            f"give one {'position' if solver.arm.slides else 'angle'} for each joint, base first",
         )
     return [math.radians(angle) for angle in angles]
 
@@ -174,9 +175,9 @@ def fk(
 ) -> None:
     """Print the tool's pose and every frame for given joint angles.
 
-    WHERE: angles in degrees ('0,-60,40', or as separate numbers), of all joints or of those with a motor (the
-    others are at their home angles); a posture of the arm file; a via point such as P0; or a trajectory file
-    (its start). Default: 'home'. Compare the frames with the real arm to find a wrong row.
+    WHERE: angles in degrees ('0,-60,40', or as separate numbers; of sliding joints mm), of all joints or of those
+    with a motor (the others are at their home angles); a posture of the arm file; a via point such as P0; or a
+    trajectory file (its start). Default: 'home'. Compare the frames with the real arm to find a wrong row.
     """
     if len(where) == 1 and posture.is_via(where[0]):
         arm, job = resolve.arm_and_job(arm_path, job_path)
@@ -214,7 +215,10 @@ def _lines(arm: Arm, angles_deg: Array, frame: str) -> Iterator[str]:
     """The table for the angles of all joints, (joints,): one row per frame, then the tool's pose."""
     frames = _frames(arm, angles_deg, frame)
     seen = "" if frame == BASE else f", in frame {frame}"
-    yield f"{arm.name} at {' '.join(_number(angle) for angle in angles_deg)} deg{seen}"
+    at = [_number(angle) for angle in angles_deg]
+    if arm.slides:
+        at = [f"{value} {joint.unit.name}," for value, joint in zip(at, arm.joints, strict=True)]
+    yield f"{arm.name} at {' '.join(at).removesuffix(',')}{'' if arm.slides else ' deg'}{seen}"
     rows = [["frame", "x", "y", "z", "roll", "pitch", "yaw"], ["", "mm", "mm", "mm", "deg", "deg", "deg"]]
     for name, row in zip(_names(arm), frames, strict=True):
         rows.append([name, *(_number(value) for value in (*row[:3, 3], *to_rpy_deg(row)))])
@@ -233,7 +237,7 @@ def _values(arm: Arm, angles_deg: Array, frame: str) -> dict[str, Any]:
     return {
         "arm": arm.name,
         "frame": frame,
-        "angles_deg": angles_deg.tolist(),
+        arm.list_key("angles_deg"): angles_deg.tolist(),
         "tool": {**tool_values(frames[-1]), "quaternion": list(to_quaternion(frames[-1]))},
         "frames": [
             {"name": name, **tool_values(frame)} for name, frame in zip(_names(arm), frames, strict=True)

@@ -197,8 +197,8 @@ def _numbers(text: str) -> list[float]:
     except ValueError:
         raise InputError(
             f"{text!r} is not a posture",
-            "give angles in degrees ('0,-60,40'), 'home' or another posture of the arm file, a via point of the job "
-            "('P0') or a trajectory file",
+            "give angles in degrees ('0,-60,40'; of a sliding joint mm), 'home' or another posture of the arm file, a "
+            "via point of the job ('P0') or a trajectory file",
         ) from None
 
 
@@ -212,7 +212,7 @@ def print_position(board: Board, as_json: bool = False) -> None:
 def format_angles(angles_deg: Array, arm: Arm) -> str:
     """A posture in one line: each driven joint's name, its angle and its motor's steps."""
     return ", ".join(
-        f"{joint.name} {round(angle, 2) + 0.0:.2f}° ({steps} steps)"
+        f"{joint.name} {joint.unit.text(angle, 2)} ({steps} steps)"
         for joint, angle, steps in zip(
             arm.driven, angles_deg, arm.transmission.whole_steps(angles_deg), strict=True
         )

@@ -12,7 +12,7 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo.basics.arrays import Array
 from armtempo.cli import results
 from armtempo.cli.results import ProgressBar
-from armtempo.encoding.encoded_motion import EncodedMotion
+from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link.board_messages import Sample
 from armtempo.report.run_folder import Repetition, RunFolder
 from armtempo.robot.recording import Watcher
@@ -29,18 +29,24 @@ class RunProgress(Watcher):
         self._before = (0, 0)
         """Ticks of the last sample, and of the motion's own time."""
 
-    def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
+    def begin(self, motion: Encoded, folder: RunFolder) -> None:
         """Print the motion and its run folder."""
-        self._motion = motion
+        (self._motion,) = motion.motions  # sequences are shown by their states
         self._started_s = time.monotonic()
-        self._say(f"{motion.name}: {motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}")
+        self._say(
+            f"{motion.name}: {self._motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}"
+        )
 
     def on_sample(self, sample: Sample, duration_s: float) -> None:
         """Show one sample."""
         time_s = sample.path_ticks / TICK_HZ  # the motion's own time
         angles = self._angles_deg(sample)
         errors = angles - self._motion.trajectory(time_s)
-        pairs = (f"{angle:.1f}° ({error:+.2f})" for angle, error in zip(angles, errors, strict=True))
+        signs = (joint.unit.sign for joint in self._motion.arm.driven)
+        pairs = (
+            f"{angle:.1f}{sign} ({error:+.2f})"
+            for angle, error, sign in zip(angles, errors, signs, strict=True)
+        )
         elapsed = time.monotonic() - self._started_s
         self._progress(time_s, duration_s, f"{elapsed:.0f} s{self._speed(sample)}  {'  '.join(pairs)}")
 

@@ -155,7 +155,8 @@ def _cells(joint: JointState) -> tuple[str, str, str, str]:
     steps, counts = f"{joint.steps} steps", f"{joint.counts} counts"
     if not joint.known:
         return joint.name, "position unknown", f"({steps})", f"  ({counts})"
-    if joint.angle_deg is None:
+    if joint.position is None:
         return joint.name, steps, "", f"  {counts}"
-    encoder = "" if joint.encoder_deg is None else f"  encoder {joint.encoder_deg + 0.0:.2f}° ({counts})"
-    return joint.name, f"{round(joint.angle_deg, 2) + 0.0:.2f}°", f"({steps})", encoder
+    sign, measured = joint.unit.sign, joint.by_encoder
+    encoder = "" if measured is None else f"  encoder {measured + 0.0:.2f}{sign} ({counts})"
+    return joint.name, joint.unit.text(joint.position, 2), f"({steps})", encoder

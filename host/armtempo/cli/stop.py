@@ -14,8 +14,8 @@ from armtempo.ports import quick_stop
 from armtempo.ports.quick_stop import StopAnswer
 from armtempo.robot import shared_board
 from armtempo.robot.board_state import BoardState
+from armtempo.robot.running import fault_name
 from armtempo.robot.shared_board import SharedBoard
-from armtempo.robot.stored_motion import fault_name
 
 _PORT_FREE_S = 5.0
 """A stopped program closes its port within this time."""

@@ -173,10 +173,14 @@ def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
         "duration_s": trajectory.duration_s,
         "degree": trajectory.joints[0].degree,
         "timing": "shared" if trajectory.shared else "per-joint",
-        "start_deg": [float(angle) for angle in motion.start_deg],
-        "end_deg": trajectory(trajectory.duration_s).tolist(),
+        motion.arm.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
+        motion.arm.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
         "joints": [
-            {"name": joint.name, "duration_s": spline.duration_s, "top_speed_deg_s": speed}
+            {
+                "name": joint.name,
+                "duration_s": spline.duration_s,
+                f"top_speed_{joint.unit.name}_s": speed,
+            }
             for joint, spline, speed in zip(motion.arm.driven, trajectory.joints, speeds, strict=True)
         ],
     }
@@ -192,7 +196,8 @@ def motion_lines(motion: EncodedMotion, speeds: list[float]) -> list[str]:
     ]
     pairs = zip(motion.arm.driven, trajectory.joints, strict=True)
     lasting = aligned([(joint.name, f"{spline.duration_s:.4f}") for joint, spline in pairs], (12, 9))
-    return found + [f"{row} s, up to {speed:.2f} deg/s" for row, speed in zip(lasting, speeds, strict=True)]
+    rows = zip(lasting, speeds, motion.arm.driven, strict=True)
+    return found + [f"{row} s, up to {speed:.2f} {joint.unit.name}/s" for row, speed, joint in rows]
 
 
 @click.command("remove")

@@ -53,10 +53,15 @@ class TaughtPoints:
         """Write what they are; raises InputError for too few points."""
         raise NotImplementedError
 
+    @property
+    def signs(self) -> str:
+        """The units of its positions, for a line of numbers."""
+        return ", ".join(dict.fromkeys(joint.unit.sign.strip() for joint in self._arm.driven))
+
     def tell(self) -> None:
         """Print the points if the file cannot be written, so that they are not lost."""
         for point in self.points_deg:
-            click.echo(f"[[via]]\nangles_deg = [{row(point)}]", err=True)
+            click.echo(f"[[via]]\n{self._arm.list_key('angles_deg')} = [{row(point)}]", err=True)
 
 
 class JobPoints(TaughtPoints):
@@ -68,7 +73,7 @@ class JobPoints(TaughtPoints):
 
     def save(self) -> None:
         """Write the job; raises InputError for fewer than two points."""
-        text = taught.of_points(taught.name_of(self._file), self.points_deg)
+        text = taught.of_points(taught.name_of(self._file), self.points_deg, self._arm)
         replace_text(self._file, text)
         results.echo(
             f"written: {self._file}, {len(self.points_deg)} via points; 'armtempo plan --job {self._file}' plans it"

@@ -144,7 +144,8 @@ def _write_posture(board: Board, file: Path, name: str, replace_old: bool) -> No
     angles_deg = taught.digits(arm, board.posture_deg().tolist())
     taught.save(file, arm, name, angles_deg, replace_old)
     words = ", ".join(
-        f"{joint.name} {angle:.12g}°" for joint, angle in zip(arm.driven, angles_deg, strict=True)
+        f"{joint.name} {angle:.12g}{joint.unit.sign}"
+        for joint, angle in zip(arm.driven, angles_deg, strict=True)
     )
     results.echo(f"{file}: posture {name!r}: {words}")
 
@@ -200,7 +201,7 @@ def by_hand(keys: Keys, points: TaughtPoints, button: Callable[[], bool] = lambd
     """
     said = ""
     while True:
-        shown = f"{row(points.where().round(2).tolist())} ° by the encoders"
+        shown = f"{row(points.where().round(2).tolist())} {points.signs} by the encoders"
         click.echo(
             f"\r\x1b[K{len(points.points_deg)} points | {shown}{' | ' if said else ''}{said}", nl=False
         )

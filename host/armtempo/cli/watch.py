@@ -14,6 +14,7 @@ from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link import traffic
 from armtempo.link.traffic import Chunk
+from armtempo.model.joint_unit import DEG, MM, NEUTRAL
 from armtempo.robot.shared_board import SharedBoard
 
 _STATE_S = 0.5
@@ -52,17 +53,19 @@ def _show_messages(messages: Iterator[dict[str, Any]], as_json: bool) -> None:
 def _message_line(message: dict[str, Any]) -> str:
     topic = message["topic"]
     if topic == "sample":
-        degrees = message.get("commanded_deg")
-        values = (
-            [f"{name} {value:.2f}°" for name, value in zip(message["joints"], degrees, strict=True)]
-            if degrees
-            else [f"{steps} steps" for steps in message["commanded_steps"]]
-        )
+        values = [f"{steps} steps" for steps in message["commanded_steps"]]
+        if "joints" in message:
+            signs = [MM.sign if unit == MM.name else DEG.sign for unit in message.get("units", ())]
+            at = message[NEUTRAL["commanded_deg"] if signs else "commanded_deg"]
+            rows = zip(message["joints"], at, signs or [DEG.sign] * len(at), strict=True)
+            values = [f"{name} {value:.2f}{sign}" for name, value, sign in rows]
         return f"{message['time_s']:9.3f} s  {'  '.join(values)}"
     if topic == "status":
         state = message["status"]
         joints = [
-            f"{one['name']} {one['steps']} steps"
+            f"{one['name']} {one['position_mm']:.2f}{MM.sign}"
+            if "position_mm" in one
+            else f"{one['name']} {one['steps']} steps"
             if one["angle_deg"] is None
             else f"{one['name']} {one['angle_deg']:.2f}°"
             for one in state["joints"]

@@ -29,7 +29,7 @@ def top_rate_steps_s(joint: DrivenJoint) -> float:
 
 def motor_rpm(joint: DrivenJoint) -> float:
     """Speed of a motor's shaft at its speed limit."""
-    return joint.limits.speed_deg_s * joint.motor.gear_ratio / 6.0
+    return joint.limits.speed_deg_s * joint.motor.reduction / 6.0
 
 
 def findings(arm: Arm) -> list[Finding]:
@@ -66,11 +66,11 @@ def _exceeded(arm: Arm) -> list[Finding]:
     return [
         warning(
             joint.name,
-            f"{bound.key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: motions keep to "
-            f"{bound.value:.4g}",
-            f"lower {bound.key} to that, or use fewer microsteps",
+            f"{key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: motions keep to {bound.value:.4g}",
+            f"lower {key} to that, or use fewer microsteps",
         )
         for joint, bound in drive_limits.exceeded(arm.table_joints, arm.coupling, arm.driver)
+        for key in (joint.unit.key(bound.key),)
     ]
 
 
@@ -79,9 +79,9 @@ def _backlash(arm: Arm) -> list[Finding]:
     return [
         note(
             joint.name,
-            f"backlash_deg = {crossing.play_deg:g} takes {crossing.duration_s:.2g} s to cross, with "
-            f"{crossing.acceleration_deg_s2:.3g} deg/s2 and up to {crossing.speed_deg_s:.3g} deg/s of its motor; "
-            "motions keep to the rest",
+            f"{joint.unit.key('backlash_deg')} = {crossing.play_deg:g} takes {crossing.duration_s:.2g} s to cross, "
+            f"with {crossing.acceleration_deg_s2:.3g} {joint.unit.name}/s2 and up to {crossing.speed_deg_s:.3g} "
+            f"{joint.unit.name}/s of its motor; motions keep to the rest",
             "nothing to do; set it to what 'armtempo selftest --with-motors' measures",
         )
         for joint, crossing in zip(arm.driven, arm.crossings, strict=True)
@@ -112,27 +112,37 @@ def _motor(joint: DrivenJoint) -> list[Finding]:
 
 def _rates(joint: DrivenJoint) -> list[Finding]:
     rate, speed = top_rate_steps_s(joint), joint.limits.speed_deg_s
-    at_limit = f"at its speed limit of {speed:g} deg/s"
+    at_limit = f"at its speed limit of {speed:g} {joint.unit.name}/s"
+    speed_key, lead = joint.unit.key("speed_deg_s"), "mm_per_rev" if joint.slides else "gear_ratio"
     rpm = motor_rpm(joint)
     found = []
     if rate > MAX_STEP_RATE:
         text = f"{at_limit} it needs {rate:.0f} steps/s, the board makes at most {MAX_STEP_RATE} {ESTIMATED}"
         found.append(
-            error(joint.name, text, "lower speed_deg_s or use fewer microsteps; check the gear ratio")
+            error(
+                joint.name,
+                text,
+                f"lower {speed_key} or use fewer microsteps; check "
+                f"{'mm_per_rev' if joint.slides else 'the gear ratio'}",
+            )
         )
     if rate < _SLOW_STEPS_S:
         text = f"{at_limit} the motor makes only {rate:.2g} steps/s"
-        found.append(
-            warning(joint.name, text, "check speed_deg_s, microsteps and gear_ratio for a wrong unit")
-        )
+        found.append(warning(joint.name, text, f"check {speed_key}, microsteps and {lead} for a wrong unit"))
     if rpm > _FAST_RPM:
         text = f"{at_limit} the motor turns at {rpm:.0f} rpm; few steppers have torque left above {_FAST_RPM:.0f}"
         found.append(
-            warning(joint.name, text, "lower speed_deg_s, or check gear_ratio (motor turns a joint turn)")
+            warning(
+                joint.name,
+                text,
+                f"lower {speed_key}, or check {lead} ({'mm' if joint.slides else 'motor turns'} a "
+                f"{'turn' if joint.slides else 'joint turn'})",
+            )
         )
     if speed / joint.limits.acceleration_deg_s2 < _SUDDEN_S:
         text = f"its acceleration limit reaches full speed in {1e3 * speed / joint.limits.acceleration_deg_s2:.2g} ms"
-        found.append(warning(joint.name, text, "lower acceleration_deg_s2 to what the motor can do"))
+        key = joint.unit.key("acceleration_deg_s2")
+        found.append(warning(joint.name, text, f"lower {key} to what the motor can do"))
     return found
 
 
@@ -141,8 +151,10 @@ def _range(joint: DrivenJoint) -> list[Finding]:
     steps = (high - low) * joint.steps_per_deg
     if steps >= _FEWEST_STEPS:
         return []
-    text = f"its whole range, {low:g} to {high:g} deg, is {steps:.2g} steps"
-    return [error(joint.name, text, "check range_deg, steps_per_rev, microsteps and gear_ratio")]
+    text = f"its whole range, {low:g} to {high:g} {joint.unit.name}, is {steps:.2g} steps"
+    lead = "mm_per_rev" if joint.slides else "gear_ratio"
+    key = joint.unit.key("range_deg")
+    return [error(joint.name, text, f"check {key}, steps_per_rev, microsteps and {lead}")]
 
 
 def encoder_findings(arm: Arm) -> list[Finding]:
@@ -165,20 +177,17 @@ def _encoder(joint: DrivenJoint) -> list[Finding]:
     assert joint.encoder is not None
     limit_deg, count_deg = joint.encoder.following_error_deg, 1.0 / joint.counts_per_deg
     found = []
+    key, unit = joint.unit.key("following_error_deg"), joint.unit.name
     if limit_deg == 0.0:
-        text = "its encoder is recorded only: with following_error_deg = 0 lost steps stop nothing"
-        found.append(
-            note(joint.name, text, "give following_error_deg, such as 2.0, to stop when steps are lost")
-        )
+        text = f"its encoder is recorded only: with {key} = 0 lost steps stop nothing"
+        found.append(note(joint.name, text, f"give {key}, such as 2.0, to stop when steps are lost"))
     elif limit_deg < count_deg:
-        text = (
-            f"following_error_deg = {limit_deg:g} is less than one count of its encoder, {count_deg:.3g} deg"
-        )
-        found.append(error(joint.name, text, "raise following_error_deg, or check counts_per_rev and 'on'"))
+        text = f"{key} = {limit_deg:g} is less than one count of its encoder, {count_deg:.3g} {unit}"
+        found.append(error(joint.name, text, f"raise {key}, or check counts_per_rev and 'on'"))
     elif limit_deg < _ordinary_deg(joint, count_deg):
         text = (
-            f"following_error_deg = {limit_deg:g} is less than what a healthy joint may show: a full step of lag, "
-            f"two counts and the backlash, {_ordinary_deg(joint, count_deg):.3g} deg"
+            f"{key} = {limit_deg:g} is less than what a healthy joint may show: a full step of lag, "
+            f"two counts and the backlash, {_ordinary_deg(joint, count_deg):.3g} {unit}"
         )
         found.append(warning(joint.name, text, "raise it above that, else it trips in ordinary motion"))
     return found
@@ -186,5 +195,5 @@ def _encoder(joint: DrivenJoint) -> list[Finding]:
 
 def _ordinary_deg(joint: DrivenJoint, count_deg: float) -> float:
     """Largest following error of a joint without a lost step, degrees."""
-    full_step_deg = 360.0 / joint.motor.steps_per_rev / joint.motor.gear_ratio
+    full_step_deg = joint.motor.per_rev / joint.motor.steps_per_rev / joint.motor.gear_ratio
     return full_step_deg + 2 * count_deg + joint.model.backlash_deg

@@ -16,6 +16,7 @@ from armtempo.diagnosis.finding import Finding, warning
 from armtempo.kinematics import Geometry, forward
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import DEG, JointUnit
 from armtempo.model.parts import DrivenJoint
 
 COARSE_MM = 0.5
@@ -60,22 +61,26 @@ def findings(arm: Arm) -> list[Finding]:
 def _of(resolution: Resolution) -> list[Finding]:
     joint, found = resolution.joint, []
     limit_deg = joint.encoder.following_error_deg if joint.encoder else 0.0
+    key, finer = (
+        joint.unit.key("following_error_deg"),
+        "a finer screw" if joint.slides else "a larger gear ratio",
+    )
     if 0.0 < limit_deg < resolution.step_deg:
         found.append(
             warning(
                 joint.name,
-                f"its smallest step, {resolution.step_deg:.3g} deg, is more than its following_error_deg of "
+                f"its smallest step, {resolution.step_deg:.3g} {joint.unit.name}, is more than its {key} of "
                 f"{limit_deg:g}, so the first step may already trip it",
-                "raise following_error_deg above a step, or use more microsteps or a larger gear ratio",
+                f"raise {key} above a step, or use more microsteps or {finer}",
             )
         )
     if resolution.step_mm > COARSE_MM:
         found.append(
             warning(
                 joint.name,
-                f"its smallest step, {resolution.step_deg:.3g} deg, moves the tool by up to "
+                f"its smallest step, {resolution.step_deg:.3g} {joint.unit.name}, moves the tool by up to "
                 f"{resolution.step_mm:.2g} mm (more than {COARSE_MM:g})",
-                "use more microsteps or a larger gear ratio, or accept it: the tool will move in steps of that size",
+                f"use more microsteps or {finer}, or accept it: the tool will move in steps of that size",
             )
         )
     return found
@@ -121,12 +126,15 @@ class JointFigures:
     """Motor speed, the same."""
     torque_margin: float | None
     """Torque of the motor divided by the needed torque; None: not known, infinite: none is needed."""
+    unit: JointUnit = DEG
+    """Of the joint."""
 
     @property
     def values(self) -> dict[str, Any]:
         """Values for JSON, which has no infinity."""
         margin = None if self.torque_margin is None or math.isinf(self.torque_margin) else self.torque_margin
-        return {**asdict(self), "torque_margin": margin}
+        found = {self.unit.key(key): value for key, value in asdict(self).items() if key != "unit"}
+        return {**found, "torque_margin": margin}
 
 
 def of(arm: Arm) -> tuple[JointFigures, ...]:
@@ -140,6 +148,7 @@ def of(arm: Arm) -> tuple[JointFigures, ...]:
             top_steps_s=drives.top_rate_steps_s(motor),
             motor_rpm=drives.motor_rpm(motor),
             torque_margin=torque.margin(motor),
+            unit=joint.unit,
         )
         for resolution, motor in zip(resolutions(arm), arm.motors, strict=True)
         for joint in (resolution.joint,)
@@ -148,7 +157,15 @@ def of(arm: Arm) -> tuple[JointFigures, ...]:
 
 def table(joints: Sequence[JointFigures]) -> list[str]:
     """Lines for people; none if nothing is driven."""
-    return aligned([_HEAD, *map(_row, joints)], _WIDTHS) if joints else []
+    if not joints:
+        return []
+    head, rows = _HEAD, [_row(joint) for joint in joints]
+    if any(joint.unit is not DEG for joint in joints):
+        head = ("joint", "steps/unit", "unit/step", *_HEAD[3:])
+        rows = [
+            (f"{joint.name} ({joint.unit.name})", *row[1:]) for joint, row in zip(joints, rows, strict=True)
+        ]
+    return aligned([head, *rows], _WIDTHS)
 
 
 def _row(joint: JointFigures) -> tuple[str, ...]:

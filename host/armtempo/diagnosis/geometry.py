@@ -62,7 +62,7 @@ def _home(arm: Arm) -> list[Finding]:
 
 
 def _frames(arm: Arm) -> list[Finding]:
-    """Frames whose origin the tool cannot come to."""
+    """Frames whose origin the tool cannot come to, and pallets with a place that it cannot."""
     reach_mm = Geometry.of(arm).reach + abs(arm.joints[0].d_mm)
     reach_mm += max((tool.length_mm for tool in arm.tools), default=0.0)
     found = []
@@ -75,6 +75,18 @@ def _frames(arm: Arm) -> list[Finding]:
             )
             found.append(
                 note(f"frame {each.name}", text, "check its position_mm, and the frame that it is in")
+            )
+    for pallet in arm.pallets:
+        numbers = range(1, pallet.places + 1)
+        away = [np.linalg.norm(np.array(pallet.pose(n, arm.frames).matrix)[:3, 3]) for n in numbers]
+        if max(away) > reach_mm:
+            number = int(np.argmax(away))
+            text = (
+                f"{pallet.describe(number + 1)} is {away[number]:.0f} mm from the base, but all links, with the "
+                f"longest tool, are {reach_mm:.0f} mm long"
+            )
+            found.append(
+                note(f"pallet {pallet.name}", text, "check its position_mm, and row_mm, column_mm, layer_mm")
             )
     return found
 
@@ -90,7 +102,8 @@ def _ends(arm: Arm) -> list[Finding]:
         if _gap_mm(end.points_mm, near) < near:
             crossing.append(where)
     found = []
-    next_step = "give [workspace] and radius_mm, so that motions are checked for it, or narrow range_deg"
+    ranges = " or ".join(dict.fromkeys(joint.unit.key("range_deg") for joint in arm.driven))
+    next_step = f"give [workspace] and radius_mm, so that motions are checked for it, or narrow {ranges}"
     if below:
         found.append(
             note("ranges", f"from home, the arm goes below its base plane with {', '.join(below)}", next_step)
@@ -104,7 +117,7 @@ def _wide(arm: Arm) -> list[Finding]:
     found = []
     for joint in arm.driven:
         low, high = joint.range_deg
-        if high - low > _FULL_TURN_DEG:
+        if high - low > _FULL_TURN_DEG and not joint.slides:
             text = f"its range of {high - low:g} deg is more than a turn"
             found.append(note(joint.name, text, "make sure that the cables allow it"))
     return found

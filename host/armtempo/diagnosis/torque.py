@@ -24,20 +24,22 @@ def margin(joint: DrivenJoint) -> float | None:
     By ``joint.model``; None if the torque is not known; infinite if none is needed.
     """
     model, motor, limits = joint.model, joint.motor, joint.limits
-    held = float(held_nm(joint, math.radians(limits.speed_deg_s) * motor.gear_ratio))
+    held = float(held_nm(joint, math.radians(limits.speed_deg_s) * motor.reduction))
     if math.isnan(held):
         return None
-    inertia = model.rotor_inertia_kg_m2 + model.inertia_kg_m2 / motor.gear_ratio**2
-    asked = inertia * math.radians(limits.acceleration_deg_s2) * motor.gear_ratio + gravity_nm(joint)
+    inertia = model.rotor_inertia_kg_m2 + joint.moved_kg_m2 / motor.reduction**2
+    asked = inertia * math.radians(limits.acceleration_deg_s2) * motor.reduction + gravity_nm(joint)
     return held / asked if asked else math.inf
 
 
 def gravity_nm(joint: DrivenJoint) -> float:
     """Largest gravity torque at the motor within the joint's range, Nm."""
     low, high = joint.range_deg
+    if joint.slides:
+        return abs(joint.weight_nm) / joint.motor.reduction
     level = math.ceil(low / 180.0) * 180.0 <= high  # the link is horizontal somewhere in the range
     share = 1.0 if level else max(abs(math.cos(math.radians(angle))) for angle in (low, high))
-    return abs(joint.model.gravity_torque_nm) * share / joint.motor.gear_ratio
+    return abs(joint.weight_nm) * share / joint.motor.reduction
 
 
 def findings(arm: Arm) -> list[Finding]:
@@ -84,10 +86,16 @@ def _of(joint: DrivenJoint) -> list[Finding]:
             f"gravity asks {gravity_nm(joint):.2g} Nm of its motor, which holds {holding:g}: the joint falls"
         )
         return [
-            error(joint.name, text, "use a larger gear ratio or a stronger motor, or correct [joint.model]")
+            error(
+                joint.name,
+                text,
+                f"use {'a finer screw' if joint.slides else 'a larger gear ratio'} or a stronger motor, or correct "
+                "[joint.model]",
+            )
         ]
     text = f"its motor has {found:.2g} times the torque that gravity and acceleration ask at its limits"
-    next_step = "lower acceleration_deg_s2 or speed_deg_s, or correct [joint.model]"
+    keys = (joint.unit.key(name) for name in ("acceleration_deg_s2", "speed_deg_s"))
+    next_step = f"lower {' or '.join(keys)}, or correct [joint.model]"
     if found < 1.0:
         return [error(joint.name, f"{text}: it loses steps", next_step)]
     return [warning(joint.name, f"{text}; {ENOUGH:g} is prudent", next_step)]

@@ -83,6 +83,8 @@ def _twists(arm: Arm) -> Iterator[Finding]:
 
 def _ranges(arm: Arm) -> Iterator[Finding]:
     for joint in arm.joints:
+        if joint.slides:
+            continue
         low, high = joint.range_deg
         if max(abs(low), abs(high)) > _TURNS_DEG:
             right = f"[{math.radians(low):.4g}, {math.radians(high):.4g}]"

@@ -61,29 +61,35 @@ def _switches(joint: DrivenJoint) -> list[Finding]:
         and switches.high_deg is not None
         and switches.low_deg >= switches.high_deg
     ):
-        text = f"its low switch trips at {switches.low_deg:g} deg, not below its high one at {switches.high_deg:g}"
-        found.append(error(joint.name, text, "correct low_deg and high_deg in its [switches]"))
+        text = (
+            f"its low switch trips at {switches.low_deg:g} {joint.unit.name}, not below its high one at "
+            f"{switches.high_deg:g}"
+        )
+        keys = f"{joint.unit.key('low_deg')} and {joint.unit.key('high_deg')}"
+        found.append(error(joint.name, text, f"correct {keys} in its [switches]"))
     for side, number, trip_deg in (
         ("low", switches.low, switches.low_deg),
         ("high", switches.high, switches.high_deg),
     ):
         if number is None and trip_deg is not None:
-            text = f"{side}_deg is given, but no input for that switch"
+            text = f"{side}_{joint.unit.name} is given, but no input for that switch"
             found.append(
                 warning(
                     joint.name,
                     text,
-                    f"give {side} = 1, 2, 3 or a pin in its [switches], or leave {side}_deg out",
+                    f"give {side} = 1, 2, 3 or a pin in its [switches], or leave {side}_{joint.unit.name} out",
                 )
             )
         if number is not None and trip_deg is None:
             protects = "protects, but " if isinstance(number, int) else ""
-            text = f"its {side} switch {protects}cannot home: its angle is not known"
-            found.append(note(joint.name, text, f"measure where it trips and give {side}_deg"))
+            what = "position" if joint.slides else "angle"
+            text = f"its {side} switch {protects}cannot home: its {what} is not known"
+            found.append(note(joint.name, text, f"measure where it trips and give {side}_{joint.unit.name}"))
         if isinstance(number, int) and trip_deg is not None and low < trip_deg < high:
-            text = f"its {side} switch trips at {trip_deg:g} deg, within its range of {low:g} to {high:g}"
+            text = f"its {side} switch trips at {trip_deg:g} {joint.unit.name}, within its range of {low:g} to {high:g}"
+            key, what = joint.unit.key("range_deg"), "position" if joint.slides else "angle"
             found.append(
-                warning(joint.name, text, "narrow range_deg to what the switch leaves, or correct the angle")
+                warning(joint.name, text, f"narrow {key} to what the switch leaves, or correct the {what}")
             )
     return found
 

@@ -19,6 +19,7 @@ from armtempo.model import pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.boards import TimerOutput, pin_number
 from armtempo.model.drive_limits import Crossing
+from armtempo.model.joint_unit import REVOLUTE
 from armtempo.model.outputs import SERVO, Output
 from armtempo.model.parts import DrivenJoint
 from armtempo.model.pin_use import Period
@@ -29,11 +30,18 @@ from armtempo.splines.trajectory import Trajectory
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
 """Fields of a joint that do not affect its position in steps."""
 _TICKS_PER_US = limits.TICK_HZ / 1e6
+_packed: tuple[Arm, bytes] | None = None
+"""The last arm, which never changes, with its record: each motion names that, and a press of a jog waits for it."""
 
 
 def arm_record(arm: Arm) -> bytes:
     """The arm record (layout: ``armtempo_shared.armrecord``); raises InputError if a value does not fit the board."""
-    return armrecord.pack(_head(arm), motor_rows(arm), outputs(arm), inputs(arm), backlash(arm))
+    global _packed
+    packed = _packed
+    if packed is None or packed[0] is not arm:
+        record = armrecord.pack(_head(arm), motor_rows(arm), outputs(arm), inputs(arm), backlash(arm))
+        packed = _packed = arm, record
+    return packed[1]
 
 
 def motor_rows(arm: Arm) -> list[dict[str, Any]]:
@@ -140,6 +148,9 @@ def _identity(arm: Arm) -> int:
             del joint["encoder"]["following_error_deg"]
         if joint["motor"]:
             del joint["motor"]["backlash_deg"]
+        if joint["type"] == REVOLUTE:  # as before there were sliding joints
+            del joint["type"]
+            (joint["motor"] or {}).pop("mm_per_rev", None)
     facts = [joints, _as_floats(arm.coupling)] if arm.coupling else joints
     text = json.dumps(facts, sort_keys=True)
     return crc32(text.encode())
@@ -168,7 +179,7 @@ def _motor(arm: Arm, number: int, max_rate: int) -> dict[str, Any]:
     if max(abs(low), abs(high)) >= 2**30:
         raise InputError(
             f"{joint.name}: its range is {high - low} steps, more than the board can count",
-            "make range_deg narrower, or use fewer microsteps",
+            f"make {joint.unit.key('range_deg')} narrower, or use fewer microsteps",
         )
     forward = (
         arm.transmission.matrix[number, number] > 0.0

@@ -22,7 +22,7 @@ from armtempo.basics import json_codec
 from armtempo.basics.errors import InputError
 from armtempo.model import frame
 from armtempo.model.arm import Arm
-from armtempo.model.parts import NOTHING
+from armtempo.model.parts import NOTHING, Joint
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import workspace_check
@@ -48,9 +48,10 @@ def of_plan(plan: Plan | SequencePlan) -> MadeWith:
     else:
         tools = [plan.arm.tool.name] if plan.arm.tool else []
         loads, pallets = (plan.job.holds,), ()
-    keys = [WORKSPACE, ROWS, *(f"frame {name}" for name in plan.frames), *(f"tool {name}" for name in tools)]
+    keys = [*(f"frame {name}" for name in plan.frames), *(f"tool {name}" for name in tools)]
     keys += [f"load {name}" for name in loads if name not in ("", NOTHING)]
     keys += [f"pallet {name}" for name in pallets]
+    keys += [ROWS, WORKSPACE]  # last, as its boxes may be in the frames
     return {key: _checksum(plan.arm, key) or 0 for key in dict.fromkeys(keys)}
 
 
@@ -68,7 +69,7 @@ def _checksum(arm: Arm, key: str) -> int | None:
     kind, _, name = key.partition(" ")
     found: Any = None
     if kind == ROWS:
-        found = [(each.d_mm, each.a_mm, each.alpha_deg, each.theta_offset_deg) for each in arm.joints]
+        found = [_row(each) for each in arm.joints]
     elif kind == WORKSPACE:
         found = _workspace(arm)
     elif kind == "frame":
@@ -80,6 +81,12 @@ def _checksum(arm: Arm, key: str) -> int | None:
         parts = {"tool": (*arm.tools, arm.tool), "load": arm.loads, "pallet": arm.pallets}.get(kind, ())
         found = next((json_codec.encode(each) for each in parts if each and each.name == name), None)
     return None if found is None else crc32(json.dumps(found).encode())
+
+
+def _row(joint: Joint) -> Any:
+    """What of a row of the table says where the tool is."""
+    numbers = [joint.d_mm, joint.a_mm, joint.alpha_deg, joint.theta_offset_deg]
+    return [*numbers, joint.slides, joint.parallel_linkage, None if joint.motor else joint.home_deg]
 
 
 def _workspace(arm: Arm) -> Any:

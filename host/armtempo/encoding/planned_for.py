@@ -26,7 +26,7 @@ def check_surroundings(what: Path | str, plan: Plan | SequencePlan, arm: Arm) ->
     """Raise InputError if something that a plan was made with has changed since."""
     change = frame.changed(plan.arm.frames, arm.frames, plan.frames)
     if change := change or made_with.changed(made_with.of_plan(plan), arm):
-        raise InputError(f"{what} is old: {change}, in {_named(arm)}", "plan it again")
+        raise InputError(f"{what} is old: {change}, in {_named(arm)}", "plan it again with this arm")
 
 
 def _named(arm: Arm) -> str:

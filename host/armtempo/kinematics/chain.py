@@ -32,9 +32,10 @@ def spread_deg(arm: Arm, angles_deg: ArrayLike, what: str = "") -> Array:
     if angles.ndim and count == len(arm.driven):
         return all_angles_deg(arm, angles)
     driven = "" if len(arm.driven) == len(arm.joints) else f", of which {len(arm.driven)} have a motor"
+    lists = "positions" if arm.slides else "angles"
     raise InputError(
-        f"{what}{count} angles given, but arm {arm.name!r} has {len(arm.joints)} joints{driven}",
-        "give one angle for each",
+        f"{what}{count} {lists} given, but arm {arm.name!r} has {len(arm.joints)} joints{driven}",
+        f"give one {lists[:-1]} for each",
     )
 
 
@@ -49,10 +50,12 @@ def outline_mm(arm: Arm, angles_deg: Array) -> Array:
     For angles of all joints, (..., joints).
     """
     geometry = Geometry.of(arm).bare
-    found = array_frames(geometry, np.radians(angles_deg))
+    angles = np.radians(angles_deg)
+    found = array_frames(geometry, angles)
     points = [np.stack(found[0].origin, axis=-1)]
-    for link, before, after in zip(geometry.links, found, found[1:], strict=False):
-        points.append(points[-1] + link.d * np.stack(before.z, axis=-1))
+    depths = geometry.depths(list(np.moveaxis(angles, -1, 0)))  # a linkage turns no sliding row
+    for d, before, after in zip(depths, found, found[1:], strict=False):
+        points.append(points[-1] + np.asarray(d)[..., None] * np.stack(before.z, axis=-1))
         points.append(np.stack(after.origin, axis=-1))
     return np.stack(points, axis=-2)
 

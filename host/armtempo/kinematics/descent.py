@@ -17,6 +17,7 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics.constraint import Constraint, Turned, Vector, cross, dot
 from armtempo.kinematics.forward import Frame, frames
 from armtempo.kinematics.geometry import Geometry
+from armtempo.model.joint_unit import SLIDE_MM
 
 STEPS = 80
 """Largest number of steps from one start, including rejected ones."""
@@ -106,7 +107,7 @@ def most_swing(problem: PoseProblem, angles_rad: Sequence[float], cost: float) -
 
 
 def _columns(problem: PoseProblem, found: list[Frame[float]]) -> tuple[list[Vector], list[Vector]]:
-    """Turn of the tool and velocity of its point per rad/s of each moving joint."""
+    """Turn of the tool and velocity of its point per rad/s of each moving joint; a sliding one does not turn it."""
     tool, linked = found[-1].origin, problem.geometry.linked
     axes = [found[joint].z for joint in problem.moving]
     levers = [_swept(found[joint], tool) for joint in problem.moving]
@@ -115,6 +116,11 @@ def _columns(problem: PoseProblem, found: list[Frame[float]]) -> tuple[list[Vect
             behind = found[joint + 1]
             axes[i] = _from(behind.z, axes[i])
             levers[i] = _from(_swept(behind, tool), levers[i])
+    for row, _ in problem.geometry.slides:
+        if row in problem.moving:
+            i = problem.moving.index(row)
+            x, y, z = found[row].z
+            axes[i], levers[i] = (0.0, 0.0, 0.0), (SLIDE_MM * x, SLIDE_MM * y, SLIDE_MM * z)
     return axes, levers
 
 

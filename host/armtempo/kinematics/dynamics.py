@@ -11,6 +11,7 @@ from armtempo.basics.arrays import Array
 from armtempo.kinematics.forward import array_frames
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import SLIDE_MM
 from armtempo.model.parts import Dynamics, Load
 
 GRAVITY_M_S2 = 9.80665
@@ -21,6 +22,8 @@ _M = 1e-3
 
 def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) -> Array:
     """Torque of each joint, including friction, Nm: (N, joints); a row without ``dynamics`` has no mass.
+
+    Of a sliding joint the force, N.
 
     Tool and load are parts of the last link.
 
@@ -37,7 +40,12 @@ def joint_torques(arm: Arm, angles: Array, rates: Array, rate_changes: Array) ->
     by_row = _row_torques(geometry, bodies, angles, rates, rate_changes)
     turns = np.array(geometry.turns(list(np.eye(len(bodies)))))
     friction, damping = np.array([(body.friction_nm, body.viscous_nm_s) for body in bodies]).T
-    return np.asarray(by_row @ turns + friction * np.sign(rates) + damping * rates)
+    return np.asarray(by_row @ turns + friction * np.sign(rates) + damping * per_rad(arm) * rates)
+
+
+def per_rad(arm: Arm) -> Array:
+    """Movement of each joint for a radian of the kinematics, in rad, or m of a sliding one: (joints,)."""
+    return np.array([_M * SLIDE_MM if joint.slides else 1.0 for joint in arm.joints])
 
 
 def _on_tool(load: Load, geometry: Geometry) -> Load:
@@ -79,12 +87,13 @@ def as_one(mass: float, parts: Sequence[tuple[float, Array, Array]]) -> tuple[Ar
 def _row_torques(
     geometry: Geometry, bodies: Sequence[Dynamics], angles: Array, rates: Array, rate_changes: Array
 ) -> Array:
-    """Torques about the axis of each row, without friction.
+    """Torques about the axis of each row, without friction; of a sliding row the force along it.
 
     Recursive Newton-Euler (Luh, Walker, Paul 1980) with all vectors in the base's frame: speeds outwards; forces, and
     moments about the base's origin, are summed inwards.
     """
     chained = array_frames(geometry, angles)
+    slides = {row for row, _ in geometry.slides}
     turning, bending = (np.stack(geometry.turns(list(each.T))) for each in (rates, rate_changes))
     spin, spin_change = np.zeros((len(angles), 3)), np.zeros((len(angles), 3))
     # Gravity as an upward acceleration of the base
@@ -94,8 +103,11 @@ def _row_torques(
         before, after = chained[row], chained[row + 1]
         axis, origin = np.stack(before.z, axis=-1), _M * np.stack(before.origin, axis=-1)
         rate = turning[row, :, None] * axis
-        spin_change = spin_change + bending[row, :, None] * axis + np.cross(spin, rate)
-        spin = spin + rate
+        if row in slides:
+            fall = fall + _M * SLIDE_MM * (bending[row, :, None] * axis + 2.0 * np.cross(spin, rate))
+        else:
+            spin_change = spin_change + bending[row, :, None] * axis + np.cross(spin, rate)
+            spin = spin + rate
         end = _M * np.stack(after.origin, axis=-1)
         fall = fall + _carried(end - origin, spin, spin_change)
         rotation = np.stack([np.stack(part, axis=-1) for part in after[:3]], axis=-1)
@@ -110,7 +122,8 @@ def _row_torques(
     for row in reversed(range(len(bodies))):
         force, moment = force + forces[row], moment + moments[row]
         axis, origin = (np.stack(part, axis=-1) for part in (chained[row].z, chained[row].origin))
-        found.append(np.einsum("ni,ni->n", axis, moment - np.cross(_M * origin, force)))
+        along = force if row in slides else moment - np.cross(_M * origin, force)
+        found.append(np.einsum("ni,ni->n", axis, along))
     return np.stack(found[::-1], axis=1)
 
 

@@ -1,4 +1,8 @@
-"""The geometry of a serial arm: its Denavit-Hartenberg table, lengths in any one unit, angles in radians."""
+"""The geometry of a serial arm: its Denavit-Hartenberg table, lengths in any one unit, angles in radians.
+
+A sliding joint's position counts in radians too, of ``SLIDE_MM`` each (model/joint_unit.py), so that one conversion
+serves all joints; an arm with one is in mm.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from typing import NamedTuple, TypeVar
 
 from armtempo.basics.arrays import Array
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import SLIDE_MM
 
 T = TypeVar("T", float, Array)
 """Type of formulas for floats and arrays, element by element."""
@@ -33,10 +38,11 @@ _CLOSED_FORM = 6
 
 @dataclass(frozen=True)
 class Geometry:
-    """Denavit-Hartenberg rows, standard (distal) convention, revolute joints only.
+    """Denavit-Hartenberg rows, standard (distal) convention.
 
-    Row i is the transform Rz(angle + offset) Tz(d) Tx(a) Rx(alpha) from frame i - 1 to frame i.
-    All lengths share one unit, which is also the unit of the poses.
+    Row i is the transform Rz(angle + offset) Tz(d) Tx(a) Rx(alpha) from frame i - 1 to frame i, and that of a sliding
+    joint Rz(offset) Tz(d + SLIDE_MM angle) Tx(a) Rx(alpha). All lengths share one unit, which is also the unit of
+    the poses.
     """
 
     d: tuple[float, ...]
@@ -50,6 +56,8 @@ class Geometry:
     """Indices and angles of rows that never turn: a pedestal under the arm, a tool on it."""
     tool: tuple[float, ...] = ()
     """The tool's pose in the frame after the last row, its first 3 rows of 4; (): that frame is the tool's."""
+    slides: tuple[tuple[int, float], ...] = ()
+    """Indices of sliding joints, and how far each is from 0 at most, in mm."""
 
     def __hash__(self) -> int:
         """Computed once, as caches look up a geometry for every pose."""
@@ -57,7 +65,9 @@ class Geometry:
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.d, self.a, self.alpha, self.offset, self.linked, self.still, self.tool))
+        return hash(
+            (self.d, self.a, self.alpha, self.offset, self.linked, self.still, self.tool, self.slides)
+        )
 
     @classmethod
     def of(cls, arm: Arm) -> Geometry:
@@ -74,6 +84,9 @@ class Geometry:
                 if joint.motor is None and joint.range_deg[1] - joint.range_deg[0] <= STILL_DEG
             ),
             tool=tuple(value for row in arm.tool.matrix[:3] for value in row) if arm.tool else (),
+            slides=tuple(
+                (i, max(map(abs, joint.range_deg))) for i, joint in enumerate(arm.joints) if joint.slides
+            ),
         )
 
     @cached_property
@@ -83,7 +96,7 @@ class Geometry:
         return tuple(Link(d, a, *twist(alpha), offset) for d, a, alpha, offset in rows)
 
     def turns(self, angles: Sequence[T]) -> Sequence[T]:
-        """The rotation of each row, without its offset, from the joints' angles (floats or arrays)."""
+        """The rotation of each row, or its sliding, without its offset, from the joints' angles (floats or arrays)."""
         if not self.linked:
             return angles
         turns = list(angles)
@@ -111,7 +124,31 @@ class Geometry:
         d, a, alpha, offset = (row[self.core] for row in (self.d, self.a, self.alpha, self.offset))
         linked = tuple(joint - first for joint in self.linked)
         still = tuple((index - first, angle) for index, angle in self.still if first <= index < end)
-        return Geometry(d, a, alpha, offset, linked, still)
+        slides = tuple((index - first, far) for index, far in self.slides if first <= index < end)
+        return Geometry(d, a, alpha, offset, linked, still, slides=slides)
+
+    def holding(self, angles: Sequence[float]) -> Geometry:
+        """The geometry whose sliding rows never move from where they are at a posture (joints,): for the closed form of
+        an arm on a rail; itself without such rows."""
+        if not self.slides:
+            return self
+        held = dict(self.still) | {row: angles[row] for row, _ in self.slides}
+        return replace(self, still=tuple(sorted(held.items())))
+
+    def depths(self, turns: Sequence[T]) -> Sequence[float | T]:
+        """d of each row, of the sliding ones where they are; ``turns``: as ``turns`` returns it."""
+        found: list[float | T] = list(self.d)
+        for row, _ in self.slides:
+            found[row] = self.d[row] + SLIDE_MM * turns[row]
+        return found
+
+    @cached_property
+    def lengths(self) -> tuple[float, ...]:
+        """Largest distance along the axis of each row from its frame to the next."""
+        found = list(map(abs, self.d))
+        for row, far in self.slides:
+            found[row] += far
+        return tuple(found)
 
     @cached_property
     def bare(self) -> Geometry:
@@ -130,8 +167,12 @@ class Geometry:
 
     @property
     def reach(self) -> float:
-        """Sum of all lengths except the base height: a bound of the tool's distance from the foot of joint 2."""
-        return math.fsum(map(abs, self.d[1:])) + math.fsum(map(abs, self.a)) + self.tool_length
+        """Sum of all lengths except the base height: a bound of the tool's distance from the foot of joint 2.
+
+        With that of the base if it slides.
+        """
+        first = self.lengths[:1] if self.slides and self.slides[0][0] == 0 else ()
+        return math.fsum([*first, *self.lengths[1:]]) + math.fsum(map(abs, self.a)) + self.tool_length
 
 
 def twist(alpha: float) -> tuple[float, float]:

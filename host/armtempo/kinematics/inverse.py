@@ -177,7 +177,10 @@ def _still(geometry: Geometry) -> tuple[Array, Array]:
         d, a, alpha, offset = (row[rows] for row in (geometry.d, geometry.a, geometry.alpha, geometry.offset))
         angles = [angle for index, angle in geometry.still if index in range(geometry.joints)[rows]]
         tool = geometry.tool if rows.stop == geometry.joints else ()
-        frame = frames(Geometry(d, a, alpha, offset, tool=tool), angles)[-1]
+        slides = tuple(
+            (index - rows.start, far) for index, far in geometry.slides if rows.start <= index < rows.stop
+        )
+        frame = frames(Geometry(d, a, alpha, offset, tool=tool, slides=slides), angles)[-1]
         pose = np.eye(4)
         pose[:3] = np.column_stack(frame)
         inverse = np.eye(4)

@@ -14,6 +14,7 @@ from armtempo.kinematics.numerical import NumericalSolution, NumericalSolutions
 from armtempo.kinematics.rejection import Rejection
 from armtempo.kinematics.solutions import ELBOW_STRETCHED, ON_AXIS_1, WRIST_STRAIGHT
 from armtempo.kinematics.solver import CLOSED_FORM, NUMERICAL, Answer, PoseSolver
+from armtempo.model.joint_unit import DEG, JointUnit, names
 from armtempo.model.pose import to_rpy_deg
 from armtempo.model.tool_pose import Pose
 
@@ -47,29 +48,34 @@ def listings(
 def lines(answer: Answer) -> Iterator[str]:
     """The table, with the chosen solution marked by ``*``, angles in degrees, and the tool's pose."""
     if answer.choice:
-        yield from _closed_form_lines(answer.choice)
+        yield from _closed_form_lines(answer.choice, _units(answer))
     if answer.search and (answer.success or not answer.choice):
-        yield from _numerical_lines(answer.search)
+        yield from _numerical_lines(answer.search, _units(answer))
     if answer.reason:
         yield f"rejected: {answer.reason.splitlines()[0]}"  # the table above has the reasons one by one
     yield from _tool_lines(answer)
 
 
-def _closed_form_lines(choice: Choice) -> Iterator[str]:
+def _closed_form_lines(choice: Choice, units: Sequence[JointUnit]) -> Iterator[str]:
     yield (
         f"{choice.postures} of 4 arm postures reach the wrist centre"
         + (", with any angle of joint 1" if choice.on_axis else "")
         + f" (the paper's region {choice.region})"
     )
-    yield f"  no  {'branch':<19}{_heads(6)}"
+    yield f"  no  {'branch':<19}{_heads(units)}"
     for candidate in choice.candidates:
         chosen = candidate is choice.chosen
         singular = [SINGULAR[bit] for bit in SINGULAR if candidate.singular & bit]
-        words = ". ".join((_verdict(candidate, chosen), *singular))
+        words = ". ".join((_verdict(candidate, chosen, units), *singular))
         yield f"{_mark(chosen, candidate.number)}{candidate.branch!s:<19}{_row(candidate.angles_rad)}  {words}"
 
 
-def _numerical_lines(search: NumericalSolutions) -> Iterator[str]:
+def _units(answer: Answer) -> list[JointUnit]:
+    """Of all joints."""
+    return [joint.unit for joint in answer.arm.joints]
+
+
+def _numerical_lines(search: NumericalSolutions, units: Sequence[JointUnit]) -> Iterator[str]:
     count = len(search.solutions)
     yield (
         f"{search.target.description}: {count} posture{'' if count == 1 else 's'} found numerically from "
@@ -77,16 +83,16 @@ def _numerical_lines(search: NumericalSolutions) -> Iterator[str]:
         + (", of many: it leaves joints free" if search.leaves_free else "")
     )
     if search.solutions:
-        yield f"  no  {_heads(len(search.nearest.angles_rad))}"
+        yield f"  no  {_heads(units)}"
     for number, solution in enumerate(search.solutions, 1):
         chosen = solution is search.chosen
-        yield f"{_mark(chosen, number)}{_row(solution.angles_rad)}  {_verdict(solution, chosen)}"
+        yield f"{_mark(chosen, number)}{_row(solution.angles_rad)}  {_verdict(solution, chosen, units)}"
 
 
 def _tool_lines(answer: Answer) -> Iterator[str]:
     """The tool's pose, and its distance from the wanted pose."""
     if not answer.success:
-        yield f"nearest posture found, deg:{_row(answer.angles_rad)}"
+        yield f"nearest posture found, {names(_units(answer))}:{_row(answer.angles_rad)}"
     position = " ".join(_short(value, 4) for value in answer.tool[:3, 3])
     roll, pitch, yaw = (_short(value, 4) for value in to_rpy_deg(answer.tool))
     yield (
@@ -96,8 +102,9 @@ def _tool_lines(answer: Answer) -> Iterator[str]:
         yield f"with the joints that have no motor at home the tool is {driven} from the pose"
 
 
-def _heads(joints: int) -> str:
-    return "".join(f"{f'theta{i} deg':>12}" for i in range(1, joints + 1))
+def _heads(units: Sequence[JointUnit]) -> str:
+    named = (f"{'theta' if unit is DEG else 'd'}{number} {unit.name}" for number, unit in enumerate(units, 1))
+    return "".join(f"{head:>12}" for head in named)
 
 
 def _mark(chosen: bool, number: int) -> str:
@@ -109,10 +116,12 @@ def _row(angles_rad: Iterable[float]) -> str:
     return "".join(f"{angle:12.4f}" if math.isfinite(angle) else f"{'-':>12}" for angle in degrees)
 
 
-def _verdict(solution: Candidate | NumericalSolution, chosen: bool) -> str:
+def _verdict(solution: Candidate | NumericalSolution, chosen: bool, units: Sequence[JointUnit] = ()) -> str:
     if solution.rejections:
         return "rejected: " + "; ".join(reason.text for reason in solution.rejections)
-    distance = f"{math.degrees(solution.distance_rad):.1f} deg from the previous posture"
+    distance = (
+        f"{math.degrees(solution.distance_rad):.1f} {names(units) or DEG.name} from the previous posture"
+    )
     return f"chosen, {distance}" if chosen else f"usable, {distance}"
 
 
@@ -137,13 +146,13 @@ def values(answer: Answer) -> dict[str, Any]:
         "tolerance_deg": target.tolerance_deg,
         "success": answer.success,
         "reason": answer.reason,
-        "angles_deg": _degrees(answer.angles_rad),
+        answer.arm.list_key("angles_deg"): _degrees(answer.angles_rad),
         "tool": tool_values(answer.tool),
         "miss": answer.miss._asdict(),
         "miss_driven": answer.miss_driven._asdict(),
     }
     if answer.search and (answer.success or not answer.choice):
-        return found | _numerical_values(answer.search)
+        return found | _numerical_values(answer.search, answer.arm.list_key("angles_deg"))
     assert answer.choice is not None
     return found | _closed_form_values(answer.choice)
 
@@ -171,7 +180,7 @@ def _closed_form_values(choice: Choice) -> dict[str, Any]:
     }
 
 
-def _numerical_values(search: NumericalSolutions) -> dict[str, Any]:
+def _numerical_values(search: NumericalSolutions, key: str) -> dict[str, Any]:
     return {
         "method": NUMERICAL,
         "starts": search.starts,
@@ -180,7 +189,7 @@ def _numerical_values(search: NumericalSolutions) -> dict[str, Any]:
         "solutions": [
             {
                 "number": number,
-                "angles_deg": _degrees(solution.angles_rad),
+                key: _degrees(solution.angles_rad),
                 "usable": not solution.rejections,
                 "rejections": _rejections(solution.rejections),
                 "miss": solution.miss._asdict(),

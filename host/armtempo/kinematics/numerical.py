@@ -1,4 +1,4 @@
-"""The numerical inverse, for any arm of revolute joints and any target: all postures that a seeded search finds."""
+"""The numerical inverse, for any arm and any target: all postures that a seeded search finds."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def search(arm: MovingArm, target: Pose, previous_rad: Sequence[float], seed: in
     for start in _starts(arm, previous, seed):
         solution = _solution(arm, problem, descend(problem, start), previous)
         starts += 1
-        if problem.constraint.reached(solution.miss) and not any(_same(solution, other) for other in found):
+        if problem.constraint.reached(solution.miss) and not _known(arm, solution, found):
             found.append(solution)
         if _enough(arm, target, found, starts):
             break
@@ -154,16 +154,19 @@ def descents(
     found: list[NumericalSolution] = []
     for start in starts_rad:
         solution = _solution(arm, problem, descend(problem, start), previous)
-        if problem.constraint.reached(solution.miss) and not any(_same(solution, other) for other in found):
+        if problem.constraint.reached(solution.miss) and not _known(arm, solution, found):
             found.append(solution)
     return found
 
 
 def _starts(arm: MovingArm, previous: list[float], seed: int) -> Iterator[list[float]]:
-    """The previous posture, then random ones: within the ranges, or within a turn if a range is wider."""
+    """The previous posture, then random ones: within the ranges, or within a turn if one is wider and not sliding."""
     yield previous
     rng = np.random.default_rng(seed)
-    ends = [(low, min(high, low + math.tau)) for low, high in arm.bounds]
+    ends = [
+        (low, high if joint in arm.ranges.slides else min(high, low + math.tau))
+        for joint, (low, high) in zip(arm.moving, arm.bounds, strict=True)
+    ]
     for _ in range(MOST_STARTS - 1):
         start = previous.copy()
         for joint, (low, high) in zip(arm.moving, ends, strict=True):
@@ -188,10 +191,14 @@ def _solution(
     return NumericalSolution(angles, miss, rejections, math.dist(angles, previous))
 
 
-def _same(one: NumericalSolution, other: NumericalSolution) -> bool:
+def _known(arm: MovingArm, one: NumericalSolution, found: list[NumericalSolution]) -> bool:
+    return any(_same(arm, one, other) for other in found)
+
+
+def _same(arm: MovingArm, one: NumericalSolution, other: NumericalSolution) -> bool:
     return all(
-        abs(math.remainder(a - b, math.tau)) < SAME_RAD
-        for a, b in zip(one.angles_rad, other.angles_rad, strict=True)
+        abs(a - b if joint in arm.ranges.slides else math.remainder(a - b, math.tau)) < SAME_RAD
+        for joint, (a, b) in enumerate(zip(one.angles_rad, other.angles_rad, strict=True))
     )
 
 

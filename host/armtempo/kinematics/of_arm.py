@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -108,10 +108,10 @@ def inverse(
 
     ``pose``: (4, 4) or (3, 4), lengths in mm, or a Pose, possibly with a partial orientation. ``near_deg``,
     (joints,) or (J,): the posture to stay near to; None: home. A complete pose of an arm with a closed form
-    has eight solutions, of which some may be rejected. For any other arm or pose, the result is that of a
-    numerical search with the driven joints, possibly empty: one solution if the arm is redundant for the
-    pose, else all, but at most 16 of a continuum, as at a singular pose. Raises InputError for a matrix that
-    is not a pose.
+    has eight solutions, of which some may be rejected; slides under it stay where they are. For any other arm or
+    pose, the result is that of a numerical search with the driven joints, possibly empty: one solution if the arm is
+    redundant for the pose, else all, but at most 16 of a continuum, as at a singular pose. Raises InputError for a
+    matrix that is not a pose.
     """
     solver = _solver(arm)
     near = solver.home_rad if near_deg is None else tuple(_posture(solver.arm, near_deg).tolist())
@@ -121,7 +121,7 @@ def inverse(
     if solver.refusals or (given and given.fixed != WHOLE):
         answer = solver.solve(given or _whole(rows), near)
         return _listed(answer.search.solutions if answer.search else ())
-    choice = choose_of_rows(solver.geometry, rows, solver.ranges, near)
+    choice = choose_of_rows(solver.geometry.holding(near), rows, solver.ranges, near)
     found = _listed(choice.candidates)
     return found if found[0].usable else _listed(_within_tolerance(solver, choice, given, near)) or found
 
@@ -168,8 +168,10 @@ def _within_tolerance(
     starts = choice.of_nearer_poses(near, reach, slack) if beyond < reach else []
     if not beside and not starts:
         return []
-    target, core = given or _whole(choice.pose), solver.geometry.core
-    problem = solver.moving.with_all.problem(Constraint.of(target), within=False)
+    target, core = given or _whole(choice.pose), choice.geometry.core
+    problem = replace(solver.moving.with_all, geometry=choice.geometry).problem(
+        Constraint.of(target), within=False
+    )
     for angles in beside:
         swing = _SWINGS * most_swing(problem, angles, _COST)
         if np.all(np.abs(solver.ranges.excess(angles)[core]) <= swing):

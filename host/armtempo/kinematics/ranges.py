@@ -47,12 +47,14 @@ class Ranges:
 
     low: Array
     high: Array
+    slides: frozenset[int] = frozenset()
+    """Indices of sliding joints, to whose positions no turns are added."""
 
     @classmethod
     def of(cls, arm: Arm) -> Ranges:
         """Take the ranges of ``arm``."""
         low, high = np.radians([joint.range_deg for joint in arm.joints]).T
-        return cls(low, high)
+        return cls(low, high, frozenset(index for index, joint in enumerate(arm.joints) if joint.slides))
 
     @cached_property
     def ends(self) -> tuple[tuple[float, float], ...]:
@@ -61,9 +63,12 @@ class Ranges:
 
     @cached_property
     def _whole(self) -> tuple[tuple[float, float, float | None], ...]:
-        """Low and high of each joint, and the middle if only one number of whole turns fits."""
+        """Low and high of each joint, and the middle if only one number of whole turns fits; of a sliding one NaN."""
         return tuple(
-            (low, high, 0.5 * (low + high) if high - low < _ONE_TURN else None) for low, high in self.ends
+            (low, high, math.nan)
+            if index in self.slides
+            else (low, high, 0.5 * (low + high) if high - low < _ONE_TURN else None)
+            for index, (low, high) in enumerate(self.ends)
         )
 
     def placed(self, angles: Sequence[float], previous: Sequence[float]) -> list[float]:
@@ -76,7 +81,8 @@ class Ranges:
         for angle, before, (low, high, middle) in zip(angles, previous, self._whole, strict=True):
             if not low <= angle <= high or (middle is None and not -_STAYS < angle - before < _STAYS):
                 if middle is not None:
-                    angle = middle + _remainder(angle - middle, _TURN)
+                    if middle == middle:  # not NaN
+                        angle = middle + _remainder(angle - middle, _TURN)
                 elif not low <= (nearest := before + _remainder(angle - before, _TURN)) <= high:
                     angle = _placed(angle, low, high, before)
                 else:

@@ -19,6 +19,7 @@ from armtempo.kinematics.solutions import (
     TOO_NEAR,
     PoseSolutions,
 )
+from armtempo.model.joint_unit import DEG, MM
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Rejection:
     """"unreachable", "duplicate" or "range"."""
     text: str
     amount: float = 0.0
-    """Excess: a length for "unreachable", degrees for "range" (negative below the range)."""
+    """Excess: a length for "unreachable", in the joint's unit for "range" (negative below the range)."""
     joint: int | None = None
     """For "range": 1 to 6."""
     inequality: int | None = None
@@ -144,7 +145,8 @@ def out_of_range(ranges: Ranges, angles: Sequence[float]) -> tuple[Rejection, ..
 def _range_text(ranges: Ranges, joint: int, angle: float) -> str:
     low, high, at = map(math.degrees, (*ranges.ends[joint], angle))
     side, by = ("below", low - at) if at < low else ("above", at - high)
-    return f"joint {joint + 1} at {at:.4g} deg is {by:.4g} deg {side} its range {low:g} to {high:g}"
+    unit = (MM if joint in ranges.slides else DEG).name
+    return f"joint {joint + 1} at {at:.4g} {unit} is {by:.4g} {unit} {side} its range {low:g} to {high:g}"
 
 
 def reasons(

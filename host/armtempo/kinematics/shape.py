@@ -146,6 +146,8 @@ def refusals(geometry: Geometry) -> list[str]:
     geometry = geometry.moving
     if geometry.joints != 6:
         return [f"it has {geometry.joints} joints, not 6"]
+    if geometry.slides:
+        return [f"joint {geometry.slides[0][0] + 1} slides"]
     if geometry.linked:
         return [f"a parallel linkage turns joint {geometry.linked[0] + 1}"]
     return [*_twist_refusals(geometry), *_length_refusals(geometry)]

@@ -1,5 +1,7 @@
 """Inverse kinematics of any arm: by the closed form if it has one, else numerically.
 
+Slides under the six joints of a closed form or behind them stay where they are, unless no solution is usable there.
+
 ``PoseSolver.nearest`` is for following a moving target (a jog in tool space): one answer, near the present
 posture. ``PoseSolver.solve`` finds all postures, with reasons for rejected ones.
 """
@@ -60,6 +62,7 @@ class Nearest:
 class Answer:
     """The postures of a target."""
 
+    arm: Arm
     target: Pose
     choice: Choice | None
     """The eight solutions of the closed form, if used."""
@@ -125,7 +128,7 @@ class PoseSolver:
     @cached_property
     def refusals(self) -> list[str]:
         """Why the closed form does not serve this arm; empty if it does."""
-        return refusals(self.geometry)
+        return refusals(self.geometry.holding(self.home_rad))
 
     def nearest(self, target: Pose, start_rad: Sequence[float]) -> Nearest:
         """The posture that meets ``target`` nearest to ``start_rad``, (joints,): well under a millisecond.
@@ -134,7 +137,8 @@ class PoseSolver:
         the nearest of all solutions; others the result of one descent from the start.
         """
         start = self._checked(start_rad)
-        if target.fixed == WHOLE and not self.refusals and len(self.moving.moving) == 6:
+        turning = [joint for joint in self.moving.moving if joint not in self.ranges.slides]
+        if target.fixed == WHOLE and not self.refusals and len(turning) == 6:
             angles = self._nearest_of_eight(target, start)
             if angles is not None:
                 return self._answer(target, start, angles, CLOSED_FORM)
@@ -160,7 +164,7 @@ class PoseSolver:
         previous = self._checked(previous_rad)
         choice = None
         if target.fixed == WHOLE and not self.refusals and not numerically:
-            choice = choose(self.geometry, target.matrix, self.ranges, previous)
+            choice = choose(self.geometry.holding(previous), target.matrix, self.ranges, previous)
             if choice.chosen:
                 return self._solved(target, choice, None, choice.chosen.angles_rad.tolist())
             found = search(self.moving.with_all, target, previous)
@@ -186,7 +190,8 @@ class PoseSolver:
         """The nearest solution of the closed form within the ranges; None if there is none."""
         rows = [element for row in target.matrix for element in row]
         best, least = None, math.inf
-        for angles, outcome in zip(*inverse_of_pose(self.geometry, rows, start)[:2], strict=True):
+        geometry = self.geometry.holding(start)
+        for angles, outcome in zip(*inverse_of_pose(geometry, rows, start)[:2], strict=True):
             if outcome != OK:
                 continue
             placed, outside = self.ranges.fitted(angles, start)
@@ -225,7 +230,7 @@ class PoseSolver:
             constraint.miss(frames(self.geometry, posture)[-1]) for posture in (angles, driven)
         )
         tool = forward(self.geometry, angles)
-        return Answer(target, choice, found, tuple(angles), tool, miss, miss_driven, reason)
+        return Answer(self.arm, target, choice, found, tuple(angles), tool, miss, miss_driven, reason)
 
 
 def _reason(choice: Choice, found: NumericalSolutions) -> str:

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from armtempo.model import (
     boards,
     coupled,
     drive_limits,
+    joint_unit,
     outputs_file,
     parts_file,
     pin_use,
@@ -101,11 +103,19 @@ class Arm:
                 f"{self.source or f'arm {self.name!r}'}: no dynamics of {', '.join(light)}, but of other joints",
                 "give each joint with a motor its dynamics, mass_kg = 0 for one without a mass; or none of them",
             )
+        for before, joint in pairwise(self.joints):
+            if before.slides and joint.parallel_linkage:
+                raise InputError(
+                    f"{self.source or f'arm {self.name!r}'}: {joint.name} has a parallel linkage, but {before.name} "
+                    "before it slides",
+                    "leave parallel_linkage out: a sliding joint does not turn the next one",
+                )
         if self.coupling:
             self._check_coupling()
         where = self.source or f"arm {self.name!r}"
         frames_of.check(self.frames, where)
         pallets_of.check(self.pallets, self.frames, where)
+        tool_of.check(self.tools, where)
 
     def _check_coupling(self) -> None:
         """Raise InputError for a coupling that is none, or for what the board cannot do with coupled joints."""
@@ -138,7 +148,7 @@ class Arm:
 
     @classmethod
     def shape(cls, arm: Arm | Path | str) -> Arm:
-        """The arm for kinematics: as ``of``, but if no joint has a motor yet, each that can turn gets one."""
+        """The arm for kinematics: as ``of``, but if no joint has a motor yet, each that can move gets one."""
         if not isinstance(arm, Arm):
             path = shipped.find(arm).path
             arm = cls.read(path)
@@ -147,13 +157,13 @@ class Arm:
         if arm.driven_indices:
             return arm
         motor, limits = Motor(1, 200, 16, 1.0), Limits(1.0, 1.0, 1.0)
-        turning = [
-            replace(joint, motor=motor, limits=limits)
+        moving = [
+            replace(joint, motor=replace(motor, mm_per_rev=1.0 if joint.slides else None), limits=limits)
             if joint.range_deg[1] - joint.range_deg[0] > STILL_DEG
             else joint
             for joint in arm.joints
         ]
-        return replace(arm, joints=tuple(turning))
+        return replace(arm, joints=tuple(moving))
 
     @classmethod
     def read(cls, path: Path | str) -> Arm:
@@ -311,6 +321,54 @@ class Arm:
         there = f"it has {', '.join(names)}" if names else f"write a table [{what}.{name}] in its file"
         raise InputError(f"arm {self.name!r} has no {what} {name!r}{did_you_mean(name, names)}", there)
 
+    @cached_property
+    def slides(self) -> bool:
+        """Whether it has a sliding joint, so that lists of its joints' positions are not all in degrees."""
+        return any(joint.slides for joint in self.joints)
+
+    @cached_property
+    def units(self) -> str:
+        """The units of its driven joints, for the head of a table: "deg", "mm", or "deg or mm"."""
+        return joint_unit.names(joint.unit for joint in self.table_joints)
+
+    @cached_property
+    def unit_words(self) -> str:
+        """The same in words: "degrees", "mm", or "degrees or mm"."""
+        return " or ".join(dict.fromkeys(joint.unit.word for joint in self.table_joints))
+
+    def list_key(self, name: str) -> str:
+        """The key of a list of joint positions in files and results, by its name for arms whose joints all turn."""
+        return joint_unit.NEUTRAL[name] if self.slides else name
+
+    def given_key(self, table: Table, name: str) -> str:
+        """The key by which a file gives a list of joint positions, if it does: ``name``, or that for any unit.
+
+        Raises InputError if it is in degrees for an arm with a sliding joint, or given twice.
+        """
+        neutral = joint_unit.NEUTRAL[name]
+        if table.has(name) and self.slides:
+            raise InputError(
+                f"{table.file}: {table.place}{name}: {self._sliding}, so a list in degrees cannot say where the arm is",
+                f"write {neutral} = [...], in the order of the joints: {self.positions_text}",
+            )
+        if table.has(name) and table.has(neutral):
+            raise table.misplaced(neutral, f"leave it out beside {name}, which says the same")
+        return neutral if table.has(neutral) else name
+
+    @property
+    def _sliding(self) -> str:
+        names = [joint.name for joint in self.joints if joint.slides]
+        return f"{' and '.join(names)} {'slides' if len(names) == 1 else 'slide'}"
+
+    def listed(self, values: Iterable[str], gap: str = ", ") -> str:
+        """Positions of the driven joints (J,) as texts, in one with their units."""
+        return joint_unit.listed(values, (joint.unit for joint in self.table_joints), gap)
+
+    @property
+    def positions_text(self) -> str:
+        """What a list of positions of the driven joints holds, in words."""
+        return ", ".join(f"{joint.name} in {joint.unit.name}" for joint in self.table_joints)
+
     @property
     def all_home_deg(self) -> tuple[float, ...]:
         """The home posture of all joints, also those without a motor: degrees, (joints,)."""
@@ -345,18 +403,18 @@ class Arm:
         return tuple(joint.placed(float(angle)) for joint, angle in zip(self.driven, angles, strict=True))
 
     def _size_problem(self, count: int) -> str:
-        return f"{count} angles, but {len(self.driven)} joints have a motor"
+        what = "positions" if self.slides else "angles"
+        return f"{count} {what}, but {len(self.driven)} joints have a motor"
 
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
         """Why the driven joints cannot be at these angles; "" if they can."""
         angles = tuple(angles_deg)
         if len(angles) != len(self.driven):
             return self._size_problem(len(angles))
-        for joint, angle in zip(self.driven, self.placed(angles), strict=True):
-            low, high = joint.range_deg
-            if not low <= angle <= high:
-                return f"{joint.name}: {angle:g} degrees is outside of its range {low:g} to {high:g}"
-        return ""
+        problems = (
+            joint.range_problem(angle) for joint, angle in zip(self.driven, self.placed(angles), strict=True)
+        )
+        return next(filter(None, problems), "")
 
     def posture_problem(self, posture: ArmPosture) -> str:
         """What is wrong with a posture, without solving the inverse kinematics; "" for nothing."""
@@ -365,6 +423,7 @@ class Arm:
         if not isinstance(posture.where, Pose):
             return self.angles_problem(posture.where)
         reach_mm = sum((joint.d_mm**2 + joint.a_mm**2) ** 0.5 for joint in self.joints)
+        reach_mm += sum(max(map(abs, joint.range_deg)) for joint in self.joints if joint.slides)
         reach_mm += max((each.length_mm for each in self.tools), default=0.0)
         away_mm = sum(row[3] ** 2 for row in posture.where.matrix[:3]) ** 0.5
         if away_mm > reach_mm + posture.where.tolerance_mm + _REACHES_MM:
@@ -394,13 +453,15 @@ def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
         raise InputError(f"{where}: {problem}", "choose another name")
     if table is None:
         raise tables.fail(name, "a table")
-    forms = [key for key in ("angles_deg", "matrix", "position_mm") if table.has(key)]
+    listed = arm.given_key(table, "angles_deg")
+    forms = [key for key in (listed, "matrix", "position_mm") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
-            f"{where}: exactly one of angles_deg, matrix and position_mm is needed", "give one of them"
+            f"{where}: exactly one of {arm.list_key('angles_deg')}, matrix and position_mm is needed",
+            "give one of them",
         )
-    if forms == ["angles_deg"]:
-        found = ArmPosture(name, table.numbers("angles_deg", len(arm.driven)))
+    if forms == [listed]:
+        found = ArmPosture(name, table.numbers(listed, len(arm.driven)))
     else:
         pose = tool_pose.from_table(table, where)
         pose = frames_of.pose_in_base(pose, arm.frames, frames_of.named(table, arm.frames), where)

@@ -50,7 +50,7 @@ def bounds(motor: Motor, encoder: Encoder | None, driver: Driver) -> list[Bound]
         found.append(Bound("speed_deg_s", 1e6 / step_us / motor.steps_per_deg, reason))
     if encoder is not None:
         turns = motor.gear_ratio if encoder.on == "motor" else 1.0
-        counts_per_deg = encoder.counts_per_rev * turns / 360.0
+        counts_per_deg = encoder.counts_per_rev * turns / motor.per_rev
         found.append(
             Bound(
                 "speed_deg_s",

@@ -284,20 +284,22 @@ def is_name(name: str, longest: int = MAX_NAME) -> bool:
 def _vias(
     top: Table, arm: Arm
 ) -> tuple[tuple[tuple[float, ...] | Pose, ...], tuple[Stop, ...], tuple[ToolSegment, ...]]:
-    """``via_deg``: lists of angles; or ``via``: tables with ``angles_deg`` or a pose, stops and lines too.
+    """``via_deg`` or ``via_joints``: lists; or ``via``: tables with ``angles_deg``, ``joints`` or a pose, stops and
+    lines too.
 
     Poses and points of arcs are turned into the base.
     """
     default = frame.named(top, arm.frames)
-    if top.has("via_deg") == top.has("via"):
-        raise top.fail("via_deg", "given, or else [[via]] tables, but not both")
+    listed = arm.given_key(top, "via_deg")
+    if top.has(listed) == top.has("via"):
+        raise top.fail(arm.list_key("via_deg"), "given, or else [[via]] tables, but not both")
     stops: list[Stop] = []
     segments: list[ToolSegment] = []
     vias: list[tuple[float, ...] | Pose] = []
-    if top.has("via_deg"):
-        rows = top.array("via_deg", "a list of at least 2 lists of angles")
-        named = Table({f"via_deg P{n}": row for n, row in enumerate(rows)}, top.file)
-        vias.extend(read_angles(named, f"via_deg P{n}", arm) for n in range(len(rows)))
+    if top.has(listed):
+        rows = top.array(listed, f"a list of at least 2 lists of {'positions' if arm.slides else 'angles'}")
+        named = Table({f"{listed} P{n}": row for n, row in enumerate(rows)}, top.file)
+        vias.extend(read_angles(named, f"{listed} P{n}", arm) for n in range(len(rows)))
     else:
         tables = top.tables("via", lambda n: f"via P{n}")
         stops = [_stop(table, n, len(tables)) for n, table in enumerate(tables) if _stops(table)]
@@ -334,10 +336,11 @@ def _stop(table: Table, via: int, count: int) -> Stop:
 def _via(table: Table, name: str, arm: Arm, segment: ToolSegment | None) -> tuple[float, ...] | Pose:
     """A via point; of a pose in the frame ``name``, in the base."""
     where = f"{table.file}: {table.place.removesuffix('.')}"
-    forms = [key for key in ("angles_deg", "matrix", "position_mm", "posture") if table.has(key)]
+    listed = arm.given_key(table, "angles_deg")
+    forms = [key for key in (listed, "matrix", "position_mm", "posture") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
-            f"{where}: exactly one of angles_deg, matrix, position_mm and posture is needed",
+            f"{where}: exactly one of {arm.list_key('angles_deg')}, matrix, position_mm and posture is needed",
             "leave all but one of them out",
         )
     in_frame = forms[0] in ("matrix", "position_mm") or any(table.has(key) for key in POINTS)
@@ -347,11 +350,12 @@ def _via(table: Table, name: str, arm: Arm, segment: ToolSegment | None) -> tupl
         name = table.text("posture")
         _done(table, segment)
         return _named(name, where, arm)
-    if forms == ["angles_deg"]:
-        found = read_angles(table, "angles_deg", arm)
+    if forms == [listed]:
+        found = read_angles(table, listed, arm)
         _done(table, segment)
         return found
-    posture = table.numbers("posture_deg", len(arm.joints)) if table.has("posture_deg") else None
+    near = arm.given_key(table, "posture_deg")
+    posture = table.numbers(near, len(arm.joints)) if table.has(near) else None
     pose = frame.pose_in_base(from_table(table, where), arm.frames, name, where)
     table.done()
     if segment and segment.line:  # its tolerances are read as those of the line
@@ -374,10 +378,10 @@ def _named(name: str, where: str, arm: Arm) -> tuple[float, ...] | Pose:
 
 
 def read_angles(table: Table, key: str, arm: Arm) -> tuple[float, ...]:
-    """Angles of the driven joints in degrees, (J,), each within its range."""
+    """Positions of the driven joints, (J,), each within its range."""
     found = arm.placed(table.numbers(key, len(arm.driven)))
     for joint, angle in zip(arm.driven, found, strict=True):
         low, high = joint.range_deg
         if not low <= angle <= high:
-            raise table.fail(key, f"within the range of {joint.name}, {low:g} to {high:g} degrees")
+            raise table.fail(key, f"within the range of {joint.name}, {low:g} to {high:g} {joint.unit.word}")
     return found

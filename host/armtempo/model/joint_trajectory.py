@@ -15,6 +15,8 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.model import table_header
 from armtempo.model.arm import Arm
+from armtempo.model.exchange import from_si
+from armtempo.model.joint_unit import DEG
 
 _KEYS = ("joint_names", "points")
 _INSIDE = ("trajectory", "joint_trajectory", "goal", "msg", "message")
@@ -75,18 +77,25 @@ def of_content(content: Mapping[str, Any], path: Path | str, arm: Arm) -> Record
         raise InputError(
             f"{path}: point {late}: time_from_start does not increase", "put the points in order"
         )
-    angles = np.degrees([_numbers(point, "positions", len(names), n, path) for n, point in enumerate(points)])
+    units = [DEG] * len(names)  # of columns that are not read, nothing is said
+    of_columns = dict(zip((column.index for column in header.angles), arm.driven_indices, strict=True))
+    of_columns |= {column.index: index for index, column in header.resting.items()}
+    for place, joint_index in of_columns.items():
+        units[place] = arm.joints[joint_index].unit
+    angles = from_si(
+        [_numbers(point, "positions", len(names), n, path) for n, point in enumerate(points)], units
+    )
     for index, column in header.resting.items():
         joint = arm.joints[index]
         if np.abs(angles[:, column.index] - joint.home_deg).max() > table_header.RESTS_DEG:
             raise InputError(
-                f"{path}: {joint.name} has no motor, it stays at {joint.home_deg:g} degrees",
+                f"{path}: {joint.name} has no motor, it stays at {joint.home_deg:g} {joint.unit.word}",
                 "leave it out, or give it a motor in the arm file",
             )
     notes = (f"joints that were not used: {', '.join(header.unused)}",) if header.unused else ()
     if all(point.get("velocities") for point in points):
-        speeds = np.degrees(
-            [_numbers(point, "velocities", len(names), n, path) for n, point in enumerate(points)]
+        speeds = from_si(
+            [_numbers(point, "velocities", len(names), n, path) for n, point in enumerate(points)], units
         )
         times, angles = _between(times, angles[:, columns], speeds[:, columns])
         return Recorded(times, angles, notes)

@@ -12,11 +12,17 @@ from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_section import check, key
+from armtempo.model import joint_unit
+from armtempo.model.joint_unit import DEG, JointUnit
 
 LEVELS = ("low", "high")
 NOTHING = "nothing"
 """What an arm holds that holds no load."""
 _LEAST_LIMIT = 0.001
+_TURN_DEG = 360.0
+LEAST_RATIO, MOST_RATIO = 0.1, 10_000.0
+LEAST_MM_PER_REV, MOST_MM_PER_REV = 0.01, 1000.0
+"""The finest screw and the largest pulley of a sliding joint."""
 _MOST_US = 500.0
 END_STEPS = 0.01
 """An angle beyond its range by less, from rounded radians or single precision, is the end of the range."""
@@ -34,7 +40,7 @@ def is_curve(curve: Curve) -> bool:
 @checked_fields
 @dataclass(frozen=True)
 class Limits:
-    """Largest magnitudes of one joint's motion (Table 5)."""
+    """Largest magnitudes of one joint's motion (Table 5), in its unit."""
 
     speed_deg_s: float = field(metadata=key("largest speed", _LEAST_LIMIT, 1e5))
     acceleration_deg_s2: float = field(metadata=key("largest acceleration", _LEAST_LIMIT, 1e7))
@@ -54,7 +60,13 @@ class Motor:
     channel: int = field(metadata=key("STEP/DIR channel of the board, each used once", 1, MAX_JOINTS))
     steps_per_rev: int = field(metadata=key("full steps of the motor shaft", 4, 10_000))
     microsteps: int = field(metadata=key("subdivision of the driver", 1, 256))
-    gear_ratio: float = field(metadata=key("motor turns for one turn of the joint", 0.1, 10_000.0))
+    gear_ratio: float = field(
+        metadata=key(
+            "motor turns for one turn of the joint; of a sliding joint for one of its screw or pulley, by default 1",
+            LEAST_RATIO,
+            MOST_RATIO,
+        )
+    )
     direction: int = field(default=1, metadata=key("-1 inverts DIR", choices=(1, -1)))
     curve_rpm_nm: Curve = field(default=(), metadata=json_codec.ADDED)
     """(Shaft speed, torque) pairs; empty: not known."""
@@ -68,16 +80,34 @@ class Motor:
         },
     )
 
+    mm_per_rev: float | None = field(default=None, metadata=json_codec.ADDED)
+    """Of a sliding joint: how far it moves for a turn of its screw or pulley behind the gear; None: the joint turns."""
+
     def __post_init__(self) -> None:
         """Raise InputError for values that no motor has."""
         check(self)
         if not is_curve(self.curve_rpm_nm):
             raise InputError(f"Motor: curve_rpm_nm is {self.curve_rpm_nm}", f"give {CURVE}")
+        if self.mm_per_rev is not None and not LEAST_MM_PER_REV <= self.mm_per_rev <= MOST_MM_PER_REV:
+            raise InputError(
+                f"Motor: mm_per_rev is {self.mm_per_rev:g}",
+                f"give {LEAST_MM_PER_REV:g} to {MOST_MM_PER_REV:g}",
+            )
+
+    @property
+    def per_rev(self) -> float:
+        """Movement of the joint for a turn behind the gear: 360 degrees, or mm_per_rev."""
+        return _TURN_DEG if self.mm_per_rev is None else self.mm_per_rev
 
     @property
     def steps_per_deg(self) -> float:
-        """Step pulses per degree of the joint."""
-        return self.steps_per_rev * self.microsteps * self.gear_ratio / 360.0
+        """Step pulses per degree of the joint, or mm of a sliding one."""
+        return self.steps_per_rev * self.microsteps * self.gear_ratio / self.per_rev
+
+    @property
+    def reduction(self) -> float:
+        """Degrees of the shaft per degree of the joint, which is the gear ratio, or per mm of a sliding one."""
+        return self.gear_ratio * (_TURN_DEG / self.per_rev)
 
 
 @checked_fields
@@ -206,7 +236,11 @@ class Load:
 @checked_fields
 @dataclass(frozen=True)
 class Joint:
-    """One Denavit-Hartenberg row (standard convention) and its drive; ``motor`` None: not driven."""
+    """One Denavit-Hartenberg row (standard convention) and its drive; ``motor`` None: not driven.
+
+    A turning joint adds its angle to ``theta_offset_deg``, a sliding one its position to ``d_mm``. The fields of a
+    sliding joint and its parts that are called ``_deg`` are in mm (joint_unit.py).
+    """
 
     name: str
     d_mm: float
@@ -226,6 +260,32 @@ class Joint:
     radius_mm: float = field(default=0.0, metadata=json_codec.ADDED)
     """Of the link about its d and its a."""
     dynamics: Dynamics | None = field(default=None, metadata=json_codec.ADDED)
+    type: str = field(default=joint_unit.REVOLUTE, metadata=json_codec.ADDED)
+    """Of joint_unit.TYPES."""
+
+    def __post_init__(self) -> None:
+        """InputError for a type that is none, or a motor of another one."""
+        if self.type not in joint_unit.TYPES:
+            raise InputError(
+                f"{self.name}: type {self.type!r} is not known", f"give {' or '.join(joint_unit.TYPES)}"
+            )
+        if self.motor is not None and self.slides != (self.motor.mm_per_rev is not None):
+            raise InputError(
+                f"{self.name}: mm_per_rev is of the motor of a sliding joint, and this one is {self.type}",
+                "give it to each sliding joint with a motor, and to no other",
+            )
+        if self.slides and self.parallel_linkage:
+            raise InputError(f"{self.name}: a sliding joint has no parallel linkage", "leave it out")
+
+    @property
+    def slides(self) -> bool:
+        """Whether it is a sliding joint."""
+        return self.type == joint_unit.PRISMATIC
+
+    @property
+    def unit(self) -> JointUnit:
+        """Of its position, limits and so on."""
+        return joint_unit.of_type(self.type)
 
 
 @dataclass(frozen=True)
@@ -243,6 +303,40 @@ class DrivenJoint:
     model: JointModel
     step_share: float = 1.0
     """How far it turns for a step of its motors, in steps of its own motor; not 1 for a coupled joint."""
+
+    @property
+    def slides(self) -> bool:
+        """Whether it is a sliding joint."""
+        return self.motor.mm_per_rev is not None
+
+    @property
+    def unit(self) -> JointUnit:
+        """Of its position, limits and so on."""
+        return joint_unit.MM if self.slides else DEG
+
+    @property
+    def moved_kg_m2(self) -> float:
+        """Inertia of what it moves, by its model; a sliding joint's mass as that of a "radian" (joint_unit.py)."""
+        moved = self.model.inertia_kg_m2
+        return moved * (1e-3 * joint_unit.SLIDE_MM) ** 2 if self.slides else moved
+
+    @property
+    def weight_nm(self) -> float:
+        """Gravity torque by its model; a sliding joint's force as the torque of a "radian"."""
+        weight = self.model.gravity_torque_nm
+        return weight * 1e-3 * joint_unit.SLIDE_MM if self.slides else weight
+
+    @property
+    def labelled(self) -> str:
+        """Its name where a table mixes units: with the unit if that is not degrees."""
+        return self.unit.labelled(self.name)
+
+    def range_problem(self, angle_deg: float) -> str:
+        """Say that a position is outside of its range; "" if it is not."""
+        low, high = self.range_deg
+        if low <= angle_deg <= high:
+            return ""
+        return f"{self.name}: {angle_deg:g} {self.unit.word} is outside of its range {low:g} to {high:g}"
 
     @property
     def steps_per_deg(self) -> float:

@@ -8,9 +8,14 @@ from armtempo.basics import toml_section
 from armtempo.basics.arguments import fits
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
-from armtempo.model import outputs_file
+from armtempo.model import joint_unit, outputs_file
+from armtempo.model.joint_unit import DEG, MM, JointUnit
 from armtempo.model.parts import (
     CURVE,
+    LEAST_MM_PER_REV,
+    LEAST_RATIO,
+    MOST_MM_PER_REV,
+    MOST_RATIO,
     Curve,
     Driver,
     Dynamics,
@@ -26,12 +31,27 @@ from armtempo.model.parts import (
 )
 
 MAX_ANGLE_DEG = 36_000.0
-"""Largest angle, either way, that an arm file may give: a hundred turns."""
+"""Largest angle, either way, that an arm file may give: a hundred turns; of a sliding joint that many mm."""
 
 MAX_LENGTH_MM = 1e6
 """Longest link that an arm file may describe."""
 
 _LOCKED_DEG = 0.001
+_IN_UNITS = {
+    "": ("range_deg", "home_deg", "fixed_deg"),
+    "switches": ("low_deg", "high_deg"),
+    **{
+        name: tuple(one.name for one, _ in toml_section.keys(part))
+        for name, part in (
+            ("limits", Limits),
+            ("motor", Motor),
+            ("encoder", Encoder),
+            ("model", JointModel),
+            ("dynamics", Dynamics),
+        )
+    },
+}
+"""Fields of a joint and of its tables, some of which have another key if it slides."""
 
 
 def driver(table: Table | None) -> Driver:
@@ -46,25 +66,21 @@ def safety(table: Table | None) -> Safety:
 
 def joint(table: Table, number: int) -> Joint:
     """A [[joint]] table; ``number`` from 1."""
-    if slides := [key for key in ("type", "range_mm", "mm_per_rev", "home_mm") if table.has(key)]:
-        raise InputError(
-            f"{table.file}: joint[{number}].{slides[0]}: an arm file describes turning joints; sliding ones are not "
-            "supported",
-            "leave the joint out, and move it by other means",
-        )
-    low, high = _locked(table) if table.has("fixed_deg") else table.numbers("range_deg", 2)
-    if not -MAX_ANGLE_DEG <= low < high <= MAX_ANGLE_DEG:
-        raise table.fail(
-            "range_deg", f"two angles, the smaller first, of at most {MAX_ANGLE_DEG:g} either way"
-        )
+    kind = table.choice("type", joint_unit.TYPES, joint_unit.REVOLUTE)
+    unit = joint_unit.of_type(kind)
+    _check_units(table, unit)
+    low, high = _range(table, unit)
     linkage = table.boolean("parallel_linkage", Joint.parallel_linkage)
     if linkage and number == 1:
         raise table.fail("parallel_linkage", "false for joint 1, which has no joint before it")
-    motor = _motor(table.table("motor"))
-    limits = _limits(table.table("limits"))
+    if linkage and unit is not DEG:
+        raise table.misplaced("parallel_linkage", "leave it out: this joint slides")
+    motor = _motor(table.table("motor"), unit)
+    limits = _limits(table.table("limits"), unit)
     if motor is not None and limits is None:
-        raise table.fail("limits", "a table with speed_deg_s, acceleration_deg_s2 and jerk_deg_s3")
-    encoder = _encoder(table.table("encoder"))
+        keys = [unit.key(name) for name in ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")]
+        raise table.fail("limits", f"a table with {keys[0]}, {keys[1]} and {keys[2]}")
+    encoder = _encoder(table.table("encoder"), unit)
     if encoder is not None and motor is None:
         raise table.fail("motor", "only allowed with an encoder")
     found = Joint(
@@ -74,25 +90,63 @@ def joint(table: Table, number: int) -> Joint:
         alpha_deg=table.number("alpha_deg", least=-180.0, most=180.0),
         theta_offset_deg=table.number("theta_offset_deg", 0.0, least=-360.0, most=360.0),
         range_deg=(low, high),
-        home_deg=_home(table, low, high),
+        home_deg=_home(table, unit, low, high),
         limits=limits,
         motor=motor,
         encoder=encoder,
-        switches=_switches(table.table("switches")),
-        model=_model(table.table("model")),
+        switches=_switches(table.table("switches"), unit),
+        model=_model(table.table("model"), unit),
         parallel_linkage=linkage,
         radius_mm=table.number("radius_mm", 0.0, least=0.0, most=MAX_LENGTH_MM),
-        dynamics=_dynamics(table.table("dynamics")),
+        dynamics=_dynamics(table.table("dynamics"), unit),
+        type=kind,
     )
     table.done()
     return found
 
 
-def _dynamics(table: Table | None) -> Dynamics | None:
+def _check_units(table: Table, unit: JointUnit) -> None:
+    """InputError for a key of a joint, or of a table in it, that belongs to the other type of joints."""
+    for part, names in _IN_UNITS.items():
+        inner = table.peek(part) if part else None
+        given = Table(inner, table.file, f"{table.place}{part}.") if isinstance(inner, dict) else table
+        if part and given is table:
+            continue
+        if unit is DEG and part == "motor" and given.has("mm_per_rev"):
+            raise InputError(
+                f"{table.file}: {given.place}mm_per_rev is of a sliding joint, and this one turns",
+                f'leave it out; or give type = "{joint_unit.PRISMATIC}" to the joint',
+            )
+        for name in names:
+            wrong, right = (MM.key(name), name) if unit is DEG else (name, MM.key(name))
+            if wrong != right and given.has(wrong):
+                what = (
+                    "a sliding joint, and this one turns"
+                    if unit is DEG
+                    else "a turning joint, and this one slides"
+                )
+                raise InputError(
+                    f"{table.file}: {given.place}{wrong} is of {what}",
+                    f'give {right}; or type = "{joint_unit.TYPES[unit is DEG]}" to the joint',
+                )
+
+
+def _range(table: Table, unit: JointUnit) -> tuple[float, float]:
+    """The range of a joint, or the narrow one of a joint that is locked."""
+    if table.has(unit.key("fixed_deg")):
+        return _locked(table, unit)
+    key, what = unit.key("range_deg"), "angles" if unit is DEG else "positions in mm"
+    low, high = table.numbers(key, 2)
+    if not -MAX_ANGLE_DEG <= low < high <= MAX_ANGLE_DEG:
+        raise table.fail(key, f"two {what}, the smaller first, of at most {MAX_ANGLE_DEG:g} either way")
+    return low, high
+
+
+def _dynamics(table: Table | None, unit: JointUnit) -> Dynamics | None:
     if table is None:
         return None
     centre = table.numbers("centre_mm", 3, *[] if table.peek("mass_kg") else [(0.0,) * 3])
-    return toml_section.read(Dynamics, table, centre_mm=centre, inertia_kg_m2=_inertia(table))
+    return toml_section.read(Dynamics, table, unit.key, centre_mm=centre, inertia_kg_m2=_inertia(table))
 
 
 def _inertia(table: Table) -> tuple[float, ...]:
@@ -113,49 +167,55 @@ def loads(top: Table) -> tuple[Load, ...]:
     )
 
 
-def _home(table: Table, low: float, high: float) -> float:
-    if table.has("fixed_deg"):
+def _home(table: Table, unit: JointUnit, low: float, high: float) -> float:
+    if table.has(unit.key("fixed_deg")):
         return (low + high) / 2
-    return table.number("home_deg", min(max(0.0, low), high), least=low, most=high)
+    return table.number(unit.key("home_deg"), min(max(0.0, low), high), least=low, most=high)
 
 
-def _locked(table: Table) -> tuple[float, float]:
+def _locked(table: Table, unit: JointUnit) -> tuple[float, float]:
     """The narrow range of a joint that ``fixed_deg`` locks."""
-    angle = table.number("fixed_deg", least=1 - MAX_ANGLE_DEG, most=MAX_ANGLE_DEG - 1)
-    table.known("range_deg", "limits")
-    for key in ("motor", "home_deg"):
+    fixed, home = unit.key("fixed_deg"), unit.key("home_deg")
+    angle = table.number(fixed, least=1 - MAX_ANGLE_DEG, most=MAX_ANGLE_DEG - 1)
+    table.known(unit.key("range_deg"), "limits")
+    for key in ("motor", home):
         if table.has(key):
-            raise table.misplaced(key, "leave it out: fixed_deg locks the joint")
+            raise table.misplaced(key, f"leave it out: {fixed} locks the joint")
     return angle - _LOCKED_DEG, angle + _LOCKED_DEG
 
 
-def _limits(table: Table | None) -> Limits | None:
-    return toml_section.read(Limits, table) if table else None
+def _limits(table: Table | None, unit: JointUnit) -> Limits | None:
+    return toml_section.read(Limits, table, unit.key) if table else None
 
 
-def _motor(table: Table | None) -> Motor | None:
+def _motor(table: Table | None, unit: JointUnit) -> Motor | None:
     if table is None:
         return None
+    others: dict[str, Any] = {}
+    if unit is not DEG:
+        others["mm_per_rev"] = table.number("mm_per_rev", least=LEAST_MM_PER_REV, most=MOST_MM_PER_REV)
+        others["gear_ratio"] = table.number("gear_ratio", 1.0, least=LEAST_RATIO, most=MOST_RATIO)
     table.known("curve_rpm_nm")
     curve: Any = table.array("curve_rpm_nm", CURVE) if table.has("curve_rpm_nm") else ()
     if not fits(curve, Curve) or not is_curve(curve):
         raise table.fail("curve_rpm_nm", CURVE)
-    return toml_section.read(Motor, table, curve_rpm_nm=tuple((float(rpm), float(nm)) for rpm, nm in curve))
+    others["curve_rpm_nm"] = tuple((float(rpm), float(nm)) for rpm, nm in curve)
+    return toml_section.read(Motor, table, unit.key, **others)
 
 
-def _encoder(table: Table | None) -> Encoder | None:
-    return toml_section.read(Encoder, table) if table else None
+def _encoder(table: Table | None, unit: JointUnit) -> Encoder | None:
+    return toml_section.read(Encoder, table, unit.key) if table else None
 
 
-def _switches(table: Table | None) -> LimitSwitches:
+def _switches(table: Table | None, unit: JointUnit) -> LimitSwitches:
     if table is None:
         return LimitSwitches()
     switches = LimitSwitches(
         low=_switch(table, "low"),
         high=_switch(table, "high"),
         active=table.choice("active", ("low", "high"), "low"),
-        low_deg=_angle(table, "low_deg"),
-        high_deg=_angle(table, "high_deg"),
+        low_deg=_angle(table, unit.key("low_deg")),
+        high_deg=_angle(table, unit.key("high_deg")),
     )
     table.done()
     return switches
@@ -184,5 +244,5 @@ def _angle(table: Table, key: str) -> float | None:
     return table.number(key, least=-MAX_ANGLE_DEG, most=MAX_ANGLE_DEG) if table.has(key) else None
 
 
-def _model(table: Table | None) -> JointModel:
-    return toml_section.read(JointModel, table) if table else JointModel()
+def _model(table: Table | None, unit: JointUnit) -> JointModel:
+    return toml_section.read(JointModel, table, unit.key) if table else JointModel()

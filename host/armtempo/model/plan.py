@@ -131,11 +131,13 @@ class Plan:
 
     def to_csv(self, rate_hz: float = 100.0) -> str:
         """Angle, speed, acceleration and jerk of each driven joint as CSV, ``rate_hz`` lines a second."""
-        return exchange.to_csv(self.trajectory, rate_hz)
+        return exchange.to_csv(self.trajectory, [joint.unit for joint in self.arm.driven], rate_hz)
 
     def to_ros(self, rate_hz: float = 100.0, frame_id: str = "") -> str:
         """A trajectory_msgs/JointTrajectory message in YAML, radians, with ``rate_hz`` points a second."""
-        return exchange.to_ros(self.trajectory, [joint.name for joint in self.arm.driven], rate_hz, frame_id)
+        driven = self.arm.driven
+        names, units = [joint.name for joint in driven], [joint.unit for joint in driven]
+        return exchange.to_ros(self.trajectory, names, units, rate_hz, frame_id)
 
     @classmethod
     def load(cls, path: Path | str, altered: bool = False) -> Plan:

@@ -170,7 +170,7 @@ class _Reader:
             elif kind == "end":
                 table.choice("end", ("repeat",))
                 if not begun:
-                    raise table.fail("end", "given after a step with repeat")
+                    raise table.misplaced("end", "write it after a step with repeat")
                 row, number, repeat = begun.pop()
                 inner = tuple(found.pop())
                 found[-1].append(repeat(inner, where=_place(row), step=number))
@@ -245,13 +245,14 @@ class _Reader:
         """A posture given by name or as angles."""
         if not isinstance(table.peek(key), str):
             angles = read_angles(table, key, self.arm)
-            return ArmPosture(", ".join(f"{angle:g}" for angle in angles) + "°", angles)
+            return ArmPosture(self.arm.listed(f"{angle:g}" for angle in angles), angles)
         name = table.text(key)
         if name not in self.postures:
             near = did_you_mean(name, self.postures)
             raise InputError(
                 f"{_place(table)}{key} = {name!r}: no such posture{near}",
-                f"known here: {', '.join(sorted(self.postures))}; more with [posture.NAME] angles_deg = [...]",
+                f"known here: {', '.join(sorted(self.postures))}; more with [posture.NAME] "
+                f"{self.arm.list_key('angles_deg')} = [...]",
             )
         return self.postures[name]
 

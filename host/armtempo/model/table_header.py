@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
-from armtempo.model.exchange import CSV_COLUMNS, TIME_COLUMN
+from armtempo.model.exchange import TIME_COLUMN, columns
 from armtempo.model.tool_pose import WHOLE
 
 POSITION = ("x", "y", "z")
@@ -77,7 +77,7 @@ def is_radians(column: Column) -> bool | None:
 
 def expected(arm: Arm) -> str:
     """A header that the arm's table may have."""
-    return ",".join(joint.name for joint in arm.driven)
+    return ",".join(f"{joint.name} ({joint.unit.name})" if arm.slides else joint.name for joint in arm.driven)
 
 
 def read(names: Sequence[str], arm: Arm, where: str) -> Header:
@@ -146,7 +146,7 @@ def _meaning(name: str, arm: Arm, where: str) -> tuple[str | int | None, str]:
         return None, ""
     joint = _joint(name, key, plain, arm)
     if joint is not None:
-        return joint, _known(unit, _ANGLE, name, where)
+        return joint, _known(unit, _LENGTH if arm.joints[joint].slides else _ANGLE, name, where)
     if key in POSITION:
         return key, _known(unit, _LENGTH, name, where)
     if key in WHOLE:
@@ -157,7 +157,9 @@ def _meaning(name: str, arm: Arm, where: str) -> tuple[str | int | None, str]:
 def _joint(name: str, key: str, plain: list[str], arm: Arm) -> int | None:
     """The index of the joint that a name without unit means."""
     for number, index in enumerate(arm.driven_indices, 1):
-        if name == f"j{number}_{CSV_COLUMNS[0]}":  # as ``exchange.to_csv`` counts: the joints with a motor
+        if (
+            name == f"j{number}_{columns(arm.joints[index].unit)[0]}"
+        ):  # as ``exchange.to_csv`` counts: the joints with a motor
             return index
     named = [index for index, own in enumerate(plain) if key in {own + word for word in _ANGLE_WORDS}]
     if named:
@@ -199,16 +201,21 @@ def _called(meaning: str | int, arm: Arm) -> str:
     return arm.joints[meaning].name if isinstance(meaning, int) else meaning
 
 
-def no_header(columns: int, arm: Arm, where: str, rising: bool) -> Header:
+def no_header(count: int, arm: Arm, where: str, rising: bool) -> Header:
     """The columns of a table without a header: one for each driven joint, in their order; else InputError.
 
     ``rising``: whether the first column rises in every line.
     """
-    if columns == len(arm.driven):
-        return Header(tuple(Column(index) for index in range(columns)))
-    timed = f"{TIME_COLUMN}," if rising and columns == len(arm.driven) + 1 else ""
+    if count == len(arm.driven) and not arm.slides:
+        return Header(tuple(Column(index) for index in range(count)))
+    if count == len(arm.driven):
+        raise InputError(
+            f"{where}: no header says in which units the joints are, and not all of them turn",
+            f"write one into the first line: {expected(arm)}",
+        )
+    timed = f"{TIME_COLUMN}," if rising and count == len(arm.driven) + 1 else ""
     looks = "; the first looks like a time" if timed else ""
     raise InputError(
-        f"{where}: {columns} columns without a header, but {len(arm.driven)} joints have a motor{looks}",
+        f"{where}: {count} columns without a header, but {len(arm.driven)} joints have a motor{looks}",
         f"write a header into the first line: {timed}{expected(arm)}; or x_mm,y_mm,z_mm for poses",
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
+from armtempo.model.joint_unit import DEG
 from armtempo.splines import bspline, extremes
 from armtempo.splines.bspline import REST_PIECES
 
@@ -46,7 +47,11 @@ class Thinned:
 
 
 def thinned(
-    points_deg: Array, tolerance_deg: float, times_s: Array | None = None, ranges_deg: Array | None = None
+    points_deg: Array,
+    tolerance_deg: float,
+    times_s: Array | None = None,
+    ranges_deg: Array | None = None,
+    unit_words: str = DEG.word,
 ) -> Thinned:
     """Via points such that the spline through them (degree 5, shared timing) and the points' polyline are near.
 
@@ -59,7 +64,7 @@ def thinned(
     """
     if not 0.0 < tolerance_deg <= LARGEST_DEG:
         raise InputError(
-            f"a tolerance of {tolerance_deg:g} degrees is not allowed",
+            f"a tolerance of {tolerance_deg:g} {unit_words} is not allowed",
             f"give one above 0, at most {LARGEST_DEG:g}",
         )
     legs, waits_s = _at_rests(points_deg, times_s, _STILL * tolerance_deg)
@@ -70,13 +75,15 @@ def thinned(
     )
     beyond_deg = float(np.abs(points_deg - np.clip(points_deg, low, high)).max())
     if beyond_deg > 0.5 * tolerance_deg:
-        raise InputError(f"a point is {beyond_deg:.3g} degrees beyond the range of its joint", "correct it")
+        raise InputError(
+            f"a point is {beyond_deg:.3g} {unit_words} beyond the range of its joint", "correct it"
+        )
     wanted, inside = tolerance_deg - beyond_deg, np.zeros(2)
     for _ in range(_TRIES):
         lines = [
             _Polyline.of(np.clip(points, low + inside[0], high - inside[1]), times) for points, times in legs
         ]
-        places = [_enough(line, wanted) for line in lines]
+        places = [_enough(line, wanted, unit_words) for line in lines]
         via = [line.at(place) for line, place in zip(lines, places, strict=True)]
         whole = _whole(via)
         off_deg = _off_whole(whole, lines, places) + float(inside.max()) + beyond_deg
@@ -87,7 +94,7 @@ def thinned(
         wanted *= 0.5
     else:
         raise InputError(
-            f"its rests and the ends of ranges cannot be kept within {tolerance_deg:g} degrees",
+            f"its rests and the ends of ranges cannot be kept within {tolerance_deg:g} {unit_words}",
             "allow more with --tolerance-deg",
         )
     numbers = np.cumsum([len(each) - 1 for each in via]).tolist()
@@ -168,7 +175,7 @@ def _runs(points: Array, times_s: Array, still_deg: float) -> list[tuple[int, in
     return runs
 
 
-def _enough(line: _Polyline, tolerance_deg: float) -> Array:
+def _enough(line: _Polyline, tolerance_deg: float, unit_words: str) -> Array:
     """Places of via points: segments are halved until each is near the path, then points left out again."""
     places = line.places[[0, -1]]
     while True:
@@ -178,7 +185,7 @@ def _enough(line: _Polyline, tolerance_deg: float) -> Array:
         places = _graded(_halved(places, bad))
         if len(places) > MAX_SEGMENTS + 1:
             raise InputError(
-                f"more than {MAX_SEGMENTS + 1} via points are needed to keep within {tolerance_deg:g} degrees",
+                f"more than {MAX_SEGMENTS + 1} via points are needed to keep within {tolerance_deg:g} {unit_words}",
                 "allow more with --tolerance-deg, or cut the table into several motions",
             )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from armtempo.basics import toml_section
@@ -51,6 +52,14 @@ def check_name(name: str, place: str = "") -> None:
     if name == NOTHING:
         raise InputError(f"{place}{KIND}.{name}: {name!r} means no tool", "choose another name")
     outputs_file.check_name(f"{place}{KIND}.{name}", name)
+
+
+def check(tools: Sequence[ArmTool], where: str) -> None:
+    """Raise InputError, which begins with ``where``, for two of a name."""
+    names = [each.name for each in tools]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{where}: two tools are called {name!r}", "give each a name of its own")
 
 
 def read(top: Table) -> tuple[ArmTool, ...]:

@@ -23,6 +23,7 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
+from armtempo.model.parts import NOTHING
 
 _PACKAGE, _CELL = "armtempo_board", "cell"
 _SLEEPS = ("sleep", "sleep_ms")
@@ -151,8 +152,11 @@ class _Reader:
             elif name == "pallet":
                 self.arm.pallet(text)
                 self.pallets.setdefault(text, node.lineno)
-            elif name == "tool" and self.arm.with_tool(text).tool:
-                self.tools.setdefault(text, node.lineno)
+            elif name == "tool":
+                if not text:
+                    raise InputError("the name of the tool is empty", f"give one, or {NOTHING!r} for none")
+                if self.arm.with_tool(text).tool:
+                    self.tools.setdefault(text, node.lineno)
             elif name in ("wait", "active"):
                 self.arm.input(text)
             elif name == "set":

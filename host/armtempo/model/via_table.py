@@ -16,6 +16,8 @@ from armtempo.basics.number_table import NumberTable
 from armtempo.model import joint_trajectory, ros_bag, table_header, thinning
 from armtempo.model.arm import Arm
 from armtempo.model.joint_trajectory import Recorded
+from armtempo.model.joint_unit import DEG, NEUTRAL
+from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.table_header import Column, Header
 from armtempo.model.tool_pose import BASE, WHOLE
 
@@ -44,6 +46,14 @@ class ImportedPath:
     """Seconds of rest at via points, by their number from 0."""
     notes: tuple[str, ...] = ()
     """How the columns were taken, for the user."""
+    units: str = DEG.name
+    """Of the joints' positions."""
+    neutral: bool = False
+    """Whether the arm has a sliding joint, so that the keys of a job say nothing of units."""
+
+    def key(self, name: str) -> str:
+        """The key of a list of positions in a job file."""
+        return NEUTRAL[name] if self.neutral else name
 
     @property
     def count(self) -> int:
@@ -133,7 +143,7 @@ def via_points(
         angles, jumps = _unwound(angles, times, arm, where)
         notes += jumps
     if tolerance_deg is None and times is None:
-        return ImportedPath(angles, len(angles), notes=notes)
+        return ImportedPath(angles, len(angles), notes=notes, units=arm.units, neutral=arm.slides)
     return _thinned(angles, times, arm, tolerance_deg, notes, where)
 
 
@@ -143,12 +153,19 @@ def _thinned(
 ) -> ImportedPath:  # fmt: skip
     tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
     _check_ranges(where, angles, arm, 0.5 * tolerance)
-    found = thinning.thinned(angles, tolerance, times_s, np.array([joint.range_deg for joint in arm.driven]))
+    ranges = np.array([joint.range_deg for joint in arm.driven])
+    found = thinning.thinned(angles, tolerance, times_s, ranges, arm.unit_words)
     for place, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
         if left_out_s:
             notes += (f"{left_out_s:.3g} s of rest at the {place} are left out",)
     return ImportedPath(
-        found.via_deg, len(angles), thinned_to_deg=found.off_deg, rests_s=found.rests_s, notes=notes
+        found.via_deg,
+        len(angles),
+        thinned_to_deg=found.off_deg,
+        rests_s=found.rests_s,
+        notes=notes,
+        units=arm.units,
+        neutral=arm.slides,
     )
 
 
@@ -167,11 +184,11 @@ def job_text(name: str, path: ImportedPath, frame: str = BASE) -> str:
         )
     if path.rests_s:
         return head + "".join(
-            f"\n[[via]]\nangles_deg = {_value(row)}\n" + _rest(path.rests_s.get(number))
+            f"\n[[via]]\n{path.key('angles_deg')} = {_value(row)}\n" + _rest(path.rests_s.get(number))
             for number, row in enumerate(path.via_deg.tolist())
         )
     rows = "".join(f"    {_value(row)},\n" for row in path.via_deg.tolist())
-    return f"{head}via_deg = [\n{rows}]\n"
+    return f"{head}{path.key('via_deg')} = [\n{rows}]\n"
 
 
 def _rest(rest_s: float | None) -> str:
@@ -203,9 +220,15 @@ def _notes(table: NumberTable, header: Header, arm: Arm) -> tuple[str, ...]:
 
 
 def _angles(table: NumberTable, header: Header, arm: Arm, radians: bool | None) -> Array:
-    """The driven joints' angles, degrees (n, J)."""
+    """The driven joints' positions, (n, J)."""
     points = np.array(table.numbers([column.index for column in header.angles]))
-    if radians is None and all(column.unit == "" for column in header.angles):
+    for joint, column in zip(arm.driven, header.angles, strict=True):
+        if joint.slides and not column.unit:
+            raise InputError(
+                f"{table.path}: line 1: the column of {joint.name}, which slides, does not say its unit",
+                f"name it in the header: {joint.name} (mm)",
+            )
+    if radians is None and not arm.slides and all(column.unit == "" for column in header.angles):
         moving = np.ptp(points, axis=0) > 0.0
         spans = np.array([joint.range_deg[1] - joint.range_deg[0] for joint in arm.driven])
         if np.abs(points).max() < _RADIANS and moving.any() and spans[moving].min() > _WIDE_DEG:
@@ -214,8 +237,20 @@ def _angles(table: NumberTable, header: Header, arm: Arm, radians: bool | None) 
                 "give --degrees or --radians, or name the unit in the header: joint 1 (rad)",
             )
     return np.column_stack(
-        [_degrees(points[:, n], column, radians, table) for n, column in enumerate(header.angles)]
+        [
+            _in_unit(joint, points[:, n], column, radians, table)
+            for n, (joint, column) in enumerate(zip(arm.driven, header.angles, strict=True))
+        ]
     )
+
+
+def _in_unit(
+    joint: Joint | DrivenJoint, values: Array, column: Column, radians: bool | None, table: NumberTable
+) -> Array:
+    """Positions of a joint in its unit."""
+    if joint.slides:
+        return values * table_header.mm(column)
+    return _degrees(values, column, radians, table)
 
 
 def _degrees(values: Array, column: Column, radians: bool | None, table: NumberTable) -> Array:
@@ -232,11 +267,11 @@ def _check_resting(table: NumberTable, header: Header, arm: Arm, radians: bool |
     """Refuse angles of joints without a motor other than their home angle."""
     for index, column in header.resting.items():
         joint = arm.joints[index]
-        angles = _degrees(np.array(table.numbers([column.index]))[:, 0], column, radians, table)
+        angles = _in_unit(joint, np.array(table.numbers([column.index]))[:, 0], column, radians, table)
         for (line, _), angle in zip(table.rows, angles, strict=True):
             if abs(angle - joint.home_deg) > table_header.RESTS_DEG:
                 raise InputError(
-                    f"{table.path}: line {line}: {joint.name} at {angle:g} degrees has no motor, it stays at "
+                    f"{table.path}: line {line}: {joint.name} at {angle:g} {joint.unit.word} has no motor, it stays at "
                     f"{joint.home_deg:g}",
                     "leave its column out, or give it a motor in the arm file",
                 )
@@ -248,8 +283,8 @@ def _check_ranges(where: Sequence[str], angles: Array, arm: Arm, allowed_deg: fl
         for place, angle in zip(where, column.tolist(), strict=True):
             if not low - allowed_deg <= angle <= high + allowed_deg:
                 raise InputError(
-                    f"{place}: {joint.name} at {angle:g} degrees is outside of its range {low:g} to {high:g}",
-                    "correct the table, or range_deg in the arm file",
+                    f"{place}: {joint.name} at {angle:g} {joint.unit.word} is outside of its range {low:g} to {high:g}",
+                    f"correct the table, or {joint.unit.key('range_deg')} in the arm file",
                 )
 
 
@@ -313,6 +348,8 @@ def _unwound(
     found = angles_deg.copy()
     notes = []
     for number, joint in enumerate(arm.driven):
+        if joint.slides:
+            continue
         column = found[:, number]
         steps = np.diff(column)
         limit = joint.limits.speed_deg_s * np.diff(times_s) * _SPEED_MARGIN

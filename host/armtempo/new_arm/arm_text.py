@@ -13,10 +13,11 @@ from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.kinematics import all_frames
+from armtempo.model.joint_unit import DEG, PRISMATIC, JointUnit
 from armtempo.model.parts import Dynamics
 from armtempo.new_arm import urdf_meshes
 from armtempo.new_arm.urdf_fitting import Fit
-from armtempo.new_arm.urdf_reader import Chain, TurningJoint
+from armtempo.new_arm.urdf_reader import Chain, ChainJoint
 from armtempo.new_arm.urdf_rows import DhRow, geometry
 
 _STILL_DEG = 0.001
@@ -25,7 +26,7 @@ _STILL_DEG = 0.001
 _HEAD = """\
 # Imported from {source}, robot {robot}: from link {base} to link {tip}.
 # Checked against the URDF's own forward kinematics at {postures} random postures within the ranges: worst errors
-# {position_mm:.2g} mm and {rotation_deg:.2g} degrees. Joint angles are those of the URDF, in degrees.
+# {position_mm:.2g} mm and {rotation_deg:.2g} degrees. Joint angles are those of the URDF, in degrees{and_mm}.
 #
 # A URDF says nothing of motors, gears, encoders and wiring. Before the arm can be planned for:
 # 1. Take the '#' off the motor and limits lines of each driven joint and put its own figures in
@@ -38,8 +39,12 @@ _MOTOR = """\
 # limits = {{ speed_deg_s = {speed:g}, acceleration_deg_s2 = 30.0, jerk_deg_s3 = 120.0 }}{speed_source}
 # motor = {{ channel = {channel}, steps_per_rev = 200, microsteps = 16, gear_ratio = 1.0 }}  # put in your own
 """
+_SLIDE_MOTOR = """\
+# limits = {{ speed_mm_s = {speed:g}, acceleration_mm_s2 = 100.0, jerk_mm_s3 = 500.0 }}{speed_source}
+# motor = {{ channel = {channel}, steps_per_rev = 200, microsteps = 16, mm_per_rev = 8.0 }}  # put in your own
+"""
 _ENCODER = """\
-# encoder = {{ channel = {channel}, counts_per_rev = 4000, on = "joint", following_error_deg = 2.0 }}  # if fitted
+# encoder = {{ channel = {channel}, counts_per_rev = 4000, on = "joint", {following} = 2.0 }}  # if fitted
 """
 _NO_CHANNEL = f"# The board drives {MAX_JOINTS} joints: lock this one or another, by fixed_deg = ANGLE.\n"
 
@@ -57,6 +62,7 @@ def arm_text(chain: Chain, fit: Fit, urdf: Path) -> str:
         base=_text(chain.base),
         tip=_text(chain.tip),
         postures=fit.postures,
+        and_mm=", positions of sliding joints in mm" if chain.sliding else "",
         position_mm=fit.position_mm,
         rotation_deg=fit.rotation_deg,
     )
@@ -94,29 +100,35 @@ def _joint(row: DhRow, chain: Chain, frame: Array, first: bool, radius_mm: float
     """The table of a row; ``frame``: the frame after the row, all joints at 0."""
     if row.joint is None:
         name = "base" if first else "tool"
-        return _row_text(name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves", radius_mm)
+        return _row_text(
+            name, row, (-_STILL_DEG, _STILL_DEG), "a constant row: it never moves", radius_mm, DEG
+        )
     joint = chain.joints[row.joint]
     name = _joint_name(chain, row.joint)
     if joint.is_linked:
         note = "a linkage keeps its direction: it mimics the joint before"
-        text = _row_text(name, row, (-_STILL_DEG, _STILL_DEG), note, radius_mm) + "parallel_linkage = true\n"
+        text = (
+            _row_text(name, row, (-_STILL_DEG, _STILL_DEG), note, radius_mm, DEG)
+            + "parallel_linkage = true\n"
+        )
     else:
         note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
-        text = _row_text(name, row, _inside(joint.range_deg), note, radius_mm)
+        text = _row_text(name, row, _inside(joint.range_deg), note, radius_mm, joint.unit)
     if any(each.body for each in chain.joints):
-        text += _dynamics(joint.body.in_frame(frame) if joint.body else Dynamics(0.0))
+        text += _dynamics(joint.body.in_frame(frame) if joint.body else Dynamics(0.0), joint.unit)
     if joint.is_linked:
         return text
     return text + _placeholders(row.joint + 1 - sum(linked < row.joint for linked in chain.linked), joint)
 
 
-def _dynamics(body: Dynamics) -> str:
+def _dynamics(body: Dynamics, unit: JointUnit) -> str:
     keys = (
         field.name
         for field in fields(body)
         if field.name in ("mass_kg", "centre_mm") or np.any(getattr(body, field.name))
     )
-    return f"dynamics = {{ {', '.join(f'{key} = {_digits(getattr(body, key))}' for key in keys)} }}\n"
+    given = ((key if key.startswith("inertia") else unit.key(key), getattr(body, key)) for key in keys)
+    return f"dynamics = {{ {', '.join(f'{key} = {_digits(value)}' for key, value in given)} }}\n"
 
 
 def _digits(value: float | tuple[float, ...]) -> str:
@@ -127,9 +139,16 @@ def _digits(value: float | tuple[float, ...]) -> str:
 
 
 def _row_text(
-    name: str, row: DhRow, range_deg: tuple[float, float], note: str, radius_mm: float | None
+    name: str,
+    row: DhRow,
+    range_deg: tuple[float, float],
+    note: str,
+    radius_mm: float | None,
+    unit: JointUnit,
 ) -> str:
     lines = ["[[joint]]", f"name = {_text(name)}"]
+    if unit is not DEG:
+        lines.append(f'type = "{PRISMATIC}"')
     values = {
         "d_mm": row.d_mm,
         "a_mm": row.a_mm,
@@ -142,21 +161,25 @@ def _row_text(
             f"radius_mm = {math.ceil(10.0 * radius_mm) / 10.0!r}  # about d and a: all collision shapes"
         )
     low, high = range_deg
-    lines.append(f"range_deg = [{low!r}, {high!r}]" + (f"  # {note}" if note else ""))
-    lines.append(f"home_deg = {0.0 if low <= 0.0 <= high else round((low + high) / 2, 1)!r}")
+    lines.append(f"{unit.key('range_deg')} = [{low!r}, {high!r}]" + (f"  # {note}" if note else ""))
+    lines.append(f"{unit.key('home_deg')} = {0.0 if low <= 0.0 <= high else round((low + high) / 2, 1)!r}")
     return "\n".join(lines) + "\n"
 
 
-def _placeholders(channel: int, joint: TurningJoint) -> str:
+def _placeholders(channel: int, joint: ChainJoint) -> str:
     if channel > MAX_JOINTS:
         return _NO_CHANNEL
     speed = joint.speed_deg_s
-    motor = _MOTOR.format(
+    motor = (_SLIDE_MOTOR if joint.slides else _MOTOR).format(
         speed=20.0 if speed is None else round(speed, 3),
         speed_source="" if speed is None else "  # the speed is the URDF's",
         channel=channel,
     )
-    return motor + (_ENCODER.format(channel=channel) if channel <= MAX_ENCODERS else "")
+    return motor + (
+        _ENCODER.format(channel=channel, following=joint.unit.key("following_error_deg"))
+        if channel <= MAX_ENCODERS
+        else ""
+    )
 
 
 def _inside(range_deg: tuple[float, float]) -> tuple[float, float]:

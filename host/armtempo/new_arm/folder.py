@@ -25,10 +25,10 @@ port = {port}
 """
 _JOB = """\
 # A first motion: from the home posture through a sixth and a third of the way to the ends of the ranges.
-# Each via point has one angle for each joint with a motor, in degrees.
+# Each via point has one {what} for each joint with a motor, in {units}.
 name = "first"
 timing = "shared"
-via_deg = [
+{key} = [
 {rows}]
 """
 _SEQUENCE = """\
@@ -142,7 +142,12 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     check_free(folder)
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
     if arm.arm.driven_indices:
-        files["first.toml"] = _JOB.format(rows=_rows(arm.arm))
+        files["first.toml"] = _JOB.format(
+            what="position" if arm.arm.slides else "angle",
+            units=arm.arm.unit_words,
+            key=arm.arm.list_key("via_deg"),
+            rows=_rows(arm.arm),
+        )
         files["sequence.toml"] = _SEQUENCE
     files["README.md"] = _PAGE.format(name=arm.arm.name)
     try:

@@ -51,7 +51,7 @@ def fit(chain: Chain) -> Fit:
     for near in _NEAR:
         table = dh.derive(axes, chain.zero_pose, near)
         for decimals in _DECIMALS:
-            found = _held_against(wanted, angles, dh.rounded(table, decimals), chain.linked)
+            found = _held_against(wanted, angles, dh.rounded(table, decimals), chain)
             if found.position_mm <= POSITION_MM and found.rotation_deg <= ROTATION_DEG:
                 return found
             if best is None or found.position_mm < best.position_mm:
@@ -71,11 +71,11 @@ def _postures(chain: Chain) -> Array:
     return np.random.default_rng(SEED).uniform(low, high, (POSTURES, len(low)))
 
 
-def _held_against(wanted: Array, angles: Array, table: list[dh.DhRow], linked: tuple[int, ...]) -> Fit:
+def _held_against(wanted: Array, angles: Array, table: list[dh.DhRow], chain: Chain) -> Fit:
     """Worst errors of a table; ``wanted`` (K, 4, 4) belong to ``angles`` (K, joints)."""
     moved = np.zeros((len(angles), len(table)))
     moved[:, [column for column, row in enumerate(table) if row.joint is not None]] = angles
-    found = forward(dh.geometry(table, linked), moved)
+    found = forward(dh.geometry(table, chain.linked, chain.sliding), moved)
     away = np.linalg.norm(found[:, :3, 3] - wanted[:, :3, 3], axis=1)
     chord = np.linalg.norm(found[:, :3, :3] - wanted[:, :3, :3], axis=(1, 2))  # 2 sqrt(2) sin(angle / 2)
     turned = np.degrees(2.0 * np.arcsin(np.minimum(chord / np.sqrt(8.0), 1.0)))

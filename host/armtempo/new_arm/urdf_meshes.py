@@ -38,11 +38,13 @@ def radii_mm(chain: Chain, fit: Fit, urdf: Path) -> dict[int, float]:
     """Radii of rows, from 1, about whose d and a the links' shapes for collision are, or those that are seen.
 
     A triangle is within a capsule if its corners are; constant rows carry what the one before them does. Rows
-    without shapes are left out. InputError for a mesh that cannot be read.
+    without shapes are left out, and those of sliding joints. InputError for a mesh that cannot be read.
     """
     frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))
     found: dict[int, float] = {}
     for joint, links in enumerate(_links(chain)[1:]):
+        if chain.joints[joint].slides:
+            continue  # how far its shapes are from its d changes as it slides
         first = next(number for number, row in enumerate(fit.rows) if row.joint == joint)
         rows = [
             first,

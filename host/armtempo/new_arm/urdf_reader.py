@@ -15,6 +15,8 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, MissingPackageError
+from armtempo.model.joint_unit import DEG, SLIDE_MM, JointUnit
+from armtempo.model.joint_unit import MM as MM_UNIT
 from armtempo.model.parts_file import MAX_ANGLE_DEG
 from armtempo.new_arm import urdf_bodies, urdf_transmissions
 from armtempo.new_arm.urdf_bodies import Body
@@ -29,10 +31,10 @@ DOUBTFUL_DEG = 720.0
 CONTINUOUS_DEG = (-180.0, 180.0)
 """Range of a continuous joint, which has none in a URDF."""
 
+_SLIDING = "prismatic"
 _WHEEL_JOINTS = 2
 """An axle with its steering; a chain with at most this many joints is an arm only if each has limits."""
 _REASONS = {
-    "prismatic": "it slides, and an arm file describes turning joints only",
     "floating": "it is free in all directions, and a motor turns about one axis",
     "planar": "it moves in a plane, and a motor turns about one axis",
 }
@@ -41,21 +43,28 @@ _MOST = 8
 
 
 @dataclass(frozen=True)
-class TurningJoint:
-    """One revolute joint at joint angles 0, in the base link's frame."""
+class ChainJoint:
+    """One revolute or prismatic joint at joint angles 0, in the base link's frame."""
 
     name: str
     point_mm: Array
-    """(3,): a point of its axis."""
+    """(3,): a point of its axis, of a sliding joint any."""
     direction: Array
     """(3,): along its axis, of length 1."""
     range_deg: tuple[float, float]
+    """Of a sliding joint in mm, as its speed."""
     speed_deg_s: float | None
     continuous: bool
     body: Body | None
     """The body up to the next joint; None without a mass."""
     is_linked: bool = False
     """Whether a linkage turns it by minus the angle of the joint before, so that its link keeps its direction."""
+    slides: bool = False
+
+    @property
+    def unit(self) -> JointUnit:
+        """Of its range and speed."""
+        return MM_UNIT if self.slides else DEG
 
 
 @dataclass(frozen=True)
@@ -65,7 +74,7 @@ class Chain:
     robot: str
     base: str
     tip: str
-    joints: tuple[TurningJoint, ...]
+    joints: tuple[ChainJoint, ...]
     zero_pose: Array
     """(4, 4): the tip link's frame in the base link's, all joints at 0; lengths in mm."""
     model: Any
@@ -83,7 +92,7 @@ class Chain:
                 joint.name, *map(math.radians, joint.range_deg), *joint.range_deg
             )
             for joint in self.joints
-            if max(map(abs, joint.range_deg)) > DOUBTFUL_DEG
+            if max(map(abs, joint.range_deg)) > DOUBTFUL_DEG and not joint.slides
         )
 
     @property
@@ -91,14 +100,22 @@ class Chain:
         """Indices of the joints that a linkage turns."""
         return tuple(index for index, joint in enumerate(self.joints) if joint.is_linked)
 
+    @property
+    def sliding(self) -> tuple[int, ...]:
+        """Indices of the joints that slide."""
+        return tuple(index for index, joint in enumerate(self.joints) if joint.slides)
+
     def poses(self, angles_rad: Array) -> Array:
-        """The tip's poses by the reader's forward kinematics: (K, 4, 4) in mm for angles (K, joints) in rad.
+        """The tip's poses by the reader's forward kinematics: (K, 4, 4) in mm for angles (K, joints) in rad, of sliding
+        joints as the kinematics have them.
 
         Those of joints that a linkage turns are 0.
         """
         moving = [(index, joint.name) for index, joint in enumerate(self.joints) if not joint.is_linked]
         poses = np.empty((len(angles_rad), 4, 4))
-        for number, angles in enumerate(angles_rad):
+        values = angles_rad.copy()
+        values[:, list(self.sliding)] *= SLIDE_MM / MM
+        for number, angles in enumerate(values):
             self.model.update_cfg({name: angles[index] for index, name in moving})  # the others follow
             poses[number] = _transform(self.model, self.tip, self.base)
         return poses
@@ -128,16 +145,16 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     _refuse_wheels(path, moving)
     if not moving:
         raise InputError(
-            f"{path}: no joint between {joints[0].parent!r} and {joints[-1].child!r} turns",
+            f"{path}: no joint between {joints[0].parent!r} and {joints[-1].child!r} turns or slides",
             "choose another chain with --base and --tip",
         )
     first, last = joints[0].parent, joints[-1].child
     model.update_cfg({joint.name: 0.0 for joint in moving if joint.mimic is None})
-    turning = tuple(map(partial(_turning, model, first), moving, [*moving[1:], None]))
-    names = [joint.name for joint in moving if joint.mimic is None]
+    found = tuple(map(partial(_joint, model, first), moving, [*moving[1:], None]))
+    names = [joint.name for joint in moving if joint.mimic is None and joint.type != _SLIDING]
     couplings, unclear = urdf_transmissions.of_file(path, names)
     zero = _transform(model, last, first)
-    return Chain(model.robot.name, first, last, turning, zero, model, couplings, unclear)
+    return Chain(model.robot.name, first, last, found, zero, model, couplings, unclear)
 
 
 def _reader() -> Any:
@@ -231,12 +248,16 @@ def _reason(joint: Any, before: Any) -> str:
     """Why a joint does not fit; ``before``: the joint that moves before it in the chain."""
     if joint.type == "fixed":
         return ""
-    if joint.type not in ("revolute", "continuous"):
+    if joint.type not in ("revolute", "continuous", _SLIDING):
         return _REASONS.get(joint.type, f"its type is {joint.type!r}")
     if joint.axis is not None and not 0.0 < np.linalg.norm(joint.axis) < math.inf:
         return "its axis has no direction"
     if joint.mimic is not None:
+        if joint.type == _SLIDING or (before is not None and before.type == _SLIDING):
+            return f"it mimics {joint.mimic.joint!r}, and one of them slides; an arm file has no such linkage"
         return _mimic_reason(joint.mimic, before)
+    if joint.type == _SLIDING:
+        return _stroke_reason(joint.limit)
     return "" if joint.type == "continuous" else _range_reason(joint.limit)
 
 
@@ -260,19 +281,36 @@ def _range_reason(limit: Any) -> str:
     return ""
 
 
-def _turning(model: Any, base: str, joint: Any, after: Any) -> TurningJoint:
+def _stroke_reason(limit: Any) -> str:
+    """Why the limits of a sliding joint are no range."""
+    if limit is None or limit.lower is None or limit.upper is None:
+        return "it has no limits; add <limit lower= upper=> with the positions in m that it may slide to"
+    if not limit.lower < limit.upper:
+        return f"its limits {limit.lower:g} to {limit.upper:g} m are no range; correct them"
+    if MM * max(abs(limit.lower), abs(limit.upper)) > MAX_ANGLE_DEG:
+        return f"its limits {limit.lower:g} to {limit.upper:g} m are more than {MAX_ANGLE_DEG / MM:g} m"
+    return ""
+
+
+def _joint(model: Any, base: str, joint: Any, after: Any) -> ChainJoint:
     frame = _transform(model, joint.child, base)
     axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis, dtype=np.float64)
-    limit, continuous = joint.limit, joint.type == "continuous"
+    limit, continuous, slides = joint.limit, joint.type == "continuous", joint.type == _SLIDING
     if joint.mimic is not None:
         low_high = (0.0, 0.0)
+    elif slides:
+        low_high = (MM * limit.lower, MM * limit.upper)
     else:
         low_high = CONTINUOUS_DEG if continuous else (math.degrees(limit.lower), math.degrees(limit.upper))
-    speed = math.degrees(limit.velocity) if limit is not None and limit.velocity else None
+    speed = None
+    if limit is not None and limit.velocity:
+        speed = MM * limit.velocity if slides else math.degrees(limit.velocity)
     direction = frame[:3, :3] @ (axis / np.linalg.norm(axis))
     body = urdf_bodies.of_joint(model, base, joint, after)
     is_linked = joint.mimic is not None
-    return TurningJoint(joint.name, frame[:3, 3], direction, low_high, speed, continuous, body, is_linked)
+    return ChainJoint(
+        joint.name, frame[:3, 3], direction, low_high, speed, continuous, body, is_linked, slides
+    )
 
 
 def _transform(model: Any, link: str, base: str) -> Array:

@@ -61,9 +61,11 @@ def derive(axes: Sequence[AxisLine], tool: Array, near: Near) -> list[DhRow]:
     return _without_idle(_finish(rows, frame, tool))
 
 
-def geometry(rows: Sequence[DhRow], linked: Sequence[int] = ()) -> Geometry:
-    """The rows as the kinematics take them, lengths in mm; ``linked``: joints that a linkage turns."""
+def geometry(rows: Sequence[DhRow], linked: Sequence[int] = (), sliding: Sequence[int] = ()) -> Geometry:
+    """The rows as the kinematics take them, lengths in mm; ``linked``: joints that a linkage turns; ``sliding``: that
+    slide."""
     return Geometry(
+        slides=tuple((number, 0.0) for number, row in enumerate(rows) if row.joint in sliding),
         linked=tuple(number for number, row in enumerate(rows) if row.joint in linked),
         d=tuple(row.d_mm for row in rows),
         a=tuple(row.a_mm for row in rows),

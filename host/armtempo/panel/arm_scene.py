@@ -63,7 +63,9 @@ class ArmShape:
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
-        self.reach_mm = sum(abs(joint.d_mm) + abs(joint.a_mm) for joint in arm.joints) or 1.0
+        self.reach_mm = sum(abs(joint.d_mm) + abs(joint.a_mm) for joint in arm.joints)
+        self.reach_mm += sum(max(map(abs, joint.range_deg)) for joint in arm.joints if joint.slides)
+        self.reach_mm = self.reach_mm or 1.0
 
     def outline(self, angles_deg: Array) -> Array:
         """Points of the arm's line, (K, 3), for driven angles (J,)."""
@@ -79,11 +81,17 @@ class ArmShape:
         return Geometry.of(self.arm).bare  # a tool is drawn by itself
 
     def dials(self, angles_deg: Array) -> list[list[float]]:
-        """For each driven joint 10 numbers: centre, directions of its zero and of its axis, angle in rad."""
+        """For each driven joint 10 numbers: centre, directions of its zero and of its axis, angle in rad.
+
+        A sliding joint has no dial: all its numbers are 0.
+        """
         angles_rad = np.radians(all_angles_deg(self.arm, np.asarray(angles_deg)))
         poses = all_frames(self._geometry, angles_rad.tolist())
         found = []
         for joint in self.arm.driven_indices:
+            if self.arm.joints[joint].slides:
+                found.append([0.0] * 10)
+                continue
             axis, now, angle = poses[joint, :3, 2], poses[joint + 1, :3, 0], angles_rad[joint]
             zero = now * np.cos(angle) - np.cross(axis, now) * np.sin(angle)
             numbers = (*poses[joint, :3, 3] / self.reach_mm, *zero, *axis, angle)
@@ -120,11 +128,25 @@ class ArmShape:
         radii = self._radii
         points = self.outline(np.array(self.arm.home_deg))
         lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        for row, (low, high) in self._rails.items():
+            lengths[2 * row] = high - low
         return [
             (index, float(length), radii[index])
             for index, length in enumerate(lengths)
             if length * self.reach_mm > _SHORT_MM
         ]
+
+    @cached_property
+    def _rails(self) -> dict[int, tuple[float, float]]:
+        """Of each sliding joint, by its row: where its frame can be along its axis, which is drawn as its link."""
+        return {
+            row: (
+                (joint.d_mm + joint.range_deg[0]) / self.reach_mm,
+                (joint.d_mm + joint.range_deg[1]) / self.reach_mm,
+            )
+            for row, joint in enumerate(self.arm.joints)
+            if joint.slides
+        }
 
     @cached_property
     def _radii(self) -> list[float]:
@@ -164,6 +186,10 @@ class ArmShape:
         )
         points, first = self.outline(angles_deg), [index for index, *_ in self.pieces]
         begin, end = points[first], points[np.array(first) + 1]
+        for row, ends in self._rails.items():
+            if 2 * row in first:
+                at, axis = first.index(2 * row), frames[row][:3, 2]
+                begin[at], end[at] = (points[2 * row] + place * axis for place in ends)
         along = (end - begin) / np.linalg.norm(end - begin, axis=1, keepdims=True)
         axes = frames[list(self.arm.driven_indices)]
         middles = np.vstack(((begin + end) / 2, axes[:, :3, 3] / self.reach_mm))
@@ -273,7 +299,10 @@ class ArmScene:
     @property
     def parts(self) -> str:
         """The scene for the page's script, as JSON: its links and its ghost, the joints' ranges in rad."""
-        ranges = [np.radians(joint.range_deg).round(4).tolist() for joint in self._shape.arm.driven]
+        ranges = [
+            [0.0, 0.0] if joint.slides else np.radians(joint.range_deg).round(4).tolist()
+            for joint in self._shape.arm.driven
+        ]
         return json.dumps(
             {"scene": self.scene.id, "links": self._links, "ghost": self._ghost, "ranges": ranges}
         )

@@ -7,6 +7,7 @@ from nicegui import ui
 
 from armtempo.basics.arrays import Array
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import DEG
 from armtempo.panel import words
 
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
@@ -45,7 +46,7 @@ class CurveChart:
         self._place = ui.element("div").classes("full-width")
         self._place.set_visibility(False)  # until there is something to show
         with self._place:
-            ui.label(title).classes("text-caption")
+            ui.label(title.replace(DEG.name, arm.units)).classes("text-caption")
             self.chart = ui.echart(options, renderer="svg").classes("armtempo-chart")
 
     def show(self, times_s: Array, values: Array, reference: Array | None = None) -> None:
@@ -68,7 +69,7 @@ class CurveChart:
     def _curve(self, number: int, times_s: Array, values: Array, of_plan: bool = False) -> dict[str, object]:
         points = np.column_stack((times_s, values)).round(4).tolist()
         curve: dict[str, object] = {
-            "name": words.plain(self._arm.driven[number].name),
+            "name": words.plain(self._arm.driven[number].labelled),
             "type": "line",
             "showSymbol": False,
             "color": COLOURS[number % len(COLOURS)],

@@ -41,7 +41,7 @@ def ask(page: PanelPage, _: Press) -> None:
 
     def angles() -> str:
         shown = [
-            f"{joint.name} {angle:g}°"
+            f"{joint.name} {angle:g}{joint.unit.sign}"
             for joint, angle in zip(arm.driven, arm.home_deg, strict=True)
             if chosen() in (None, joint.name)
         ]

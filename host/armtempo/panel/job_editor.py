@@ -18,6 +18,7 @@ from armtempo.kinematics.of_arm import forward
 from armtempo.model import tool_segment
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.joint_unit import NEUTRAL
 from armtempo.model.plan import Plan
 from armtempo.model.pose import to_rpy_deg
 from armtempo.model.tool_pose import BASE, WHOLE
@@ -27,6 +28,7 @@ from armtempo.planning import planner
 
 _NEW = "panel_job"
 ANGLES, POSE, POSTURE = "angles_deg", "position_mm", "posture"
+_LIST = "via_deg"
 FORMS = (ANGLES, POSE, "matrix", POSTURE)
 """Keys that say where a via point is, one of them."""
 OPTIONS = (
@@ -84,7 +86,7 @@ class JobEditor(FileEditor):
     def new_text(self, name: str) -> str:
         """A job that rests at home."""
         row = ", ".join(f"{float(angle):g}" for angle in self.arm.home_deg)
-        return f'name = "{name}"\nvia_deg = [\n    [{row}],\n    [{row}],\n]\n'
+        return f'name = "{name}"\n{self.arm.list_key("via_deg")} = [\n    [{row}],\n    [{row}],\n]\n'
 
     def is_one(self, path: Path) -> bool:
         """Whether a file describes a job."""
@@ -92,7 +94,8 @@ class JobEditor(FileEditor):
             table = toml_table.read(path)
         except InputError:
             return False
-        return table.has("name") and (table.has("via") or table.has("via_deg")) and not table.has("joint")
+        listed = any(table.has(key) for key in ("via", _LIST, NEUTRAL[_LIST]))
+        return table.has("name") and listed and not table.has("joint")
 
     def check(self, text: str, file: Path) -> None:
         """Raise InputError if the text is no job."""
@@ -135,9 +138,22 @@ class JobEditor(FileEditor):
         ]
 
     def _rows(self) -> list[dict[str, Any]]:
-        if "via_deg" in self._values:
-            return [{ANGLES: row} for row in self._values["via_deg"]]
-        return list(self._values.get("via", []))
+        """The via points' keys; a list of positions is called ANGLES, however the file calls it."""
+        if self._is_list:
+            return [{ANGLES: row} for row in self._values[self._list_key]]
+        found = self._values.get("via", [])
+        return [
+            {ANGLES if key == NEUTRAL[ANGLES] else key: value for key, value in row.items()} for row in found
+        ]
+
+    @property
+    def _list_key(self) -> str:
+        """The key of all via points as one list."""
+        return NEUTRAL[_LIST] if self.arm.slides or NEUTRAL[_LIST] in self._values else _LIST
+
+    def _written(self, values: dict[str, Any]) -> dict[str, Any]:
+        """The keys of a via point as a file of this arm has them."""
+        return {self.arm.list_key(key) if key == ANGLES else key: value for key, value in values.items()}
 
     def take_arm(self, arm: Arm) -> None:
         """Take another version of the arm; a plan that it makes old is old."""
@@ -175,7 +191,7 @@ class JobEditor(FileEditor):
         if self._is_list:
             self._change_list(lambda rows: rows[number].__setitem__(joint, value))
         else:
-            self._change_table(number, lambda table: table[ANGLES].__setitem__(joint, value))
+            self._change_table(number, lambda table: table[_key_in(table)].__setitem__(joint, value))
 
     def set_angles(self, number: int, angles_deg: Sequence[float]) -> None:
         """Give a via point by these angles, degrees (J,), instead of what it was given by."""
@@ -183,7 +199,7 @@ class JobEditor(FileEditor):
         if self._is_list:
             self._change_list(lambda rows: rows.__setitem__(number, values))
         else:
-            self._change_table(number, lambda table: _place(table, {ANGLES: values}))
+            self._change_table(number, lambda table: _place(table, self._written({ANGLES: values})))
 
     def set_key(self, number: int, key: str, text: str) -> None:
         """Set a key of a via point; "" removes it."""
@@ -227,7 +243,7 @@ class JobEditor(FileEditor):
         if self._is_list and set(found) == {ANGLES}:
             self._change_list(lambda rows: rows.insert(number, found[ANGLES]))
         else:
-            self._change_blocks(lambda blocks: blocks.insert(number, found))
+            self._change_blocks(lambda blocks: blocks.insert(number, self._written(found)))
 
     def delete(self, number: int) -> None:
         """Remove a via point, with its keys and comments."""
@@ -261,25 +277,26 @@ class JobEditor(FileEditor):
         blocks = TomlBlocks(self.text, "via")
         blocks.tables.clear()
         document = tomlkit.parse(blocks.text)
-        document.pop("via_deg", None)
+        listed = self._list_key
+        document.pop(listed, None)
         if all(set(via) == {ANGLES} for via in vias):
             rows = tomlkit.array()
             for via in vias:
                 rows.append(_rounded(via[ANGLES]))
-            document["via_deg"] = rows.multiline(True)
+            document[listed] = rows.multiline(True)
         blocks = TomlBlocks(tomlkit.dumps(document), "via")
-        for via in vias if "via_deg" not in document else ():
-            blocks.insert(len(blocks.tables), via)
+        for via in vias if listed not in document else ():
+            blocks.insert(len(blocks.tables), self._written(via))
         self._change(blocks.text)
 
     @property
     def _is_list(self) -> bool:
         """Whether the via points are written as one list of angles."""
-        return "via_deg" in self._values
+        return self._list_key in self._values
 
     def _change_list(self, change: Callable[[Any], object]) -> None:
         document = tomlkit.parse(self.text)
-        change(document["via_deg"])
+        change(document[self._list_key])
         self._change(tomlkit.dumps(document))
 
     def _change_table(self, number: int, change: Callable[[Any], object]) -> None:
@@ -295,19 +312,20 @@ class JobEditor(FileEditor):
         self._change(blocks.text)
 
     def _with_tables(self) -> str:
-        """The text with tables [[via]], made of ``via_deg`` if it has that; InputError if comments would be lost."""
+        """The text with tables [[via]], made of a list if it has that; InputError if comments would be lost."""
         if not self._is_list:
             return self.text
         document = tomlkit.parse(self.text)
-        rows = document.pop("via_deg")
+        listed = self._list_key
+        rows = document.pop(listed)
         if isinstance(rows, Array) and "#" in rows.as_string():
             raise InputError(
-                "the comments in via_deg would be lost",
+                f"the comments in {listed} would be lost",
                 "write the via points as [[via]] tables in the job's file",
             )
         blocks = TomlBlocks(tomlkit.dumps(document), "via")
         for row in self._rows():
-            blocks.insert(len(blocks.tables), row)
+            blocks.insert(len(blocks.tables), self._written(row))
         return blocks.text
 
 
@@ -330,8 +348,17 @@ def pose_values(arm: Arm, angles_deg: Sequence[float], frame: str = BASE) -> dic
     return {POSE: position, **orientations[joints]}
 
 
-_WHERE = (*FORMS, "rpy_deg", "quaternion", "approach", "posture_deg", *(f"{name}_deg" for name in WHOLE))
+_WHERE = (
+    *(*FORMS, "rpy_deg", "quaternion", "approach", "posture_deg"),
+    *(NEUTRAL[ANGLES], NEUTRAL["posture_deg"]),
+    *(f"{name}_deg" for name in WHOLE),
+)
 """Keys that say where a via point is."""
+
+
+def _key_in(table: Any) -> str:
+    """The key of a list of positions in a table."""
+    return NEUTRAL[ANGLES] if NEUTRAL[ANGLES] in table else ANGLES
 
 
 def _via(values: dict[str, Any]) -> Via:

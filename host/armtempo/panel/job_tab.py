@@ -68,7 +68,7 @@ class JobTab:
         joints = self._operator.arm.driven
         columns = f"2.2rem 4.6rem repeat({len(joints)}, minmax(4rem, 6rem)) auto"
         with ui.element("div").classes("armtempo-grid").style(f"grid-template-columns: {columns}"):
-            for text in ("", "", *(joint.name for joint in joints), ""):
+            for text in ("", "", *(joint.labelled for joint in joints), ""):
                 ui.label(words.plain(text)).classes("text-caption ellipsis")
             for number, via in enumerate(self._jobs.vias):
                 self._row(number, via)
@@ -216,7 +216,7 @@ class JobTab:
         """Take the posture that is nearest to the via point's, and offer the others."""
         angles = self._jobs.vias[number].angles_deg
         postures = moved_tool_deg(self._jobs.tooled_arm, np.array(angles), position_mm.tolist())
-        texts = [", ".join(f"{angle:.1f}" for angle in posture) + "°" for posture in postures]
+        texts = [self._operator.arm.listed(f"{angle:.1f}" for angle in posture) for posture in postures]
         self._offered.clear()
         with self._offered:
             ui.label(words.POSTURES_OF.format(number=number, count=len(postures)))

@@ -241,8 +241,8 @@ def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
         "armtempo-where": position(operator) if live.known else words.UNKNOWN,
         "armtempo-said": words.plain(said),
     }
-    for number, angle in enumerate(angles, 1):
-        texts[f"armtempo-angle-{number}"] = f"{angle:.2f}°" if live.known else "?"
+    for number, (angle, joint) in enumerate(zip(angles, operator.arm.driven, strict=True), 1):
+        texts[f"armtempo-angle-{number}"] = f"{angle:.2f}{joint.unit.sign}" if live.known else "?"
     poses = shape.poses(angles)
     return {
         "clock_s": operator.presses.clock(),
@@ -260,7 +260,8 @@ def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
 def position(operator: PanelBoard) -> str:
     """Where the tool and the joints are."""
     angles = operator.live.angles_deg
-    where = "  ".join(f"{angle:.2f}°" for angle in angles)
+    pairs = zip(angles, operator.arm.driven, strict=True)
+    where = "  ".join(f"{angle:.2f}{joint.unit.sign}" for angle, joint in pairs)
     with suppress(InputError):
         pose = forward(operator.arm, angles)
         x, y, z = pose[:3, 3].round(1) + 0.0  # no -0.0

@@ -144,7 +144,9 @@ class LiveArm:
         if isinstance(event, Sample):
             self.heard_s = time.monotonic()
             sample = sample_json(event, self.arm)
-            if "commanded_deg" in sample:
+            keys = {name: self.arm.list_key(name) for name in ("commanded_deg", "angle_deg")}
+            if keys["commanded_deg"] in sample:
+                sample |= {name: sample[key] for name, key in keys.items()}
                 if sample["run"] != self.curves.run:
                     self.curves = LiveCurves(sample["run"])
                 self.curves.take(sample)
@@ -171,7 +173,7 @@ class LiveArm:
                 one.name: one.state(levels.outputs[n]) or one.value(levels.outputs[n])
                 for n, one in enumerate(self.arm.outputs)
             }
-        angles = [joint.angle_deg for joint in state.joints]
+        angles = [joint.position for joint in state.joints]
         # Of joints that are not known the steps say nothing
         known = all(joint.known for joint in state.joints) and None not in angles
         if not self.guided:

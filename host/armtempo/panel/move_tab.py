@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -24,7 +24,7 @@ from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import PanelPage, named
 from armtempo.planning.jog.jog_line import axis_of
 from armtempo.planning.jog.jog_motion import JogMove
-from armtempo.robot.goto import MovePace, Where, posture_deg
+from armtempo.robot.goto import MovePace, posture_deg
 
 if TYPE_CHECKING:
     from armtempo.panel.press import Press
@@ -50,6 +50,8 @@ class MoveTab:
         self._step: str | float = HOLD
         self._target_deg: Array | None = None
         """What the ghost shows."""
+        self._found_deg: Array | None = None
+        """A target that a thread found, and that is to be shown."""
         self._jogs()
         floor.build(page)
         self._targets()
@@ -60,7 +62,10 @@ class MoveTab:
         page.on_arm(self._changed)
 
     def _look(self) -> None:
-        """Take the ghost away where the arm has arrived."""
+        """Show a target that was found; take the ghost away where the arm has arrived."""
+        found_deg, self._found_deg = self._found_deg, None
+        if found_deg is not None:
+            self._show(found_deg)
         target_deg, operator = self._target_deg, self._operator
         if target_deg is None or operator.busy:
             return
@@ -86,7 +91,8 @@ class MoveTab:
                 with ui.element("div").classes("armtempo-jog"):
                     self._pair(joint.name, JogMove(math.inf, joint=number))
                     ui.label("").classes("armtempo-number").props(f'id="armtempo-angle-{number + 1}"')
-                    ui.label(f"{low:g}° … {high:g}°").classes("armtempo-note")
+                    sign = joint.unit.sign
+                    ui.label(f"{low:g}{sign} … {high:g}{sign}").classes("armtempo-note")
         self._tool_jogs()
         with ui.element("div").classes("armtempo-slide"):
             ui.label(words.SPEED_OF_JOG).classes("text-caption")
@@ -187,7 +193,7 @@ class MoveTab:
             )
             return
         by = math.copysign(self._step, move.by)
-        by_deg, by_mm = (by, None) if move.unit == "deg" else (None, by)
+        by_deg, by_mm = (by, None) if move.unit(operator.arm) == "deg" else (None, by)
         page.do(
             press,
             words.JOG_STEP,
@@ -206,12 +212,13 @@ class MoveTab:
         with ui.expansion(words.TYPED_TARGET).props("dense").classes("armtempo-expansion"):
             with ui.row():
                 kind = ui.toggle({"angles": words.ANGLES, "pose": words.POSE}, value="angles")
-                named(kind.props("dense no-caps unelevated"), words.TYPED_TARGET)
+                named(kind.props("dense no-caps unelevated"), words.FORM_OF_TARGET)
                 line = ui.switch(words.IN_A_LINE)
                 ui.button(words.TAKE_PRESENT, on_click=self._take_present).props("flat dense no-caps")
             with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="angles"):
                 self._angles = [
-                    _number(joint.name, angle) for joint, angle in zip(arm.driven, arm.home_deg, strict=True)
+                    _number(joint.labelled, angle)
+                    for joint, angle in zip(arm.driven, arm.home_deg, strict=True)
                 ]
             with ui.row().classes("armtempo-fields").bind_visibility_from(kind, "value", value="pose"):
                 self._pose = {name: _number(name, 0.0) for name in words.POSE_FIELDS}
@@ -222,12 +229,10 @@ class MoveTab:
                 if len(arm.driven) < len(words.POSE_FIELDS):
                     ui.label(words.FEW_JOINTS.format(joints=len(arm.driven))).classes("armtempo-note")
             with ui.row():
-                ui.button(
-                    words.SHOW, on_click=lambda: page.attempt(lambda: self._show_typed(kind.value))
-                ).props("outline no-caps")
+                ui.button(words.SHOW, on_click=lambda: self._show_typed(kind.value)).props("outline no-caps")
 
                 def begin(press: Press) -> None:
-                    self._go(words.TYPED_TARGET, self._typed(kind.value), line.value, press)
+                    self._go_typed(self._typed(kind.value), line.value, press)
 
                 page.hold_button(words.GO, begin, look="unelevated", name=f"{words.GO}: {words.TYPED_TARGET}")
         ui.label(words.TARGET_HINT).classes("armtempo-note")
@@ -245,21 +250,38 @@ class MoveTab:
         page, arm = self._page, self._operator.arm
         with ui.row().classes("armtempo-postures"):
             for name in ["home", *(posture.name for posture in arm.postures)]:
-                begin = partial(self._go, name, name, False)
+                begin = partial(self._go, name)
                 page.hold_button(words.plain(name), begin, name=f"{words.GO_TO} {name}")
 
-    def _go(self, what: str, where: Where, line: bool, press: Press) -> None:
-        """Show the target; go there while the button is held, or with one click."""
+    def _go(self, name: str, press: Press) -> None:
+        """Show a posture; go there while the button is held, or with one click."""
+        target_deg = posture_deg(name, self._operator.arm)
+        self._show(target_deg)
+        self._check_away(target_deg)
+        self._move(name, lambda: target_deg, False, press)
+
+    def _go_typed(self, find: Callable[[], Array], line: bool, press: Press) -> None:
+        """The same with a typed target, which takes some time to find."""
+
+        def found() -> Array:
+            target_deg = self._found_deg = find()
+            self._check_away(target_deg)
+            return target_deg
+
+        self._move(words.TYPED_TARGET, found, line, press)
+
+    def _check_away(self, target_deg: Array) -> None:
+        if np.abs(self._operator.live.angles_deg - target_deg).max() < _SAME_DEG:
+            raise InputError(words.IS_THERE, words.OTHER_TARGET)
+
+    def _move(self, what: str, find: Callable[[], Array], line: bool, press: Press) -> None:
+        """Go to the target that a thread finds."""
         page, operator = self._page, self._operator
         pace = MovePace(page.jog_percent / 100, line)
-        target_deg = posture_deg(where, operator.arm)
-        self._show(target_deg)
-        if np.abs(operator.live.angles_deg - target_deg).max() < _SAME_DEG:
-            raise InputError(words.IS_THERE, words.OTHER_TARGET)
         if self._one_click.value:
-            page.do(press, what, lambda: operator.go(target_deg, pace))
+            page.do(press, what, lambda: operator.go(find(), pace))
             return
-        page.hold.press(page.client, press, what, lambda: operator.held_move(target_deg, pace), SHOWN_S)
+        page.hold.press(page.client, press, what, lambda: operator.held_move(find(), pace), SHOWN_S)
 
     def _show(self, target_deg: Array) -> None:
         """The ghost at a target, and the tool's path to it."""
@@ -268,18 +290,27 @@ class MoveTab:
         with suppress(ArmtempoError):
             self._page.show_way(target_deg)
 
-    def _show_typed(self, kind: str) -> None:
-        self._show(posture_deg(self._typed(kind), self._operator.arm))
+    async def _show_typed(self, kind: str) -> None:
+        finds: list[Callable[[], Array]] = []
+        if self._page.attempt(lambda: finds.append(self._typed(kind))):
+            found_deg = await self._page.threaded(finds[0])
+            if found_deg is not None:
+                self._show(found_deg)
 
-    def _typed(self, kind: str) -> Where:
-        """The typed target as angles; raises ArmtempoError if it is none, or no posture reaches it."""
+    def _typed(self, kind: str) -> Callable[[], Array]:
+        """What finds the angles of the typed target, (J,), and raises PlanError if no posture reaches it.
+
+        A pose out of reach is searched for half a second, in which no page may wait. Raises InputError if no target
+        is typed.
+        """
+        arm, here_deg = self._operator.arm, self._operator.live.angles_deg
         if kind == "angles":
-            return np.array([_value(field) for field in self._angles])
+            angles = [_value(field) for field in self._angles]
+            return lambda: posture_deg(angles, arm)
         position = [_value(self._pose[name]) for name in words.POSE_FIELDS[:3]]
         turns = [_value(self._pose[name]) for name in words.POSE_FIELDS[3:]]
-        arm = self._operator.arm
         wanted = checked(arm.frame(str(self._frame.value)) @ from_rpy(position, turns))
-        return teaching.nearest(arm, wanted, self._operator.live.angles_deg)
+        return lambda: teaching.nearest(arm, wanted, here_deg)
 
     def _take_present(self) -> None:
         """Fill the fields with where the arm is."""

@@ -232,8 +232,10 @@ window.armtempo = {
         const group = new T.Group();
         group.add(this.polyline([[0, 0, 0], ...arc.map(on), [0, 0, 0]], "#999999"));
         group.add(this.polyline([[0, 0, 0], [1.25 * RADIUS, 0, 0]], "#999999"));
+        group.visible = low < high; // a sliding joint has no dial
         scene.scene.add((this.dials[i] = group));
       }
+      if (!this.dials[i].visible) return;
       const zero = vector(dial.slice(3, 6)), axis = vector(dial.slice(6, 9));
       const basis = new T.Matrix4().makeBasis(zero, axis.clone().cross(zero), axis);
       this.dials[i].quaternion.setFromRotationMatrix(basis);

@@ -326,10 +326,10 @@ class PanelBoard:
         self.board.upload(plan, replace=True, progress=self.part)
 
     def run(self, plan: Plan, times: int) -> None:
-        """Load a plan, run it and write the report."""
+        """Load a plan and run it; its report is made when it is asked for."""
         self.upload(plan)
         self.live.plan = plan
-        self.board.run(plan, times, self.runs, self.part).report()
+        self.board.run(plan, times, self.runs, self.part)
 
     def deploy(self) -> None:
         """Put this version's program on the board."""

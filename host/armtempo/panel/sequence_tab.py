@@ -224,8 +224,6 @@ class SequenceTab:
             operator.live.take_sequence(
                 board.run_sequence(plan, operator.live.take_sequence, replace=True, out=operator.runs)
             )
-            if (recorded := board.last_sequence) is not None:
-                recorded.report()
 
         self._page.do(press, words.RUN, run_it)
 

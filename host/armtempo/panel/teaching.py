@@ -65,7 +65,10 @@ def ask(page: PanelPage) -> None:
 
     asked = page.ask(words.TEACH_HINT, words.STORE, store)
     with asked.place:
-        ui.label("  ".join(f"{angle:g}°" for angle in angles)).classes("text-weight-bold")
+        pairs = zip(angles, operator.arm.driven, strict=True)
+        ui.label("  ".join(f"{angle:g}{joint.unit.sign}" for angle, joint in pairs)).classes(
+            "text-weight-bold"
+        )
         name = ui.input(words.NAME_OF_POSTURE).props("dense outlined")
         replace = ui.switch(words.REPLACE)
         page.button(words.ADD_TO_JOB, add, Needs.CONTROL)

@@ -62,6 +62,7 @@ STEP_OF_JOG, HOLD = "Length of a jog, mm or degrees", "While held"
 SPEED_OF_JOG = "Speed of jogs and targets"
 JOG_STEP = "step"
 GO_TO, TYPED_TARGET, ANGLES, POSE = "Go to", "Typed target", "Angles", "Pose"
+FORM_OF_TARGET = "How the target is given"
 POSE_FIELDS = ("x, mm", "y, mm", "z, mm", "roll, deg", "pitch, deg", "yaw, deg")
 FEW_JOINTS = "With {joints} joints the arm takes of the orientation what it can."
 ONE_CLICK, IN_A_LINE, TAKE_PRESENT, SHOW = "With one click", "In a straight line", "Where the arm is", "Show"
@@ -129,6 +130,7 @@ OPTIONS = {
 VIA_KEYS = {
     "line": "Straight line to it",
     "arc_through_mm": "Arc through [x, y, z], mm",
+    "circle_through_mm": "Circle through two, mm",
     "blend_mm": "Corner cut by, mm",
     "speed_mm_s": "Tool speed, mm/s",
     "acceleration_mm_s2": "Tool acceleration, mm/s²",
@@ -145,6 +147,7 @@ VIA_KEYS = {
     "frame": "Frame",
     "posture": "Posture",
     "posture_deg": "Near the angles, deg",
+    "posture_joints": "Near the joints at",
     "tolerance_mm": "Tolerance, mm",
     "tolerance_deg": "Tolerance, deg",
 }
@@ -265,12 +268,13 @@ _BUTTONS = {
     "teach": TAB_MOVE,
 }
 """What the panel has instead of a command."""
+_SOLUTIONS = re.compile(r"\n  solution +why not(\n  .*)*")
 _COMMAND = re.compile(r"'armtempo ([a-z-]+)([^']*)'")
 
 
 def of_error(error: ArmtempoError) -> str:
-    """An error of the library in the words of the panel: buttons instead of commands."""
-    return of_text(str(error))
+    """An error of the library in the words of the panel: buttons instead of commands, no table of solutions."""
+    return of_text("; ".join(one for one in (_SOLUTIONS.sub("", error.problem), error.hint) if one))
 
 
 def of_job(text: str) -> str:

@@ -64,7 +64,7 @@ def limits_of(arm: Arm) -> list[Limits]:
         if not all(math.isfinite(value) and value > 0 for value in values):
             raise InputError(
                 f"arm {arm.name!r}: the limits of {joint.name} must be positive numbers, not {values}",
-                "set speed_deg_s, acceleration_deg_s2 and jerk_deg_s3 in the arm file",
+                f"set {', '.join(joint.unit.key(key) for key in _LIMITS)} in the arm file",
             )
         limits.append(joint.limits)
     if not limits:
@@ -88,8 +88,8 @@ def highest_rates(arm: Arm) -> list[float]:
         rate = speed_deg_s * motor.steps_per_deg
         if rate > MAX_STEP_RATE:
             raise InputError(
-                f"arm {arm.name!r}: {motor.name} at its speed limit of {speed_deg_s:g} deg/s needs {rate:.0f} "
-                f"steps/s; the board supports at most {MAX_STEP_RATE} {ESTIMATED}",
+                f"arm {arm.name!r}: {motor.name} at its speed limit of {speed_deg_s:g} {motor.unit.name}/s needs "
+                f"{rate:.0f} steps/s; the board supports at most {MAX_STEP_RATE} {ESTIMATED}",
                 "check the unit, lower the limit, or use fewer microsteps",
             )
         found.append(rate)
@@ -104,7 +104,7 @@ def check_crossings(arm: Arm) -> None:
 
 
 def _check_crossing(arm: Arm, motor: DrivenJoint, crossing: Crossing) -> None:
-    what = f"arm {arm.name!r}: {motor.name}: backlash_deg = {crossing.play_deg:g}"
+    what = f"arm {arm.name!r}: {motor.name}: {motor.unit.key('backlash_deg')} = {crossing.play_deg:g}"
     if crossing.duration_s > LONGEST_CROSSING_S:
         raise InputError(
             f"{what}: to cross it takes {crossing.duration_s:.2g} s at its limits, more than {LONGEST_CROSSING_S:g} s",
@@ -117,15 +117,18 @@ def _check_crossing(arm: Arm, motor: DrivenJoint, crossing: Crossing) -> None:
         raise InputError(
             f"{what} is {steps:.0f} steps, and until they are made the motor reaches {rate:.0f} steps/s; the board "
             f"makes at most {MAX_BACKLASH_STEPS} and {MAX_CROSSING_RATE} steps/s",
-            "use fewer microsteps, or lower acceleration_deg_s2",
+            f"use fewer microsteps, or lower {motor.unit.key('acceleration_deg_s2')}",
         )
+
+
+_LIMITS = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 
 
 def hardware_notes(arm: Arm) -> tuple[str, ...]:
     """Limits of the arm's tables that the driver or the encoder does not allow."""
     return tuple(
-        f"{joint.name}: {bound.key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: planned with "
-        f"{bound.value:.4g}"
+        f"{joint.name}: {joint.unit.key(bound.key)} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: "
+        f"planned with {bound.value:.4g}"
         for joint, bound in drive_limits.exceeded(arm.table_joints, arm.coupling, arm.driver)
     )
 
@@ -135,6 +138,11 @@ def check_job(arm: Arm, job: Job) -> None:
     refine = 1 if isinstance(job.refine, str) else job.refine
     if arm.coupling and job.timing != "shared":
         raise InputError(f"job {job.name!r}: {COUPLED_AXES}", SHARE)
+    if arm.slides and job.corridor_deg is not None:
+        raise InputError(
+            f"job {job.name!r}: corridor_deg is of arms whose joints all turn, and {arm.name!r} has a sliding one",
+            "give corridor_mm, the tool's largest distance from the spline, or leave it out",
+        )
     _check_path(job)
     kind = job.parameters.get("fitness", FITNESS[0])
     if kind not in FITNESS:
@@ -288,13 +296,14 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
     """Raise InputError for via angles (n + 1, J) that are not a motion of this arm."""
     if via_deg.ndim != 2 or len(via_deg) < 2 or via_deg.shape[1] != len(arm.driven):
         raise InputError(
-            f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} angles each, "
-            "one for each driven joint",
-            "give each via point all of these angles",
+            f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} "
+            f"{'positions' if arm.slides else 'angles'} each, one for each driven joint",
+            f"give each via point all of these {'positions' if arm.slides else 'angles'}",
         )
     if not np.all(np.isfinite(via_deg)):
         raise InputError(
-            f"job {job.name!r}: a via angle is not a finite number", "give every angle as a number of degrees"
+            f"job {job.name!r}: a via angle is not a finite number",
+            f"give every angle as a number of degrees{', every sliding joint one of mm' if arm.slides else ''}",
         )
     circles = any(segment.circle_through_mm is not None for segment in job.tool_segments)
     if np.all(np.ptp(via_deg, axis=0) <= TOLERANCE) and not circles:
@@ -308,6 +317,8 @@ def long_ways(arm: Arm, via_deg: Array) -> tuple[str, ...]:
     at the same place."""
     notes = []
     for number, joint in enumerate(arm.driven):
+        if joint.slides:
+            continue
         for via, (start, end) in enumerate(pairwise(via_deg[:, number].tolist()), 1):
             turn = -360.0 * round((end - start) / 360.0)
             if turn:
@@ -329,7 +340,7 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int, hint: str = MOV
         margin = TOLERANCE * max(1.0, abs(least), abs(most))
         if lowest < least - margin or highest > most + margin:
             raise PlanError(
-                f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} degrees, its range is "
+                f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} {joint.unit.word}, its range is "
                 f"{least:g} to {most:g}",
                 hint,
             )

@@ -72,9 +72,10 @@ def _swing_note(arm: Arm, job: Job, trajectory: Trajectory) -> list[str]:
     if swing.beyond_deg <= _SWING_DEG:
         return []
     helps = 'path = "free" helps' if job.path == "through" else "a via point or a stop = true there keeps it"
+    joint = arm.driven[swing.joint]
     return [
-        f"between P{swing.via} and P{swing.via + 1} {arm.driven[swing.joint].name} reaches {swing.reached_deg:.2f} "
-        f"degrees, {swing.beyond_deg:.1f} beyond both; {helps}"
+        f"between P{swing.via} and P{swing.via + 1} {joint.name} reaches {swing.reached_deg:.2f} "
+        f"{joint.unit.word}, {swing.beyond_deg:.1f} beyond both; {helps}"
     ]
 
 

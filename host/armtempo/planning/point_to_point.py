@@ -42,7 +42,8 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
         found = np.asarray(angles_deg, dtype=float)
     except (TypeError, ValueError):
         raise InputError(
-            f"{angles_deg!r:.40} is not a posture", "give an angle in degrees for each joint with a motor"
+            f"{angles_deg!r:.40} is not a posture",
+            f"give an angle in degrees for each joint with a motor{', of a sliding one mm' if arm.slides else ''}",
         ) from None
     if found.shape != (len(arm.driven),):
         raise InputError(
@@ -51,12 +52,8 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
         )
     found = np.array(arm.placed(found))
     for joint, angle in zip(arm.driven, found, strict=True):
-        low, high = joint.range_deg
-        if not low <= angle <= high:
-            raise InputError(
-                f"{joint.name}: {angle:g} degrees is outside of its range {low:g} to {high:g}",
-                "give an angle within it",
-            )
+        if problem := joint.range_problem(angle):
+            raise InputError(problem, f"give {'a position' if joint.slides else 'an angle'} within it")
     return found
 
 

@@ -186,6 +186,10 @@ class _Compiler:
                 f"{step.where}repeat: it is within another repeat for pallet {step.pallet!r}",
                 "repeat it once",
             )
+        if not step.steps:
+            raise InputError(
+                f"{step.where}repeat: nothing is repeated", "put steps between repeat and its end"
+            )
         outermost = not self._depth
         self._depth += 1
         found: list[SequenceRow] = []

@@ -12,6 +12,7 @@ from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.forward import Frame, array_frames
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import SLIDE_MM
 from armtempo.model.tool_pose import Pose
 
 
@@ -26,7 +27,7 @@ class ToolState:
     slope_mm_deg: Array
     """Derivative of the position by each joint, mm/deg: (P, 3, J)."""
     axes_deg: Array
-    """Axis of each joint times the radians of a degree: (P, 3, J)."""
+    """Axis of each joint times the radians of a degree: (P, 3, J); 0 of a sliding one."""
 
 
 class Tool:
@@ -41,6 +42,7 @@ class Tool:
         identity = np.eye(len(arm.joints))[:, [arm.driven_indices[joint] for joint in moving]]
         turned = np.array(self._geometry.turns(list(identity)))
         self._rows = np.flatnonzero(np.any(turned != 0.0, axis=1))
+        self._slides = {row for row, _ in self._geometry.slides}
         self.turns = turned[self._rows]
         """Turn of each moving row per turn of each joint: (R, J)."""
 
@@ -62,6 +64,10 @@ class Tool:
         axes, slopes = [], []
         for row in self._rows:
             axis = np.radians(1.0) * np.stack(chained[row].z, axis=-1)
+            if row in self._slides:
+                axes.append(np.zeros_like(axis))
+                slopes.append(SLIDE_MM * axis)
+                continue
             axes.append(axis)
             slopes.append(np.cross(axis, position - np.stack(chained[row].origin, axis=-1)))
         return np.array(axes), np.array(slopes)
@@ -70,7 +76,7 @@ class Tool:
         """First and second derivatives of the position, each (P, 3), for angles (P, J) with derivatives
         ``rate``, ``bend``.
 
-        A turning row also turns the axes of the rows after it.
+        A turning row also turns the axes of the rows after it, a sliding one does not.
         """
         chained = self._frames(angles_deg)
         axes, slopes = self._by_row(chained, np.stack(chained[-1].origin, axis=-1))
@@ -101,6 +107,15 @@ class Tool:
 
     @property
     def reach_mm(self) -> Array:
-        """Largest distance of the tool from the axis of each moving row: (R,)."""
-        lengths = np.abs(self._geometry.a) + np.abs(self._geometry.d)
-        return np.asarray(np.cumsum(lengths[::-1])[::-1][self._rows] + self._geometry.tool_length)
+        """Largest distance of the tool from the axis of each moving row: (R,).
+
+        Bound of the column of the Jacobian of each row, per radian. A turn of one changes the column of another by the
+        reach of the outer of the two at most; to hold for an outer row that slides, whose column is SLIDE_MM long, that
+        of the rows inside of it is no smaller.
+        """
+        lengths = np.abs(self._geometry.a) + np.array(self._geometry.lengths)
+        reach = np.cumsum(lengths[::-1])[::-1] + self._geometry.tool_length
+        for row in self._slides:
+            reach[row] = SLIDE_MM
+            reach[:row] = np.maximum(reach[:row], SLIDE_MM)
+        return np.asarray(reach[self._rows])

@@ -14,7 +14,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.progress import Progress, part
 from armtempo.kinematics.chain import all_angles_deg
-from armtempo.kinematics.dynamics import joint_torques
+from armtempo.kinematics.dynamics import joint_torques, per_rad
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, Limits
@@ -102,7 +102,7 @@ def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
     """The torques of a motion, None for an arm without ``dynamics``.
 
     At the motor: the joint's torque from inverse dynamics and friction (of coupled joints: the sum that does the same
-    work), divided by the gear ratio, plus the rotor's inertia.
+    work), divided by the gear ratio, plus the rotor's inertia. A force along a sliding joint: that of its lead.
     """
     if not any(joint.dynamics for joint in arm.joints):
         return None
@@ -113,9 +113,9 @@ def of_motion(arm: Arm, trajectory: Trajectory) -> MotorTorques | None:
     rates, changes = np.zeros_like(angles), np.zeros_like(angles)
     for order, each in enumerate((rates, changes), 1):
         each[:, indices] = np.radians(trajectory(times, order))
-    gear = np.array([joint.motor.gear_ratio for joint in driven])
+    gear = np.array([joint.motor.reduction for joint in driven])
     rotor = np.array([joint.model.rotor_inertia_kg_m2 for joint in driven])
-    at_joint = joint_torques(arm, angles, rates, changes)[:, indices]
+    at_joint = (joint_torques(arm, angles, rates, changes) * per_rad(arm))[:, indices]
     gears = arm.transmission
     needed = gears.motor_loads(at_joint) / gear + rotor * gear * gears.motors_deg(changes[:, indices])
     speeds = gear * gears.motors_deg(rates[:, indices])

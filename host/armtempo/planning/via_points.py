@@ -84,7 +84,14 @@ class _Setup:
         low, high = np.radians(ends).T
         solver = PoseSolver(arm)
         driven = np.array([joint.motor is not None for joint in arm.joints])
-        return cls(arm, solver, Ranges(low, high), np.array(solver.home_rad), driven, not solver.refusals)
+        return cls(
+            arm,
+            solver,
+            Ranges(low, high, solver.ranges.slides),
+            np.array(solver.home_rad),
+            driven,
+            not solver.refusals,
+        )
 
     def moved(self, angles: Array) -> Array:
         """The posture with the driven joints at ``angles`` and the others at their home angles."""
@@ -195,8 +202,9 @@ def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
     """All joints, the driven ones at the angles of a via point."""
     if len(via) != setup.driven.sum():
         raise InputError(
-            f"{where}: {len(via)} angles, but {setup.driven.sum()} joints have a motor",
-            "give one angle for each of them",
+            f"{where}: {len(via)} {'positions' if setup.arm.slides else 'angles'}, but {setup.driven.sum()} joints "
+            "have a motor",
+            f"give one {'position' if setup.arm.slides else 'angle'} for each of them",
         )
     posture = setup.home.copy()
     posture[setup.driven] = np.radians(via)
@@ -209,7 +217,8 @@ def _solve(
     """All that the pose asks for, (joints,) in rad; the choice only if it came of the closed form."""
     if not setup.closed_form or target.fixed != WHOLE:
         return _searched(setup, target, previous, where), None
-    choice = choose(setup.solver.geometry, target.matrix, setup.ranges, previous)
+    geometry = setup.solver.geometry.holding(previous.tolist())
+    choice = choose(geometry, target.matrix, setup.ranges, previous)
     usable = [candidate for candidate in choice.candidates if candidate.usable]
     if not usable:
         return _searched(setup, target, previous, where, choice), None
@@ -236,8 +245,9 @@ def _searched(
 def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Array:
     if len(posture_deg) != len(setup.home):
         raise InputError(
-            f"{where}: posture_deg has {len(posture_deg)} angles, not {len(setup.home)}",
-            "give one angle for each joint of the arm",
+            f"{where}: {setup.arm.list_key('posture_deg')} has {len(posture_deg)} "
+            f"{'positions' if setup.arm.slides else 'angles'}, not {len(setup.home)}",
+            f"give one {'position' if setup.arm.slides else 'angle'} for each joint of the arm",
         )
     return np.radians(posture_deg)
 
@@ -259,7 +269,7 @@ def _miss_note(setup: _Setup, target: Pose, needed: Array, number: int) -> list[
 
 def _needs(setup: _Setup, needed: Array) -> str:
     return ", ".join(
-        f"{joint.name} at {angle:.4g} deg (stays at {joint.home_deg:g})"
+        f"{joint.name} at {angle:.4g} {joint.unit.name} (stays at {joint.home_deg:g})"
         for joint, angle in zip(setup.arm.joints, np.degrees(needed), strict=True)
         if joint.motor is None and abs(angle - joint.home_deg) > STAYS_DEG
     )
@@ -267,7 +277,7 @@ def _needs(setup: _Setup, needed: Array) -> str:
 
 def _branch(setup: _Setup, posture: Array, before: Branch | None) -> Branch:
     """The branch at a via point; if the arm is between two, it still counts as on the one before."""
-    here = branch_of(setup.solver.geometry, posture)
+    here = branch_of(setup.solver.geometry.holding(posture.tolist()), posture)
     return here.after(before) if before else here
 
 

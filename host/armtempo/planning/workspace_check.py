@@ -22,6 +22,7 @@ from armtempo.kinematics.chain import all_angles_deg, outline_mm
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import SLIDE_MM
 from armtempo.model.workspace import KeepOut, Workspace
 from armtempo.planning.capsules import box_distance, segment_distance
 from armtempo.splines import extremes
@@ -113,14 +114,18 @@ class Bodies:
 
     @cached_property
     def turned(self) -> Array:
-        """Largest turn of each row per degree of each driven joint: (joints, J)."""
+        """Largest turn of each row per degree of each driven joint, or of sliding by its mm: (joints, J)."""
         identity = np.eye(len(self.arm.joints))[:, list(self.arm.driven_indices)]
         return np.asarray(np.abs(np.array(Geometry.of(self.arm).turns(list(identity)))))
 
     @cached_property
     def reach_mm(self) -> Array:
-        """Largest distance of a segment from the axis of a row, (S, joints); 0 if the row does not move it."""
-        lengths = np.array([(abs(joint.d_mm), abs(joint.a_mm)) for joint in self.arm.joints]).ravel()
+        """Largest distance of a segment from the axis of a row, (S, joints); 0 if the row does not move it.
+
+        It bounds how far a radian of the row moves the segment; a sliding row moves the end of its own d too.
+        """
+        geometry = Geometry.of(self.arm)
+        lengths = np.stack([geometry.lengths, np.abs(geometry.a)], axis=1).ravel()
         lengths = np.append(lengths, [self.arm.tool.length_mm] if self.arm.tool else [])
         lengths = np.append(lengths, np.linalg.norm(self.load_ends_mm, axis=1).max(initial=0.0))[
             : len(self.names)
@@ -130,6 +135,8 @@ class Bodies:
             for row in range(len(self.arm.joints)):
                 if segment > 2 * row:  # the d of a row is on its axis
                     found[segment, row] = lengths[2 * row + 1 : segment + 1].sum()
+        for row, _ in geometry.slides:
+            found[2 * row :, row] = SLIDE_MM
         return found
 
     @cached_property
@@ -184,7 +191,8 @@ class Bodies:
         found = [float(self.reach_mm[segment] @ rows) for segment in self.moves for _ in self.obstacles]
         for one, other in self.pairs:  # relative to the first segment, only rows after it move the other
             after = np.arange(len(rows)) >= one // 2 + one % 2
-            found.append(float(self.reach_mm[other, after] @ rows[after]))
+            reach_mm = self.reach_mm[other, after] + self.reach_mm[one, after]  # the d of a sliding row grows
+            found.append(float(reach_mm @ rows[after]))
         return np.array(found)
 
 
@@ -292,7 +300,7 @@ def tell_start(arm: Arm, driven_deg: Iterable[float]) -> None:
 def check(arm: Arm, trajectory: Trajectory, outwards: bool = False) -> None:
     """Raise PlanError if a motion leaves the workspace, with objects and time; ``outwards``: see ``first_touch``."""
     if touch := touch_of(arm, trajectory, None, outwards):
-        raise _refused(trajectory, touch, f"at {touch.time_s:.2f} s")
+        raise _refused(arm, trajectory, touch, f"at {touch.time_s:.2f} s")
 
 
 def check_plan(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array, outwards: bool) -> None:
@@ -305,10 +313,10 @@ def check_plan(arm: Arm, trajectory: Trajectory, speeds_deg_s: Array, outwards: 
     if len(via_times_s) > 2 and touch.time_s > 0.0:
         after = int(np.clip(np.searchsorted(via_times_s, touch.time_s), 1, len(via_times_s) - 1))
         place += f", between P{after - 1} and P{after}"
-    raise _refused(trajectory, touch, place)
+    raise _refused(arm, trajectory, touch, place)
 
 
-def _refused(trajectory: Trajectory, touch: Touch, place: str) -> PlanError:
+def _refused(arm: Arm, trajectory: Trajectory, touch: Touch, place: str) -> PlanError:
     if touch.time_s == 0.0:
         return PlanError(
             f"{trajectory.name}: {touch.description} where it starts",
@@ -316,5 +324,6 @@ def _refused(trajectory: Trajectory, touch: Touch, place: str) -> PlanError:
         )
     return PlanError(
         f"{trajectory.name}: {touch.description} ({place})",
-        "add or move a via point, take another branch with posture_deg, or correct [workspace] in the arm file",
+        f"add or move a via point, take another branch with {arm.list_key('posture_deg')}, or correct [workspace] in "
+        "the arm file",
     )

@@ -166,7 +166,7 @@ def _draw_capsules(axis: Axes, arm: Arm, seen: tuple[int, int]) -> None:
 def _joint(axis: Axes, arm: Arm, index: int, size: float) -> None:
     joint, home = arm.joints[index], np.array(arm.all_home_deg)
     before = all_frames(Geometry.of(arm), np.radians(home).tolist())[index]
-    view = _view(before[:3, 2])
+    view = _view(before[:3, 0 if joint.slides else 2])  # a sliding joint from the side
     low, high = joint.range_deg
     for angle, colour in ((low, LOW), (high, HIGH), (joint.home_deg, HOME)):
         angles = home.copy()
@@ -178,7 +178,8 @@ def _joint(axis: Axes, arm: Arm, index: int, size: float) -> None:
     axis.plot(*(view @ before[:3, 3]), "o", markersize=11, markerfacecolor="none", color=HOME)
     if abs(before[2, 2]) < 1e-6:
         axis.axhline(0.0, color=GROUND, linewidth=0.8, zorder=0)
-    _frame(axis, f"{joint.name}: {low:g}° to {high:g}°, home {joint.home_deg:g}°")
+    sign = joint.unit.sign
+    _frame(axis, f"{joint.name}: {low:g}{sign} to {high:g}{sign}, home {joint.home_deg:g}{sign}")
 
 
 def _view(direction: Array) -> Array:
@@ -222,5 +223,6 @@ def _explain(figure: Figure, arm: Arm) -> None:
     )
     figure.legend(handles=lines, loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle(
-        f"{arm.name}: each joint seen along its axis, the others at their home angles; lengths in mm"
+        f"{arm.name}: each joint seen along its axis{', sliding ones from the side' if arm.slides else ''}, "
+        "the others at their home angles; lengths in mm"
     )

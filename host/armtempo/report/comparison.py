@@ -11,6 +11,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import RunFolderError
+from armtempo.model.joint_unit import heads
 from armtempo.report import analysis, drawing, html_page, plots
 from armtempo.report.evaluation import Evaluation, LegEvaluation, evaluate
 
@@ -68,7 +69,9 @@ def render(found: dict[str, Evaluation], complaints: Sequence[str]) -> str:
     for joint in range(max((len(leg.names) for leg in legs.values()), default=0)):
         name, caption = f"joint-{joint + 1}", f"Joint {joint + 1}: mean angle, speed, acceleration and error."
         sheet.heading(f"Joint {joint + 1}")
-        sheet.figure(drawing.inline_svg(plots.overlay(_of_joint(legs, joint)), name, caption), caption)
+        units = [leg.units[joint] for leg in legs.values() if joint < len(leg.units)]
+        drawn = plots.overlay(_of_joint(legs, joint), units[0])
+        sheet.figure(drawing.inline_svg(drawn, name, caption), caption)
     return sheet.render()
 
 
@@ -102,7 +105,9 @@ def _table(sheet: html_page.Page, found: dict[str, LegEvaluation]) -> None:
                     *(html_page.number(1000 * lags[end, joint], "+.0f") for end in (0, 1)),
                 ]
             )
-    sheet.table(tuple(_COLUMNS), rows, "The mean of the repetitions against the plan", _COLUMNS)
+    units = dict.fromkeys(unit for evaluation in found.values() for unit in evaluation.units)
+    columns = heads(_COLUMNS, units)
+    sheet.table(tuple(columns), rows, "The mean of the repetitions against the plan", columns)
 
 
 def _of_joint(found: dict[str, LegEvaluation], joint: int) -> dict[str, tuple[Array, Array, Array]]:

@@ -11,6 +11,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import JointUnit
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.report import analysis, peaks, replayed, run_reader
@@ -49,7 +50,13 @@ class LegEvaluation:
 
     @property
     def names(self) -> list[str]:
-        return [joint.name for joint in self.joints]
+        """Of the driven joints, of sliding ones with the unit."""
+        return [joint.unit.labelled(joint.name) for joint in self.joints]
+
+    @property
+    def units(self) -> list[JointUnit]:
+        """Of the driven joints."""
+        return [joint.unit for joint in self.joints]
 
     @property
     def limits(self) -> list[Limits]:

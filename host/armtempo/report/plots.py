@@ -13,6 +13,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import MissingPackageError
 from armtempo.basics.text import visible
+from armtempo.model.joint_unit import DEG, JointUnit
 from armtempo.model.parts import Limits
 from armtempo.planning.torque import MotorTorques
 from armtempo.report import replayed
@@ -64,7 +65,9 @@ def _joint_figure(rows: int, names: Sequence[str], height: float) -> tuple[Figur
     return figure, axes
 
 
-def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
+def motion(
+    trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str], units: Sequence[JointUnit] = ()
+) -> Figure:
     """Angle, speed, acceleration and jerk of every joint, with ``limits`` unless empty (Figs. 5 and 7)."""
     figure, axes = _joint_figure(4, names, 8.0)
     times = np.linspace(0.0, trajectory.duration_s, _POINTS)
@@ -74,11 +77,17 @@ def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str
             axis.plot(times, values[:, joint], color=COLOURS[joint % len(COLOURS)])
             if limits:
                 _mark_limits(axis, limits[joint], order)
-    _label(axes, _LABELS)
+    _label(axes, _LABELS, units)
     return figure
 
 
-def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
+def tracking(
+    found: Curves,
+    trajectory: Trajectory,
+    limits: Sequence[Limits],
+    names: Sequence[str],
+    units: Sequence[JointUnit] = (),
+) -> Figure:
     """Measured mean and its standard error as a band, with theory (Figs. 11 and 12), and the planned jerk.
 
     For a joint without an encoder the command; ``limits`` may be empty.
@@ -101,7 +110,7 @@ def tracking(found: Curves, trajectory: Trajectory, limits: Sequence[Limits], na
                 _mark_limits(axis, limits[joint], order)
     for axis in axes[0]:
         axis.legend(frameon=False)
-    _label(axes, _LABELS)
+    _label(axes, _LABELS, units)
     return figure
 
 
@@ -112,7 +121,7 @@ def _draw_mean(axis: Axes, found: Curves, order: int, joint: int) -> None:
     axis.plot(found.times_s, mean, color=colour, label="measured" if found.measured[joint] else "commanded")
 
 
-def errors(found: Curves, names: Sequence[str]) -> Figure:
+def errors(found: Curves, names: Sequence[str], units: Sequence[JointUnit] = ()) -> Figure:
     """Measured, or else commanded, minus planned angle of every repetition, and their mean."""
     figure, axes = _joint_figure(1, names, 2.6)
     for joint, axis in enumerate(axes[0]):
@@ -120,7 +129,7 @@ def errors(found: Curves, names: Sequence[str]) -> Figure:
         for run in found.each[:, 0, :, joint]:
             axis.plot(found.times_s, run - found.theory[0, :, joint], color=colour, alpha=0.3, linewidth=0.8)
         axis.plot(found.times_s, found.mean[0, :, joint] - found.theory[0, :, joint], color=colour)
-    _label(axes, ("error (°)",))
+    _label(axes, ("error (°)",), units)
     return figure
 
 
@@ -142,7 +151,7 @@ def torque(found: MotorTorques, enough: float) -> Figure:
     return figure
 
 
-def overlay(runs: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
+def overlay(runs: Mapping[str, tuple[Array, Array, Array]], unit: JointUnit = DEG) -> Figure:
     """One joint of several runs: times (K,), mean angle, speed and acceleration (3, K), angle error (K,)."""
     figure, axes = new_figure(4, 1, 4.8, 8.0, share=True)
     for index, (name, (times, mean, error)) in enumerate(runs.items()):
@@ -150,7 +159,7 @@ def overlay(runs: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
             axis.plot(times, values, color=COLOURS[index % len(COLOURS)], label=_shown(name))
     axes[0][0].legend(frameon=False)
     axes[-1][0].set_xlabel("time (s)")
-    _label(axes, (*_LABELS[:3], "error (°)"))
+    _label(axes, (*_LABELS[:3], "error (°)"), (unit,))
     return figure
 
 
@@ -184,11 +193,16 @@ def _mark_limits(axis: Axes, limits: Limits, order: int) -> None:
         axis.axhline(value, color=LIMIT_COLOUR, linestyle="--", linewidth=0.8)
 
 
-def _label(axes: Any, labels: Sequence[str]) -> None:
-    """The labels beside the rows; small numbers get a common power of ten, as they would be longer than the margin."""
+def _label(axes: Any, labels: Sequence[str], units: Sequence[JointUnit]) -> None:
+    """The labels beside the rows; small numbers get a common power of ten, as they would be longer than the margin.
+
+    ``units``: of the columns; (): all in degrees.
+    """
     for row, label in zip(axes, labels, strict=False):
-        for axis in row:
-            axis.set_ylabel(label)
+        for axis, unit in zip(row, units or (DEG,) * len(row), strict=True):
+            axis.set_ylabel(
+                label if unit is DEG else label.replace("angle", "position").replace("°", unit.name)
+            )
             axis.ticklabel_format(axis="y", scilimits=(-2, 6))
             theme(axis)
 

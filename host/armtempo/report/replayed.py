@@ -13,6 +13,7 @@ from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.encoding import decode
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import DEG, JointUnit
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.report import run_folder
@@ -73,6 +74,8 @@ class JointResult:
     """Final angle from the encoder; without one, from the steps."""
     error_deg: float
     """``angle_deg`` minus the end of the trajectory."""
+    unit: JointUnit = DEG
+    """Of both."""
 
 
 def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
@@ -87,7 +90,11 @@ def results(run: RunData, trajectory: Trajectory) -> tuple[JointResult, ...]:
     start_steps = gears.whole_steps(start_deg)
     return tuple(
         JointResult(
-            scale.name, steps[joint] - start_steps[joint], float(angle_deg), float(angle_deg - end_deg[joint])
+            scale.name,
+            steps[joint] - start_steps[joint],
+            float(angle_deg),
+            float(angle_deg - end_deg[joint]),
+            scale.unit,
         )
         for joint, (scale, angle_deg) in enumerate(zip(run.joints, angles_deg, strict=True))
     )

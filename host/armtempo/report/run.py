@@ -130,7 +130,7 @@ class Run:
         Fields: ``repetition`` (from 1), ``run`` (the board's number of the motion's run), ``row`` (from 0; -1 if it
         was not reported), ``index`` of the sample in its motion's run (from 0), ``time_s`` by the board's motion
         clock and ``path_s`` in the motion's own time; and for each driven joint, (J,): ``commanded_steps``,
-        ``commanded_deg``, and ``angle_deg`` from the encoder (NaN without an encoder).
+        ``commanded_deg``, and ``angle_deg`` from the encoder (NaN without an encoder), of a sliding joint both in mm.
         """
         joints = len(self._content.joints)
         whole = ("repetition", "run", "row", "index")

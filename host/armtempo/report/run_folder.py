@@ -38,6 +38,7 @@ from armtempo.basics.installation import installed_version
 from armtempo.link.board_messages import Positions, RowBegun, Sample, SequenceState
 from armtempo.link.follow import Gap
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import DEG, PRISMATIC, REVOLUTE, JointUnit, of_type
 from armtempo.model.transmission import Transmission
 
 FORMAT = "armtempo run"
@@ -98,18 +99,44 @@ class JointScale:
     counts_per_deg: float
     coupling: tuple[float, ...] = ()
     """Of a motor that other joints turn too: its angle by those of all joints."""
+    type: str = REVOLUTE
+    """Of ``joint_unit.TYPES``; the scales of a sliding joint are per mm."""
+
+    @property
+    def unit(self) -> JointUnit:
+        """Of its position."""
+        return of_type(self.type)
+
+    @property
+    def measured_column(self) -> str:
+        """What its column of positions by the encoders is called, after its number."""
+        return "angle_deg" if self.unit is DEG else "position_mm"
+
+    @property
+    def commanded_column(self) -> str:
+        """The same of its commanded positions."""
+        return f"commanded_{self.unit.name}"
 
     @property
     def values(self) -> dict[str, Any]:
         """The entry of run.json."""
-        return {name: value for name, value in vars(self).items() if name != "coupling" or value}
+        found = {name: value for name, value in vars(self).items() if name != "coupling" or value}
+        if self.unit is DEG:
+            del found["type"]
+        return found
 
 
 def scales(arm: Arm) -> tuple[JointScale, ...]:
     """The scales of an arm's driven joints."""
     rows = arm.coupling or [()] * len(arm.driven)
     return tuple(
-        JointScale(joint.name, joint.motor.steps_per_deg, joint.counts_per_deg, tuple(row))
+        JointScale(
+            joint.name,
+            joint.motor.steps_per_deg,
+            joint.counts_per_deg,
+            tuple(row),
+            PRISMATIC if joint.slides else REVOLUTE,
+        )
         for joint, row in zip(arm.driven, rows, strict=True)
     )
 
@@ -134,20 +161,20 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
     measured = transmission(joints).measured
     for number, (joint, seen) in enumerate(zip(joints, measured, strict=True), start=1):
         same = (
-            "angle of the joint by the steps of all motors"
+            f"{'angle' if joint.unit is DEG else 'position'} of the joint by the steps of all motors"
             if joint.coupling
-            else "the same in degrees of the joint"
+            else f"the same in {joint.unit.word} of the joint"
         )
         of_motor = " of its motor" if joint.coupling else ""
         found |= {
             f"j{number}_commanded_steps": f"{joint.name}: step pulses made{of_motor}, signed",
-            f"j{number}_commanded_deg": f"{joint.name}: {same}",
+            f"j{number}_{joint.commanded_column}": f"{joint.name}: {same}",
         }
         if joint.counts_per_deg:
             found[f"j{number}_counts"] = f"{joint.name}: encoder counts{of_motor}"
         if seen:
             same = same.replace("steps of all motors", "encoders of all motors")
-            found[f"j{number}_angle_deg"] = f"{joint.name}: {same}"
+            found[f"j{number}_{joint.measured_column}"] = f"{joint.name}: {same}"
     return found | {
         "run": "the board's number of the motion's run",
         "row": "number of its row in run.json, from 0; empty if the row was not reported",

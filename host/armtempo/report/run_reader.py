@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import RunFolderError
 from armtempo.basics.text import visible
 from armtempo.link.follow import Gap
+from armtempo.model.joint_unit import REVOLUTE, TYPES
 from armtempo.model.transmission import coupling_problem
 from armtempo.report.run_folder import (
     FORMAT,
@@ -219,7 +220,10 @@ def scales(meta: Mapping[str, Any]) -> tuple[JointScale, ...]:
 def _scale(joint: Mapping[str, Any]) -> JointScale:
     name = visible(str(joint["name"]))
     row = tuple(map(_finite, joint.get("coupling", ())))
-    found = JointScale(name, _finite(joint["steps_per_deg"]), _finite(joint["counts_per_deg"]), row)
+    kind = joint.get("type", REVOLUTE)
+    if kind not in TYPES:
+        raise ValueError(f"the type of {name!r} is not known")
+    found = JointScale(name, _finite(joint["steps_per_deg"]), _finite(joint["counts_per_deg"]), row, kind)
     if not found.steps_per_deg:
         raise ValueError("steps_per_deg is 0")
     return found
@@ -329,14 +333,14 @@ def _parsed(
             raise ValueError(f"column {name} has values that no run can have")
         return values
 
-    def joint_columns(name: str) -> Array:
-        found = [column(f"j{number}_{name}", _LARGEST) for number in range(1, len(joints) + 1)]
+    def joint_columns(names: Sequence[str]) -> Array:
+        found = [column(f"j{number}_{name}", _LARGEST) for number, name in enumerate(names, 1)]
         return np.array(found).reshape(len(joints), len(lines)).T
 
     angle_deg = np.full((len(lines), len(joints)), np.nan)
     for number, seen in enumerate(transmission(joints).measured):
         if seen:
-            angle_deg[:, number] = column(f"j{number + 1}_angle_deg", _LARGEST)
+            angle_deg[:, number] = column(f"j{number + 1}_{joints[number].measured_column}", _LARGEST)
     for name in {"run", "row"} - table.keys():  # a motion of version 1
         table[name] = ["0"] * len(lines)
     table["row"] = [text or str(_UNKNOWN) for text in table["row"]]
@@ -349,8 +353,8 @@ def _parsed(
         column("index", _LARGEST).astype(np.int64),
         column("time_s", _LONGEST_S),
         column("path_s" if "path_s" in table else "time_s", _LONGEST_S),
-        joint_columns("commanded_steps").astype(np.int64),
-        joint_columns("commanded_deg"),
+        joint_columns(["commanded_steps"] * len(joints)).astype(np.int64),
+        joint_columns([joint.commanded_column for joint in joints]),
         angle_deg,
         column("run", _LARGEST).astype(np.int64),
         row,

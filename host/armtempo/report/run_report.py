@@ -54,11 +54,11 @@ def figures(found: LegEvaluation) -> dict[str, tuple[Figure, str]]:
     band = " with its standard error (band)" if found.curves.measured.any() else ""
     drawn = {
         "tracking": (
-            plots.tracking(found.curves, trajectory, limits, names),
+            plots.tracking(found.curves, trajectory, limits, names, found.units),
             f"{_what_is_seen(found)} (solid){band}, the plan (dotted), limits (dashed).",
         ),
         "errors": (
-            plots.errors(found.curves, names),
+            plots.errors(found.curves, names, found.units),
             f"{_what_is_seen(found)} minus planned angle: every repetition (pale) and their mean.",
         ),
     }

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from armtempo.model.joint_unit import heads
 from armtempo.model.plan import Plan
 from armtempo.planning import checks, path_deviation
 from armtempo.report import analysis, html_page, peaks, verdict
@@ -86,7 +87,8 @@ def result(sheet: html_page.Page, found: Evaluation) -> None:
         _of_motion(sheet, found.legs[0])
     elif found.legs:
         sheet.heading("Its motions")
-        sheet.table(tuple(_LEGS), [row for leg in found.legs for row in _leg_rows(leg)], explained=_LEGS)
+        columns = heads(_LEGS, found.legs[0].units)
+        sheet.table(tuple(columns), [row for leg in found.legs for row in _leg_rows(leg)], explained=columns)
     else:
         sheet.note("No motion was recorded.")
 
@@ -170,7 +172,8 @@ def _measured(sheet: html_page.Page, found: LegEvaluation) -> None:
         for joint, name in enumerate(found.names)
         if found.curves.measured[joint]
     ]
-    sheet.table(tuple(_MEASURED), rows, "Measured against the plan: mean of the repetitions", _MEASURED)
+    columns = heads(_MEASURED, found.units)
+    sheet.table(tuple(columns), rows, "Measured against the plan: mean of the repetitions", columns)
 
 
 def _steps(sheet: html_page.Page, found: LegEvaluation) -> None:
@@ -179,20 +182,21 @@ def _steps(sheet: html_page.Page, found: LegEvaluation) -> None:
     step_deg = transmission(found.joints).step_deg
     off = np.abs(found.last.commanded_deg - found.trajectory(found.last.path_s)).max(axis=0)
     rows = [
-        [joint.name, str(end[n] - start[n]), str(made[n]), f"{step_deg[n]:.4f}", f"{off[n]:.4f}"]
-        for n, joint in enumerate(found.joints)
+        [name, str(end[n] - start[n]), str(made[n]), f"{step_deg[n]:.4f}", f"{off[n]:.4f}"]
+        for n, name in enumerate(found.names)
     ]
-    sheet.table(tuple(_STEPS), rows, "Step pulses", _STEPS)
+    columns = heads(_STEPS, found.units)
+    sheet.table(tuple(columns), rows, "Step pulses", columns)
 
 
 def _peaks(sheet: html_page.Page, found: LegEvaluation) -> None:
     seen = bool(found.curves.measured.any())
     rows: list[Sequence[object]] = []
-    for name, most, checked in zip(found.names, found.extremes, found.limit_checks, strict=True):
-        for quantity, unit, value, check in zip(
-            ("speed", "acceleration"), ("°/s", "°/s²"), most.values, checked, strict=False
+    for joint, most, checked in zip(found.joints, found.extremes, found.limit_checks, strict=True):
+        for quantity, per, value, check in zip(
+            ("speed", "acceleration"), ("/s", "/s²"), most.values, checked, strict=False
         ):
-            cells = (name, quantity, f"{value:.2f}", f"{check.limit:g} {unit}")
+            cells = (joint.name, quantity, f"{value:.2f}", f"{check.limit:g} {joint.unit.sign.strip()}{per}")
             rows.append((*cells, *_measured_peak(check)) if seen else cells)
     columns = {name: text for name, text in _PEAKS.items() if seen or name not in _MEASURED_PEAKS}
     sheet.table(tuple(columns), rows, "Peaks and their limits", columns)
@@ -207,7 +211,8 @@ def _measured_peak(check: peaks.LimitCheck) -> tuple[object, object]:
 def plan_extremes(sheet: html_page.Page, plan: Plan) -> None:
     """Motion times with their lower bounds, exact extremes with the limits, and the planner's notes."""
     rows = [_extremes_row(plan, joint) for joint in range(len(plan.extremes))]
-    sheet.table(tuple(_EXTREMES), rows, "Motion time, and largest magnitudes with their limits", _EXTREMES)
+    columns = heads(_EXTREMES, [joint.unit for joint in plan.arm.driven])
+    sheet.table(tuple(columns), rows, "Motion time, and largest magnitudes with their limits", columns)
     for note in plan.notes:
         sheet.note(f"Note: {note}")
 
@@ -254,7 +259,7 @@ def _extremes_row(plan: Plan, joint: int) -> list[str]:
     floors = [search.floor_s for search in plan.searches if joint in search.joints]
     largest = zip(plan.extremes[joint].values, limits.values, strict=True)
     return [
-        plan.arm.driven[joint].name,
+        plan.arm.driven[joint].labelled,
         f"{plan.trajectory.joints[joint].duration_s:.4f}",
         f"{floors[0]:.4f}" if floors else "–",
         *(f"{value:.3f} of {most:g}" for value, most in largest),

@@ -15,6 +15,7 @@ from armtempo.diagnosis.figures import findings as coarse_steps
 from armtempo.encoding import flash_use
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
+from armtempo.model.joint_unit import DEG, names
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, path_deviation, rest_to_rest, torque
 from armtempo.planning.free import free_plan
@@ -45,7 +46,8 @@ def lines(plan: Plan, verbose: bool = False) -> list[str]:
     """
     job = plan.job
     text = [f"{job.name}: {plan.total_s:.4f} s{_at_least(plan)}; {', '.join(_settings(plan, verbose))}"]
-    rows = [*_HEAD, *(_row(plan, joint) for joint in range(len(plan.extremes)))]
+    units = tuple(text.replace("deg", plan.arm.units) for text in _HEAD[1])
+    rows = [_HEAD[0], units, *(_row(plan, joint) for joint in range(len(plan.extremes)))]
     text += aligned([row[:1] + row[3:] for row in rows] if plan.trajectory.shared else rows, _widths(plan))
     text += _faster(plan)
     if job.timing == "per-joint" and len(plan.searches) > 1:
@@ -83,9 +85,17 @@ def torque_lines(motions: Iterable[tuple[Arm, Trajectory]]) -> list[str]:
 
 def result_lines(results: Iterable[JointResult]) -> list[str]:
     """Lines on a run: each joint's steps, final angle and its error."""
-    rows = [["joint", "steps sent", "angle", "error"], ["", "net", "deg", "deg"]]
+    results = list(results)
+    unit = names(joint.unit for joint in results)
+    what = "angle" if unit == DEG.name else "position"
+    rows = [["joint", "steps sent", what, "error"], ["", "net", unit, unit]]
     rows += [
-        [joint.name, str(joint.steps_sent), f"{joint.angle_deg:.3f}", f"{joint.error_deg:+.4f}"]
+        [
+            joint.unit.labelled(joint.name),
+            str(joint.steps_sent),
+            f"{joint.angle_deg:.3f}",
+            f"{joint.error_deg:+.4f}",
+        ]
         for joint in results
     ]
     return aligned(rows, _RESULT_WIDTHS)
@@ -142,7 +152,7 @@ def _row(plan: Plan, joint: int) -> tuple[str, ...]:
     bounds = [f"{search.floor_s:.4f}" for search in plan.searches if joint in search.joints]
     pairs = zip(plan.extremes[joint].values, limits.values, strict=True)
     reached = [f"{value:.2f} / {limit:g}" for value, limit in pairs]
-    return plan.arm.driven[joint].name, time, (bounds or ["-"])[0], *reached
+    return plan.arm.driven[joint].labelled, time, (bounds or ["-"])[0], *reached
 
 
 def _polished(search: Search) -> str:
@@ -216,10 +226,11 @@ def values(plan: Plan) -> dict[str, Any]:
 def _joint_values(plan: Plan, joint: int) -> dict[str, Any]:
     driven = plan.arm.driven[joint]
     floors = [search.floor_s for search in plan.searches if joint in search.joints]
+    keys = [driven.unit.key(name) for name in _QUANTITIES]
     return {
         "name": driven.name,
         "duration_s": plan.trajectory.joints[joint].duration_s,
         "floor_s": floors[0] if floors else None,
-        "extremes": dict(zip(_QUANTITIES, map(float, plan.extremes[joint].values), strict=True)),
-        "limits": dict(zip(_QUANTITIES, driven.limits.values, strict=True)),
+        "extremes": dict(zip(keys, map(float, plan.extremes[joint].values), strict=True)),
+        "limits": dict(zip(keys, driven.limits.values, strict=True)),
     }

@@ -9,6 +9,7 @@ import numpy as np
 from armtempo_shared.sequence import ENDINGS, STOPPED
 from numpy.typing import NDArray
 
+from armtempo.model.joint_unit import JointUnit
 from armtempo.model.steps import position, whole_cycles
 from armtempo.report import peaks, replayed
 from armtempo.report.evaluation import Evaluation, LegEvaluation
@@ -169,16 +170,18 @@ def _following(found: Evaluation) -> Iterator[VerdictItem]:
     largest = np.where(measured, most, np.nan)
     allowed = _following_errors_deg(found.legs[0])
     too_far = [
-        f"{name} was up to {off:.2f}° from the plan, {most:g}° are allowed"
-        for name, off, most in zip(names, largest, allowed, strict=True)
+        f"{joint.name} was up to {off:.2f}{joint.unit.sign} from the plan, {most:g}{joint.unit.sign} are allowed"
+        for joint, off, most in zip(found.legs[0].joints, largest, allowed, strict=True)
         if 0.0 < most < off
     ]
     yield from (VerdictItem(BAD, text) for text in too_far)
     if not too_far:
-        worst = int(np.nanargmax(largest))
-        yield VerdictItem(
-            GOOD, f"the arm followed: at most {largest[worst]:.2f}° from the plan ({names[worst]})"
-        )
+        worst: dict[JointUnit, tuple[str, float]] = {}  # degrees and mm do not compare
+        for joint, off in zip(found.legs[0].joints, largest, strict=True):
+            if off > worst.get(joint.unit, ("", -1.0))[1]:
+                worst[joint.unit] = joint.name, off
+        listed = (f"{off:.2f}{unit.sign} from the plan ({name})" for unit, (name, off) in worst.items())
+        yield VerdictItem(GOOD, f"the arm followed: at most {' and '.join(listed)}")
 
 
 def without_encoder(names: Sequence[str]) -> str:

@@ -26,9 +26,9 @@ from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardIO
 from armtempo.robot.position import ArmPosition
 from armtempo.robot.programs import Programs
+from armtempo.robot.running import LOCK_S
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import BoardStore
-from armtempo.robot.stored_motion import LOCK_S
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

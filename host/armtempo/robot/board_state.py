@@ -10,11 +10,13 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from armtempo.basics.errors import LinkError
+from armtempo.model.joint_unit import DEG, MM, JointUnit
 
 if TYPE_CHECKING:
     from armtempo.link import Client
     from armtempo.link.board_messages import Hello
     from armtempo.model.arm import Arm
+    from armtempo.model.parts import DrivenJoint
 
 
 @dataclass(frozen=True)
@@ -28,11 +30,30 @@ class JointState:
     steps: int
     """Steps commanded, of its own motor."""
     angle_deg: float | None
-    """The commanded angle; None if the arm is not known."""
+    """The commanded angle; None if the arm is not known, or the joint slides."""
     counts: int
     """Encoder counts; 0 without an encoder. Of a coupled joint: of its own motor."""
     encoder_deg: float | None
-    """The angle by the encoders; None without one, or if the arm is not known."""
+    """The angle by the encoders; None without one, or if the arm is not known, or the joint slides."""
+    position_mm: float | None = None
+    """Of a sliding joint: the commanded position; None if the arm is not known."""
+    encoder_mm: float | None = None
+    """Of a sliding joint: the position by the encoders; None without one."""
+
+    @property
+    def position(self) -> float | None:
+        """The commanded position in its unit; None if the arm is not known."""
+        return self.angle_deg if self.position_mm is None else self.position_mm
+
+    @property
+    def by_encoder(self) -> float | None:
+        """The same by the encoders; None without one too."""
+        return self.encoder_deg if self.encoder_mm is None else self.encoder_mm
+
+    @property
+    def unit(self) -> JointUnit:
+        """Of both."""
+        return DEG if self.position_mm is None else MM
 
 
 @dataclass(frozen=True)
@@ -111,14 +132,19 @@ class BoardState:
     """Of a virtual board: how often each sector of its flash was erased; a chip's is good for 10 000."""
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
-        return asdict(self)
+        """Plain values; of each joint only those in its unit."""
+        found = asdict(self)
+        for joint in found["joints"]:
+            turns = joint["position_mm"] is None
+            for key in ("position_mm", "encoder_mm") if turns else ("angle_deg", "encoder_deg"):
+                del joint[key]
+        return found
 
     @classmethod
     def of_json(cls, values: Mapping[str, Any]) -> BoardState:
         """The state from ``to_json``; raises LinkError if another version of armtempo wrote it."""
         try:
-            joints = tuple(JointState(**joint) for joint in values["joints"])
+            joints = tuple(JointState(**{**_IN_MM, **joint}) for joint in values["joints"])
             stand = SequenceStand(**values["sequence"]) if values["sequence"] else None
             tool = ToolPlace(*map(tuple, values["tool"].values())) if values["tool"] else None
             return cls(**{**values, "joints": joints, "sequence": stand, "tool": tool})
@@ -140,8 +166,7 @@ class BoardState:
                 joint,
                 name=driven.name,
                 known=known[number],
-                angle_deg=angles[number],
-                encoder_deg=measured[number] if gears.measured[number] else None,
+                **_of_unit(driven, angles[number], measured[number] if gears.measured[number] else None),
             )
             for number, (joint, driven) in enumerate(zip(self.joints, arm.driven, strict=True))
         )
@@ -149,11 +174,26 @@ class BoardState:
         return replace(self, arm=arm.name, arm_source=arm.source, joints=joints, tool=tool)
 
 
+_IN_MM: dict[str, None] = {"angle_deg": None, "encoder_deg": None}
+"""What ``to_json`` leaves out of a sliding joint."""
+
+
+def _of_unit(joint: DrivenJoint, at: float, measured: float | None) -> dict[str, Any]:
+    """The fields of a joint's positions."""
+    return dict(
+        zip(
+            ("position_mm", "encoder_mm") if joint.slides else ("angle_deg", "encoder_deg"),
+            (at, measured),
+            strict=True,
+        )
+    )
+
+
 def _tool(arm: Arm, joints: tuple[JointState, ...]) -> ToolPlace:
     from armtempo.kinematics.of_arm import forward
     from armtempo.model.pose import to_rpy_deg
 
-    pose = forward(arm, [joint.angle_deg or 0.0 for joint in joints])
+    pose = forward(arm, [joint.position or 0.0 for joint in joints])
     x, y, z = (round(float(value), 3) + 0.0 for value in pose[:3, 3])
     roll, pitch, yaw = (round(value, 3) + 0.0 for value in to_rpy_deg(pose))
     return ToolPlace((x, y, z), (roll, pitch, yaw))
@@ -163,7 +203,7 @@ def read(client: Client, port: str) -> BoardState:
     """The board's present state, in steps and counts."""
     from armtempo.encoding.engine_heap import EngineHeap
     from armtempo.link.program_version import own_crc
-    from armtempo.robot.stored_motion import fault_name
+    from armtempo.robot.running import fault_name
 
     info, status = client.info, client.status()
     pairs = zip(status.positions.commanded_steps, status.positions.counts, strict=True)

@@ -23,8 +23,8 @@ from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.planning import point_to_point, via_points, workspace_check
 from armtempo.ports.names import is_sim
 from armtempo.robot import arm_state
+from armtempo.robot.running import SampleSink, put_once, raise_fault, replay
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import SampleSink, put_once, raise_fault, replay
 from armtempo.splines.trajectory import Trajectory
 
 Where = Plan | SequencePlan | Encoded | Path | str | ArrayLike

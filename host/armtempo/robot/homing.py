@@ -23,15 +23,15 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
+from armtempo.robot.running import put_once, raise_fault, replay
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import put_once, raise_fault, replay
 
 HomingProgress = Callable[[str, int, int], object]
 """Called with what happens now or was seen, by joint; how many joints are at home, and how many are homed."""
 FAST, SLOW = 0.2, 0.04
 """Fractions of the joint's limits in the first and in the second approach."""
 BACK_DEG = 3.0
-"""Distance by which a joint backs off from its switch."""
+"""Distance by which a joint backs off from its switch; here and below in mm of a sliding one."""
 MARGIN_DEG = 5.0
 """How far beyond its range and its switch's angle a joint goes on for it: it may have stood beyond the other end."""
 MOST_PRESSED_DEG = 12.0
@@ -83,7 +83,9 @@ def home_to_switches(
         of = f"arm {arm.name!r}" if joint is None else arm.driven[joint].name
         raise InputError(
             f"{of} has no limit switch whose angle is known",
-            "give low_deg or high_deg in a joint's [switches], or home by hand",
+            "give low_deg or high_deg (of a sliding joint low_mm or high_mm) in a joint's [switches], or home by hand"
+            if arm.slides
+            else "give low_deg or high_deg in a joint's [switches], or home by hand",
         )
     told = _Told(progress, sum(map(len, groups)))
     found_deg: dict[int, float] = {}
@@ -162,7 +164,10 @@ class _GroupHoming:
         self.told(f"{self._names(whole)}: on the way to the switch")
         gone_deg = self._approach(whole, FAST)
         for index, distance_deg in gone_deg.items():
-            self.told(f"{self._names([index])}: switch seen after {distance_deg:.1f}°; once more, slowly")
+            sign = self.arm.driven[index].unit.sign
+            self.told(
+                f"{self._names([index])}: switch seen after {distance_deg:.1f}{sign}; once more, slowly"
+            )
         self._approach_again()
         away_deg = {index: BACK_DEG + switch.outside_deg for index, switch in self.switches.items()}
         self._leave(away_deg)
@@ -188,8 +193,8 @@ class _GroupHoming:
                 left[index] += BACK_DEG - distance_deg
                 if distance_deg > 1.5 * BACK_DEG:
                     raise LinkError(
-                        f"{self.arm.driven[index].name}: its limit switch tripped {distance_deg:.2f} degrees after it "
-                        f"had been left by {BACK_DEG:g}",
+                        f"{self.arm.driven[index].name}: its limit switch tripped {distance_deg:.2f} "
+                        f"{self.arm.driven[index].unit.word} after it had been left by {BACK_DEG:g}",
                         "check its wiring and that it sits firmly",
                     )
                 if distance_deg < 0.5 * BACK_DEG:
@@ -200,8 +205,8 @@ class _GroupHoming:
     def _fail_pressed(self, stuck: list[int]) -> None:
         levels = ", ".join(f'active = "{self.arm.driven[index].switches.active}"' for index in stuck)
         raise LinkError(
-            f"{self._names(stuck)}: its limit switch is still pressed {MOST_PRESSED_DEG:g} degrees away from where it "
-            "tripped",
+            f"{self._names(stuck)}: its limit switch is still pressed {MOST_PRESSED_DEG:g} "
+            f"{self.arm.driven[stuck[0]].unit.word} away from where it tripped",
             f"its level is probably inverted: the arm file has {levels}; or it is stuck, or wired to another pin",
         )
 
@@ -219,8 +224,8 @@ class _GroupHoming:
                 del left[tripped]
             elif missed:
                 raise LinkError(
-                    f"{self._names(missed)}: no limit switch tripped within {distances_deg[missed[0]]:.0f} degrees, "
-                    "its range and a margin",
+                    f"{self._names(missed)}: no limit switch tripped within {distances_deg[missed[0]]:.0f} "
+                    f"{self.arm.driven[missed[0]].unit.word}, its range and a margin",
                     "check its wiring, its pin and its level ('active') in the arm file, and where the joint stands",
                 )
             elif max(moved.values()) <= _TOLERANCE_DEG:
@@ -265,7 +270,7 @@ class _GroupHoming:
         if stopped:
             raise LinkError(
                 f"{self._names(stopped)}: a switch tripped on the way to its home posture",
-                "check home_deg and the switches in the arm file",
+                f"check {self.arm.driven[stopped[0]].unit.key('home_deg')} and the switches in the arm file",
             )
 
     def _names(self, joints: Iterable[int]) -> str:

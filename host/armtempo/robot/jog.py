@@ -22,7 +22,7 @@ from armtempo.link.session import OnLoss
 from armtempo.model.arm import Arm
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMotion, JogMove
-from armtempo.robot import arm_state, goto, stored_motion
+from armtempo.robot import arm_state, goto, running
 from armtempo.robot.stop_request import StopRequest
 
 NAME = "jog"
@@ -50,7 +50,7 @@ def plan(client: Client, arm: Arm, move: JogMove, speed: float = jog_motion.SPEE
 
 
 def distance_deg(here_deg: Array, arm: Arm, joint: int | str, to_deg: float) -> float:
-    """The distance of a joint from an angle; 0 for less than half a step. Raises InputError for an unknown joint."""
+    """The distance of a joint from a position; 0 for less than half a step. Raises InputError for an unknown joint."""
     number = jog_motion.number_of_joint(arm, joint)
     found = to_deg - float(here_deg[number])
     return found if abs(found) * arm.driven[number].steps_per_deg >= 0.5 else 0.0
@@ -99,7 +99,7 @@ class HeldJog:
         client = self._client
         client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
-        key = stored_motion.put_once(client, encoded.data)
+        key = running.put_once(client, encoded.data)
         with ExitStack() as ends:
             # Nothing holds the jog while a broken port is waited for
             ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
@@ -201,11 +201,11 @@ class HeldJog:
 
     def _rest(self) -> None:
         client = self._client
-        stored_motion.send_stop(client)
-        limit_s = client.session.clock() + rest_s(self.motion, stopped=True) + stored_motion.BRAKE_S
+        running.send_stop(client)
+        limit_s = client.session.clock() + rest_s(self.motion, stopped=True) + running.BRAKE_S
         while (status := client.status()).moving:
             if client.session.clock() > limit_s:
-                stored_motion.stop(client, now=True)
+                running.stop(client, now=True)
             self._take(client.session.poll(HOLD_S))
         while client.session.events:
             self._take(client.session.events.popleft())

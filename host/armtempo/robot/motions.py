@@ -21,10 +21,10 @@ from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import via_points
-from armtempo.planning.jog.jog_motion import SPEED, move_of
+from armtempo.planning.jog.jog_motion import SPEED, by_of_joint, move_of, number_of_joint
 from armtempo.report.run import Run
 from armtempo.report.run_folder import RunFolder
-from armtempo.robot import arm_state, goto, jog, recording, sequence_run, stored_motion
+from armtempo.robot import arm_state, goto, jog, recording, running
 from armtempo.robot.by_hand import HandGuided
 from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
@@ -87,11 +87,12 @@ class Motions:
     ) -> Array:
         """Move a joint or the tool: ``joint=2, by_deg=-5``, ``axis="z", by_mm=10``, or ``axis="z", by_deg=5``.
 
-        ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of the base, "tool-x", … of the tool or
-        "tray-x", … of a frame of the arm: the tool moves along it by ``by_mm``, or turns about it by
-        ``by_deg``; ``speed``: fraction of the speed limits, 0.01 to 1. The jog ends early at the end of a range,
-        or if the tool cannot continue along the line (``last_jog_ends`` says why). Returns the posture in degrees,
-        (J,). Raises LinkError if the position is unknown, InputError if no motion in that direction is possible.
+        A sliding joint: ``joint="lift", by_mm=10``. ``joint``: number (from 1) or name; ``axis``: "x", "y", "z" of
+        the base, "tool-x", … of the tool or "tray-x", … of a frame of the arm: the tool moves along it by ``by_mm``,
+        or turns about it by ``by_deg``; ``speed``: fraction of the speed limits, 0.01 to 1. The jog ends early at the
+        end of a range, or if the tool cannot continue along the line (``last_jog_ends`` says why). Returns the
+        posture in degrees and mm, (J,). Raises LinkError if the position is unknown, InputError if no motion in that
+        direction is possible.
         """
         arm = self._board.known_arm()
         move = move_of(arm, joint, axis, by_deg, by_mm)
@@ -101,14 +102,30 @@ class Motions:
         return self._posture_deg()
 
     def jog_to(
-        self, joint: int | str, angle_deg: float, speed: float = SPEED, stop: StopRequest | None = None
+        self,
+        joint: int | str,
+        angle_deg: float | None = None,
+        speed: float = SPEED,
+        stop: StopRequest | None = None,
+        *,
+        position_mm: float | None = None,
     ) -> Array:
-        """Move a joint to an angle; nothing moves if it is there. The rest as in ``jog``."""
+        """Move a joint to an angle, or a sliding one to ``position_mm``; nothing moves if it is there. The rest as in
+        ``jog``."""
         arm = self._board.known_arm()
+        number = number_of_joint(arm, joint)
+        to, other = (angle_deg, position_mm)[:: -1 if arm.driven[number].slides else 1]
+        if to is None or other is not None:
+            name, unit = arm.driven[number].name, arm.driven[number].unit
+            raise InputError(
+                f"{name} moves to a position in {unit.word}",
+                f"give {'position_mm' if arm.driven[number].slides else 'angle_deg'} alone",
+            )
         self._board.start.home_virtual_arm(arm)
-        by_deg = jog.distance_deg(self._posture_deg(), arm, joint, angle_deg)
-        if by_deg:
-            return self.jog(joint, by_deg, speed=speed, stop=stop)
+        distance = jog.distance_deg(self._posture_deg(), arm, joint, to)
+        if distance:
+            by_deg, by_mm = by_of_joint(arm, joint, distance)
+            return self.jog(joint, by_deg, by_mm=by_mm, speed=speed, stop=stop)
         self.last_jog_ends = ""
         return self._posture_deg()
 
@@ -127,8 +144,10 @@ class Motions:
         """
         arm = self._board.known_arm()
         by = math.copysign(math.inf, direction)
-        along = None if turn or joint is not None else by
-        move = move_of(arm, joint, axis, None if along else by, along)
+        by_deg, by_mm = (by, None) if turn else (None, by)
+        if joint is not None:
+            by_deg, by_mm = by_of_joint(arm, joint, by)
+        move = move_of(arm, joint, axis, by_deg, by_mm)
         self._board.start.home_virtual_arm(arm)
         return HeldJog(self._board.client, arm, jog.plan(self._board.client, arm, move, speed))
 
@@ -153,11 +172,11 @@ class Motions:
         """Replay a motion ``repeat`` times, 1 to 99, or run a sequence, and record it in a new run folder in ``out``.
 
         ``motion``: a plan, its file (FILE.json), or the name of a motion or sequence on the board, which is refused
-        if what it was planned with has changed since; a sequence takes neither ``repeat`` nor ``progress`` nor
-        ``watcher``. The arm must be homed and at the start; the arm of a virtual board is moved there. Between
-        repetitions it returns along the same path. The speed is that of the last ``speed`` call. ``progress`` counts
-        seconds of motion; ``watcher`` is called with folder, samples and repetitions. If the run ends early, it raises,
-        and ``last_run`` holds the recording.
+        if what it was planned with has changed since; a sequence takes neither ``repeat`` nor ``progress``. The arm
+        must be homed and at the start; the arm of a virtual board is moved there. Between repetitions it returns
+        along the same path. The speed is that of the last ``speed`` call. ``progress`` counts seconds of motion;
+        ``watcher`` is called with folder, samples and repetitions. If the run ends early, it raises, and
+        ``last_run`` holds the recording.
         Raises LinkError if the arm is not homed or not at the start, the board has another motion of this name
         (``upload`` can replace it), or is set up for another arm.
         """
@@ -168,12 +187,11 @@ class Motions:
         if isinstance(motion, SequencePlan | EncodedSequence) or (
             isinstance(motion, str) and self._is_sequence(motion)
         ):
-            if repeat != 1 or progress is not None or watcher is not None:
+            if repeat != 1 or progress is not None:
                 raise InputError(
-                    "run: a sequence takes no repeat, progress or watcher",
-                    "leave them out; its steps repeat it, 'run_sequence' takes a watcher of its states",
+                    "run: a sequence takes no repeat or progress", "leave them out; its steps repeat it"
                 )
-            self.run_sequence(motion, stop=stop, out=out)
+            self._run_sequence(motion, lambda _: None, stop, False, out, watcher or Watcher())
             return Run.load(cast(Path, self._last_folder))
         encoded = self._motion(motion)
         if isinstance(motion, str):
@@ -207,6 +225,17 @@ class Motions:
         the sequence ends as ``timed_out`` or raises BoardError, as its step says. After Stopped,
         ``client.sequence()`` has the last state.
         """
+        return self._run_sequence(sequence, watcher, stop, replace, out, Watcher())
+
+    def _run_sequence(
+        self,
+        sequence: SequencePlan | EncodedSequence | str,
+        on_state: SequenceWatcher,
+        stop: StopRequest | None,
+        replace: bool,
+        out: Path | str | None,
+        watcher: Watcher,
+    ) -> SequenceState:
         client = self._board.client
         with self._board.stoppable(stop) as wanted:
             if isinstance(sequence, str):
@@ -216,14 +245,15 @@ class Motions:
                 key = encoded.key
                 self._take_start(encoded, wanted)
             if out is None:
-                end = sequence_run.run(client, key, wanted, watcher).end
-                sequence_run.raise_failure(client, end)
+                end = running.run_sequence(client, key, wanted, on_state).end
+                running.raise_sequence_failure(client, end)
                 return end
             if isinstance(sequence, str):
                 encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
             folder = self._recorded(encoded, Path(out))
             self._last_sequence = folder.path
-            return recording.sequence(client, key, folder, wanted, watcher)
+            watcher.begin(encoded, folder)
+            return recording.sequence(client, encoded, folder, wanted, watcher, on_state)
 
     def _stored_sequence(self, name: str) -> MotionKey:
         """The key of a sequence on the board; a virtual arm is at home."""
@@ -276,7 +306,7 @@ class Motions:
         For motions that no call of this object waits for, such as one started by the button. To stop ``run``,
         give it a ``StopRequest``.
         """
-        stored_motion.stop(self._board.client, now)
+        running.stop(self._board.client, now)
 
     def request_stop(self, now: bool = False, by: str = "another thread") -> bool:
         """Stop a motion from a thread other than the one that waits for it, where Stopped is raised. Does not wait.
@@ -284,7 +314,7 @@ class Motions:
         ``by``: who asks for the stop, for messages. Returns whether something moved. Raises NoAnswerError if
         the board does not answer.
         """
-        return stored_motion.request_stop(self._board.client, self._board.stops, now, by)
+        return running.request_stop(self._board.client, self._board.stops, now, by)
 
     def speed(self, fraction: float) -> None:
         """Set the speed as a fraction of the planned speed, 0.01 to 1, for the running and all later motions.

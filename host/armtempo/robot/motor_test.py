@@ -1,4 +1,4 @@
-"""The self-test with motors: each joint moves a degree there and back, slowly; switches and E-stop are pressed.
+"""The self-test with motors: each joint moves a degree or mm there and back, slowly; switches and E-stop are pressed.
 
 It uses the usual moves of the board program, so everything that stops a motion stops these.
 """
@@ -20,7 +20,7 @@ from armtempo.diagnosis.selftest.selftest import UNIQUE_ID_DIGITS
 from armtempo.link import Client
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
-from armtempo.planning.jog.jog_motion import SLOWEST, move_of
+from armtempo.planning.jog.jog_motion import SLOWEST, by_of_joint, move_of
 from armtempo.robot import arm_state, jog
 from armtempo.robot.stop_request import StopRequest
 
@@ -42,7 +42,9 @@ _WIRING = "check its wire, its pin in the arm file, and the level at which it tr
 def question(arm: Arm, posture_deg: Array) -> str:
     """The question to confirm: lists all moves from this posture, degrees (J,)."""
     ways = zip(arm.driven, posture_deg, strict=True)
-    joints = ", ".join(f"{joint.name} by {way_deg(joint, at_deg):+.2g}°" for joint, at_deg in ways)
+    joints = ", ".join(
+        f"{joint.name} by {way_deg(joint, at_deg):+.2g}{joint.unit.sign}" for joint, at_deg in ways
+    )
     return (
         f"arm {arm.name!r}: the drivers are switched on, and these move there and back, slowly, one after the other: "
         f"{joints}. Is the arm supported and everybody clear of it?"
@@ -105,7 +107,8 @@ class MotorTest:
         self._moved(joint, 0.5 * by_deg)
         there = self._moved(joint, 0.5 * by_deg)
         way = "larger" if by_deg > 0 else "smaller"
-        is_right = self._ask(f"did {joint.name} just turn towards {way} angles?")
+        moved = f"slide towards {way} positions" if joint.slides else f"turn towards {way} angles"
+        is_right = self._ask(f"did {joint.name} just {moved}?")
         reversed_ = self._moved(joint, -0.5 * by_deg)
         back = self._moved(joint, -0.5 * by_deg)
         cure, lines = (
@@ -149,7 +152,7 @@ class MotorTest:
         )
 
     def _jog(self, joint: DrivenJoint, by_deg: float, speed: float) -> None:
-        move = move_of(self._arm, joint.name, None, by_deg, None)
+        move = move_of(self._arm, joint.name, None, *by_of_joint(self._arm, joint.name, by_deg))
         jog.step(self._client, self._arm, move, speed, self._stop)
 
     def _switches(self, joint: DrivenJoint, at_deg: float) -> None:
@@ -216,7 +219,7 @@ def judge_encoder(joint: DrivenJoint, steps: int, counts: int) -> tuple[Measurem
     due = float(joint.counts_per_step * steps)
     allowed = _NOISE_COUNTS + _RATIO_OFF * abs(due)
     off_deg = abs(counts - due) / joint.counts_per_deg
-    measured = f"{counts} counts for {steps} steps, {off_deg:.2f}° off"
+    measured = f"{counts} counts for {steps} steps, {off_deg:.2f}{joint.unit.sign} off"
     expected = f"{due:.0f} counts, within {allowed:.0f}"
     if abs(counts - due) <= allowed:
         return Measurement(PART, what, measured, expected, Level.GOOD), []
@@ -238,26 +241,26 @@ def judge_backlash(
     with the play taken up. Both ends of a move are counts that may be off by one. None if the encoder does not count.
     """
     what, within_deg = f"{joint.name}: backlash", _NOISE_COUNTS / joint.counts_per_deg
-    seen, whole = abs(reversed_.counts), abs(further.counts)
+    seen, whole, sign = abs(reversed_.counts), abs(further.counts), joint.unit.sign
     lost_deg, crossed_deg = (whole - seen) / joint.counts_per_deg, joint.motor.backlash_deg
     if whole <= _NOISE_COUNTS:
         return None, []
     if abs(lost_deg) <= within_deg or (lost_deg < 0.0 and not crossed_deg):
-        beside = f" beside the {crossed_deg:g}° that its motor crosses" if crossed_deg else ""
-        measured = f"none that its encoder shows{beside}, less than {within_deg:.2g}°"
+        beside = f" beside the {crossed_deg:g}{sign} that its motor crosses" if crossed_deg else ""
+        measured = f"none that its encoder shows{beside}, less than {within_deg:.2g}{sign}"
         return Measurement(PART, what, measured), []
     if seen <= _NOISE_COUNTS:
         size_deg = abs(reversed_.steps) / joint.steps_per_deg
-        measured = f"it did not move in the first {size_deg:.2g}° after it was reversed"
+        measured = f"it did not move in the first {size_deg:.2g}{sign} after it was reversed"
         cure = "look for a loose coupling, belt or set screw; its encoder was not checked"
-        return judged(PART, what, measured, f"less than {size_deg:.2g}°", False, cure), []
+        return judged(PART, what, measured, f"less than {size_deg:.2g}{sign}", False, cure), []
     whole_deg = max(crossed_deg + lost_deg, 0.0)
-    measured = f"{whole_deg:.2g}° within {within_deg:.2g}°, of the joint against its motor"
+    measured = f"{whole_deg:.2g}{sign} within {within_deg:.2g}{sign}, of the joint against its motor"
     if crossed_deg:
-        measured += f", which crosses {crossed_deg:g}°"
+        measured += f", which crosses {crossed_deg:g}{sign}"
     return Measurement(PART, what, measured), [
-        f"motor: backlash_deg = {whole_deg:.2g} or so, which its motor then crosses at each reversal; for the virtual "
-        "arm the same in model"
+        f"motor: {joint.unit.key('backlash_deg')} = {whole_deg:.2g} or so, which its motor then crosses at each "
+        "reversal; for the virtual arm the same in model"
     ]
 
 
@@ -271,7 +274,8 @@ def _corrections(joint: DrivenJoint, due: float, counts: int) -> Iterator[str]:
     ratio = abs(counts / due)
     if abs(abs(counts) - abs(due)) > _NOISE_COUNTS + _RATIO_OFF * abs(due):
         per_rev = round(joint.encoder.counts_per_rev * ratio)
+        lead = "mm_per_rev" if joint.slides else "gear_ratio"
         yield (
-            f"encoder: counts_per_rev = {per_rev} or so; or the motor's microsteps or gear_ratio, as it moved "
+            f"encoder: counts_per_rev = {per_rev} or so; or the motor's microsteps or {lead}, as it moved "
             f"{ratio:.2g} times as far"
         )

@@ -17,7 +17,7 @@ from armtempo.link.follow import Followed, SequenceWatcher
 from armtempo.model.arm import Arm
 from armtempo.model.job import is_name
 from armtempo.model.user_program import UserProgram
-from armtempo.robot import sequence_run
+from armtempo.robot import running
 from armtempo.robot.connection import Connection
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import store
@@ -132,6 +132,6 @@ class Programs:
                 if isinstance(event, Notice):
                     listener(event.text)
 
-            end = sequence_run.run(client, key, wanted, watcher, take, program=True).end
-            sequence_run.raise_failure(client, end, program=True)
+            end = running.run_sequence(client, key, wanted, watcher, take, program=True).end
+            running.raise_sequence_failure(client, end, program=True)
             return end

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import chain
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from armtempo_shared.sequence import MOVE
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_motion
-from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
 from armtempo.link.board_messages import RowBegun, Sample, SequenceState
@@ -21,10 +22,10 @@ from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequenceRow
 from armtempo.report import run_folder
 from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder, RunRow
-from armtempo.robot import sequence_run
+from armtempo.robot import running
 from armtempo.robot.goto import move_once
+from armtempo.robot.running import fault_name, raise_fault, readable, replay
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import fault_name, raise_fault, readable, replay
 
 _END_S = 1e-3
 """A run that ended earlier than its motion by more than this was stopped."""
@@ -33,11 +34,11 @@ _END_S = 1e-3
 class Watcher:
     """Callbacks during a run; override those that you need."""
 
-    def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
-        """The run folder was made, and the arm is at the start of the motion."""
+    def begin(self, motion: Encoded, folder: RunFolder) -> None:
+        """The run folder was made, and the arm is at the start of the motion or sequence."""
 
     def on_sample(self, sample: Sample, duration_s: float) -> None:
-        """A sample of a motion of ``duration_s`` has arrived."""
+        """A sample of a motion of ``duration_s`` has arrived; NaN for a motion of a sequence that was not reported."""
 
     def end(self, repetition: Repetition) -> None:
         """A repetition has ended, also by a stop or a fault."""
@@ -52,7 +53,7 @@ class ProgressWatcher(Watcher):
         self._inner = inner
         self._ended = 0
 
-    def begin(self, motion: EncodedMotion, folder: RunFolder) -> None:
+    def begin(self, motion: Encoded, folder: RunFolder) -> None:
         self._inner.begin(motion, folder)
 
     def on_sample(self, sample: Sample, duration_s: float) -> None:
@@ -89,12 +90,18 @@ def _row(row: SequenceRow) -> RunRow:
 
 
 def sequence(
-    client: Client, key: MotionKey, folder: RunFolder, stop: StopRequest, watcher: SequenceWatcher
+    client: Client,
+    encoded: Encoded,
+    folder: RunFolder,
+    stop: StopRequest,
+    watcher: Watcher,
+    on_state: SequenceWatcher,
 ) -> SequenceState:
     """Run a stored sequence, and record its rows and samples in the run folder; returns its last state.
 
     Raises BoardError if a fault ends it, or the board refuses one of its motions.
     """
+    legs_s = [math.nan, *(motion.trajectory.duration_s for motion in encoded.motions)]
     clock = client.session.clock
     begun_s = clock()
     row_of_run: dict[int, int] = {}  # of each run that was reported and may have more samples
@@ -106,16 +113,19 @@ def sequence(
                 if event.row < len(folder.rows) and folder.rows[event.row].leg:
                     row_of_run[event.run] = event.row
             elif isinstance(event, Sample):
-                file.append(event, row_of_run.get(event.run))
+                row = row_of_run.get(event.run)
+                file.append(event, row)
+                watcher.on_sample(event, legs_s[0 if row is None else folder.rows[row].leg])
                 for run in [run for run in row_of_run if run < event.run]:
                     del row_of_run[run]
 
-        followed = sequence_run.run(client, key, stop, watcher, take)
+        followed = running.run_sequence(client, encoded.key, stop, on_state, take)
         end = followed.end
         file.repetition.end_rows(
             end, fault_name(end.code), client.counters(), clock() - begun_s, followed.lost
         )
-        sequence_run.raise_failure(client, end)
+        watcher.end(file.repetition)
+        running.raise_sequence_failure(client, end)
     return end
 
 

@@ -22,9 +22,9 @@ from armtempo.ports import claim, names
 from armtempo.ports.messages import TOPICS, Message
 from armtempo.ports.server import Server
 from armtempo.robot.board_state import BoardState
+from armtempo.robot.running import LOCK_S, fault_name, request_stop
 from armtempo.robot.speed import change_speed
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.stored_motion import LOCK_S, fault_name, request_stop
 
 EVERY_S = 0.5
 """Interval of the published states."""
@@ -161,8 +161,10 @@ def sample_json(sample: Sample, arm: Arm | None) -> dict[str, Any]:
         gears = arm.transmission
         angles = gears.angles_of_counts(counts).tolist()
         found["joints"] = [joint.name for joint in arm.driven]
-        found["commanded_deg"] = gears.angles_of_steps(steps).tolist()
-        found["angle_deg"] = [
+        if arm.slides:
+            found["units"] = [joint.unit.name for joint in arm.driven]
+        found[arm.list_key("commanded_deg")] = gears.angles_of_steps(steps).tolist()
+        found[arm.list_key("angle_deg")] = [
             angle if seen else None for angle, seen in zip(angles, gears.measured, strict=True)
         ]
     return found

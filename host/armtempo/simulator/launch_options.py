@@ -166,14 +166,15 @@ def _joint(joint: DrivenJoint) -> dict[str, Any]:
     if model.holding_torque_nm and not (model.inertia_kg_m2 or model.rotor_inertia_kg_m2):
         raise InputError(
             f"{joint.name}: model.holding_torque_nm without an inertia",
-            "give model.inertia_kg_m2 or model.rotor_inertia_kg_m2 in the arm file",
+            f"give model.{joint.unit.key('inertia_kg_m2')} or model.rotor_inertia_kg_m2 in the arm file",
         )
     return {
         "steps_per_deg": motor.steps_per_deg,
-        "gear_ratio": motor.gear_ratio,
+        "gear_ratio": motor.reduction,
+        "slides": joint.slides,
         "microsteps": motor.microsteps,
         "low_deg": joint.switches.low_deg,
         "high_deg": joint.switches.high_deg,
-        "model": asdict(model),
+        "model": asdict(model) | {"inertia_kg_m2": joint.moved_kg_m2, "gravity_torque_nm": joint.weight_nm},
         "encoder_on_motor": joint.encoder is not None and joint.encoder.on == "motor",
     }

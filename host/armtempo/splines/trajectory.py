@@ -128,7 +128,7 @@ class Trajectory:
     @property
     def duration_s(self) -> float:
         """Time at which the last joint arrives."""
-        return max(joint.duration_s for joint in self.joints)
+        return max(joint.duration_s for joint in (self.joints[:1] if self.shared else self.joints))
 
     def __call__(self, time_s: ArrayLike, order: int = 0) -> Array:
         """Like ``JointSpline.__call__``, all joints in the last axis: (..., J)."""

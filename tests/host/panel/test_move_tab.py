@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from armtempo.panel.panel_board import PanelBoard
 from armtempo.robot import homing
 
 from tests.host import arms
-from tests.host.panel.fakes import ARM, board_state, unhomed
+from tests.host.panel.fakes import ARM, board_state, press, unhomed
 from tests.host.panel.pages import pages
 
 
@@ -33,6 +34,37 @@ def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
     assert forward(ARM, found)[:3, 3] == pytest.approx(place, abs=0.1)
     with pytest.raises(PlanError):
         teaching.nearest(ARM, from_rpy((9999.0, 0.0, 0.0), (0.0, 0.0, 0.0)), here)
+    ar4 = Arm.of("ar4")
+    with pytest.raises(PlanError, match="why not") as refused:
+        teaching.nearest(ar4, from_rpy((900.0, 0.0, 474.0), (0.0, 90.0, 0.0)), np.array(ar4.home_deg))
+    assert "misses it by" in (said := words.of_error(refused.value))
+    assert said.endswith("or ask for less of its orientation")
+    assert "why not" not in said  # a table for the terminal
+
+
+def test_no_page_waits_while_a_typed_pose_is_searched_for(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    operator.live.state = board_state()
+    asked: list[threading.Thread] = []
+
+    def nearest(*_: object) -> np.ndarray:
+        asked.append(threading.current_thread())
+        return np.array([10.0, -50.0, 40.0])
+
+    monkeypatch.setattr(teaching, "nearest", nearest)
+    with pages(operator) as page:
+        page.named(words.FORM_OF_TARGET).value = "pose"
+        shown: list[object] = []
+        page.of.show_ghost = shown.append  # type: ignore[method-assign]
+        page.fire(page.named(words.SHOW), "click")
+        assert len(shown) == len(asked) == 1
+        page.named(words.ONE_CLICK).value = True
+        go = page.named(f"{words.GO}: {words.TYPED_TARGET}")
+        page.of.holds[int(go.props["data-hold"])](press(operator))
+        page.done()
+        assert len(shown) == len(asked) == 2  # where it goes is shown too
+        assert threading.main_thread() not in asked
 
 
 def test_what_the_switches_home_is_named_in_its_order() -> None:
@@ -59,9 +91,13 @@ def test_an_output_is_marked_as_the_board_says_and_set_by_a_press(
 
 
 def test_a_jog_that_is_not_possible_is_grey_with_the_reason(operator: PanelBoard) -> None:
-    operator.live.state = board_state()
+    operator.live.state = unhomed()
     with pages(operator) as page:
-        assert page.named("joint 1 +").enabled
+        plus = page.named("joint 1 +")
+        assert words.NOT_HOMED in [one.reason for one in page.of.controls if one.element is plus]
+        operator.live.state = board_state()
+        page.look()
+        assert plus.enabled
         assert page.named("⟳ x +").enabled  # what is not in view is not asked for
         page.named(words.FRAME).value = BASE
         page.look()
@@ -104,7 +140,7 @@ def test_a_typed_pose_is_in_the_chosen_frame(operator_of: Callable[[Arm], PanelB
         assert fields[:3] == pytest.approx(there[:3, 3].tolist(), abs=0.01)
         shown = [page.of.scene]
         page.of.show_ghost = shown.append  # type: ignore[method-assign, assignment]
-        page.named(words.TYPED_TARGET).value = "pose"
+        page.named(words.FORM_OF_TARGET).value = "pose"
         page.fire(page.named(words.SHOW), "click")
         np.testing.assert_allclose(shown[-1], operator.live.angles_deg, atol=0.1)
 

@@ -38,7 +38,10 @@ def tool_pose(path: Path, angles: dict[str, float], link: str = "tool") -> Array
             move = move @ about(unit, angle)
         if joint.get("name") in angles:
             axis = np.array(joint.find("axis").get("xyz").split(), float)  # type: ignore[union-attr]
-            move = move @ about(axis, angles[str(joint.get("name"))])
+            value = angles[str(joint.get("name"))]
+            slide = np.eye(4)
+            slide[:3, 3] = 1000 * value * axis / np.linalg.norm(axis)
+            move = move @ (slide if joint.get("type") == "prismatic" else about(axis, value))
         pose, link = move @ pose, joint.find("parent").get("link")  # type: ignore[union-attr, assignment]
     return pose
 

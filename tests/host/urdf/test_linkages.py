@@ -59,8 +59,11 @@ def test_other_linkages_are_refused(tmp_path: Path, master: str, factor: float) 
     ("old", "new", "said"),
     [
         (J2_LIMIT, J2_LIMIT + MIMIC.format("j1", 1, 0), "joint 'j2': it mimics 'j1'"),
-        ('name="j2" type="revolute"', 'name="j2" type="prismatic"', "joint 'j2': it slides"),
-        ('name="j3" type="revolute"', 'name="j3" type="prismatic"', "joint 'j3': it slides"),
+        (
+            'name="j2" type="revolute">',
+            'name="j2" type="prismatic">' + MIMIC.format("j1", -1, 0),
+            "joint 'j2': it mimics 'j1', and one of them slides",
+        ),
     ],
 )
 def test_joints_of_the_main_chain_are_not_taken_for_fingers(
@@ -76,6 +79,36 @@ def test_joints_of_the_main_chain_are_not_taken_for_fingers(
     assert said in result.output
 
 
+@pytest.mark.parametrize("slides", ["j1", "j2", "j3"])
+def test_a_joint_that_slides_is_in_mm(tmp_path: Path, slides: str) -> None:
+    """Its limits and speed in m, friction in N; it is not taken for a finger."""
+    urdf, out = tmp_path / "slide.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    text = text.replace(f'name="{slides}" type="revolute"', f'name="{slides}" type="prismatic"')
+    text = text.replace('<link name="tool"/>', f'<link name="tool">{INERTIAL}</link>')
+    text = text.replace("</joint>", '<dynamics friction="1.5" damping="2.5"/></joint>')
+    urdf.write_text(text)
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    content = out.read_text()
+    assert content.count("mm_per_rev = 8.0") == content.count("speed_mm_s = ") == 1
+    assert ("friction_n = 1.5" in content) == (slides == "j3")
+    out.write_text(content.replace("# motor", "motor").replace("# limits", "limits"))
+    arm = Arm.load(out)
+    (joint,) = (joint for joint in arm.driven if joint.slides)
+    assert joint.name == slides
+    assert joint.range_deg[1] == pytest.approx({"j1": 2.5, "j2": 2.0, "j3": 3.0}[slides] * 1000)
+    rng = np.random.default_rng(SEED)
+    for at in rng.uniform(-2.0, 2.0, (20, len(arm.driven))):
+        moved = [
+            1000 * value if each.slides else np.degrees(value)
+            for each, value in zip(arm.driven, at, strict=True)
+        ]
+        wanted = tool_pose(urdf, dict(zip((each.name for each in arm.driven), at, strict=True)))
+        np.testing.assert_allclose(of_arm.forward(arm, moved), wanted, atol=0.02)
+
+
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 DIFFERENTIAL = """
   <transmission name="wrist">
     <type>transmission_interface/DifferentialTransmission</type>

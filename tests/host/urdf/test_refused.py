@@ -36,7 +36,6 @@ REFUSED = [
         "does_not_fit",
         [],
         [
-            "joint 'slide': it slides",
             "joint 'copy': it mimics 'turn'",
             "joint 'float': it is free",
             "joint 'glide': it moves in a plane",

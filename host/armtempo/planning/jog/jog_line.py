@@ -19,6 +19,7 @@ from armtempo.kinematics.forward import forward
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.frame import TOOL
+from armtempo.model.joint_unit import SLIDE_MM
 from armtempo.model.tool_pose import APPROACH, BASE, PITCH, ROLL, WHOLE, YAW, Pose
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line.deviation import LineDeviation, proven
@@ -191,10 +192,18 @@ class ToolLine:
         if outside := self._outside(angles):
             return f"{outside} is at the end of its range"
         most = MOST_GAIN * (math.radians(step) if self.about else step / self.reach_mm)
-        worst = int(np.argmax(np.abs(angles - before)))
-        if abs(angles[worst] - before[worst]) > most + 1e-9:
-            return f"the posture is nearly singular: {self.arm.joints[worst].name} would turn too far"
+        moved = np.abs(angles - before) * self._parts_of_reach
+        worst = int(np.argmax(moved))
+        if moved[worst] > most + 1e-9:
+            joint = self.arm.joints[worst]
+            goes = "slide" if joint.slides else "turn"
+            return f"the posture is nearly singular: {joint.name} would {goes} too far"
         return angles
+
+    @cached_property
+    def _parts_of_reach(self) -> Array:
+        """Of each joint: how far it moves the tool for a radian of the kinematics, at most, by the reach: (joints,)."""
+        return np.array([SLIDE_MM / self.reach_mm if joint.slides else 1.0 for joint in self.arm.joints])
 
     def _outside(self, angles: Array) -> str:
         """The first joint within the margin of its range, and nearer than at the start; "" if none."""

@@ -48,10 +48,11 @@ class JogMove:
     about: bool = False
     """Turn the tool about the axis instead of moving it along."""
 
-    @property
-    def unit(self) -> str:
+    def unit(self, arm: Arm) -> str:
         """Unit of ``by``."""
-        return "deg" if self.joint is not None or self.about else "mm"
+        if self.joint is not None:
+            return arm.driven[self.joint].unit.name
+        return "deg" if self.about else "mm"
 
     def describe(self, arm: Arm) -> str:
         """Describe what moves."""
@@ -76,22 +77,37 @@ class JogMotion:
         return self.trajectory(self.trajectory.duration_s)
 
 
+def by_of_joint(arm: Arm, joint: int | str, by: float) -> tuple[float | None, float | None]:
+    """``by_deg`` and ``by_mm`` of a jog of a joint by a distance in its unit; InputError if there is no such joint."""
+    return (None, by) if arm.driven[number_of_joint(arm, joint)].slides else (by, None)
+
+
 def move_of(
     arm: Arm, joint: int | str | None, axis: str | None, by_deg: float | None, by_mm: float | None
 ) -> JogMove:
-    """A move from the arguments of ``Board.jog``: a joint by degrees, or the tool along an axis by mm or
-    about it by degrees.
+    """A move from the arguments of ``Board.jog``: a joint by degrees (a sliding one by mm), or the tool along an axis
+    by mm or about it by degrees.
 
     Raises InputError if the arguments contradict, or the arm has no such joint.
     """
     given = [by for by in (by_deg, by_mm) if by is not None]
-    if (joint is None) == (axis is None) or len(given) != 1 or (joint is not None and by_deg is None):
+    number = None if joint is None or len(given) != 1 else number_of_joint(arm, joint)
+    slides = number is not None and arm.driven[number].slides
+    if (
+        (joint is None) == (axis is None)
+        or len(given) != 1
+        or (number is not None and not slides and by_deg is None)
+    ):
         raise InputError(
             "a jog moves a joint by degrees, or the tool along an axis by mm or about it by degrees",
             "give joint and by_deg, axis and by_mm, or axis and by_deg",
         )
-    if joint is not None:
-        return JogMove(given[0], joint=number_of_joint(arm, joint))
+    if number is not None:
+        if slides and by_mm is None:
+            raise InputError(
+                f"{arm.driven[number].name} slides: it moves by mm, not by degrees", "give by_mm"
+            )
+        return JogMove(given[0], joint=number)
     return JogMove(given[0], axis=axis or "", about=by_deg is not None)
 
 
@@ -198,8 +214,10 @@ def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
     inside = math.floor(edge * scale + 1e-9) / scale if by > 0 else math.ceil(edge * scale - 1e-9) / scale
     end = max(inside, here) if by > 0 else min(inside, here)
     if abs(end - here) * scale < _INSIDE_STEPS:
-        raise InputError(f"{joint.name} is at the end of its range, {end:g} degrees", "jog it the other way")
-    return end, f"{joint.name} is at the end of its range, {edge:g} degrees"
+        raise InputError(
+            f"{joint.name} is at the end of its range, {end:g} {joint.unit.word}", "jog it the other way"
+        )
+    return end, f"{joint.name} is at the end of its range, {edge:g} {joint.unit.word}"
 
 
 def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:

@@ -179,9 +179,9 @@ def _check_range(course: Course, distance: float, angles_deg: Array) -> None:
         if not low - 1e-6 <= angle <= high + 1e-6:
             end = low if angle < low else high
             raise PlanError(
-                f"{course.place(distance)}: {joint.name} reaches the end of its range, {end:g} degrees, so the tool "
-                "cannot follow",
-                "move the line, or give posture_deg of another branch at its start",
+                f"{course.place(distance)}: {joint.name} reaches the end of its range, {end:g} {joint.unit.word}, so "
+                "the tool cannot follow",
+                f"move the line, or give {course.arm.list_key('posture_deg')} of another branch at its start",
             )
 
 

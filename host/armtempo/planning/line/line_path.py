@@ -99,8 +99,9 @@ def _followed(arm: Arm, job: Job, leg: Leg, via_deg: Array) -> Followed:
     if off[worst] > _SAME_DEG:
         raise PlanError(
             f"{leg.name}: along the line the arm comes to P{leg.last} with {arm.driven[worst].name} at "
-            f"{found.end_deg[worst]:.4g} degrees, not {via_deg[leg.last, worst]:.4g}",
-            f"give P{leg.last} as a pose, or the angles of the branch of P{leg.first}; or leave line out",
+            f"{found.end_deg[worst]:.4g} {arm.driven[worst].unit.word}, not {via_deg[leg.last, worst]:.4g}",
+            f"give P{leg.last} as a pose, or the {'positions' if arm.slides else 'angles'} of the branch of "
+            f"P{leg.first}; or leave line out",
         )
     return found
 

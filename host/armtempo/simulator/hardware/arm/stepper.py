@@ -112,6 +112,7 @@ class Stepper(IdealMotor):
         self._pull = model["holding_torque_nm"] * per_rad / inertia
         self._damping = model["damping_nm_s"] / inertia
         self._gravity = model["gravity_torque_nm"] / gear * per_rad / inertia
+        self._slides = joint["slides"]
         self._corner = model["corner_speed_rad_s"] * per_rad
         self._play = model["backlash_deg"] * self._steps_per_deg / 2
         self._phase = model["encoder_phase_counts"]
@@ -203,8 +204,8 @@ class Stepper(IdealMotor):
 
     def _weight(self, x):
         """Acceleration of the rotor by gravity at ``x``, in steps/s²."""
-        if not self._gravity:
-            return 0.0
+        if not self._gravity or self._slides:
+            return self._gravity
         return self._gravity * cos((self._start_deg + x / self._steps_per_deg) * pi / 180)
 
     def _fade_in(self, moved):

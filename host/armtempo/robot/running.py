@@ -8,12 +8,22 @@ from typing import TypeVar
 
 from armtempo_shared import wire
 from armtempo_shared.messages import ONCE_NAME, PERMILLE
+from armtempo_shared.program import SUFFIX
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client
-from armtempo.link.board_messages import Sample
-from armtempo.link.follow import CHECK_S, Followed, Follower, MotionFollower, RunEnd
+from armtempo.link.board_messages import Sample, SequenceState
+from armtempo.link.follow import (
+    CHECK_S,
+    Followed,
+    Follower,
+    MotionFollower,
+    RunEnd,
+    SequenceFollower,
+    SequenceWatcher,
+    where,
+)
 from armtempo.link.refusal import refusal
 from armtempo.link.session import RECONNECT_S, OnLoss
 from armtempo.robot.stop_request import StopRequest
@@ -66,6 +76,26 @@ def replay(
         raise LinkError(
             f"{error.problem}; what happened after the last sample is not known", f"{error.hint}"
         ) from error
+
+
+def run_sequence(
+    client: Client,
+    key: MotionKey,
+    stop: StopRequest,
+    on_state: SequenceWatcher = lambda _: None,
+    take: Callable[[Followed], object] = lambda _: None,
+    program: bool = False,
+) -> SequenceFollower:
+    """Start a stored sequence (or ``program``) and follow it to its end; see ``follow``.
+
+    Raises BoardError if the board refuses to start.
+    """
+
+    def start() -> SequenceFollower:
+        before = client.start(key.name, key.crc).run
+        return SequenceFollower(client, key.name + SUFFIX if program else key.name, before, on_state)
+
+    return follow(client, stop, start, take)
 
 
 def follow(
@@ -195,6 +225,22 @@ def raise_fault(end: RunEnd) -> None:
     if end.fault:
         said = "".join(f"; the board says: {text.strip()}" for text in readable(end.notices))
         raise refusal(f"a fault ended the motion{said}", end.fault, end.fault_joint)
+
+
+def raise_sequence_failure(client: Client, end: SequenceState, program: bool = False) -> None:
+    """Raise BoardError if a fault ended a sequence (or ``program``), or the board refused one of its motions."""
+    what, place = ("program", f"in line {end.step}") if program else ("sequence", where(end))
+    if end.ending == "fault" and program and end.code == wire.ERROR_CODES["underrun"]:
+        raise BoardError(
+            f"the program kept the board from its work {place} or after it, so that the steps ran out; the "
+            "position is known",
+            "let it call the cell while the arm moves, such as cell.sleep(0.001); then 'armtempo clear'",
+            end.code,
+        )
+    if end.ending == "fault":
+        raise refusal(f"a fault ended the {what} {place}", end.code, client.status().fault_joint)
+    if end.ending == "refused":
+        raise refusal(f"the {what} could not continue {place}", end.code)
 
 
 def readable(notices: tuple[str, ...]) -> tuple[str, ...]:

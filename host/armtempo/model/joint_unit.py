@@ -1,0 +1,91 @@
+"""The unit of a joint: a turning joint is at an angle in degrees, a sliding one at a position in mm.
+
+The program's names say ``_deg`` of every joint's position, speed and limits; of a sliding joint these are in mm, mm/s
+and so on. Whatever a user reads or writes asks the joint's unit instead. The kinematics calculate in radians: of a
+sliding joint that is the same conversion of its mm, so that 180/pi mm are one "radian" (``SLIDE_MM``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+REVOLUTE, PRISMATIC = "revolute", "prismatic"
+TYPES = (REVOLUTE, PRISMATIC)
+SLIDE_MM = math.degrees(1.0)
+"""How far a sliding joint moves for a "radian" of the kinematics."""
+_KEYS = {
+    "friction_nm": "friction_n",
+    "viscous_nm_s": "viscous_n_s_m",
+    "gravity_torque_nm": "gravity_force_n",
+    "inertia_kg_m2": "moved_kg",
+}
+"""Keys of an arm file that are not alike but for their unit."""
+
+
+@dataclass(frozen=True)
+class JointUnit:
+    """A unit of joints."""
+
+    name: str
+    """In tables and keys, and before "/s"."""
+    word: str
+    """In sentences, after a number and a space."""
+    sign: str
+    """Right after a number."""
+
+    def key(self, name: str) -> str:
+        """The key of an arm file for a field of a joint or of a part of it, which is named for turning joints."""
+        if self is DEG:
+            return name
+        return _KEYS.get(name, name.replace("_deg", "_mm"))
+
+    def labelled(self, name: str) -> str:
+        """A joint's name where a table mixes units: with its unit if that is not degrees."""
+        return name if self is DEG else f"{name} ({self.name})"
+
+    def text(self, value: float, digits: int) -> str:
+        """A value with ``digits`` decimals, and never -0."""
+        return f"{round(value, digits) + 0.0:.{digits}f}{self.sign}"
+
+
+DEG = JointUnit("deg", "degrees", "°")
+MM = JointUnit("mm", "mm", " mm")
+
+
+def of_type(kind: str) -> JointUnit:
+    """The unit of joints of a type of TYPES."""
+    return MM if kind == PRISMATIC else DEG
+
+
+def names(units: Iterable[JointUnit]) -> str:
+    """Their names, each once, for the head of a table."""
+    return " or ".join(dict.fromkeys(unit.name for unit in units))
+
+
+def heads(texts: Mapping[str, str], units: Iterable[JointUnit]) -> dict[str, str]:
+    """Heads of a table with their meanings: for joints of other units than degrees with these instead of "°"."""
+    signs = " or ".join(dict.fromkeys(unit.sign.strip() for unit in units)) or DEG.sign
+    return {head.replace(DEG.sign, signs): text for head, text in texts.items()}
+
+
+def listed(values: Iterable[str], units: Iterable[JointUnit], gap: str = ", ") -> str:
+    """A list of positions: with one sign for all if they are angles, else each with its own."""
+    given, signs = list(values), [unit.sign for unit in units]
+    if len({*signs}) <= 1:
+        return gap.join(given) + (signs[0] if signs else "")
+    return gap.join(value + sign for value, sign in zip(given, signs, strict=True))
+
+
+NEUTRAL = {
+    "angles_deg": "joints",
+    "via_deg": "via_joints",
+    "posture_deg": "posture_joints",
+    "start_deg": "start_joints",
+    "end_deg": "end_joints",
+    "commanded_deg": "commanded_joints",
+    "angle_deg": "measured_joints",
+}
+"""Keys of lists of joint positions in files and results, and those that say nothing of the unit: each position is in
+its joint's. An arm with a sliding joint has only the latter."""
