@@ -133,6 +133,22 @@ def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     assert [text.split()[0] for text in pipe.told] == ["the", "connected"] * 2
 
 
+def test_a_sample_comes_once_though_the_board_was_silent_to_whoever_took_it(tmp_path: Path) -> None:
+    """Such as a watcher that changes the speed."""
+    pipe = Pipe(tmp_path / "flash")
+    pipe.run_samples = 30
+    board, stored = prepared(pipe)
+    silent = [NoAnswerError("the board is silent")]
+
+    def speed() -> None:
+        if silent:
+            raise silent.pop()
+
+    end, indices = replay(board, stored, speed)
+    assert indices == list(range(pipe.run_samples))
+    assert end.received == pipe.run_samples
+
+
 @pytest.mark.slow
 def test_cable_out_during_an_upload(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")

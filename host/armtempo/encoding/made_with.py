@@ -48,9 +48,10 @@ def of_plan(plan: Plan | SequencePlan) -> MadeWith:
     else:
         tools = [plan.arm.tool.name] if plan.arm.tool else []
         loads, pallets = (plan.job.holds,), ()
-    keys = [WORKSPACE, ROWS, *(f"frame {name}" for name in plan.frames), *(f"tool {name}" for name in tools)]
+    keys = [*(f"frame {name}" for name in plan.frames), *(f"tool {name}" for name in tools)]
     keys += [f"load {name}" for name in loads if name not in ("", NOTHING)]
     keys += [f"pallet {name}" for name in pallets]
+    keys += [ROWS, WORKSPACE]  # last, as its boxes may be in the frames
     return {key: _checksum(plan.arm, key) or 0 for key in dict.fromkeys(keys)}
 
 

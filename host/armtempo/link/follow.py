@@ -177,14 +177,16 @@ class Follower(ABC):
         while self._others:  # a row before the samples of its motion
             yield self._others.popleft()
         while True:
-            if self._next in self._held:
+            sample = self._held.pop(self._next, None)
+            if sample is not None:
                 self._received += 1
-                yield self._held.pop(self._next)
             elif self._next < self._oldest:
                 self._count_lost()
             else:
                 return
-            self._next += 1
+            self._next += 1  # now: whoever takes it may fail, and come back for the next one
+            if sample is not None:
+                yield sample
 
     def _count_lost(self) -> None:
         last = self._lost[-1] if self._lost else None
