@@ -310,7 +310,7 @@ def test_lists_of_positions_say_nothing_of_degrees() -> None:
     assert Job.of_table(toml_table.parse(tables, "a"), LIFT).via == ((0.0, 1.0), (150.0, 2.0))
     for text, key in ((neutral, "via_deg"), (tables, "angles_deg")):
         degrees = text.replace("via_joints", key).replace("joints", key)
-        with pytest.raises(InputError, match=f"{key}: z slide") as error:
+        with pytest.raises(InputError, match=f"{key}: z slides, so a list in degrees") as error:
             Job.of_table(toml_table.parse(degrees, "a"), LIFT)
         assert "z in mm, turn in deg" in str(error.value)
     two = Arm("two", tuple(replace(LIFT.joints[1], name=name, motor=replace(LIFT.joints[1].motor, channel=number))
@@ -324,7 +324,7 @@ def test_lists_of_positions_say_nothing_of_degrees() -> None:
         Job.of_table(toml_table.parse(neutral.replace("150.0", "250.0"), "a"), LIFT)
     posture = SMALL.replace('name = "lift"', 'name = "lift"\nposture.up = { joints = [150.0, 10.0] }')
     assert arm_of(posture).posture("up").where == (150.0, 10.0)
-    with pytest.raises(InputError, match=r"posture\.up\.angles_deg: z slide"):
+    with pytest.raises(InputError, match=r"posture\.up\.angles_deg: z slides, so"):
         arm_of(posture.replace("joints = [150", "angles_deg = [150"))
     with pytest.raises(InputError, match="corridor_deg is of arms whose joints all turn"):
         planner.plan(LIFT, Job("a", via=((0.0, 0.0), (100.0, 10.0)), corridor_deg=1.0))
