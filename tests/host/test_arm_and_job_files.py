@@ -61,6 +61,17 @@ def test_the_shipped_arm_is_the_papers() -> None:
         ("backlash_deg = 0.05", "backlash_deg = 500", ["backlash_deg = 500", "at most 90"]),
         ("home_deg = 0.0", 'type = "prismatic"', ["joint[1].range_deg is of a turning joint", "range_mm"]),
         ("home_deg = 0.0", "fixed_deg = 5", ["joint[1].motor", "leave it out: fixed_deg locks the joint"]),
+        ("home_deg = 0.0", "dynamics = { mass_kg = 1, centre_mm = [0, 0, 1e300] }", ["from -1e+06 to 1e+06"]),
+        (
+            "home_deg = 0.0",
+            "dynamics = { mass_kg = 0, inertia_kg_m2 = [1e300, 0, 0, 0, 0, 0] }",
+            ["from -10000 to 10000"],
+        ),
+        (
+            "motor = { channel = 3",
+            "# motor = { channel = 3",
+            ["joint[3].encoder = ", "give the joint a motor"],
+        ),
         ("home_deg = 0.0", "parallel_linkage = true", ["joint[1].parallel_linkage", "no joint before it"]),
         ("microsteps = 8", "microstep = 8", ["joint[2].motor.microsteps is missing"]),
         ("gear_ratio = 20.0", "gear_ratio = 20.0, wheels = 3", ["joint[2].motor.wheels: unknown key"]),
@@ -234,6 +245,7 @@ def test_what_can_be_wrong_with_a_turned_position(via: str, said: str, tmp_path:
     ("text", "said"),
     [
         ("", ["via_deg is missing", "[[via]]"]),
+        (TWO + "[[via]]\nangles_deg = [0, -60, 40]\n", ["not allowed here", "both give the via points"]),
         ("via_deg = []\n", ["via_deg = []", "at least 2 lists"]),
         ("via_deg = [[0, -60, 40]]\n", ["1 via point is not a motion", "at least 2"]),
         ("via_deg = [[0, -60, 40], [20, -75]]\n", ["via_deg P1 = [20, -75]", "list of 3 numbers"]),

@@ -30,6 +30,15 @@ def frames(data: bytes, piece: int = 0) -> list[tuple[int, int, bytes]]:
     return found
 
 
+def test_a_row_is_found_by_its_number() -> None:
+    for kind in "CAOPSTER":
+        for row in table.rows(kind):
+            assert table.row_of(kind, row[1]) == row
+    for kind, number in (("C", 0x40), ("E", 0x01), ("A", 0x7E)):
+        with pytest.raises(KeyError):
+            table.row_of(kind, number)
+
+
 def test_layout() -> None:
     """As the page describes it, byte for byte; the crc32 of "123456789" is the published check value."""
     frame = wire.frame(7, 0x21, b"ab")

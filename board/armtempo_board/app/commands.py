@@ -20,7 +20,7 @@ from armtempo_shared.messages import (
     RESUME,
     SLOWEST_PERMILLE,
 )
-from armtempo_shared.table import offset, rows
+from armtempo_shared.table import offset, row_of, rows
 from micropython import const
 
 from armtempo_board import features, step_rates
@@ -116,11 +116,11 @@ class Commands:
         """The row of a command; the last one is kept, as an upload asks for the same again and again."""
         if self._last[_NUMBER] != number:
             gc.collect()  # what is kept should lie at a low address
-            for (name, found, fields, _, tail), (_, _, values, _, _) in zip(rows("C"), rows("A")):
-                if found == number:
-                    in_store = number in _STORE or number == _DRIVERS
-                    handler = name if in_store else getattr(type(self), name, None)
-                    self._last = number, (handler, fields, values, tail)
+            name, _, fields, _, tail = row_of("C", number)
+            _, _, values, _, _ = row_of("A", number)
+            in_store = number in _STORE or number == _DRIVERS
+            handler = name if in_store else getattr(type(self), name, None)
+            self._last = number, (handler, fields, values, tail)
         return self._last[_ROW]  # type: ignore[no-any-return]
 
     def _store(self, name: str, row: tuple, length: int) -> "int | None":

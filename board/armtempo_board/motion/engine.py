@@ -168,8 +168,6 @@ class Engine:
         self._homing = homing
         self.fault_joint = NO_JOINT
         self.inputs.watch(homing or _ALL_JOINTS)
-        if not ready:
-            gc.collect()
 
     def _override(self, rate: int, motion: "MotionHead") -> "Any":
         """Check the motion; returns its time law."""

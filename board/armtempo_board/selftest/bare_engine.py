@@ -1,5 +1,6 @@
 """An engine for the board's arm without its drivers, for the parts that make steps."""
 
+import gc
 import time
 
 import stm
@@ -117,4 +118,5 @@ def load(engine: "Any", motion: bytes, start_steps: "list[int]") -> "Motion":
     engine.home((1 << len(start_steps)) - 1, start_steps)
     found = Motion(motion)
     engine.load(found)
+    gc.collect()
     return found

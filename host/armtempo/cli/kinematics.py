@@ -116,9 +116,9 @@ def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
     angles = numbers(previous, "--previous")
     if len(angles) != len(solver.home_rad):
         raise InputError(
-            f"--previous: {len(angles)} {'positions' if solver.arm.slides else 'angles'} given, the arm has "
+            f"--previous: {len(angles)} {solver.arm.position_word}s given, the arm has "
             f"{len(solver.home_rad)} joints",
-            f"give one {'position' if solver.arm.slides else 'angle'} for each joint, base first",
+            f"give one {solver.arm.position_word} for each joint, base first",
         )
     return [math.radians(angle) for angle in angles]
 

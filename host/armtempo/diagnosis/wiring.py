@@ -82,14 +82,17 @@ def _switches(joint: DrivenJoint) -> list[Finding]:
             )
         if number is not None and trip_deg is None:
             protects = "protects, but " if isinstance(number, int) else ""
-            what = "position" if joint.slides else "angle"
-            text = f"its {side} switch {protects}cannot home: its {what} is not known"
+            text = f"its {side} switch {protects}cannot home: its {joint.unit.what} is not known"
             found.append(note(joint.name, text, f"measure where it trips and give {side}_{joint.unit.name}"))
         if isinstance(number, int) and trip_deg is not None and low < trip_deg < high:
             text = f"its {side} switch trips at {trip_deg:g} {joint.unit.name}, within its range of {low:g} to {high:g}"
-            key, what = joint.unit.key("range_deg"), "position" if joint.slides else "angle"
+            key = joint.unit.key("range_deg")
             found.append(
-                warning(joint.name, text, f"narrow {key} to what the switch leaves, or correct the {what}")
+                warning(
+                    joint.name,
+                    text,
+                    f"narrow {key} to what the switch leaves, or correct the {joint.unit.what}",
+                )
             )
     return found
 

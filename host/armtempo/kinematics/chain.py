@@ -32,10 +32,9 @@ def spread_deg(arm: Arm, angles_deg: ArrayLike, what: str = "") -> Array:
     if angles.ndim and count == len(arm.driven):
         return all_angles_deg(arm, angles)
     driven = "" if len(arm.driven) == len(arm.joints) else f", of which {len(arm.driven)} have a motor"
-    lists = "positions" if arm.slides else "angles"
     raise InputError(
-        f"{what}{count} {lists} given, but arm {arm.name!r} has {len(arm.joints)} joints{driven}",
-        f"give one {lists[:-1]} for each",
+        f"{what}{count} {arm.position_word}s given, but arm {arm.name!r} has {len(arm.joints)} joints{driven}",
+        f"give one {arm.position_word} for each",
     )
 
 

@@ -116,12 +116,10 @@ def _row(angles_rad: Iterable[float]) -> str:
     return "".join(f"{angle:12.4f}" if math.isfinite(angle) else f"{'-':>12}" for angle in degrees)
 
 
-def _verdict(solution: Candidate | NumericalSolution, chosen: bool, units: Sequence[JointUnit] = ()) -> str:
+def _verdict(solution: Candidate | NumericalSolution, chosen: bool, units: Sequence[JointUnit]) -> str:
     if solution.rejections:
         return "rejected: " + "; ".join(reason.text for reason in solution.rejections)
-    distance = (
-        f"{math.degrees(solution.distance_rad):.1f} {names(units) or DEG.name} from the previous posture"
-    )
+    distance = f"{math.degrees(solution.distance_rad):.1f} {names(units)} from the previous posture"
     return f"chosen, {distance}" if chosen else f"usable, {distance}"
 
 

@@ -34,6 +34,7 @@ from armtempo.model import pallet as pallets_of
 from armtempo.model import posture as named
 from armtempo.model import tool as tool_of
 from armtempo.model.frame import ArmFrame
+from armtempo.model.joint_unit import DEG, MM
 from armtempo.model.outputs import Input, Output
 from armtempo.model.pallet import ArmPallet
 from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
@@ -336,6 +337,11 @@ class Arm:
         """The same in words: "degrees", "mm", or "degrees or mm"."""
         return " or ".join(dict.fromkeys(joint.unit.word for joint in self.table_joints))
 
+    @cached_property
+    def position_word(self) -> str:
+        """What a position of any of its joints is called: "angle", or "position" if a joint slides."""
+        return (MM if self.slides else DEG).what
+
     def list_key(self, name: str) -> str:
         """The key of a list of joint positions in files and results, by its name for arms whose joints all turn."""
         return joint_unit.NEUTRAL[name] if self.slides else name
@@ -403,8 +409,7 @@ class Arm:
         return tuple(joint.placed(float(angle)) for joint, angle in zip(self.driven, angles, strict=True))
 
     def _size_problem(self, count: int) -> str:
-        what = "positions" if self.slides else "angles"
-        return f"{count} {what}, but {len(self.driven)} joints have a motor"
+        return f"{count} {self.position_word}s, but {len(self.driven)} joints have a motor"
 
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
         """Why the driven joints cannot be at these angles; "" if they can."""

@@ -292,12 +292,17 @@ def _vias(
     default = frame.named(top, arm.frames)
     listed = arm.given_key(top, "via_deg")
     if top.has(listed) == top.has("via"):
-        raise top.fail(arm.list_key("via_deg"), "given, or else [[via]] tables, but not both")
+        if top.has("via"):
+            raise top.misplaced(
+                listed, "leave out this list, or the [[via]] tables: both give the via points"
+            )
+        what = f"a list of at least 2 lists of {arm.position_word}s"
+        raise top.fail(arm.list_key("via_deg"), f"{what}, or else [[via]] tables")
     stops: list[Stop] = []
     segments: list[ToolSegment] = []
     vias: list[tuple[float, ...] | Pose] = []
     if top.has(listed):
-        rows = top.array(listed, f"a list of at least 2 lists of {'positions' if arm.slides else 'angles'}")
+        rows = top.array(listed, f"a list of at least 2 lists of {arm.position_word}s")
         named = Table({f"{listed} P{n}": row for n, row in enumerate(rows)}, top.file)
         vias.extend(read_angles(named, f"{listed} P{n}", arm) for n in range(len(rows)))
     else:

@@ -34,6 +34,8 @@ class JointUnit:
     """In sentences, after a number and a space."""
     sign: str
     """Right after a number."""
+    what: str
+    """What a position of a joint is called."""
 
     def key(self, name: str) -> str:
         """The key of an arm file for a field of a joint or of a part of it, which is named for turning joints."""
@@ -50,8 +52,8 @@ class JointUnit:
         return f"{round(value, digits) + 0.0:.{digits}f}{self.sign}"
 
 
-DEG = JointUnit("deg", "degrees", "°")
-MM = JointUnit("mm", "mm", " mm")
+DEG = JointUnit("deg", "degrees", "°", "angle")
+MM = JointUnit("mm", "mm", " mm", "position")
 
 
 def of_type(kind: str) -> JointUnit:

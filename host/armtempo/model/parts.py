@@ -79,7 +79,6 @@ class Motor:
             **json_codec.ADDED,
         },
     )
-
     mm_per_rev: float | None = field(default=None, metadata=json_codec.ADDED)
     """Of a sliding joint: how far it moves for a turn of its screw or pulley behind the gear; None: the joint turns."""
 

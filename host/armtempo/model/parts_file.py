@@ -37,6 +37,7 @@ MAX_LENGTH_MM = 1e6
 """Longest link that an arm file may describe."""
 
 _LOCKED_DEG = 0.001
+_MOST_KG_M2 = 1e4
 _IN_UNITS = {
     "": ("range_deg", "home_deg", "fixed_deg"),
     "switches": ("low_deg", "high_deg"),
@@ -82,7 +83,7 @@ def joint(table: Table, number: int) -> Joint:
         raise table.fail("limits", f"a table with {keys[0]}, {keys[1]} and {keys[2]}")
     encoder = _encoder(table.table("encoder"), unit)
     if encoder is not None and motor is None:
-        raise table.fail("motor", "only allowed with an encoder")
+        raise table.misplaced("encoder", "give the joint a motor too, or leave it out")
     found = Joint(
         name=table.text("name", f"joint {number}"),
         d_mm=table.number("d_mm", least=-MAX_LENGTH_MM, most=MAX_LENGTH_MM),
@@ -145,12 +146,13 @@ def _range(table: Table, unit: JointUnit) -> tuple[float, float]:
 def _dynamics(table: Table | None, unit: JointUnit) -> Dynamics | None:
     if table is None:
         return None
-    centre = table.numbers("centre_mm", 3, *[] if table.peek("mass_kg") else [(0.0,) * 3])
+    needed = [] if table.peek("mass_kg") else [(0.0,) * 3]
+    centre = table.numbers("centre_mm", 3, *needed, most=MAX_LENGTH_MM)
     return toml_section.read(Dynamics, table, unit.key, centre_mm=centre, inertia_kg_m2=_inertia(table))
 
 
 def _inertia(table: Table) -> tuple[float, ...]:
-    return table.numbers("inertia_kg_m2", 6, (0.0,) * 6)
+    return table.numbers("inertia_kg_m2", 6, (0.0,) * 6, most=_MOST_KG_M2)
 
 
 def loads(top: Table) -> tuple[Load, ...]:
@@ -160,7 +162,7 @@ def loads(top: Table) -> tuple[Load, ...]:
             Load,
             table,
             name=name,
-            centre_mm=table.numbers("centre_mm", 3, (0.0,) * 3),
+            centre_mm=table.numbers("centre_mm", 3, (0.0,) * 3, most=MAX_LENGTH_MM),
             inertia_kg_m2=_inertia(table),
         )
         for name, table in outputs_file.named(top, "load")

@@ -134,7 +134,7 @@ class Plan:
         return exchange.to_csv(self.trajectory, [joint.unit for joint in self.arm.driven], rate_hz)
 
     def to_ros(self, rate_hz: float = 100.0, frame_id: str = "") -> str:
-        """A trajectory_msgs/JointTrajectory message in YAML, radians, with ``rate_hz`` points a second."""
+        """A trajectory_msgs/JointTrajectory message in YAML, radians and metres, with ``rate_hz`` points a second."""
         driven = self.arm.driven
         names, units = [joint.name for joint in driven], [joint.unit for joint in driven]
         return exchange.to_ros(self.trajectory, names, units, rate_hz, frame_id)

@@ -157,9 +157,8 @@ def _meaning(name: str, arm: Arm, where: str) -> tuple[str | int | None, str]:
 def _joint(name: str, key: str, plain: list[str], arm: Arm) -> int | None:
     """The index of the joint that a name without unit means."""
     for number, index in enumerate(arm.driven_indices, 1):
-        if (
-            name == f"j{number}_{columns(arm.joints[index].unit)[0]}"
-        ):  # as ``exchange.to_csv`` counts: the joints with a motor
+        position, *_ = columns(arm.joints[index].unit)
+        if name == f"j{number}_{position}":  # as ``exchange.to_csv`` counts: the joints with a motor
             return index
     named = [index for index, own in enumerate(plain) if key in {own + word for word in _ANGLE_WORDS}]
     if named:

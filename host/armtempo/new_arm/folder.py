@@ -143,7 +143,7 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
     if arm.arm.driven_indices:
         files["first.toml"] = _JOB.format(
-            what="position" if arm.arm.slides else "angle",
+            what=arm.arm.position_word,
             units=arm.arm.unit_words,
             key=arm.arm.list_key("via_deg"),
             rows=_rows(arm.arm),

@@ -47,13 +47,13 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
         ) from None
     if found.shape != (len(arm.driven),):
         raise InputError(
-            f"a posture of arm {arm.name!r} has {len(arm.driven)} angles, not {found.size}",
-            "give one angle for each joint with a motor",
+            f"a posture of arm {arm.name!r} has {len(arm.driven)} {arm.position_word}s, not {found.size}",
+            "give one for each joint with a motor",
         )
     found = np.array(arm.placed(found))
     for joint, angle in zip(arm.driven, found, strict=True):
         if problem := joint.range_problem(angle):
-            raise InputError(problem, f"give {'a position' if joint.slides else 'an angle'} within it")
+            raise InputError(problem, "stay within it")
     return found
 
 

@@ -65,10 +65,8 @@ def _joint_figure(rows: int, names: Sequence[str], height: float) -> tuple[Figur
     return figure, axes
 
 
-def motion(
-    trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str], units: Sequence[JointUnit] = ()
-) -> Figure:
-    """Angle, speed, acceleration and jerk of every joint, with ``limits`` unless empty (Figs. 5 and 7)."""
+def motion(trajectory: Trajectory, limits: Sequence[Limits], names: Sequence[str]) -> Figure:
+    """Angle, speed, acceleration and jerk of every joint, which turns, with ``limits`` unless empty (Figs. 5 and 7)."""
     figure, axes = _joint_figure(4, names, 8.0)
     times = np.linspace(0.0, trajectory.duration_s, _POINTS)
     for order in range(4):
@@ -77,7 +75,7 @@ def motion(
             axis.plot(times, values[:, joint], color=COLOURS[joint % len(COLOURS)])
             if limits:
                 _mark_limits(axis, limits[joint], order)
-    _label(axes, _LABELS, units)
+    _label(axes, _LABELS, ())
     return figure
 
 
@@ -201,7 +199,7 @@ def _label(axes: Any, labels: Sequence[str], units: Sequence[JointUnit]) -> None
     for row, label in zip(axes, labels, strict=False):
         for axis, unit in zip(row, units or (DEG,) * len(row), strict=True):
             axis.set_ylabel(
-                label if unit is DEG else label.replace("angle", "position").replace("°", unit.name)
+                label if unit is DEG else label.replace(DEG.what, unit.what).replace("°", unit.name)
             )
             axis.ticklabel_format(axis="y", scilimits=(-2, 6))
             theme(axis)

@@ -110,7 +110,7 @@ class JointScale:
     @property
     def measured_column(self) -> str:
         """What its column of positions by the encoders is called, after its number."""
-        return "angle_deg" if self.unit is DEG else "position_mm"
+        return f"{self.unit.what}_{self.unit.name}"
 
     @property
     def commanded_column(self) -> str:
@@ -161,7 +161,7 @@ def columns(joints: Sequence[JointScale]) -> dict[str, str]:
     measured = transmission(joints).measured
     for number, (joint, seen) in enumerate(zip(joints, measured, strict=True), start=1):
         same = (
-            f"{'angle' if joint.unit is DEG else 'position'} of the joint by the steps of all motors"
+            f"{joint.unit.what} of the joint by the steps of all motors"
             if joint.coupling
             else f"the same in {joint.unit.word} of the joint"
         )

@@ -15,7 +15,7 @@ from armtempo.diagnosis.figures import findings as coarse_steps
 from armtempo.encoding import flash_use
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
-from armtempo.model.joint_unit import DEG, names
+from armtempo.model.joint_unit import DEG, MM, names
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import checks, path_deviation, rest_to_rest, torque
 from armtempo.planning.free import free_plan
@@ -87,7 +87,7 @@ def result_lines(results: Iterable[JointResult]) -> list[str]:
     """Lines on a run: each joint's steps, final angle and its error."""
     results = list(results)
     unit = names(joint.unit for joint in results)
-    what = "angle" if unit == DEG.name else "position"
+    what = (DEG if unit == DEG.name else MM).what
     rows = [["joint", "steps sent", what, "error"], ["", "net", unit, unit]]
     rows += [
         [

@@ -113,13 +113,12 @@ class Motions:
         """Move a joint to an angle, or a sliding one to ``position_mm``; nothing moves if it is there. The rest as in
         ``jog``."""
         arm = self._board.known_arm()
-        number = number_of_joint(arm, joint)
-        to, other = (angle_deg, position_mm)[:: -1 if arm.driven[number].slides else 1]
+        moved = arm.driven[number_of_joint(arm, joint)]
+        to, other = (position_mm, angle_deg) if moved.slides else (angle_deg, position_mm)
         if to is None or other is not None:
-            name, unit = arm.driven[number].name, arm.driven[number].unit
             raise InputError(
-                f"{name} moves to a position in {unit.word}",
-                f"give {'position_mm' if arm.driven[number].slides else 'angle_deg'} alone",
+                f"{moved.name} moves to a position in {moved.unit.word}",
+                f"give {'position_mm' if moved.slides else 'angle_deg'} alone",
             )
         self._board.start.home_virtual_arm(arm)
         distance = jog.distance_deg(self._posture_deg(), arm, joint, to)

@@ -10,7 +10,7 @@ import stand_in
 from app_rig import ROOT, App, connected, flash, start, state
 from armtempo_board.link.serial_link import SerialLink
 from armtempo_board.storage import motion_file, store
-from armtempo_shared import motion, wire
+from armtempo_shared import motion, table, wire
 
 
 def case_repeated_command_acts_once():
@@ -153,6 +153,18 @@ def case_what_is_no_longer_used_counts_as_free():
         [bytearray(1000) for _ in range(500)]
         assert host.hello(session=3)[0] == "ok"
         assert app.controller.free_heap > free - 100_000, (free, app.controller.free_heap)
+
+
+def case_a_command_is_looked_up_alone():
+    """To parse the whole table takes 40 KB, for which the chip would collect its heap for 0.14 s."""
+    if hasattr(gc, "mem_alloc"):
+        gc.collect()
+        gc.disable()
+        before = gc.mem_alloc()
+        table.row_of("C", 0x21)
+        took = gc.mem_alloc() - before
+        gc.enable()
+        assert took < 4000, took
 
 
 def case_start_only_when_everything_is_valid():

@@ -1,4 +1,4 @@
-"""Users' programs on the program above the engine: what their calls do, and how they end."""
+"""Users' programs on the program above the engine: what their calls do, and which are started."""
 
 # all cases: slow on CPython
 
@@ -8,87 +8,10 @@ import sys
 import cases
 import sequence_rig
 import stand_in
-from app_rig import connected, state
+from app_rig import state
 from armtempo_shared import motion, program, sequence, wire
-from sequence_rig import ARM_CRC, LEGS, Inputs, Outputs
-
-if sys.implementation.name == "cpython":
-    import traceback
-
-    sys.print_exception = lambda error, file: traceback.print_exception(error, file=file)
-HEAD = "from armtempo_board import cell\n"
-TABLE = {
-    "file": "pick.py",
-    "limits": [[1000, 4000, 20000], [1000, 4000, 20000]],
-    "per_deg": [10.0, 20.0],
-    "postures": {"home": [0, 0], "there": [10, 10], "away": [10, 100000]},
-    "motions": {},
-    "outputs": {"gripper": [1, 0.0, 1.0, {"open": 0, "closed": 65535}]},
-    "inputs": {"part": 0},
-    "counters": ["parts"],
-    "pallets": {"tray": [2, 1, 2, {"": 0, "long": 4}], "far": [1, 1, 1, {"long": 8}]},
-    "tools": {"long": {"there": [12, 12], "away": []}},
-}
-PLACES = [[10 * number, 20, 10 * number + 1, 21] for number in range(9)]
-
-
-class World:
-    """What goes on around a program: ``script`` is called with it in each turn of the loop."""
-
-    def __init__(self, source, script=lambda world: None, legs=LEGS):
-        self.app, self.host = connected()
-        self.controller = self.app.controller
-        self.board = self.controller.board
-        self.board.outputs, self.board.inputs = Outputs(), Inputs()
-        self.script = script
-        self.turns = 0
-        for name in sorted(legs):
-            assert self.host.upload(name, legs[name])[-1][0] == "ok"
-        table = dict(TABLE)
-        table["motions"] = {name: wire.record_crc(legs[name]) for name in legs}
-        self.data = program.pack(ARM_CRC, table, HEAD + source, PLACES)
-
-    def start(self):
-        """Store it and start it: the answer."""
-        assert self.host.upload("pick", self.data)[-1][0] == "ok"
-        return self.start_stored()
-
-    def start_stored(self):
-        return self.host.ask("start", (0, wire.record_crc(self.data)), "pick")
-
-    def execute(self):
-        """As the main loop does."""
-        self.app.execute_program(self.turn)
-        self.host.turn(5)
-
-    def run(self):
-        answer = self.start()
-        assert answer[0] == "ok", answer
-        self.execute()
-        return self.stands()
-
-    def turn(self):
-        self.turns += 1
-        assert self.turns < 20000, "it does not end"
-        stand_in.Clock.now_ms += 1
-        self.script(self)
-        self.host.turn()
-
-    def stands(self):
-        kind, fields, name = self.host.ask("sequence")
-        assert kind == "ok" and name in ("pick.py", b"pick.py"), name
-        return sequence.ENDINGS[fields[0]], fields[1], fields[2]
-
-    def said(self):
-        return [tail for kind, _, tail in self.host.events if kind == "notice"]
-
-    def target(self):
-        """Where the move in memory ends, steps."""
-        move = self.board.once.motion(self.board.store)
-        points = [move.points(move.angle_offset(joint) + 8 * move.segments, 5) for joint in range(2)]
-        weights = (1, 26, 66, 26, 1)
-        sums = [sum([weight * point for weight, point in zip(weights, row)]) for row in points]
-        return [(one + (60 << 28)) // (120 << 28) for one in sums]
+from program_rig import TABLE, World
+from sequence_rig import ARM_CRC
 
 
 def arrives(world):
@@ -151,31 +74,6 @@ def case_a_program_acts_while_a_motion_runs():
     assert world.run() == ("finished", 0, 0)
     assert world.board.outputs.log == [(1, 65535)]
     assert world.turns >= 40
-
-
-def case_an_exception_brakes_and_is_a_fault_with_its_line():
-    def script(world):
-        engine = world.board.engine
-        if "brake" in engine.calls:
-            engine.finish()
-
-    world = World(
-        "def pick():\n    cell.start('there')\n    cell.active('part')\n    return 1 // 0\n\npick()\n", script
-    )
-    ending, code, line = world.run()
-    assert (ending, line) == ("fault", 5), (ending, line)
-    assert wire.ERRORS[code][0] == "program_failed" and state(world.host) == "fault"
-    (text,) = world.said()
-    assert text.startswith('  File "pick.py", line 7') and "line 5, in pick" in text, text
-    assert "ZeroDivisionError" in text and "cell.py" not in text, text
-    assert world.start_stored()[:2] == ("error", "fault_pending")
-    assert world.host.ask("clear")[0] == "ok"
-
-
-def case_a_text_just_before_an_exception_does_not_hide_it():
-    world = World("cell.sleep(0.2)\nprint('here')\n1 // 0\n")
-    assert world.run()[0] == "fault"
-    assert world.said()[0] == "here" and "ZeroDivisionError" in world.said()[1], world.said()
 
 
 def case_without_a_host_texts_take_little_time():
@@ -267,36 +165,6 @@ def case_what_is_not_possible_is_an_exception_with_words():
         assert not sequence_rig.runs(world.app) and not world.board.outputs.log
 
 
-def case_a_stop_ends_it_and_nothing_is_done_after():
-    asked = []
-
-    def script(world):
-        if world.turns == 20:
-            asked.append(world.host.ask("start", (0, 0), "there")[:2])
-            asked.append(world.host.ask("put_once", (0, 9), b"")[:2])
-            assert world.host.ask("stop", (0,))[0] == "ok"
-        if world.turns == 30:
-            world.board.engine.finish()
-
-    world = World(
-        "try:\n"
-        "    cell.start('there')\n"
-        "    while True:\n"
-        "        try:\n"
-        "            cell.active('part')\n"
-        "        except Exception:\n"
-        "            print('swallowed')\n"
-        "finally:\n"
-        "    cell.set('gripper', 'closed')\n",
-        script,
-    )
-    assert world.run()[0] == "stopped"
-    assert asked == [("error", "busy"), ("error", "busy")]
-    assert not world.said() and not world.board.outputs.log
-    assert world.turns == 30 and "brake" in world.board.engine.calls
-    assert state(world.host) == "idle"
-
-
 def case_marks_serve_a_loop_without_calls_and_tell_its_line():
     lines = []
 
@@ -367,80 +235,12 @@ def case_the_hosts_speed_is_that_of_its_motions():
     assert rates == [500, 250, 200], rates
 
 
-def case_a_fault_of_the_board_ends_it():
-    def script(world):
-        if world.turns == 10:
-            world.board.engine.fault = 40
-            world.board.engine.finish()
-
-    world = World("cell.run('there')\nprint('after')\n", script)
-    ending, code, _ = world.run()
-    assert (ending, code) == ("fault", 40) and not world.said()
-
-
-def case_nothing_of_it_acts_after_its_end():
-    world = World(
-        "import cases, sys\nsys.modules['helper'] = cases\ncases.kept = cell\n"
-        "cases.Ended = sys.modules['armtempo_board.app.cell'].Ended\n"
-    )
-    assert world.run()[0] == "finished"
-    assert "helper" not in sys.modules and cases is sys.modules["cases"]
-    assert not [name for name in sys.modules if name.endswith(("cell", "user_program", "rest_to_rest"))]
-    assert not hasattr(sys.modules["armtempo_board.app"], "cell")
-    for call in (lambda: cases.kept.goto("there"), lambda: cases.kept.set("gripper", "closed")):
-        try:
-            call()
-            raise AssertionError("it acted")
-        except cases.Ended:
-            pass
-    assert world.start_stored()[0] == "ok"  # what it needs is imported again
-    world.execute()
-    assert not sequence_rig.runs(world.app) and not world.board.outputs.log
-
-
-def case_wrong_syntax_leaves_nothing():
-    import armtempo_board
-
-    ending, _, line = World("pass\nx = = 1\n").run()
-    assert (ending, line) == ("fault", 3), (ending, line)
-    assert not hasattr(armtempo_board, "cell")
-
-
 def case_its_moves_have_memory_after_a_sequence():
     world = World("pass\n")
     world.board.once.release()
     assert world.start()[0] == "ok"
     assert len(world.board.once._data) == world.board.once.capacity
     world.execute()
-
-
-def case_a_full_heap_ends_it():
-    world = World("found = []\nwhile __at__(3):\n    found.append(bytearray(1 << 40))\n")
-    ending, _, line = world.run()
-    assert (ending, line) == ("fault", 4), (ending, line)
-    text = world.said()[0]
-    assert "MemoryError" in text or "OverflowError" in text, text
-
-
-def case_a_pass_without_memory_is_the_programs_fault():
-    """The program has filled the heap, and what the board's own work lacks is missing."""
-
-    def script(world):
-        engine = world.board.engine
-        if "brake" in engine.calls:
-            engine.finish()
-        elif world.turns == 10:
-            world.app.link.poll = full
-
-    def full():
-        del world.app.link.poll
-        raise MemoryError
-
-    world = World("cell.start('there')\nwhile True:\n    cell.moving()\n", script)
-    ending, code, line = world.run()
-    assert (ending, wire.ERRORS[code][0], line) == ("fault", "program_failed", 4), (ending, code, line)
-    assert "brake" in world.board.engine.calls and "freeze" not in world.board.engine.calls
-    assert "MemoryError" in world.said()[0]
 
 
 def case_other_programs_than_the_stored_one_are_refused():
@@ -486,17 +286,6 @@ def case_the_button_starts_it_but_not_before_homing():
     assert not world.app.events.notice and not world.said()  # nothing of it for the next host
     world.app.commands.greeted = True
     assert world.stands()[0] == "stopped" and world.turns == 30
-
-
-def case_what_a_lost_host_was_not_told_gives_way_to_the_traceback():
-    def script(world):
-        world.app.link.room = lambda size: False
-
-    world = World("print('one')\nprint('two')\n1 // 0\n", script)
-    assert world.start()[0] == "ok"
-    world.host.turn = lambda times=1: [world.app.run_once() for _ in range(times)]
-    world.execute()
-    assert b"ZeroDivisionError" in world.app.events.notice, world.app.events.notice
 
 
 cases.run(globals())
