@@ -4,11 +4,11 @@
 
 MICROPYTHON: a checkout as ``armtempo firmware`` takes it. That command builds the firmware with the program; one
 without is built next to it, and gets the compiled files that ``armtempo deploy`` copies. QEMU (7.2 or newer) runs each;
-the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board; then README's
-commands for one are run, but for those that write the flash, with encoders that are not watched. What stands
-in for timers, DMA, USB, encoders and backup SRAM (loop_board.c, firmware_loop.py, firmware_host.py of
-tests/board/scripts) is a part of both firmwares, so that it takes little of the heap; what it takes is given next to
-the chip's. FOLDER keeps what was built.
+the host reaches it over TCP, sends the arm, homes it, uploads the motion and runs it, as with any board; in the
+firmware once more with backlash. Then README's commands for one are run, but for those that write the flash, with
+encoders that are not watched. What stands in for timers, DMA, USB, encoders and backup SRAM (loop_board.c,
+firmware_loop.py, firmware_host.py of tests/board/scripts) is a part of both firmwares, so that it takes little of the
+heap; what it takes is given next to the chip's. FOLDER keeps what was built.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
 from armtempo.deploy import program_files
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encode, encoded_motion
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -39,7 +39,9 @@ from armtempo.model.parts import LimitSwitches, Safety
 from armtempo.planning import planner
 from armtempo.robot.board import Board
 from armtempo.robot.connect import connect
+from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.motion import Motion
+from numpy.typing import NDArray
 
 from tests.benchmark import firmware, loop
 from tests.board import oracle
@@ -55,6 +57,10 @@ PATIENCE_S = 300.0
 FIRST_COMPARE = 0x40000034
 """Address of TIM2's first compare register."""
 SIX_JOINTS = "ar4"
+IN_FIRMWARE = "in the firmware"
+BACKLASH_DEG = 0.3
+CROSSED_LATE_S = 0.05
+"""A crossing begins 25 ms after the loop has seen the reversal."""
 USB = 'pyb.usb_mode("VCP")'
 START = """import gc
 
@@ -186,16 +192,53 @@ def worst_edge(record: bytes, said: list[str]) -> float:
 
     ``said``: what a board with ``edges`` printed during the motion. AssertionError if there are more or fewer edges.
     """
+    motion, worst = Motion(record), 0.0
+    for joint, ticks in enumerate(rising_edges(said, motion.joints)):
+        exact = oracle.without_grazes(oracle.crossings(motion, joint), oracle.GAP_TICKS)
+        assert len(ticks) == len(exact.ticks), (joint, len(ticks), len(exact.ticks))
+        worst = max(worst, float(np.max(np.abs(_off(ticks, exact.ticks)[exact.speed > 50]))))
+    return worst
+
+
+def rising_edges(said: list[str], joints: int) -> list[NDArray[np.int32]]:
+    """Of each joint, in ticks: what a board with ``edges`` printed during a motion."""
     data = bytes.fromhex("".join(re.findall(r"@ edges (\w+)", "".join(said))))
     rows = np.frombuffer(data, dtype="<i4").reshape(-1, 2)
-    motion, worst = Motion(record), 0.0
-    for joint in range(motion.joints):
+    return [rows[rows[:, 0] == FIRST_COMPARE + 4 * joint, 1][::2] for joint in range(joints)]
+
+
+def _off(ticks: NDArray[np.int32], exact: Array) -> Array:
+    """Distance of edges from where they should be; the counter wraps."""
+    return (ticks - exact + (1 << 31)) % (1 << 32) - (1 << 31)
+
+
+def check_crossings(record: bytes, said: list[str], arm: Arm) -> str:
+    """What a joint's edges show, which reverses at most once: AssertionError unless all are those of its spline, and
+    as many more as its play has, between the reversal and the end of the crossing."""
+    motion, found = Motion(record), []
+    for joint, ticks in enumerate(rising_edges(said, motion.joints)):
         exact = oracle.without_grazes(oracle.crossings(motion, joint), oracle.GAP_TICKS)
-        ticks = rows[rows[:, 0] == FIRST_COMPARE + 4 * joint, 1]
-        assert len(ticks) == 2 * len(exact.ticks), (joint, len(ticks), len(exact.ticks))
-        error = (ticks[::2] - exact.ticks + (1 << 31)) % (1 << 32) - (1 << 31)
-        worst = max(worst, float(np.max(np.abs(error[exact.speed > 50]))))
-    return worst
+        crossing, steps = arm.crossings[joint], encode.backlash(arm)[joint]["steps"]
+        turned = [*np.flatnonzero(np.diff(exact.direction)), len(exact.ticks) - 1]
+        assert len(turned) <= 2, joint
+        assert crossing is not None
+        before = turned[0] + 1
+        crossed_ticks = exact.ticks[turned[0]] + (crossing.duration_s + CROSSED_LATE_S) * TICK_HZ
+        after = int(np.count_nonzero(exact.ticks > crossed_ticks)) if len(turned) > 1 else 0
+        assert len(ticks) == len(exact.ticks) + steps * (len(turned) - 1), (
+            joint,
+            len(ticks),
+            len(exact.ticks),
+        )
+        own = np.concatenate((ticks[:before], ticks[len(ticks) - after :]))
+        where = np.concatenate((np.arange(before), np.arange(len(exact.ticks) - after, len(exact.ticks))))
+        off = np.abs(_off(own, exact.ticks[where])[exact.speed[where] > 50])
+        assert np.max(off) < 2.0, (joint, np.max(off))
+        least_us = float(np.min(np.diff(ticks))) / TICK_HZ * 1e6
+        found.append(
+            f"joint {joint + 1} {len(ticks)}, of them {len(ticks) - len(exact.ticks)} of its play, {least_us:.0f} us"
+        )
+    return "; ".join(found)
 
 
 def unwatched(arm: Arm) -> Arm:
@@ -211,9 +254,12 @@ def unwatched(arm: Arm) -> Arm:
     return replace(arm, joints=joints, safety=Safety())
 
 
-def run(elf: Path, image: Path) -> dict[str, Heap]:
-    """Drive a board through the shipped motion by the host's own link; AssertionError if it does not end well."""
-    arm = unwatched(Arm.paper())
+def run(elf: Path, image: Path, backlash_deg: float = 0.0) -> dict[str, Heap]:
+    """Drive a board through the shipped motion by the host's own link; AssertionError if it does not end well.
+
+    ``backlash_deg``: of each joint.
+    """
+    arm = with_backlash(unwatched(Arm.paper()), backlash_deg)
     plan = planner.plan(arm, replace(Job.paper(arm), population=5, iterations=20))
     with running(elf, image) as (port, said), tempfile.TemporaryDirectory() as runs:
         with connect(port) as board:
@@ -224,9 +270,25 @@ def run(elf: Path, image: Path) -> dict[str, Heap]:
             _check_steps(board, arm, plan.trajectory(plan.total_s))
         print(f"    {plan.job.name}: {plan.total_s:.3f} s, {len(done.samples)} samples, ends where planned")
         _wait(said, "@ ended")
-        error = worst_edge(encoded_motion.of_plan(plan).data, said[before:])
-        print(f"    pulses: one for each half step that the spline passes, at most {error:.2f} ticks from it")
+        record = encoded_motion.of_plan(plan).data
+        if backlash_deg:
+            edges = check_crossings(record, said[before:], arm)
+            print(f"    pulses with {backlash_deg} deg of backlash, and the least time between two: {edges}")
+        else:
+            error = worst_edge(record, said[before:])
+            print(
+                f"    pulses: one for each half step that the spline passes, at most {error:.2f} ticks from it"
+            )
         return heaps(said)
+
+
+def with_backlash(arm: Arm, backlash_deg: float) -> Arm:
+    """The arm with this backlash of each motor."""
+    joints = [
+        replace(joint, motor=joint.motor and replace(joint.motor, backlash_deg=backlash_deg))
+        for joint in arm.joints
+    ]
+    return replace(arm, joints=tuple(joints))
 
 
 def readme(elf: Path, image: Path) -> None:
@@ -273,7 +335,7 @@ def both_ways(micropython: Path, folder: Path) -> Iterator[tuple[str, Path, Path
     """The program in the firmware, and as compiled files: a title, the firmware's ELF file, the image of its flash."""
     board = define_board(micropython, folder)
     elf = build_with_program(micropython, board, folder / "with-program")
-    yield "in the firmware", elf, flash(folder, elf, with_library=False)
+    yield IN_FIRMWARE, elf, flash(folder, elf, with_library=False)
     elf = firmware.build_at(micropython, board, folder / "stock")
     yield "files, compiled", elf, flash(folder, elf, with_library=True)
 
@@ -283,6 +345,8 @@ def main(micropython: Path, folder: Path) -> None:
     for title, elf, image in both_ways(micropython, folder):
         print(title, flush=True)
         tell(run(elf, image))
+        if title == IN_FIRMWARE:
+            tell(run(elf, image, BACKLASH_DEG))
         readme(elf, image)
         print(f"    {SIX_JOINTS}, six joints:", flush=True)
         try:

@@ -2,6 +2,7 @@
 
     python -m tests.benchmark.loop MICROPYTHON [files]
     python -m tests.benchmark.loop MICROPYTHON stops [COUNT [SEED [RATE]]]
+    python -m tests.benchmark.loop MICROPYTHON backlash
 
 MICROPYTHON as for tests/benchmark/firmware.py. The program is built into stock MicroPython for the chip, and
 that is run by QEMU, which counts instructions: so long lasts the motion's time meanwhile, so a ring that the loop comes
@@ -11,11 +12,15 @@ files; only what stands around it is built in, as its heap is not the program's.
 
 With ``stops`` it counts how a stop, a pause with its end and a change of speed end, COUNT of each at random moments of
 a motion up to the rates that hello states (or RATE, of each joint), with one to six joints.
+
+With ``backlash`` one, three and six joints reverse again and again, and cross their backlash at up to the rate that the
+host allows.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 import random
 import re
 import struct
@@ -29,12 +34,19 @@ from statistics import median
 from typing import Any
 from zlib import crc32
 
+import numpy as np
 from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
 from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo_shared import armrecord, wire
-from armtempo_shared.limits import MAX_JOINTS, MAX_STEP_RATE, MAX_STEP_RATE_SUM, TICK_HZ
+from armtempo_shared.limits import (
+    MAX_CROSSING_RATE,
+    MAX_JOINTS,
+    MAX_STEP_RATE,
+    MAX_STEP_RATE_SUM,
+    TICK_HZ,
+)
 from armtempo_shared.motion import MOST_RAMP_BITS, OTHER_ENTRIES, REST_ENTRIES
 
 from tests.benchmark import firmware
@@ -64,6 +76,8 @@ CHANGED = ((240_000, 1), (40_000, 1), (80_000, 3), (25_000, 3), (8_000, 6), (20_
 SOME_CYCLES = (1.3, 2.0, 3.0)
 SOME_CHANGES = ((BRAKE,), (0, 1000), (300, 1000))
 """At random moments."""
+CROSSED = ((60, 0.5), (1000, 1.5))
+"""Steps of backlash, and seconds to and fro: a crossing as short as a jerk, and one that lasts until the next."""
 RAMP_S, WHOLE_S = 0.5, 1.2
 MILLION = (333_000, 3, 1.0, 2.4)  # steps/s in sum; as ``cruise`` takes them
 RAMPS = (TICK_HZ // 2 >> MOST_RAMP_BITS,) * (REST_ENTRIES + OTHER_ENTRIES)
@@ -79,7 +93,7 @@ COMMANDS = 60  # status and samples in turn, one every 50 ms
 IN_FIRMWARE = {
     "engine": "armtempo_board.motion.engine",
     "matches": ("armtempo_board.hardware.isr", "matches"),
-    "set_interval": ("armtempo_board.stepgen.newton", "set_interval"),
+    "set_interval": ("armtempo_board.stepgen.interval_steps", "set_interval"),
 }
 """Where the stand-ins find what they take the place of."""
 _SHIFT = 7
@@ -104,6 +118,7 @@ class Case:
     """Pairs of other commands until the first of them."""
     every_ms: int = 50
     """Between two commands."""
+    backlash: tuple[Row, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -153,6 +168,19 @@ def cruise(
         [0] * joints,
         changes,
     )
+
+
+def reversing(rate: int, joints: int, play: int, period_s: float) -> Case:
+    """All joints alike: to and fro, three times, up to half of a rate; the other half crosses ``play`` steps."""
+    cruising = cruise(rate, joints)
+    times = np.linspace(0.0, 3.0, 25)
+    swing = rate / 2 * period_s / (2.0 * np.pi)
+    via = swing * (1.0 - np.cos(2.0 * np.pi * times))
+    motion = motions.record([via] * joints, [np.full(len(times) - 1, period_s / 8)], 5)
+    acceleration = (rate / 2) ** 2 / play
+    pace = math.ceil(TICK_HZ * math.sqrt(2.0 / acceleration) / 64)
+    backlash = ({"steps": play, "on_motor": 0, "spare": 0, "pace": pace},) * joints
+    return replace(cruising, name="reversing", motion=motion, backlash=backlash)
 
 
 def paper() -> Case:
@@ -245,7 +273,7 @@ def _write(tree: Path, case: Case, settings: dict[str, Any], as_files: bool) -> 
     """The files of the flash. Encoders stand still here, so no counts belong to a step; switches are not tripped."""
     (tree / "armtempo").mkdir(parents=True)
     rows = [{**joint, "counts_num": 0, "counts_den": 1, "limit_active_high": 1} for joint in case.rows]
-    record = armrecord.pack(case.head, rows)
+    record = armrecord.pack(case.head, rows, backlash=case.backlash)
     motion = bytearray(case.motion)
     struct.pack_into(f"<I{len(RAMPS)}H", motion, 12, wire.record_crc(record), *RAMPS)
     struct.pack_into("<I", motion, len(motion) - 4, crc32(motion[:-4]))
@@ -366,6 +394,18 @@ def count_stops(board: Board, count: int, seed: int, rate: int) -> None:
         print(f"    {cycles} cycles, joints {joints}, {each} steps/s: {ends}", flush=True)
 
 
+def cross(board: Board) -> None:
+    """Print what a turn costs in which joints cross their backlash, and how such motions end."""
+    for joints, (play, period_s) in itertools.product((1, 3, MAX_JOINTS), CROSSED):
+        case = reversing(MAX_CROSSING_RATE, joints, play, period_s)
+        print(f"joints {joints}, {play} steps, {period_s} s to and fro", flush=True)
+        for cycles in SOME_CYCLES:
+            run = board.run(case, cycles)
+            print(f"    {cycles} cycles: {_end(run)}; {_turns(run, cycles)}", flush=True)
+            if cycles == SOME_CYCLES[0]:
+                print("\n".join(describe(run)), flush=True)
+
+
 def main(micropython: Path, as_files: bool) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
@@ -418,5 +458,8 @@ if __name__ == "__main__":
         with tempfile.TemporaryDirectory() as folder:
             numbers = map(int, [*sys.argv[3:6], *("4", "1", "0")[len(sys.argv[3:6]) :]])
             count_stops(Board(Path(sys.argv[1]).resolve(), Path(folder)), *numbers)
+    elif sys.argv[2:] == ["backlash"]:
+        with tempfile.TemporaryDirectory() as folder:
+            cross(Board(Path(sys.argv[1]).resolve(), Path(folder)))
     else:
         main(Path(sys.argv[1]).resolve(), sys.argv[2:] == ["files"])

@@ -26,7 +26,7 @@ from armtempo.model.arm_json import load as load_arm
 from armtempo.model.arm_json import save as save_arm
 from armtempo.model.job import Job
 from armtempo.model.joint_trajectory import of_text
-from armtempo.model.joint_unit import PRISMATIC, SLIDE_MM
+from armtempo.model.joint_unit import PRISMATIC
 from armtempo.model.parts import Dynamics, Joint, JointModel, Limits, Motor
 from armtempo.model.plan import Plan
 from armtempo.planning import planner, point_to_point, sequence_planner, torque, via_points, workspace_check
@@ -404,14 +404,12 @@ def test_a_line_is_followed_with_a_slide() -> None:
     start, end = (20.0, 20.0, 60.0, 0.0), (90.0, 50.0, 40.0, 0.0)
     poses = [armtempo.forward(SCARA, at) for at in (start, end)]
     places = [pose[:3, 3].tolist() for pose in poses]
-    text = f'name = "a"\n[[via]]\njoints = {list(start)}\n[[via]]\nposition_mm = {places[1]}\nline = true\n'
+    line = f"position_mm = {places[1]}\nline = true\ntolerance_mm = 2"
+    text = f'name = "a"\nrefine = 1\n[[via]]\njoints = {list(start)}\n[[via]]\n{line}\n'
     plan = planner.plan(SCARA, Job.of_table(toml_table.parse(text, "a"), SCARA))
     path = armtempo.forward(SCARA, plan.trajectory(np.linspace(0.0, plan.total_s, 200)))[:, :3, 3]
     way = poses[1][:3, 3] - poses[0][:3, 3]
     way /= np.linalg.norm(way)
     off = path - poses[0][:3, 3]
-    assert np.linalg.norm(off - np.outer(off @ way, way), axis=1).max() < 0.15
-
-
-def test_slide_mm_is_a_radian_of_the_one_conversion() -> None:
-    assert math.degrees(1.0) == SLIDE_MM
+    assert np.linalg.norm(off - np.outer(off @ way, way), axis=1).max() < 2.0
+    np.testing.assert_allclose(path[-1], places[1], atol=0.1)

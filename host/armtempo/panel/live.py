@@ -160,7 +160,8 @@ class LiveArm:
         """The tool's path by the samples, if there are new ones."""
         curves = self.curves
         if self._seen != (seen := (curves.run, len(curves.time_s))) and seen[1] > 1:
-            self.run_path_mm = chains_mm(self.arm, curves.thinned(_MOST_POINTS).angle_deg)[:, -1]
+            arm = self.plan.arm if self.plan is not None else self.arm  # a job's tool is its own
+            self.run_path_mm = chains_mm(arm, curves.thinned(_MOST_POINTS).angle_deg)[:, -1]
         self._seen = seen
 
     def ask(self, board: Board) -> None:

@@ -65,6 +65,23 @@ def test_links_get_thinner_and_joints_have_housings_about_their_axes() -> None:
         assert along == pytest.approx([0, 0, 1], abs=1e-4)
 
 
+def test_a_sliding_joint_is_drawn_as_its_rail_and_has_no_dial() -> None:
+    """Along which the rest of the arm moves."""
+    arm = Arm.of("scara_z")
+    shape = ArmShape(arm)
+    low, high = (
+        np.array(shape.poses(np.array([z, 0.0, 0.0, 0.0])))[:, :3] * shape.reach_mm for z in (0.0, 150.0)
+    )
+    index, length, _ = shape.pieces[0]
+    assert (index, length * shape.reach_mm) == (0, pytest.approx(150.0))
+    assert low[0] == pytest.approx([0, 0, 75], abs=0.1)
+    assert high[0] == pytest.approx(low[0])
+    assert (high - low)[1 : len(shape.pieces)] == pytest.approx(
+        np.tile([0, 0, 150], (len(shape.pieces) - 1, 1)), abs=0.1
+    )
+    assert [any(dial) for dial in shape.dials(np.array(arm.home_deg))] == [False, True, True, True]
+
+
 def test_the_view_from_above_is_aligned_with_the_axes() -> None:
     x, y, z = arm_scene.EYES["top"]
     assert x == 0.0

@@ -65,6 +65,27 @@ def comments(text: str) -> set[str]:
     return {line.partition("#")[2].strip() for line in text.splitlines() if "#" in line}
 
 
+def test_via_points_of_an_arm_with_a_slide_are_written_without_degrees(tmp_path: Path) -> None:
+    """And an arm that only turns may have them so too: what is changed keeps its key."""
+    editor = JobEditor(Arm.load("scara_z"), tmp_path, None)
+    assert "via_joints = [" in editor.text
+    editor.set_angle(1, 0, "50")
+    editor.insert(1, [10.0, 1.0, 1.0, 1.0])
+    editor.set_key(1, "stop", "true")
+    assert editor.job().via == ((0, 0, 0, 0), (10, 1, 1, 1), (50, 0, 0, 0))
+    assert "joints = [10.0" in editor.text
+    assert "deg" not in editor.text
+    editor.set_pose(1)
+    assert editor.vias[1].form == POSE
+    file = tmp_path / "turning.toml"
+    file.write_text('name = "a"\n[[via]]\njoints = [0, -60, 40]\n[[via]]\njoints = [5, -60, 40]\n')
+    turning = JobEditor(ARM, tmp_path, file)
+    assert turning.vias[0].form == ANGLES
+    turning.set_angle(0, 0, "3")
+    assert "joints = [3, -60, 40]" in turning.text
+    assert turning.job().via[0] == (3, -60, 40)
+
+
 def test_the_files_are_the_jobs_of_the_folder(editor: JobEditor) -> None:
     assert editor.files() == ["job.toml", "rows.toml"]
     with pytest.raises(InputError, match="no such job"):

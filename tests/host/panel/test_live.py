@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo.kinematics.of_arm import forward
 from armtempo.link.board_messages import Positions, Sample
+from armtempo.model.tool import ArmTool
 from armtempo.panel import layout, problem
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.live import LiveArm
@@ -30,6 +33,19 @@ def test_curves_that_are_read_stay_whole_when_a_run_begins() -> None:
         3,
         1,
     ]
+
+
+def test_the_path_of_a_run_is_that_of_its_tool() -> None:
+    live = LiveArm(ARM)
+    tip = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 50.0), (0.0, 0.0, 0.0, 1.0))
+    live.plan = type("Plan", (), {"arm": replace(ARM, tool=ArmTool("pen", tip))})()  # type: ignore[assignment]
+    for number in range(2):
+        live.take_event(Sample(1, 0, number, number, 0, Positions((0, 0, 0), (0, 0, 0))))
+    live.draw()
+    assert live.plan is not None
+    there = forward(live.plan.arm, live.curves.angle_deg[0])[:3, 3]
+    np.testing.assert_allclose(live.run_path_mm, [there, there])
+    assert np.linalg.norm(there - forward(ARM, live.curves.angle_deg[0])[:3, 3]) == pytest.approx(50.0)
 
 
 def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: PanelBoard) -> None:

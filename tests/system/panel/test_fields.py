@@ -44,7 +44,7 @@ def refusal(folder: Path, name: str, text: str, command: str = "plan --arm arm.t
 
 @pytest.mark.parametrize(
     ("tab", "file", "button", "count"),
-    [("Job", "job.toml", "Plan", 11), ("Sequence", "all.toml", "Save", 16)],
+    [("Job", "job.toml", "Plan", 11), ("Sequence", "all.toml", "Save", 19)],
 )
 def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
     page: Any, panel: Panel, tmp_path: Path, tab: str, file: str, button: str, count: int

@@ -1,0 +1,145 @@
+"""Stands in main.py of an emulated board for the start of the program: counts instructions of what it calls.
+
+The emulator gives each instruction a nanosecond, and its TIM2 a tick of one. QEMU's timers have no phase, so a cost is
+right to the few instructions of reading one.
+"""
+
+import gc
+import os
+import sys
+import time
+from array import array
+from binascii import crc32
+
+import machine
+import micropython
+import pyb
+import stm
+from machine import mem32
+
+ROOT = "/flash/armtempo"
+BACKUP_SRAM = 0x2002F000
+"""Memory of the emulator's that the chip has not, in the place of the backup SRAM that the emulator has not."""
+RECORD_BYTES = 16384
+ROUNDS = 5
+
+began = array("i", [0])
+
+
+class Beyond:
+    """A module, and what the chip's has besides, or instead."""
+
+    def __init__(self, module, **names):
+        self._module = module
+        self._names = names
+
+    def __getattr__(self, name):
+        return self._names[name] if name in self._names else getattr(self._module, name)
+
+
+class Port:
+    """The first thing the program does with it in its loop is to read."""
+
+    RTS = CTS = 0
+
+    def init(self, flow):
+        """Flow control does not matter here."""
+
+    def readinto(self, buffer, count):
+        """The program waits for a host now."""
+        say("start", spent())
+        costs()
+        print("@ end")
+        sys.exit()
+
+
+@micropython.viper
+def begin():
+    """Count from here."""
+    ptr32(began)[0] = ptr32(1 << 30)[9]
+
+
+@micropython.viper
+def spent() -> int:
+    """Instructions since ``begin``."""
+    return ptr32(1 << 30)[9] - ptr32(began)[0]
+
+
+def say(name, cost):
+    """A line for the host."""
+    print("@ cost", name, cost)
+
+
+def nothing(*arguments):
+    """In the place of what does not matter here."""
+
+
+def least(function, *arguments):
+    """Instructions of a call, the least of some: an interrupt may come in one."""
+    found = []
+    for _ in range(ROUNDS):
+        gc.collect()
+        begin()
+        function(*arguments)
+        found.append(spent())
+    return min(found)
+
+
+def cost(name, function, *arguments):
+    """Tell what a call takes, without the call itself."""
+    say(name, least(function, *arguments) - least(nothing, *arguments))
+
+
+def opened(path):
+    """Open a file and close it."""
+    open(path, "rb").close()
+
+
+def read(path):
+    """All of a file in pieces, as the check of a record reads it."""
+    piece = memoryview(bytearray(256))
+    with open(path, "rb") as file:
+        while file.readinto(piece):
+            pass
+
+
+def costs():
+    """Of what a start calls, once the program waits for a host."""
+    from armtempo_board.storage import motion_file, store
+
+    kept = store.Store(ROOT, False)
+    for name in ("go", "large"):
+        path = "%s/%s.atm" % (ROOT, name)
+        size = os.stat(path)[6]
+        say("bytes_" + name, size)
+        cost("open_" + name, opened, path)
+        cost("read_" + name, read, path)
+        cost("check_" + name, motion_file.stated_crc, path, size)
+        cost("motion_" + name, kept.motion, name)
+    cost("kind", kept.kind, "go")
+    cost("default", kept.default)
+    cost("stat", os.stat, ROOT + "/go.atm")
+    cost("statvfs", os.statvfs, ROOT)
+    cost("listdir", os.listdir, ROOT)
+    cost("store", store.Store, ROOT)
+    cost("crc32", crc32, bytes(RECORD_BYTES // 4))
+    cost("collect", gc.collect)
+
+
+def replace():
+    """Put the port, and what the emulator has not, into place; count the start."""
+    timer = stm.TIM2
+    mem32[timer + stm.TIM_PSC] = 0
+    mem32[timer + stm.TIM_ARR] = -1
+    mem32[timer + stm.TIM_EGR] = 1
+    mem32[timer + stm.TIM_CR1] = 1
+    begin()
+    before_ms = time.ticks_ms()
+    time.sleep_ms(20)
+    a_ms = spent() // time.ticks_diff(time.ticks_ms(), before_ms)
+    say("boot", before_ms * a_ms)
+    sys.modules["pyb"] = Beyond(pyb, USB_VCP=Port)
+    sys.modules["stm"] = Beyond(stm, BKPSRAM=BACKUP_SRAM)
+    sys.modules["os"] = Beyond(os, dupterm=nothing, urandom=bytes)
+    sys.modules["machine"] = Beyond(machine, unique_id=lambda: b"123456789012")
+    begin()
