@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from armtempo.basics.errors import InputError
+
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
@@ -21,12 +23,12 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 def not_empty(ctx: click.Context, param: click.Parameter, name: str | None) -> str | None:
-    """The name that an option gives; BadParameter for "", which code takes for none.
+    """The name that an option gives; InputError for "", which code takes for none.
 
     An unset variable of a script would else go unseen.
     """
     if name is not None and not name.strip():
-        raise click.BadParameter("the name is empty; give one, or leave the option out", ctx, param)
+        raise InputError(f"{param.opts[0]}: the name is empty", "give one, or leave the option out")
     return name
 
 
