@@ -100,7 +100,7 @@ def row_of(kind: str, number: int) -> "Row":
     at = _TABLE.find(text)
     while at >= 0:
         begin = _TABLE.rfind("\n", 0, at) + 1
-        if _TABLE[begin : begin + 1] == kind:
+        if _TABLE[begin : begin + 1] == kind and _TABLE[at + 3] in " \n":  # not a field such as 'fault'
             end = _TABLE.find("\n", at)
             while _TABLE[end + 1 : end + 2] == " ":
                 end = _TABLE.find("\n", end + 1)

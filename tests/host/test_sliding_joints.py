@@ -29,7 +29,7 @@ from armtempo.model.joint_trajectory import of_text
 from armtempo.model.joint_unit import PRISMATIC
 from armtempo.model.parts import Dynamics, Joint, JointModel, Limits, Motor
 from armtempo.model.plan import Plan
-from armtempo.planning import planner, point_to_point, torque, via_points, workspace_check
+from armtempo.planning import planner, point_to_point, sequence_planner, torque, via_points, workspace_check
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove, move_of
 from armtempo.planning.tool import Tool
@@ -357,6 +357,13 @@ def test_a_motion_keeps_its_limits_and_goes_out_and_in_with_its_units(tmp_path: 
             via_table.of_text(f"{head}\n0,0\n15,1\n", "a.csv", LIFT)
     with pytest.raises(InputError, match="no header says in which units"):
         via_table.of_text("0,0\n15,1\n", "a.csv", LIFT)
+
+
+def test_a_sequence_says_where_a_slide_is_in_mm() -> None:
+    job = Job("a", via=((50.0, 10.0), (60.0, 20.0)), **QUICK)
+    steps = [armtempo.Goto((0.0, 0.0)), armtempo.RunMotion(planner.plan(LIFT, job))]
+    with pytest.raises(InputError, match=r"a begins at 50 mm, 10°, but the arm is at 0 mm, 0°"):
+        sequence_planner.plan(LIFT, armtempo.Sequence("s", steps))
 
 
 def test_jogs_move_a_slide_by_mm_and_the_tool_along_it() -> None:

@@ -285,10 +285,9 @@ def test_a_place_out_of_reach_is_named_with_its_line(tmp_path: Path) -> None:
         UserProgram.load(written("cell.pallet('try')\n", tmp_path), arm)
     with pytest.raises(InputError, match=r"pick.py, line 2: .*has no tool 'ling'; did you mean 'long'"):
         UserProgram.load(written("cell.tool('ling')\n", tmp_path), arm)
-    large = replace(arm.pallets[0], columns=400, column_mm=0.1)
-    many = UserProgram.load(written("cell.pallet('tray')\n", tmp_path), arm)
-    with pytest.raises(InputError, match="and 400 places of pallets take more than the 16384 bytes"):
-        encoded_program.of_program(many, replace(arm, pallets=(large,)))
+    many = UserProgram.load(written(f"cell.pallet('tray')\n# {16_000 * 'x'}\n", tmp_path), arm)
+    with pytest.raises(InputError, match="and 3 places of pallets take more than the 16384 bytes"):
+        encoded_program.of_program(many, arm)
 
 
 def test_a_move_to_a_place_that_would_leave_the_workspace_is_told(tmp_path: Path) -> None:

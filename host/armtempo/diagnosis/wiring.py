@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 
 from armtempo.diagnosis.finding import Finding, error, note, warning
-from armtempo.model.arm import Arm, shared_channels
+from armtempo.model import channels
+from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.pin_use import problems as pin_problems
 
@@ -31,7 +32,7 @@ def findings(arm: Arm) -> list[Finding]:
 def _channels(arm: Arm) -> list[Finding]:
     return [
         error(" and ".join(joints), f"share {key}.channel = {channel}", "give each its own channel")
-        for key, channel, joints in shared_channels(arm)
+        for key, channel, joints in channels.shared(arm.joints)
     ]
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
@@ -18,6 +16,7 @@ from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
 from armtempo.model import (
     boards,
+    channels,
     coupled,
     drive_limits,
     joint_unit,
@@ -477,29 +476,10 @@ def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
     return found
 
 
-class SharedChannel(NamedTuple):
-    """A channel of the board used by more than one joint."""
-
-    key: str
-    """``"motor"`` or ``"encoder"``."""
-    channel: int
-    joints: tuple[str, ...]
-
-
-def shared_channels(arm: Arm) -> list[SharedChannel]:
-    """Channels used by more than one joint; empty for a valid arm."""
-    users: dict[tuple[str, int], list[str]] = defaultdict(list)
-    for joint in arm.joints:
-        for key, part in (("motor", joint.motor), ("encoder", joint.encoder)):
-            if part is not None:
-                users[key, part.channel].append(joint.name)
-    return [SharedChannel(*place, tuple(names)) for place, names in users.items() if len(names) > 1]
-
-
 def _check_channels(arm: Arm, path: Path | str) -> None:
     if not arm.driven:
         raise InputError(f"{path}: no joint has a motor", "add at least one [joint.motor]")
-    for key, channel, joints in shared_channels(arm):
+    for key, channel, joints in channels.shared(arm.joints):
         raise InputError(
             f"{path}: {key}.channel = {channel} is used by {' and '.join(joints)}", "give each joint its own"
         )

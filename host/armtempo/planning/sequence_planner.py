@@ -289,8 +289,8 @@ class _Compiler:
         start, end = _angles(trajectory(0.0)), _angles(trajectory(trajectory.duration_s))
         if here.angles_deg is not None and not self._same(here.angles_deg, start):
             raise InputError(
-                f"{step.where}run: {motion.name} begins at {_format_angles(start)}, but the arm is at "
-                f"{here.name or _format_angles(here.angles_deg)} ({_format_angles(here.angles_deg)})",
+                f"{step.where}run: {motion.name} begins at {self._listed(start)}, but the arm is at "
+                f"{here.name or self._listed(here.angles_deg)} ({self._listed(here.angles_deg)})",
                 f"put a step before it that goes there: goto with the same file as run, {motion.name!r}",
             )
         holds = _job(motion).holds or self._holds
@@ -310,14 +310,17 @@ class _Compiler:
             self._motions[id(motion)] = SourceMotion(name, motion)
         return self._motions[id(motion)]
 
+    def _listed(self, angles: Angles) -> str:
+        return self.arm.listed(f"{round(angle, 3) + 0.0:g}" for angle in angles)
+
     def _target(self, step: kinds.Goto) -> _Place:
         target = step.target
         if isinstance(target, str):
             target = self.arm.posture(target)
         elif isinstance(target, list | tuple):
             if problem := self.arm.angles_problem(target):
-                raise InputError(f"{step.where}goto: {problem}", "give one angle for each joint with a motor")
-            target = ArmPosture(_format_angles(target), tuple(target))
+                raise InputError(f"{step.where}goto: {problem}", "give one for each joint with a motor")
+            target = ArmPosture(self._listed(target), tuple(target))
         if isinstance(target, ArmPosture):
             return self.posture(target, f"{step.where}goto: ")
         motion = self._motion(target)
@@ -447,7 +450,3 @@ def _move(leg: int, step: int, words: str) -> SequenceRow:
 
 def _angles(values: np.ndarray) -> Angles:
     return tuple(float(value) for value in values)
-
-
-def _format_angles(angles: Angles) -> str:
-    return ", ".join(f"{round(angle, 3) + 0.0:g}" for angle in angles) + "°"

@@ -180,7 +180,14 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
         type(
             "Plan",
             (),
-            {"name": "feed", "arm": operator.arm, "frames": ("tray",), "total_s": 1.0, "trajectory": None},
+            {
+                "name": "feed",
+                "arm": operator.arm,
+                "frames": ("tray",),
+                "job": type("Job", (), {"name": "feed", "holds": ""}),
+                "total_s": 1.0,
+                "trajectory": None,
+            },
         )(),
         operator.jobs.version,
     )  # type: ignore[arg-type]
