@@ -15,6 +15,7 @@ from armtempo.basics.text import is_number
 
 _SEPARATORS = (";", "\t", ",")
 """Tried in this order, blanks if there is none; with the first two, a comma may be the decimal separator."""
+_REMARK = re.compile(r"^#\s*")
 _BLANKS, _WIDE_BLANKS = re.compile(r"\s+"), re.compile(r"\s{2,}")
 
 
@@ -97,13 +98,28 @@ def _separator(text: str) -> str:
 def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
     if separator:
         return csv.reader(lines, delimiter=separator)
-    rows = [_BLANKS.split(line.strip()) for line in lines]
+    lines = [_REMARK.sub("#", line.strip()) for line in lines]
+    rows = [_BLANKS.split(line) for line in lines]
     width = max((len(row) for row in rows if row and all(map(is_number, row))), default=0)
     # a header's names may have single blanks in them
     return [
-        wide if len(row) != width and len(wide := _WIDE_BLANKS.split(line.strip())) == width else row
+        next(
+            (names for names in (_WIDE_BLANKS.split(line), _names(row)) if len(names) == width != len(row)),
+            row,
+        )
         for line, row in zip(lines, rows, strict=True)
     ]
+
+
+def _names(words: list[str]) -> list[str]:
+    """The names in a header of single blanks: a word, with the numbers and units in brackets after it."""
+    names = words[:1]
+    for word in words[1:]:
+        if is_number(word) or word[:1] in ("(", "["):
+            names[-1] += f" {word}"
+        else:
+            names.append(word)
+    return names
 
 
 def _fitted(row: list[str], width: int, where: str) -> list[str]:
