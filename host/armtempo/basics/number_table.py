@@ -57,7 +57,8 @@ def text_of(path: Path) -> str:
 def of_text(text: str, path: Path | str) -> NumberTable:
     """The table in a text from ``path``; skips empty lines, and those that begin with ``#``.
 
-    A first line without a number is a header, also after a ``#``. Raises InputError if the text is not a table, for a
+    A first line without a number is a header; so is the last line with ``#`` above the numbers, if it has as many words
+    as they have columns, whatever is between the words. Raises InputError if the text is not a table, for a
     first line of words and numbers, and for a line with more or fewer cells than the first one.
     """
     separator = _separator(text)
@@ -71,9 +72,9 @@ def of_text(text: str, path: Path | str) -> NumberTable:
     header = None
     if rows and not any(map(is_number, _pointed(rows[0][1], separator))):
         header = rows.pop(0)[1]
-    above = [row for number, row in remarks if rows and number < rows[0][0]]
-    if header is None and above and len(above[-1]) == len(rows[0][1]) > 1:
-        header = [above[-1][0].lstrip("# "), *above[-1][1:]]
+    above = [number for number, _ in remarks if rows and number < rows[0][0]]
+    if header is None and above:
+        header = _names(text.splitlines()[above[-1] - 1], separator, len(rows[0][1]))
     while header and not header[-1]:
         header.pop()
     width = len(header) if header is not None else len(rows[0][1]) if rows else 0
@@ -93,6 +94,16 @@ def _separator(text: str) -> str:
     lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
     first = next(lines, "")
     return next((separator for separator in _SEPARATORS if separator in first), "")
+
+
+def _names(remark: str, separator: str, width: int) -> list[str] | None:
+    """The names of so many columns in a line that begins with ``#``; None if it has more or fewer."""
+    bare = remark.removeprefix("\ufeff").strip().lstrip("# \t")
+    for each in dict.fromkeys((separator, *_SEPARATORS, "")):
+        words = next(iter(csv.reader([bare], delimiter=each)), []) if each else _BLANKS.split(bare)
+        if len(words) == width > 1:
+            return [word.strip() for word in words]
+    return None
 
 
 def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
