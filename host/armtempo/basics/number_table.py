@@ -15,7 +15,6 @@ from armtempo.basics.text import is_number
 
 _SEPARATORS = (";", "\t", ",")
 """Tried in this order, blanks if there is none; with the first two, a comma may be the decimal separator."""
-_REMARK = re.compile(r"^#\s*")
 _BLANKS, _WIDE_BLANKS = re.compile(r"\s+"), re.compile(r"\s{2,}")
 
 
@@ -103,27 +102,28 @@ def _names(remark: str, separator: str, width: int) -> list[str] | None:
         words = next(iter(csv.reader([bare], delimiter=each)), []) if each else _BLANKS.split(bare)
         if len(words) == width > 1:
             return [word.strip() for word in words]
-    return None
+    return _of_width(width, bare, _BLANKS.split(bare)) if width > 1 else None
 
 
 def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
     if separator:
         return csv.reader(lines, delimiter=separator)
-    lines = [_REMARK.sub("#", line.strip()) for line in lines]
-    rows = [_BLANKS.split(line) for line in lines]
+    rows = [_BLANKS.split(line.strip()) for line in lines]
     width = max((len(row) for row in rows if row and all(map(is_number, row))), default=0)
     # a header's names may have single blanks in them
     return [
-        next(
-            (names for names in (_WIDE_BLANKS.split(line), _names(row)) if len(names) == width != len(row)),
-            row,
-        )
+        row if len(row) == width else _of_width(width, line.strip(), row) or row
         for line, row in zip(lines, rows, strict=True)
     ]
 
 
-def _names(words: list[str]) -> list[str]:
-    """The names in a header of single blanks: a word, with the numbers and units in brackets after it."""
+def _of_width(width: int, line: str, words: list[str]) -> list[str] | None:
+    """So many names that have single blanks in them; None if there are more or fewer."""
+    return next((names for names in (_WIDE_BLANKS.split(line), _joined(words)) if len(names) == width), None)
+
+
+def _joined(words: list[str]) -> list[str]:
+    """Each word with the numbers, and units in brackets, after it."""
     names = words[:1]
     for word in words[1:]:
         if is_number(word) or word[:1] in ("(", "["):
