@@ -121,6 +121,8 @@ RAD = ("0,-1.0471975511965976,0.6981317007977318", "0.349065850,-1.308996939,0.8
         ("0  -60   40\n 20 -75 50\n", None),
         ("joint 2  joint 1  joint 3\n-60 0 40\n-75 20 50\n", None),
         ("j2 j1 j3\n-60 0 40\n-75 20 50\n", None),
+        ("joint 2 joint 1 joint 3 (rad)\n-60 0 0.698131701\n-75 20 0.872664626\n", None),
+        ("# joint 2 joint 1 joint 3\n-60 0 40\n-75 20 50\n", None),
         ("\ufeffj1\tj2\tj3\r\n0\t-60\t4e1\r\n20\t-75\t50\r\n", None),
         ("\n".join(RAD), True),
         ("\n".join(("joint 1 (rad),joint 2 [rad],joint_3_rad", *RAD)), None),

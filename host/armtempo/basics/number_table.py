@@ -102,7 +102,7 @@ def _names(remark: str, separator: str, width: int) -> list[str] | None:
         words = next(iter(csv.reader([bare], delimiter=each)), []) if each else _BLANKS.split(bare)
         if len(words) == width > 1:
             return [word.strip() for word in words]
-    return None
+    return _of_width(width, bare, _BLANKS.split(bare)) if width > 1 else None
 
 
 def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
@@ -112,9 +112,25 @@ def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
     width = max((len(row) for row in rows if row and all(map(is_number, row))), default=0)
     # a header's names may have single blanks in them
     return [
-        wide if len(row) != width and len(wide := _WIDE_BLANKS.split(line.strip())) == width else row
+        row if len(row) == width else _of_width(width, line.strip(), row) or row
         for line, row in zip(lines, rows, strict=True)
     ]
+
+
+def _of_width(width: int, line: str, words: list[str]) -> list[str] | None:
+    """So many names that have single blanks in them; None if there are more or fewer."""
+    return next((names for names in (_WIDE_BLANKS.split(line), _joined(words)) if len(names) == width), None)
+
+
+def _joined(words: list[str]) -> list[str]:
+    """Each word with the numbers, and units in brackets, after it."""
+    names = words[:1]
+    for word in words[1:]:
+        if is_number(word) or word[:1] in ("(", "["):
+            names[-1] += f" {word}"
+        else:
+            names.append(word)
+    return names
 
 
 def _fitted(row: list[str], width: int, where: str) -> list[str]:

@@ -65,7 +65,7 @@ def of_text(
     text: str, path: Path | str, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
 ) -> ImportedPath:
     """Via points from the text of a table, as ``via_points``; ``path`` names it in messages."""
-    if joint_trajectory.is_ros(text):
+    if joint_trajectory.is_ros(text, path):
         return _of_recording(joint_trajectory.of_text(text, path, arm), path, arm, tolerance_deg)
     return via_points(number_table.of_text(text, path), arm, radians, tolerance_deg)
 
@@ -91,7 +91,7 @@ def _of_recording(found: Recorded, path: Path | str, arm: Arm, tolerance_deg: fl
 def recorded(path: Path, arm: Arm, radians: bool | None = None) -> Recorded:
     """A motion with its times, from a table with a time or a JointTrajectory; errors as in ``read``."""
     text = "" if ros_bag.is_bag(path) else number_table.text_of(path)
-    if not text or joint_trajectory.is_ros(text):
+    if not text or joint_trajectory.is_ros(text, path):
         found = ros_bag.read(path, arm) if not text else joint_trajectory.of_text(text, path, arm)
         where = [f"{path}: at {time:g} s" for time in found.times_s]
     else:
