@@ -181,6 +181,16 @@ def test_the_commands_take_recordings(tmp_path: Path, monkeypatch: pytest.Monkey
     assert "at 0.0000 -60.0000 40.0000" in there.output
 
 
+def test_a_recording_beyond_a_range_says_where(tmp_path: Path) -> None:
+    table, trajectory = tmp_path / "beyond.csv", tmp_path / "beyond.json"
+    times, angles = np.array([0.0, 3.0, 6.0]), np.array([[0, -60, 40], [40, -60, 40], [40, -60, 400]])
+    table.write_text("time_s,j1,j2,j3\n0,0,-60,40\n3,40,-60,40\n60,40,-60,400\n")
+    trajectory.write_text(json.dumps(message(20.0 * times, angles)))
+    for path, where in ((table, "line 4"), (trajectory, "at 120 s")):
+        with pytest.raises(InputError, match=rf"{where}: joint 3 at 400 degrees is outside of its range"):
+            via_table.recorded(path, ARM)
+
+
 def test_a_table_without_times_has_no_timing(tmp_path: Path) -> None:
     table = tmp_path / "via.csv"
     table.write_text("j1,j2,j3\n0,-60,40\n20,-75,50\n")

@@ -88,7 +88,9 @@ def _of_recording(found: Recorded, path: Path | str, arm: Arm, tolerance_deg: fl
     return _thinned(angles, found.times_s, arm, tolerance_deg, (*found.notes, *notes), where)
 
 
-def recorded(path: Path, arm: Arm, radians: bool | None = None) -> Recorded:
+def recorded(
+    path: Path, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
+) -> Recorded:
     """A motion with its times, from a table with a time or a JointTrajectory; errors as in ``read``."""
     text = "" if ros_bag.is_bag(path) else number_table.text_of(path)
     if not text or joint_trajectory.is_ros(text, path):
@@ -107,6 +109,7 @@ def recorded(path: Path, arm: Arm, radians: bool | None = None) -> Recorded:
         found = Recorded(times, _angles(table, header, arm, radians), _notes(table, header, arm))
         where = [f"{path}: line {line}" for line, _ in table.rows]
     angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
+    _check_ranges(where, angles, arm, TOLERANCE_DEG if tolerance_deg is None else tolerance_deg)
     return Recorded(found.times_s, angles, (*found.notes, *notes))
 
 
