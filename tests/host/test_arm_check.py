@@ -87,6 +87,8 @@ FOUND = [
     ("radians", [("alpha_deg = -90.0", "alpha_deg = -1.5708")], "warning", "alpha_deg = -1.5708: is it in radians?"),
     ("a range in radians", [("range_deg = [-10.0, 190.0]", "range_deg = [-0.17, 2.79]")], "warning",
      "joint 1: range_deg = [-0.17, 2.79]: is it in radians?"),
+    ("a speed in degrees/s", [("speed_deg_s = 50.0", "speed_deg_s = 2865.0")], "warning",
+     "joint 1: speed_deg_s = 2865, 50 rad/s: were degrees/s taken as rad/s?"),
     ("still joints", [], "note", "motors: no motor: joint 4, joint 5, joint 6"),
 ]  # fmt: skip
 

@@ -134,7 +134,7 @@ def _trajectory(found: Any, path: Path | str) -> Mapping[str, Any]:
     for _ in range(_DEEPEST):
         if isinstance(found, list):
             if len(found) > 1 and all(isinstance(each, Mapping) for each in found):
-                raise InputError(f"{path}: has {len(found)} trajectories", "give a file with one of them")
+                raise InputError(f"{path}: has {len(found)} messages", "give a file with one trajectory")
             found = found[0] if len(found) == 1 else None
             continue
         if not isinstance(found, Mapping):
