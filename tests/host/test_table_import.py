@@ -15,10 +15,11 @@ from armtempo.kinematics.of_arm import forward, inverse, inverse_many
 from armtempo.model import shipped, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import Limits
 from armtempo.model.pose import from_rpy
 from armtempo.model.posture import ArmPosture
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import planner, point_to_point, via_points
+from armtempo.planning import planner, point_to_point, recorded, via_points
 from click.testing import CliRunner
 
 from tests.host.made_runs import shipped_plan
@@ -72,6 +73,26 @@ def test_a_slow_way_back_is_no_jump(tmp_path: Path) -> None:
     table = tmp_path / "recorded.csv"
     table.write_text(recording([170, 0, -170, 0, 170], period_s=5.0))
     assert np.ptp(via_table.read(table, WIDE).via_deg[:, 0]) == 340.0
+
+
+@pytest.mark.parametrize("high_deg", [400.0, 190.0])
+def test_a_coarse_recording_within_a_turn_goes_on_as_its_neighbours_do(
+    tmp_path: Path, high_deg: float
+) -> None:
+    """On a joint that may turn nearly once between two points; the long way, which a range may ask for, is told."""
+    first = replace(ARM.joints[0], range_deg=(-400.0, high_deg), limits=Limits(360.0, 500.0, 2000.0))
+    arm = replace(ARM, joints=(first, *ARM.joints[1:]))
+    table = tmp_path / "recorded.csv"
+    way = np.array([160.0, 165.0, 175.0, 185.0, 195.0, 200.0])
+    table.write_text(recording(within_a_turn(way), period_s=1.0))  # type: ignore[arg-type]
+    found = via_table.recorded(table, arm)
+    goes_on = high_deg > 200.0
+    np.testing.assert_allclose(found.angles_deg[:, 0], way if goes_on else within_a_turn(way))  # type: ignore[arg-type]
+    assert len(found.notes) == goes_on
+    if not goes_on:
+        told = recorded.plan(arm, "coarse", found.times_s, found.angles_deg, tolerance_deg=20.0).notes
+        said = "2 s to 3 s: joint 1 goes 350 degrees from 175 to -175; 185, 10 the other way, is in its range too"
+        assert said in told
 
 
 NEAR = 90.0 + 1e-4 / ARM.driven[0].steps_per_deg

@@ -27,6 +27,8 @@ _RADIANS, _WIDE_DEG = 7.0, 100.0
 """Angles below this may be radians, if the joints turn further than that many degrees."""
 _METRES = 2.0
 """Positions below this may be in metres."""
+_ALIKE = 2.0
+"""A step of a recording is as its neighbours if it is no faster than this factor."""
 _SPEED_MARGIN = 1.05
 """Recordings may be faster than the limit by this factor, as their times scatter."""
 
@@ -364,7 +366,8 @@ def _unwound(
     """A recording (n, J) with its jumps of a turn taken out, and a note for each joint that had some.
 
     A joint that moves by more than half a turn between two points, faster than its speed limit, has been recorded
-    within a turn: it goes on by the short way. Raises InputError, with ``where`` of the point, if it is faster than its
+    within a turn: it goes on by the short way. So it does if only that way goes on as before and after the two points,
+    and the range allows it. Raises InputError, with ``where`` of the point, if it is faster than its
     limit that way too, or leaves its range. ``times_s``: (n,), increasing.
     """
     found = angles_deg.copy()
@@ -374,10 +377,17 @@ def _unwound(
             continue
         column = found[:, number]
         steps = np.diff(column)
+        turns = -360.0 * np.round(steps / 360.0)
         limit = joint.limits.speed_deg_s * np.diff(times_s) * _SPEED_MARGIN
         jumps = np.flatnonzero((np.abs(steps) > 180.0) & (np.abs(steps) > limit))
+        likely = np.union1d(jumps, _likely(steps, turns, times_s))
+        whole = column + np.concatenate(
+            ([0.0], np.cumsum(np.where(np.isin(np.arange(len(steps)), likely), turns, 0.0)))
+        )
+        if joint.range_deg[0] <= whole.min() and whole.max() <= joint.range_deg[1]:
+            jumps = likely
         for jump in jumps.tolist():
-            turn = -360.0 * round(steps[jump] / 360.0)
+            turn = turns[jump]
             if abs(steps[jump] + turn) > limit[jump]:
                 raise InputError(
                     f"{where[jump + 1]}: {joint.name} jumps from {angles_deg[jump, number]:g} to "
@@ -398,3 +408,18 @@ def _unwound(
             f"{joint.name}: recorded within a turn; it goes on from {column[jumps[0]]:g} to {column[-1]:g} degrees"
         )
     return found, tuple(notes)
+
+
+def _likely(steps: Array, turns: Array, times_s: Array) -> Array:
+    """Which steps (n,) go on at the speed of their neighbours, and in their direction, only with their turns added."""
+    speeds = (steps + turns) / np.diff(times_s)
+    found = []
+    for step in np.flatnonzero((turns != 0.0) & (steps * speeds < 0.0)).tolist():
+        beside = speeds[[each for each in (step - 1, step + 1) if 0 <= each < len(speeds)]]
+        if (
+            beside.size
+            and np.all(beside * speeds[step] > 0.0)
+            and abs(speeds[step]) <= _ALIKE * np.abs(beside).max()
+        ):
+            found.append(step)
+    return np.array(found, dtype=np.intp)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -312,9 +313,9 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
         )
 
 
-def long_ways(arm: Arm, via_deg: Array) -> tuple[str, ...]:
+def long_ways(arm: Arm, via_deg: Array, places: Sequence[str] = ()) -> tuple[str, ...]:
     """Notes: joints that move by more than half a turn between two via points (n + 1, J), where a shorter way ends
-    at the same place."""
+    at the same place. ``places``: what the points are called; else by their numbers, "P0" and on."""
     notes = []
     for number, joint in enumerate(arm.driven):
         if joint.slides:
@@ -324,9 +325,10 @@ def long_ways(arm: Arm, via_deg: Array) -> tuple[str, ...]:
             if turn:
                 low, high = joint.range_deg
                 short = end + turn
+                between = " to ".join(places[via - 1 : via + 1]) if places else f"P{via - 1} to P{via}"
                 can = "is in its range too" if low <= short <= high else "is out of its range"
                 notes.append(
-                    f"P{via - 1} to P{via}: {joint.name} goes {abs(end - start):.4g} degrees from {start:.4g} to "
+                    f"{between}: {joint.name} goes {abs(end - start):.4g} degrees from {start:.4g} to "
                     f"{end:.4g}; {short:.4g}, {abs(short - start):.4g} the other way, {can}"
                 )
     return tuple(notes)

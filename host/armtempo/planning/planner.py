@@ -62,16 +62,21 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_reached(arm, reached)
     speeds_deg_s = np.array([each.speed_deg_s for each in reached])
     workspace_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
-    notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, trajectory))
+    notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, via, trajectory))
     return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
 
 
-def _swing_note(arm: Arm, job: Job, trajectory: Trajectory) -> list[str]:
+def _swing_note(arm: Arm, job: Job, via_deg: Array, trajectory: Trajectory) -> list[str]:
     """A note if a joint leaves the angles between two via points by more than ``_SWING_DEG``."""
     swing = path_deviation.widest_swing(trajectory, [each.via for each in job.tool_segments if each.line])
     if swing.beyond_deg <= _SWING_DEG:
         return []
     helps = 'path = "free" helps' if job.path == "through" else "a via point or a stop = true there keeps it"
+    if job.path == "through":
+        steps = np.abs(np.diff(via_deg, axis=0)) * [joint.steps_per_deg for joint in arm.driven]
+        twice = np.flatnonzero(np.all(steps < 1.0, axis=1))
+        for first in twice[np.abs(twice - swing.via) <= 1][:1].tolist():
+            helps = f"P{first} and P{first + 1} are less than a step apart: leave one out; or {helps}"
     joint = arm.driven[swing.joint]
     return [
         f"between P{swing.via} and P{swing.via + 1} {joint.name} reaches {swing.reached_deg:.2f} "

@@ -80,7 +80,8 @@ def plan(
         floor_kind=floor.kind,
     )
     kept = f"follows the recording on its own times, within {off_deg:.2g} {arm.units} at its points"
-    return Plan(arm, job, via_deg, (kept, *notes), trajectory, (search,), reached, planner.versions())
+    long = checks.long_ways(arm, angles_deg, [f"{time:g} s" for time in times_s])
+    return Plan(arm, job, via_deg, (kept, *notes, *long), trajectory, (search,), reached, planner.versions())
 
 
 def _splines(points: Array, axis: Array) -> tuple[JointSpline, ...]:
