@@ -70,8 +70,13 @@ def modules() -> dict[str, Path]:
 
 def _imported(path: Path) -> set[str]:
     """Modules of the shared package that a file imports, at any place in it."""
+    return _imported_by(path.read_text(encoding="utf-8"))
+
+
+@cache
+def _imported_by(source: str) -> set[str]:
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom) and node.module == PACKAGES[1]:
             found |= {name.name for name in node.names}
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{PACKAGES[1]}."):
