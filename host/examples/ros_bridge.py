@@ -13,8 +13,7 @@ import threading
 import time
 
 import armtempo
-import numpy as np
-from armtempo.model import joint_trajectory
+from armtempo.model import exchange, joint_trajectory
 from armtempo.planning import recorded
 
 ACTION = "/arm_controller/follow_joint_trajectory"
@@ -60,7 +59,7 @@ class Bridge(armtempo.Watcher):
             try:
                 goal = self.goals.get(timeout=PERIOD_S)
             except queue.Empty:
-                self.publish(np.array(self.board.posture_deg()))
+                self.publish(self.board.posture_deg())
                 continue
             self.follow(goal)
             if once:
@@ -95,15 +94,15 @@ class Bridge(armtempo.Watcher):
 
     def on_sample(self, sample, duration_s):
         """Publish where the arm is during a motion."""
-        steps = np.array(sample.positions.commanded_steps)
-        self.publish(steps / [joint.steps_per_deg for joint in self.arm.driven])
+        self.publish(self.arm.transmission.angles_of_steps(sample.positions.commanded_steps))
 
-    def publish(self, angles_deg):
-        """A message of joint_states."""
+    def publish(self, positions):
+        """A message of joint_states, of the driven joints' positions in degrees, or mm of sliding joints."""
         now = time.time_ns()
         header = {"stamp": {"sec": now // 10**9, "nanosec": now % 10**9}, "frame_id": ""}
         names = [joint.name for joint in self.arm.driven]
-        state = {"header": header, "name": names, "position": np.radians(angles_deg).tolist()}
+        si = exchange.to_si(positions, [joint.unit for joint in self.arm.driven])
+        state = {"header": header, "name": names, "position": si.tolist()}
         self.send({"op": "publish", "topic": STATES, "msg": {**state, "velocity": [], "effort": []}})
 
 

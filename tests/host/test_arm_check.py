@@ -87,6 +87,8 @@ FOUND = [
     ("radians", [("alpha_deg = -90.0", "alpha_deg = -1.5708")], "warning", "alpha_deg = -1.5708: is it in radians?"),
     ("a range in radians", [("range_deg = [-10.0, 190.0]", "range_deg = [-0.17, 2.79]")], "warning",
      "joint 1: range_deg = [-0.17, 2.79]: is it in radians?"),
+    ("a speed in degrees/s", [("speed_deg_s = 50.0", "speed_deg_s = 2865.0")], "warning",
+     "joint 1: speed_deg_s = 2865, 50 rad/s: were degrees/s taken as rad/s?"),
     ("still joints", [], "note", "motors: no motor: joint 4, joint 5, joint 6"),
 ]  # fmt: skip
 
@@ -353,8 +355,10 @@ STATE = BoardState(
 )
 
 
-def test_a_sound_board_has_nothing_wrong() -> None:
-    assert {item.level for item in doctor.examine_board(STATE)} == {Level.GOOD}
+@pytest.mark.parametrize("unread", [0, 2326])  # of a run that nobody watched
+def test_a_sound_board_has_nothing_wrong(unread: int) -> None:
+    found = doctor.examine_board(replace(STATE, samples_lost=unread))
+    assert {item.level for item in found} == {Level.GOOD}
 
 
 @pytest.mark.parametrize(

@@ -173,6 +173,35 @@ def test_a_file_that_is_not_the_locked_one_is_not_unpacked(content: bytes | None
     assert not (tmp_path / "cache").exists()
 
 
+# the other Pythons of CI's machine: each release once, and a line if there is none
+
+
+def test_pythons_that_ci_tries(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    script = sources.script(ROOT / ".ci" / "pythons.py")
+    one = {sys.version_info[:2]: Path("own")}
+    two = {**one, (3, 99): Path("newer")}
+    assert [(each.name, each.python) for each in script.environments(one)] == [("oldest", Path("own"))]
+    assert [(each.name, each.python) for each in script.environments(two)] == [
+        ("newest-3.99", Path("newer")),
+        ("oldest", Path("own")),
+    ]
+    stood_in = script.main.__globals__
+    stood_in.update(PLACE=tmp_path, test=lambda environment: (True, environment.name))
+    stood_in["pythons"] = lambda: two
+    assert script.main() == 0
+    assert capsys.readouterr().out.splitlines() == ["newest-3.99", "oldest"]
+    stood_in.update(pythons=lambda: one, test=lambda environment: (False, environment.name))
+    assert script.main() == 1
+    last = "only one Python from 3.11 on is on this machine; no other was tested"
+    assert capsys.readouterr().out.splitlines() == ["oldest", last]
+
+
+def test_no_page_installs_armtempo_from_an_index() -> None:
+    """None has it yet: an installation names a folder, such as ./armtempo."""
+    wanted = re.compile(r"\binstall (?:--?[\w-]+ )*['\"]?armtempo\b(?!-)")
+    assert [path.name for path in PAGES if wanted.search(path.read_text(encoding="utf-8"))] == []
+
+
 @pytest.mark.parametrize("name", SCRIPT.TABLES)
 def test_page_is_current(name: str) -> None:
     text = (ROOT / "host" / "docs" / name).read_text(encoding="utf-8")

@@ -224,6 +224,7 @@ SENTENCES = (
     "can look at them",
     "Is there while",
     "version of machine",
+    "the board does {",  # a limit, without what it is a limit of
 )
 """Parts of sentences that had to be read twice."""
 

@@ -13,10 +13,10 @@ from armtempo.basics.errors import InputError, PlanError
 from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
-from armtempo.model.parts import Limits
+from armtempo.model.parts import Limits, LimitSwitches
 from armtempo.model.plan import Plan
 from armtempo.model.tool_segment import ToolSegment
-from armtempo.planning import checks, lower_bounds, path_deviation, planner
+from armtempo.planning import checks, lower_bounds, path_deviation, planner, torque
 from armtempo.planning.fitness import Fitness, scale_of
 from armtempo.planning.lower_bounds import Floor
 from armtempo.report import text_summary
@@ -241,6 +241,31 @@ def with_limits(*limits: float) -> Arm:
 def test_refuses_wrong_input(arm: Arm, changes: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         planner.plan(arm, replace(JOB, **changes))
+
+
+def test_no_plan_goes_beyond_a_switch_within_the_range() -> None:
+    arms = [
+        replace(ARM, joints=(replace(ARM.joints[0], switches=switches), *ARM.joints[1:]))
+        for switches in (LimitSwitches(low=1, low_deg=0.0), LimitSwitches(low="PD0", low_deg=0.0))
+    ]
+    job = Job("back", via=((20.0, -60.0, 40.0), (-5.0, -60.0, 40.0)))
+    with pytest.raises(PlanError, match="beyond its low switch, which stops it at 0"):
+        planner.plan(arms[0], job)
+    assert planner.plan(arms[1], job).total_s  # read while homing only
+    assert planner.plan(arms[0], replace(job, via=((20.0, -60.0, 40.0), (0.0, -60.0, 40.0)))).total_s
+
+
+def test_no_motor_is_faster_than_its_torque_curve_goes() -> None:
+    """Joint 1 at 40 deg/s is 13.3 rpm."""
+    first = ARM.joints[0]
+    assert first.motor is not None
+    motor = replace(first.motor, curve_rpm_nm=((0.0, 0.5), (10.0, 0.4)))
+    arm = replace(ARM, joints=(replace(first, motor=motor), *ARM.joints[1:]))
+    plan = planner.plan(arm, Job("turn", via=((0.0, -60.0, 40.0), (180.0, -60.0, 40.0))))
+    most = 60.0 / motor.gear_ratio
+    assert plan.extremes[0].speed_deg_s == pytest.approx(most, rel=1e-3)
+    assert torque.held_nm(arm.driven[0], np.radians(plan.extremes[0].speed_deg_s * motor.gear_ratio)) > 0.39
+    assert any(f"its curve_rpm_nm ends at 10 rpm: planned with {most:.4g}" in note for note in plan.notes)
 
 
 @pytest.mark.parametrize(

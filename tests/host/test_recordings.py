@@ -68,6 +68,22 @@ def test_joints_are_found_by_name_in_any_message(inside: tuple[str, ...]) -> Non
     assert found.notes == ("joints that were not used: gripper",)
 
 
+def test_messages_are_told_from_tables_however_they_begin() -> None:
+    content = json.dumps(message(TIMES[:3], MOVE(TIMES[:3])))
+    points_first = json.dumps(dict(reversed(json.loads(content).items())))
+    flow = content.replace("joint 1", "joint_1")
+    for name, text in (
+        ("list.json", f"[{content}]"),
+        ("display.json", f'{{"model_id": "a", "trajectory": [{{"joint_trajectory": {content}}}]}}'),
+        ("first.txt", points_first),
+        ("remark.yaml", f"# of the feeder\ntrajectory: {content}\n---\n"),
+        ("quoted.yml", f'"trajectory": {flow}\n'),
+        ("pasted text", f"stamp: 0\ntrajectory: {content}\n"),
+    ):
+        found = via_table.of_text(text, name, ARM)
+        np.testing.assert_allclose(found.via_deg[0], MOVE(0.0), atol=1e-6, err_msg=name)
+
+
 def test_points_with_speeds_are_joined_as_controllers_do() -> None:
     few = np.linspace(0.0, MOVE.duration_s, 6)
     content = message(few, MOVE(few))
@@ -89,6 +105,9 @@ def spoiled(change: dict[str, Any], point: dict[str, Any] | None = None) -> str:
     [
         ("{", "is neither JSON nor YAML"),
         ("{}", "has no JointTrajectory"),
+        ("[1, 2]", "has no JointTrajectory"),
+        (f"[{spoiled({})}, {spoiled({})}]", "has 2 messages"),
+        (f"---\n{spoiled({})}\n" * 2, "has 2 messages"),
         (spoiled({}, {"positions": [0.0, 0.0]}), "point 1: positions must be 3 numbers"),
         (spoiled({}, {"positions": [0.0, 0.0, "x"]}), "point 1: positions must be 3 numbers"),
         (spoiled({}, {"positions": [0.0, 0.0, float("nan")]}), "point 1: positions must be 3 numbers"),
@@ -160,6 +179,16 @@ def test_the_commands_take_recordings(tmp_path: Path, monkeypatch: pytest.Monkey
     there = run(main, ["fk", "move.json"])
     assert there.exit_code == 0, there.output
     assert "at 0.0000 -60.0000 40.0000" in there.output
+
+
+def test_a_recording_beyond_a_range_says_where(tmp_path: Path) -> None:
+    table, trajectory = tmp_path / "beyond.csv", tmp_path / "beyond.json"
+    times, angles = np.array([0.0, 3.0, 6.0]), np.array([[0, -60, 40], [40, -60, 40], [40, -60, 400]])
+    table.write_text("time_s,j1,j2,j3\n0,0,-60,40\n3,40,-60,40\n60,40,-60,400\n")
+    trajectory.write_text(json.dumps(message(20.0 * times, angles)))
+    for path, where in ((table, "line 4"), (trajectory, "at 120 s")):
+        with pytest.raises(InputError, match=rf"{where}: joint 3 at 400 degrees is outside of its range"):
+            via_table.recorded(path, ARM)
 
 
 def test_a_table_without_times_has_no_timing(tmp_path: Path) -> None:
@@ -243,6 +272,14 @@ def test_bags_that_will_not_do_are_refused(tmp_path: Path) -> None:
     two = bag(tmp_path / "two", "trajectory_msgs/msg/JointTrajectory", [trajectory(), trajectory()], True)
     with pytest.raises(InputError, match="two: has 2 trajectories"):
         via_table.recorded(two, ARM)
+    later = states(["J1", "J2", "J3"])
+    twice = bag(tmp_path / "twice", "sensor_msgs/msg/JointState", [later[1], *later[1:]], True)
+    assert len(via_table.recorded(twice, ARM).times_s) == len(TIMES)
+    back = bag(tmp_path / "back", "sensor_msgs/msg/JointState", [*later[20:], *later[1:20]], True)
+    with pytest.raises(
+        InputError, match=r"back: the stamps of its JointStates go back by .* after the first"
+    ):
+        via_table.recorded(back, ARM)
     other = bag(tmp_path / "other", "sensor_msgs/msg/JointState", states(["a", "b", "c"]), True)
     with pytest.raises(InputError, match="neither a JointTrajectory nor JointStates of all driven joints"):
         via_table.read(other, ARM)

@@ -112,12 +112,17 @@ RAD = ("0,-1.0471975511965976,0.6981317007977318", "0.349065850,-1.308996939,0.8
         ("time_s,j1_angle_deg,j2_angle_deg,j3_angle_deg\n8,0,-60,40\n9,20,-75,50\n", None),
         ("joint 1,joint 2,joint 3,joint 5\n0,-60,40,0\n20,-75,50,0\n", None),
         ("# axis 2,axis 1,axis 3\n-60,0,40\n# a remark\n-75,20,50\n", None),
+        ("# a remark\n# j3 j1 j2\n40 0 -60\n50 20 -75\n", None),
+        ("#j3,j1,j2\n40 0 -60\n50 20 -75\n", None),
+        ("# j3 j1 j2\n40,0,-60\n50,20,-75\n", None),
         ("0;-60;40\n20;-75;50\n", None),
         ("joint 1;joint 2;joint 3;\n0,0;-60,0;40,0;\n20,0;-75,0;50,0;\n", None),
         ("0\t-60\t40\n20\t-75\t50\n", None),
         ("0  -60   40\n 20 -75 50\n", None),
         ("joint 2  joint 1  joint 3\n-60 0 40\n-75 20 50\n", None),
         ("j2 j1 j3\n-60 0 40\n-75 20 50\n", None),
+        ("joint 2 joint 1 joint 3 (rad)\n-60 0 0.698131701\n-75 20 0.872664626\n", None),
+        ("# joint 2 joint 1 joint 3\n-60 0 40\n-75 20 50\n", None),
         ("\ufeffj1\tj2\tj3\r\n0\t-60\t4e1\r\n20\t-75\t50\r\n", None),
         ("\n".join(RAD), True),
         ("\n".join(("joint 1 (rad),joint 2 [rad],joint_3_rad", *RAD)), None),
@@ -159,8 +164,15 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
         ),
         ("joint 1;joint 2;joint 3\n0;-60;40\n1;2\n", "line 3: 2 values"),
         ("time_s,joint 1,joint 2,joint 3\n1,0,-60,40\n1,20,-75,50\n", "line 3: the time does not increase"),
-        ("\n".join(RAD), "no angle is beyond 1.31: degrees or radians.*--radians"),
+        ("\n".join(RAD), "no angle without a unit is beyond 1.31: degrees or radians.*--radians"),
         ("\n".join(("j1,j2,j3", *RAD)), "degrees or radians"),
+        ("\n".join(("j1 (rad),j2,j3", *RAD)), "beyond 1.31: degrees or radians.*joint 2 \\(rad\\)"),
+        ("0,1,2\n0,-60,40\n20,-75,50\n", "line 1: 0,1,2 are the numbers of columns.*joint 1,joint 2,joint 3"),
+        ("1,2,3\n0,-60,40\n20,-75,50\n", "line 1: 1,2,3 are the numbers of columns"),
+        (
+            "x_mm,y_mm,z_mm,roll,pitch,yaw\n200,0,100,3.1416,0,1.5708\n300,0,100,3.1416,0,1.5708\n",
+            "beyond 3.14: degrees or radians.*roll \\(rad\\)",
+        ),
         ("x_mm,y_mm\n1,2\n3,4\n", "does not name"),
         ("x,y,z\n0.2,0,0.1\n0.3,0,0.1\n", "mm or metres.*x_m,y_m,z_m"),
         ("x,y,z,rx,ry,rz\n200,0,100,0,0,0\n300,0,100,0,0,0\n", "'rx' is not known as part of a pose"),
@@ -173,6 +185,16 @@ def test_a_table_that_will_not_do_is_refused_with_its_line(tmp_path: Path, text:
     table.write_text(text)
     with pytest.raises(InputError, match=said):
         via_table.read(table, ARM)
+
+
+def test_a_wide_joint_may_be_in_radians_beside_narrow_and_sliding_ones(tmp_path: Path) -> None:
+    table = tmp_path / "via.csv"
+    narrow = replace(ARM, joints=(replace(ARM.joints[0], range_deg=(-50.0, 50.0)), *ARM.joints[1:]))
+    sliding = "z (mm),joint 1,joint 2,joint 3\n10,0,0.5,0\n20,0.4,1,0\n"
+    for arm, text in ((narrow, "\n".join(RAD)), (Arm.load("scara_z"), sliding)):
+        table.write_text(text)
+        with pytest.raises(InputError, match="degrees or radians"):
+            via_table.read(table, arm)
 
 
 def test_a_unit_of_the_header_is_not_overruled(tmp_path: Path) -> None:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import random
 import re
+from dataclasses import replace
 
 import pytest
 from armtempo.basics.text import aligned, wrapped
-from armtempo.cli import main
+from armtempo.cli import main, state
 from armtempo.cli.commands import COMMANDS
 from armtempo.model import shipped
+from armtempo.model.arm import Arm
+from armtempo.robot.board_state import JointState, record_crc
 from click.testing import CliRunner
 
+from tests.host.test_arm_check import STATE
 from tests.interpreters import ROOT
 
 SEED = 5
@@ -87,6 +91,50 @@ def test_every_line_fits(arguments: tuple[str, ...]) -> None:
     )
     assert too_long(narrow) == []
     assert narrow.split() == wide.split()
+    assert broken(wide, narrow) == []
+
+
+_ROW = re.compile(r"(?=.*\S {2,}\S+ {2,}\S).*?(?= {2,}[a-z]+[,:] |$)")
+"""The columns of a table's row, without a remark such as "rejected: …" behind them."""
+
+
+def broken(wide: str, narrow: str) -> list[str]:
+    """Rows of tables whose columns are on several lines where the terminal is narrow."""
+    rows = [found[0].rstrip() for line in wide.splitlines() if (found := _ROW.match(line))]
+    return [row for row in rows if not any(line.startswith(row) for line in narrow.splitlines())]
+
+
+def test_a_wrapped_row_of_a_table_is_noticed() -> None:
+    row = "          base         -170.00°  (-75555 steps)  encoder -170.00° (-75555 counts)"
+    assert broken(row, "\n".join(wrapped(row, 80))) == [row]
+    cells = "   2      216.8699    -84.2360    134.3750"
+    remark = f"{cells}  rejected: {'a word ' * 9}"
+    assert broken(remark, "\n".join(wrapped(remark, 80))) == []
+    assert broken(remark, "\n".join(wrapped(remark, 40))) == [cells]
+
+
+@pytest.mark.parametrize("name", shipped.files())
+@pytest.mark.parametrize("end", [0, 1], ids=["low", "high"])
+def test_the_positions_of_a_board_fit_at_the_ends_of_the_ranges(name: str, end: int) -> None:
+    arm = Arm.load(shipped.files()[name])
+    gears = arm.transmission
+    steps = gears.whole_steps([joint.range_deg[end] for joint in arm.driven])
+    turned = [number / per_deg for number, per_deg in zip(steps, gears.steps_per_deg, strict=True)]
+    counts = [round(angle * per_deg) for angle, per_deg in zip(turned, gears.counts_per_deg, strict=True)]
+    pairs = zip(steps, counts, strict=True)
+    joints = tuple(JointState("joint", True, *_unnamed(*pair)) for pair in pairs)
+    found = replace(STATE, arm="", arm_crc=record_crc(arm), joints=joints).named(arm)
+    assert found.arm
+    lines = state.motion_lines(found)
+    assert [line for line in lines if len(line) > 80] == []
+    rows = [line for line in lines if " steps)" in line]
+    assert len(rows) == len(arm.driven)
+    assert len({line.index(" steps)") for line in rows}) == 1
+
+
+def _unnamed(steps: int, counts: int) -> tuple[int, None, int, None]:
+    """What a board says of a joint."""
+    return steps, None, counts, None
 
 
 def too_long(text: str) -> list[str]:

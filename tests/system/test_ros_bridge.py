@@ -6,6 +6,7 @@ import importlib.util
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -86,6 +87,28 @@ def test_goals_are_followed_and_states_published(bridge: Any) -> None:
     states = bridge.sent.states()
     assert len(states) > 3
     assert np.all(np.diff(states[:, 0]) >= -1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "positions"),
+    [("thor", (0, 10, 20, 30, 35, -50)), ("scara_z", (100, 20, 30, -40))],
+)
+def test_states_are_of_the_joints_and_in_rad_and_m(
+    example: Any, name: str, positions: tuple[float, ...]
+) -> None:
+    """Also where one motor turns several joints, and where a joint slides."""
+    arm = Arm.load(name)
+    sent = Rosbridge()
+    steps = arm.transmission.whole_steps(positions)
+    sample = SimpleNamespace(positions=SimpleNamespace(commanded_steps=steps))
+    example.Bridge(None, arm, sent.append).on_sample(sample, 1.0)
+    state = sent[0]["msg"]
+    assert state["name"] == [joint.name for joint in arm.driven]
+    si = [
+        0.001 * position if joint.slides else np.radians(position)
+        for joint, position in zip(arm.driven, positions, strict=True)
+    ]
+    assert state["position"] == pytest.approx(si, abs=1e-3)
 
 
 def test_what_cannot_be_followed_is_aborted_with_its_reason(bridge: Any) -> None:

@@ -23,6 +23,7 @@ from armtempo.link import open_board
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
+from armtempo.planning import point_to_point
 from armtempo.report import run_folder, run_reader
 from armtempo.robot import arm_state
 from armtempo.simulator import InjectedFault, LaunchOptions, launch
@@ -95,14 +96,28 @@ def test_a_sim_folder_keeps_where_the_arm_stands(tmp_path: Path) -> None:
     assert not kept.exists()
 
 
-def test_the_progress_goes_aside_of_json(tmp_path: Path) -> None:
-    file = small_plan(tmp_path / "small.json")
-    done = commandline.run("run", file, "--json", folder=tmp_path)
+def test_a_trajectory_of_ros_runs_on_its_own_times(tmp_path: Path) -> None:
+    """Slower than its limits allow; with --json its notes and progress go aside."""
+    arm = Arm.paper()
+    move = point_to_point.straight("move", (0, -60, 40), (8, -63, 37), arm)
+    times = np.linspace(0.0, 1.3 * move.duration_s, 30)
+    points = [
+        {"positions": row, "time_from_start": at}
+        for row, at in zip(np.radians(move(times / 1.3)).tolist(), times.tolist(), strict=True)
+    ]
+    message = {"joint_names": [joint.name for joint in arm.driven], "points": points}
+    (tmp_path / "feed.json").write_text(json.dumps(message))
+    done = commandline.run("run", "feed.json", "--arm", "paper", "--json", folder=tmp_path)
     assert done.exit_code == 0, done.errors
     done.said("samples-01.csv: complete")
+    assert "follows the recording on its own times" in done.errors.replace("\n", " ")
     found = json.loads(done.output)
     assert (found["complete"], found["repetitions"]) == (True, ["complete"])
-    assert run_reader.load(tmp_path / found["folder"]).repetitions[0].state == "complete"
+    run = run_reader.load(tmp_path / found["folder"]).repetitions[0]
+    assert run.state == "complete"
+    assert run.time_s[-1] == pytest.approx(times[-1], abs=0.1)
+    wanted = move(np.minimum(run.time_s / 1.3, move.duration_s))
+    assert np.abs(run.commanded_deg - wanted).max() < 0.2
 
 
 def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> None:

@@ -56,7 +56,8 @@ def text_of(path: Path) -> str:
 def of_text(text: str, path: Path | str) -> NumberTable:
     """The table in a text from ``path``; skips empty lines, and those that begin with ``#``.
 
-    A first line without a number is a header, also after a ``#``. Raises InputError if the text is not a table, for a
+    A first line without a number is a header; so is the last line with ``#`` above the numbers, if it has as many words
+    as they have columns, whatever is between the words. Raises InputError if the text is not a table, for a
     first line of words and numbers, and for a line with more or fewer cells than the first one.
     """
     separator = _separator(text)
@@ -70,9 +71,9 @@ def of_text(text: str, path: Path | str) -> NumberTable:
     header = None
     if rows and not any(map(is_number, _pointed(rows[0][1], separator))):
         header = rows.pop(0)[1]
-    above = [row for number, row in remarks if rows and number < rows[0][0]]
-    if header is None and above and len(above[-1]) == len(rows[0][1]) > 1:
-        header = [above[-1][0].lstrip("# "), *above[-1][1:]]
+    above = [number for number, _ in remarks if rows and number < rows[0][0]]
+    if header is None and above:
+        header = _names(text.splitlines()[above[-1] - 1], separator, len(rows[0][1]))
     while header and not header[-1]:
         header.pop()
     width = len(header) if header is not None else len(rows[0][1]) if rows else 0
@@ -94,6 +95,16 @@ def _separator(text: str) -> str:
     return next((separator for separator in _SEPARATORS if separator in first), "")
 
 
+def _names(remark: str, separator: str, width: int) -> list[str] | None:
+    """The names of so many columns in a line that begins with ``#``; None if it has more or fewer."""
+    bare = remark.removeprefix("\ufeff").strip().lstrip("# \t")
+    for each in dict.fromkeys((separator, *_SEPARATORS, "")):
+        words = next(iter(csv.reader([bare], delimiter=each)), []) if each else _BLANKS.split(bare)
+        if len(words) == width > 1:
+            return [word.strip() for word in words]
+    return _of_width(width, bare, _BLANKS.split(bare)) if width > 1 else None
+
+
 def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
     if separator:
         return csv.reader(lines, delimiter=separator)
@@ -101,9 +112,25 @@ def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
     width = max((len(row) for row in rows if row and all(map(is_number, row))), default=0)
     # a header's names may have single blanks in them
     return [
-        wide if len(row) != width and len(wide := _WIDE_BLANKS.split(line.strip())) == width else row
+        row if len(row) == width else _of_width(width, line.strip(), row) or row
         for line, row in zip(lines, rows, strict=True)
     ]
+
+
+def _of_width(width: int, line: str, words: list[str]) -> list[str] | None:
+    """So many names that have single blanks in them; None if there are more or fewer."""
+    return next((names for names in (_WIDE_BLANKS.split(line), _joined(words)) if len(names) == width), None)
+
+
+def _joined(words: list[str]) -> list[str]:
+    """Each word with the numbers, and units in brackets, after it."""
+    names = words[:1]
+    for word in words[1:]:
+        if is_number(word) or word[:1] in ("(", "["):
+            names[-1] += f" {word}"
+        else:
+            names.append(word)
+    return names
 
 
 def _fitted(row: list[str], width: int, where: str) -> list[str]:

@@ -225,7 +225,7 @@ def import_urdf(
         "worst_position_mm": float(fit.position_mm),
         "worst_rotation_deg": float(fit.rotation_deg),
         "radii_mm": [joint.radius_mm for joint in arm.joints],
-        "doubts": [*chain.doubts, *chain.unclear],
+        "doubts": [*chain.doubts, *chain.narrowed, *chain.unclear],
     }
     lines = [
         f"{chain.robot!r}: {len(chain.joints)} joints from link {chain.base!r} to {chain.tip!r}",
@@ -235,9 +235,9 @@ def import_urdf(
         f"wrote {out}; add the motors, then: armtempo check --arm {out}",
     ]
     lines += [
-        f"note: {doubt} A URDF has radians; correct it, or range_deg in {out}" for doubt in chain.doubts
+        f"note: {doubt} A URDF has radians; correct it, or the joint in {out}" for doubt in chain.doubts
     ]
-    lines += [f"note: {unclear}" for unclear in chain.unclear]
+    lines += [f"note: {said}" for said in (*chain.narrowed, *chain.unclear)]
     if chain.couplings:
         lines.append(
             f"the URDF's transmissions couple joints: [coupling] in {out} is to be used with the motors"

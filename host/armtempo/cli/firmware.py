@@ -91,7 +91,7 @@ def _values(made: Image) -> dict[str, Any]:
     "given",
     type=options.PATH,
     metavar="FILE",
-    help="The zip file of a release, or a folder that 'armtempo firmware' made. Default: the only one in this folder.",
+    help="The folder that 'armtempo firmware' made, or a zip file of it. Default: the only one in this folder.",
 )
 @click.option("--port", metavar="PORT", help="The board's present port, if it runs MicroPython.")
 @click.option(

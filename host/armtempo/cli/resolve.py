@@ -183,7 +183,7 @@ def as_recorded(
     """A plan on the recording's own times; errors as in ``recorded.plan``."""
     from armtempo.planning import recorded  # here, as it loads the planner
 
-    found = via_table.recorded(path, arm, radians)
+    found = via_table.recorded(path, arm, radians, tolerance_deg)
     tolerance = recorded.TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
     return recorded.plan(arm, name, found.times_s, found.angles_deg, tolerance, found.notes)
 

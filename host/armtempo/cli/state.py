@@ -18,6 +18,9 @@ from armtempo.model.arm import Arm
 from armtempo.model.steps import position, whole_cycles
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 
+_WIDTH, _INDENT = 80, 10
+"""Columns of a terminal, and those before a table of the state."""
+
 
 @click.command("status")
 @options.board(options.arm_of_board)
@@ -83,7 +86,7 @@ def motion_lines(state: BoardState) -> list[str]:
     found = [f"state     {state.state}{_speed(state)}{_rest(state)}"]
     if state.fault:
         found.append(f"fault     {state.fault}; see 'armtempo clear'")
-    found += [f"          {line}" for line in joint_lines(state)]
+    found += [" " * _INDENT + line for line in joint_lines(state)]
     if state.sequence:
         found.append(_sequence(state.sequence))
     found.append(f"link      {_link(state)}")
@@ -123,7 +126,7 @@ def _rest(state: BoardState) -> str:
 def joint_lines(state: BoardState) -> list[str]:
     """One line per joint: name, angle (steps), encoder angle (counts); and a line for the tool."""
     rows = [_cells(joint) for joint in state.joints]
-    lines = [row.rstrip() for row in aligned(rows, (12, 10, 1, 1))] if rows else []
+    lines = [row.rstrip() for row in aligned(rows, (12, 10, 1, 1), _WIDTH - _INDENT)] if rows else []
     return [*lines, f"tool at {format_tool(state.tool)}"] if state.tool else lines
 
 

@@ -62,12 +62,12 @@ def _of(joint: DrivenJoint) -> list[Finding]:
 
 
 def _exceeded(arm: Arm) -> list[Finding]:
-    """Limits beyond what the driver or the encoder allows."""
+    """Limits beyond what the driver, the motor's curve or the encoder allows."""
     return [
         warning(
             joint.name,
             f"{key} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: motions keep to {bound.value:.4g}",
-            f"lower {key} to that, or use fewer microsteps",
+            f"lower {key} to that, or change what sets it",
         )
         for joint, bound in drive_limits.exceeded(arm.table_joints, arm.coupling, arm.driver)
         for key in (joint.unit.key(bound.key),)

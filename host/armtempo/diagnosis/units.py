@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from armtempo.basics.arrays import Array
 from armtempo.diagnosis.finding import Finding, warning
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import is_range_doubtful, is_speed_doubtful
 from armtempo.model.parts import Joint
 from armtempo.model.tool_pose import BASE
 
@@ -16,8 +17,6 @@ _SHORT_MM, _TINY_MM = 2.0, 0.02
 _NARROW_DEG = (0.1, 2 * math.pi)
 """A range, and an end of one, that may be in radians."""
 _NEAR_RAD = 0.002
-_TURNS_DEG = 720.0
-"""No joint of a small arm turns further, as its cables would not."""
 _TWISTS = [math.pi * part / 12 for part in range(1, 25)]
 
 
@@ -86,12 +85,19 @@ def _ranges(arm: Arm) -> Iterator[Finding]:
         if joint.slides:
             continue
         low, high = joint.range_deg
-        if max(abs(low), abs(high)) > _TURNS_DEG:
+        if is_range_doubtful(joint.range_deg):
             right = f"[{math.radians(low):.4g}, {math.radians(high):.4g}]"
             yield warning(
                 joint.name,
-                f"range_deg = [{low:g}, {high:g}]: more than two turns; were degrees taken as radians?",
+                f"range_deg = [{low:g}, {high:g}], in rad {right}: were degrees taken as radians?",
                 f"if so, write range_deg = {right}",
+            )
+        if joint.limits and is_speed_doubtful(speed := joint.limits.speed_deg_s):
+            right = f"{math.radians(speed):.4g}"
+            yield warning(
+                joint.name,
+                f"speed_deg_s = {speed:g}, {right} rad/s: were degrees/s taken as rad/s?",
+                f"if so, write speed_deg_s = {right}",
             )
         least, most = _NARROW_DEG
         if high - low > least and max(abs(low), abs(high)) <= most + _NEAR_RAD and _is_fraction(joint):

@@ -85,16 +85,16 @@ def _switches(joint: DrivenJoint) -> list[Finding]:
             protects = "protects, but " if isinstance(number, int) else ""
             text = f"its {side} switch {protects}cannot home: its {joint.unit.what} is not known"
             found.append(note(joint.name, text, f"measure where it trips and give {side}_{joint.unit.name}"))
-        if isinstance(number, int) and trip_deg is not None and low < trip_deg < high:
-            text = f"its {side} switch trips at {trip_deg:g} {joint.unit.name}, within its range of {low:g} to {high:g}"
-            key = joint.unit.key("range_deg")
-            found.append(
-                warning(
-                    joint.name,
-                    text,
-                    f"narrow {key} to what the switch leaves, or correct the {joint.unit.what}",
-                )
+    for side, at_deg in joint.switches_within:
+        text = f"its {side} switch trips at {at_deg:g} {joint.unit.name}, within its range of {low:g} to {high:g}"
+        key = joint.unit.key("range_deg")
+        found.append(
+            warning(
+                joint.name,
+                text,
+                f"narrow {key} to what the switch leaves, or correct the {joint.unit.what}",
             )
+        )
     return found
 
 

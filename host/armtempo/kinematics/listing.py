@@ -92,7 +92,7 @@ def _numerical_lines(search: NumericalSolutions, units: Sequence[JointUnit]) -> 
 def _tool_lines(answer: Answer) -> Iterator[str]:
     """The tool's pose, and its distance from the wanted pose."""
     if not answer.success:
-        yield f"nearest posture found, {names(_units(answer))}:{_row(answer.angles_rad)}"
+        yield f"nearest posture found, {names(_units(answer))}: {' '.join(_row(answer.angles_rad).split())}"
     position = " ".join(_short(value, 4) for value in answer.tool[:3, 3])
     roll, pitch, yaw = (_short(value, 4) for value in to_rpy_deg(answer.tool))
     yield (

@@ -1,4 +1,4 @@
-"""What a joint's driver and encoder allow, beside the limits of its table: motions keep to the smaller of both.
+"""What a joint's driver, motor and encoder allow, beside the limits of its table: motions keep to the smaller of both.
 
 A motor with backlash has part of its speed and acceleration for that.
 """
@@ -22,6 +22,8 @@ CROSSING_SHARE = 0.25
 """Most of a motor's speed and acceleration that it uses to cross its backlash."""
 _REVERSAL_STEPS = 0.16 * 0.99
 """Largest acceleration times the square of the time between opposite steps, of which the board allows 0.16."""
+_CURVE_END = 1.0 - 1e-6
+"""Of a torque curve's last speed, so that rounding leads to no speed beyond it, where the curve has no torque."""
 _SLACK_US = 1e6 * REVERSAL_SLACK_TICKS / TICK_HZ
 
 
@@ -35,7 +37,7 @@ class Bound(NamedTuple):
 
 
 def bounds(motor: Motor, encoder: Encoder | None, driver: Driver) -> list[Bound]:
-    """The limits that the driver's timing and the encoder set, for the motor behind its gear."""
+    """The limits that the driver's timing, the encoder and the torque curve set, for the motor behind its gear."""
     step_us = driver.pulse_us + driver.low_us
     turn_us = max(driver.pulse_us + driver.dir_hold_us + driver.dir_setup_us + 2.0 * _SLACK_US, step_us)
     found = [
@@ -48,6 +50,10 @@ def bounds(motor: Motor, encoder: Encoder | None, driver: Driver) -> list[Bound]
     if 1e6 / step_us < MAX_STEP_RATE:  # else the board's rate is the smaller one, and refused beyond
         reason = f"pulse_us and low_us allow a step every {step_us:g} us, {1e6 / step_us:.0f} steps/s"
         found.append(Bound("speed_deg_s", 1e6 / step_us / motor.steps_per_deg, reason))
+    if motor.curve_rpm_nm:
+        last_rpm, _ = motor.curve_rpm_nm[-1]
+        speed = _CURVE_END * 6.0 * last_rpm / motor.reduction
+        found.append(Bound("speed_deg_s", speed, f"its curve_rpm_nm ends at {last_rpm:g} rpm"))
     if encoder is not None:
         turns = motor.gear_ratio if encoder.on == "motor" else 1.0
         counts_per_deg = encoder.counts_per_rev * turns / motor.per_rev

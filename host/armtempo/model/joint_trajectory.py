@@ -19,8 +19,13 @@ from armtempo.model.exchange import from_si
 from armtempo.model.joint_unit import DEG
 
 _KEYS = ("joint_names", "points")
+_SUFFIXES = (".json", ".yaml", ".yml")
 _INSIDE = ("trajectory", "joint_trajectory", "goal", "msg", "message")
 """Keys under which other messages have a trajectory: DisplayTrajectory, FollowJointTrajectory's goal."""
+_DEEPEST = 8
+"""Levels of messages and lists in which a trajectory is looked for."""
+_BEFORE = "\ufeff \t\r\n"
+"""What may stand before JSON."""
 _STEP_S = 0.01
 """Largest step of the points of a trajectory with speeds."""
 
@@ -36,10 +41,9 @@ class Recorded:
     notes: tuple[str, ...] = ()
 
 
-def is_ros(text: str) -> bool:
-    """Whether a text is a message, and no table."""
-    begin = text.lstrip("\ufeff \r\n-")
-    return begin.startswith(("{", "header:", "joint_names:", *(f"{key}:" for key in _INSIDE)))
+def is_ros(text: str, path: Path | str) -> bool:
+    """Whether a text is a message, and no table: by the name of its file, or by what it says."""
+    return Path(path).suffix.lower() in _SUFFIXES or _is_json(text) or _KEYS[0] in text
 
 
 def of_text(text: str, path: Path | str, arm: Arm) -> Recorded:
@@ -104,27 +108,35 @@ def of_content(content: Mapping[str, Any], path: Path | str, arm: Arm) -> Record
 
 def _content(text: str, path: Path | str) -> Mapping[str, Any]:
     try:
-        found = json.loads(text) if text.lstrip().startswith("{") else _yaml(text)
+        found = json.loads(text.lstrip(_BEFORE)) if _is_json(text) else _yaml(text)
     except ValueError as error:
         raise InputError(f"{path}: is neither JSON nor YAML: {error}", "give a whole message") from None
     return _trajectory(found, path)
 
 
+def _is_json(text: str) -> bool:
+    return text.lstrip(_BEFORE).startswith(("{", "["))
+
+
 def _yaml(text: str) -> Any:
+    """Its documents that are not empty."""
     try:
         import yaml
     except ImportError:
         raise MissingPackageError("reading YAML", "PyYAML", "ros") from None
     try:
-        return next((each for each in yaml.safe_load_all(text) if each is not None), None)
+        return [each for each in yaml.safe_load_all(text) if each is not None]
     except yaml.YAMLError as error:
         raise ValueError(str(error).replace("\n", " ")) from None
 
 
 def _trajectory(found: Any, path: Path | str) -> Mapping[str, Any]:
-    for _ in range(4):
-        if isinstance(found, list) and len(found) == 1:
-            found = found[0]
+    for _ in range(_DEEPEST):
+        if isinstance(found, list):
+            if len(found) > 1 and all(isinstance(each, Mapping) for each in found):
+                raise InputError(f"{path}: has {len(found)} messages", "give a file with one trajectory")
+            found = found[0] if len(found) == 1 else None
+            continue
         if not isinstance(found, Mapping):
             break
         if all(key in found for key in _KEYS):

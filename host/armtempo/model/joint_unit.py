@@ -24,6 +24,28 @@ _KEYS = {
 """Keys of an arm file that are not alike but for their unit."""
 
 
+_TURNS_DEG = 720.0
+"""No joint of a small arm turns further, as its cables would not."""
+_TURN_RAD, _NEAR_RAD = math.tau, 0.002
+_FAST_RAD_S = 20.0
+"""No joint of an arm turns faster."""
+
+
+def is_range_doubtful(range_deg: tuple[float, float]) -> bool:
+    """Whether the angles were probably degrees that were taken for radians, and converted.
+
+    They are more than two turns, or whole numbers of radians, as nobody writes them, of more than a turn.
+    """
+    most = max(map(abs, range_deg))
+    whole = all(abs(end - round(end)) < _NEAR_RAD for end in map(math.radians, range_deg))
+    return most > _TURNS_DEG or (whole and math.radians(most) > _TURN_RAD)
+
+
+def is_speed_doubtful(speed_deg_s: float) -> bool:
+    """Whether a speed was probably in degrees/s, taken for rad/s and converted."""
+    return math.radians(speed_deg_s) > _FAST_RAD_S
+
+
 @dataclass(frozen=True)
 class JointUnit:
     """A unit of joints."""

@@ -338,6 +338,20 @@ class DrivenJoint:
         return f"{self.name}: {angle_deg:g} {self.unit.word} is outside of its range {low:g} to {high:g}"
 
     @property
+    def switches_within(self) -> tuple[tuple[str, float], ...]:
+        """("low" or "high", position) of each switch that stops the joint within its range."""
+        low, high = self.range_deg
+        ends = (
+            ("low", self.switches.low, self.switches.low_deg),
+            ("high", self.switches.high, self.switches.high_deg),
+        )
+        return tuple(
+            (side, at_deg)
+            for side, number, at_deg in ends
+            if isinstance(number, int) and at_deg is not None and low < at_deg < high
+        )
+
+    @property
     def steps_per_deg(self) -> float:
         """Steps per degree of the joint: how finely it can be placed. Positions of motors: ``Arm.transmission``."""
         return self.motor.steps_per_deg / self.step_share

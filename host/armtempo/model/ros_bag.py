@@ -23,8 +23,9 @@ def is_bag(path: Path) -> bool:
 def read(path: Path, arm: Arm) -> Recorded:
     """The one JointTrajectory of a recording; without any, the motion that its JointStates tell.
 
-    JointStates count that name all driven joints, by their stamps. Raises MissingPackageError without rosbags,
-    InputError for a file that cannot be read, for several trajectories, and as ``joint_trajectory.of_content``.
+    JointStates count that name all driven joints, by their stamps; of those with the same stamp the first. Raises
+    MissingPackageError without rosbags, InputError for a file that cannot be read, for several trajectories, for stamps
+    that go back, and as ``joint_trajectory.of_content``.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -70,12 +71,21 @@ def _content(reader: Any, path: Path, arm: Arm) -> dict[str, Any]:
     names = list(states[0].name)
     if any(list(state.name) != names for state in states):
         raise InputError(f"{path}: its JointStates name different joints", "record one topic of them")
-    times = [state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec for state in states]
+    stamps = [state.header.stamp for state in states]
+    times_ns = [10**9 * int(stamp.sec) + int(stamp.nanosec) for stamp in stamps]
     points = []
-    for time, state in zip(times, states, strict=True):
-        since_s = time - times[0]
-        if not points or since_s > points[-1]["time_from_start"]:
+    before_ns = times_ns[0]
+    for time_ns, state in zip(times_ns, states, strict=True):
+        if time_ns < before_ns:
+            raise InputError(
+                f"{path}: the stamps of its JointStates go back by {1e-9 * (before_ns - time_ns):.3g} s, "
+                f"{1e-9 * (before_ns - times_ns[0]):.6g} s after the first",
+                "record one motion of one publisher, with a clock that is not set meanwhile",
+            )
+        if not points or time_ns > before_ns:
+            since_s = 1e-9 * (time_ns - times_ns[0])
             points.append({"positions": state.position.tolist(), "time_from_start": since_s})
+        before_ns = time_ns
     return {"joint_names": names, "points": points}
 
 

@@ -65,7 +65,7 @@ def of_text(
     text: str, path: Path | str, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
 ) -> ImportedPath:
     """Via points from the text of a table, as ``via_points``; ``path`` names it in messages."""
-    if joint_trajectory.is_ros(text):
+    if joint_trajectory.is_ros(text, path):
         return _of_recording(joint_trajectory.of_text(text, path, arm), path, arm, tolerance_deg)
     return via_points(number_table.of_text(text, path), arm, radians, tolerance_deg)
 
@@ -88,10 +88,12 @@ def _of_recording(found: Recorded, path: Path | str, arm: Arm, tolerance_deg: fl
     return _thinned(angles, found.times_s, arm, tolerance_deg, (*found.notes, *notes), where)
 
 
-def recorded(path: Path, arm: Arm, radians: bool | None = None) -> Recorded:
+def recorded(
+    path: Path, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
+) -> Recorded:
     """A motion with its times, from a table with a time or a JointTrajectory; errors as in ``read``."""
     text = "" if ros_bag.is_bag(path) else number_table.text_of(path)
-    if not text or joint_trajectory.is_ros(text):
+    if not text or joint_trajectory.is_ros(text, path):
         found = ros_bag.read(path, arm) if not text else joint_trajectory.of_text(text, path, arm)
         where = [f"{path}: at {time:g} s" for time in found.times_s]
     else:
@@ -107,6 +109,7 @@ def recorded(path: Path, arm: Arm, radians: bool | None = None) -> Recorded:
         found = Recorded(times, _angles(table, header, arm, radians), _notes(table, header, arm))
         where = [f"{path}: line {line}" for line, _ in table.rows]
     angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
+    _check_ranges(where, angles, arm, TOLERANCE_DEG if tolerance_deg is None else tolerance_deg)
     return Recorded(found.times_s, angles, (*found.notes, *notes))
 
 
@@ -205,6 +208,13 @@ def _header(table: NumberTable, arm: Arm) -> Header:
     if table.header is not None:
         return table_header.read(table.header, arm, f"{table.path}: line 1")
     columns = len(table.rows[0][1]) if table.rows else len(arm.driven)
+    for least in (0, 1):
+        if columns > 1 and table.rows and table.rows[0][1] == [str(least + n) for n in range(columns)]:
+            raise InputError(
+                f"{table.path}: line {table.rows[0][0]}: {','.join(table.rows[0][1])} are the numbers of columns, or "
+                "a point?",
+                f"write a header in their place, or above the point: {table_header.expected(arm)}",
+            )
     first = np.array(table.numbers([0]))
     rising = len(first) > 1 and bool(np.all(np.diff(first[:, 0]) > 0.0))
     return table_header.no_header(columns, arm, f"{table.path}: line 1", rising)
@@ -228,20 +238,29 @@ def _angles(table: NumberTable, header: Header, arm: Arm, radians: bool | None) 
                 f"{table.path}: line 1: the column of {joint.name}, which slides, does not say its unit",
                 f"name it in the header: {joint.name} (mm)",
             )
-    if radians is None and not arm.slides and all(column.unit == "" for column in header.angles):
-        moving = np.ptp(points, axis=0) > 0.0
-        spans = np.array([joint.range_deg[1] - joint.range_deg[0] for joint in arm.driven])
-        if np.abs(points).max() < _RADIANS and moving.any() and spans[moving].min() > _WIDE_DEG:
-            raise InputError(
-                f"{table.path}: no angle is beyond {np.abs(points).max():.3g}: degrees or radians?",
-                "give --degrees or --radians, or name the unit in the header: joint 1 (rad)",
-            )
+    unnamed = [
+        number
+        for number, (joint, column) in enumerate(zip(arm.driven, header.angles, strict=True))
+        if not joint.slides and not column.unit
+    ]
+    wide = [np.ptp(arm.driven[n].range_deg) > _WIDE_DEG and np.ptp(points[:, n]) > 0.0 for n in unnamed]
+    if radians is None and any(wide):
+        _check_degrees(points[:, unnamed], table, arm.driven[unnamed[0]].name)
     return np.column_stack(
         [
             _in_unit(joint, points[:, n], column, radians, table)
             for n, (joint, column) in enumerate(zip(arm.driven, header.angles, strict=True))
         ]
     )
+
+
+def _check_degrees(angles: Array, table: NumberTable, name: str) -> None:
+    """Refuse angles without a unit, whose first column is ``name``, that may as well be radians."""
+    if (most := float(np.abs(angles).max())) < _RADIANS:
+        raise InputError(
+            f"{table.path}: no angle without a unit is beyond {most:.3g}: degrees or radians?",
+            f"give --degrees or --radians, or name the unit in the header: {name} (rad)",
+        )
 
 
 def _in_unit(
@@ -305,6 +324,9 @@ def _poses(
             f"{table.path}: no position is beyond {np.abs(position).max():.3g}: mm or metres?",
             "name the unit in the header: x_mm,y_mm,z_mm or x_m,y_m,z_m",
         )
+    unnamed = [key for key in WHOLE if key in columns and not header.pose[key].unit]
+    if radians is None and unnamed and any(columns[key].any() for key in unnamed):
+        _check_degrees(np.column_stack([columns[key] for key in unnamed]), table, unnamed[0])
     position = position * [table_header.mm(header.pose[key]) for key in table_header.POSITION]
     turned = {
         f"{key}_deg": _degrees(columns[key], header.pose[key], radians, table)

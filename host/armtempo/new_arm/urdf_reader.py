@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, MissingPackageError
-from armtempo.model.joint_unit import DEG, SLIDE_MM, JointUnit
+from armtempo.model.joint_unit import DEG, SLIDE_MM, JointUnit, is_range_doubtful, is_speed_doubtful
 from armtempo.model.joint_unit import MM as MM_UNIT
 from armtempo.model.parts_file import MAX_ANGLE_DEG
 from armtempo.new_arm import urdf_bodies, urdf_transmissions
@@ -24,9 +24,6 @@ from armtempo.new_arm.urdf_transmissions import Coupling
 
 MM = 1000.0
 """Millimetres in the URDF's unit, the metre."""
-
-DOUBTFUL_DEG = 720.0
-"""Ranges beyond this, in either direction, were probably written in degrees."""
 
 CONTINUOUS_DEG = (-180.0, 180.0)
 """Range of a continuous joint, which has none in a URDF."""
@@ -60,6 +57,8 @@ class ChainJoint:
     is_linked: bool = False
     """Whether a linkage turns it by minus the angle of the joint before, so that its link keeps its direction."""
     slides: bool = False
+    narrowed_by: str = ""
+    """Name of the joint that a linkage turns with this one, and whose limits are narrower."""
 
     @property
     def unit(self) -> JointUnit:
@@ -87,12 +86,30 @@ class Chain:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Joints whose limits are probably in degrees."""
-        return tuple(
+        turning = [joint for joint in self.joints if not joint.slides]
+        ranges = (
             "joint {!r}: its limits, {:.4g} to {:.4g} rad, are {:.5g} to {:.5g} degrees: are they in degrees?".format(
                 joint.name, *map(math.radians, joint.range_deg), *joint.range_deg
             )
+            for joint in turning
+            if is_range_doubtful(joint.range_deg)
+        )
+        speeds = (
+            f"joint {joint.name!r}: its speed, {math.radians(joint.speed_deg_s):.4g} rad/s, is {joint.speed_deg_s:.5g} "
+            "degrees/s: is it in degrees/s?"
+            for joint in turning
+            if joint.speed_deg_s is not None and is_speed_doubtful(joint.speed_deg_s)
+        )
+        return (*ranges, *speeds)
+
+    @property
+    def narrowed(self) -> tuple[str, ...]:
+        """What is said of ranges that are narrower than in the file."""
+        return tuple(
+            f"joint {joint.name!r}: its range is {joint.range_deg[0]:.5g} to {joint.range_deg[1]:.5g} degrees, by the "
+            f"limits of {joint.narrowed_by!r}, which it turns"
             for joint in self.joints
-            if max(map(abs, joint.range_deg)) > DOUBTFUL_DEG and not joint.slides
+            if joint.narrowed_by
         )
 
     @property
@@ -150,7 +167,7 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
         )
     first, last = joints[0].parent, joints[-1].child
     model.update_cfg({joint.name: 0.0 for joint in moving if joint.mimic is None})
-    found = tuple(map(partial(_joint, model, first), moving, [*moving[1:], None]))
+    found = _narrowed(path, moving, map(partial(_joint, model, first), moving, [*moving[1:], None]))
     names = [joint.name for joint in moving if joint.mimic is None and joint.type != _SLIDING]
     couplings, unclear = urdf_transmissions.of_file(path, names)
     zero = _transform(model, last, first)
@@ -182,6 +199,12 @@ def _check_text(path: Path) -> None:
     if root.get("name") is None:
         raise InputError(f"{path}: its <robot> element has no name", 'give it one: <robot name="my_arm">')
     values = [value for element in root.iter() for value in element.attrib.values()]
+    joints = {joint.get("name"): joint.find("mimic") for joint in root.findall("joint")}
+    for name, mimic in joints.items():
+        master = None if mimic is None else mimic.get("joint")
+        if mimic is not None and (master == name or master not in joints):
+            what = "itself" if master == name else f"{master!r}, which this robot does not have"
+            raise InputError(f"{path}: joint {name!r} mimics {what}", "correct its <mimic>, or take it out")
     unfilled = next((value for value in values if "$(" in value or "${" in value), "")
     if unfilled or any("xacro" in element.tag for element in root.iter()):
         left = f", with {unfilled!r} still to be filled in" if unfilled else ""
@@ -313,6 +336,28 @@ def _joint(model: Any, base: str, joint: Any, after: Any) -> ChainJoint:
     )
 
 
+def _narrowed(path: Path, moving: Sequence[Any], found: Iterable[ChainJoint]) -> tuple[ChainJoint, ...]:
+    """The joints, those that turn others by a linkage within the limits of these too."""
+    joints = list(found)
+    for number, joint in enumerate(moving):
+        limit = joint.limit
+        if joint.mimic is None or joint.type == "continuous" or limit is None:
+            continue
+        if limit.lower is None or limit.upper is None:
+            continue
+        offset, before = joint.mimic.offset or 0.0, joints[number - 1]
+        low, high = (math.degrees(offset - end) for end in (limit.upper, limit.lower))
+        kept = max(low, before.range_deg[0]), min(high, before.range_deg[1])
+        if not kept[0] < kept[1]:
+            raise InputError(
+                f"{path}: the limits of {joint.name!r}, which mimics {before.name!r}, leave that no range",
+                f"correct the limits of one of them; {joint.name!r} may do without",
+            )
+        if kept != before.range_deg:
+            joints[number - 1] = replace(before, range_deg=kept, continuous=False, narrowed_by=joint.name)
+    return tuple(joints)
+
+
 def _transform(model: Any, link: str, base: str) -> Array:
     """The frame of ``link`` in that of ``base``, in mm."""
     pose: Array = np.array(model.get_transform(link, base), dtype=np.float64)
@@ -372,17 +417,19 @@ def _below(joints: Sequence[Any], first: str) -> Iterator[list[Any]]:
 def _fingers(joints: Sequence[Any]) -> set[str]:
     """Names of the joints of grippers: side by side, they slide, or one mimics the other.
 
-    A joint that mimics one before it, as a linkage does, and one that slides alone are parts of the arm.
+    A joint that mimics one of its own chain, as a linkage does, and one that slides alone are parts of the arm.
     """
     above = {joint.child: joint for joint in joints}
+    before_of = {joint.name: {each.name for each in _before(joint, above)} for joint in joints}
     slides = [joint.name for joint in joints if joint.type == "prismatic"]
     found = set()
     for joint in joints:
-        before = {each.name for each in _before(joint, above)}
-        if joint.mimic is not None and joint.mimic.joint not in before:
-            found |= {joint.name, joint.mimic.joint}
+        before = before_of[joint.name]
+        master = None if joint.mimic is None else joint.mimic.joint
+        if master is not None and master not in before and joint.name not in before_of[master]:
+            found |= {joint.name, master}
         if joint.name in slides:
-            after = {each.name for each in joints if joint.name in {up.name for up in _before(each, above)}}
+            after = {name for name, above_it in before_of.items() if joint.name in above_it}
             if set(slides) - before - after - {joint.name}:
                 found.add(joint.name)
     return found

@@ -68,7 +68,7 @@ class Panel:
     def serve(self, listening: socket.socket, token: str) -> None:
         """Serve on a bound socket; a client needs the ``token``."""
         host, port = listening.getsockname()[:2]
-        guarded = Access(self._api, {*reachable(host), *_names(host)}, token, port)
+        guarded = Access(self._api, served_hosts(host), token, port)
         config = uvicorn.Config(
             guarded,
             log_level="warning",
@@ -173,6 +173,11 @@ def url(address: str, port: int, token: str) -> str:
     """The page that brings the token."""
     name = f"[{address}]" if ":" in address else address
     return f"http://{name}:{port}/?token={token}"
+
+
+def served_hosts(host: str) -> set[str]:
+    """Addresses and names by which pages may ask a server that listens on ``host``."""
+    return {*reachable(host), *_names(host)}
 
 
 def _names(host: str) -> set[str]:

@@ -125,7 +125,7 @@ _LIMITS = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 
 
 def hardware_notes(arm: Arm) -> tuple[str, ...]:
-    """Limits of the arm's tables that the driver or the encoder does not allow."""
+    """Limits of the arm's tables that the driver, a motor's curve or the encoder does not allow."""
     return tuple(
         f"{joint.name}: {joint.unit.key(bound.key)} = {getattr(joint.limits, bound.key):g}, but {bound.reason}: "
         f"planned with {bound.value:.4g}"
@@ -333,7 +333,8 @@ def long_ways(arm: Arm, via_deg: Array) -> tuple[str, ...]:
 
 
 def check_ranges(arm: Arm, angle_points_deg: Array, degree: int, hint: str = MOVE_VIAS) -> None:
-    """Raise PlanError, with this hint, if the path leaves a joint's range, also between the via points."""
+    """Raise PlanError, with this hint, if the path leaves a joint's range, also between the via points, or goes beyond
+    a switch within it, which would stop the arm."""
     low, high = extremes.range_of(np.moveaxis(bspline.polynomials(angle_points_deg, degree), 2, 0))
     for joint, lowest, highest in zip(arm.driven, low, high, strict=True):
         least, most = joint.range_deg
@@ -344,6 +345,13 @@ def check_ranges(arm: Arm, angle_points_deg: Array, degree: int, hint: str = MOV
                 f"{least:g} to {most:g}",
                 hint,
             )
+        for side, at_deg in joint.switches_within:
+            if lowest < at_deg - margin if side == "low" else highest > at_deg + margin:
+                raise PlanError(
+                    f"{joint.name}: the path reaches {lowest:.7g} to {highest:.7g} {joint.unit.word}, beyond its "
+                    f"{side} switch, which stops it at {at_deg:g}",
+                    f"stay on this side of it, or correct {joint.unit.key(f'{side}_deg')} in its [switches]",
+                )
 
 
 def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:

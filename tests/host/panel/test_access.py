@@ -8,11 +8,12 @@ import re
 import socket
 from contextlib import ExitStack
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 from armtempo.cli.panel import _way_in
 from armtempo.panel.access import COOKIE, MOST_BYTES, Access, Policy
-from armtempo.panel.server import listen, reachable, url
+from armtempo.panel.server import listen, reachable, served_hosts, url
 
 
 async def _inner(scope: Any, receive: Any, send: Any) -> None:
@@ -155,10 +156,13 @@ def test_the_printed_addresses_work(host: str, loopback: bool) -> None:
         bound, port = listening.getsockname()[:2]
         addresses = reachable(bound)
         assert addresses
+        guarded = Access(_inner, served_hosts(bound), "secret", port)
         for address in addresses:
             assert not ipaddress.ip_address(address).is_unspecified
             with socket.create_connection((address, port), timeout=10):
                 pass
+            page = urlsplit(url(address, port, "secret"))
+            assert answer(guarded, query=page.query, host=page.netloc)[0]["status"] == 200
     assert ipaddress.ip_address(addresses[-1]).is_loopback  # for this machine's browser
     assert ipaddress.ip_address(addresses[0]).is_loopback == (loopback or len(addresses) == 1)
 

@@ -41,6 +41,22 @@ def test_a_joint_that_a_parallelogram_turns(tmp_path: Path, limit: str, master: 
         np.testing.assert_allclose(pose, tool_pose(urdf, angles), atol=0.02)
 
 
+def test_the_limits_of_a_linked_joint_narrow_the_range_of_its_master(tmp_path: Path) -> None:
+    """It is at 0.3 rad minus the angle of j2, which may turn to 2 rad."""
+    urdf, out = tmp_path / "linkage.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    limit = J3_LIMIT.replace("-3.0", "-0.5").replace("3.0", "0.6")
+    urdf.write_text(text.replace(J3_LIMIT, limit + MIMIC.format("j2", -1, 0.3)))
+    said = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)]).output
+    assert "joint 'j2': its range is -17.189 to 45.837 degrees, by the limits of 'j3'" in said
+    low, high = Arm.shape(out).joints[1].range_deg
+    assert (low, high) == pytest.approx(np.degrees((-0.3, 0.8)), abs=1e-3)
+    urdf.write_text(text.replace(J3_LIMIT, J3_LIMIT.replace("-3.0", "2.9") + MIMIC.format("j2", -1, 0.3)))
+    refused = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "none.toml")])
+    assert refused.exit_code == 2
+    assert "the limits of 'j3', which mimics 'j2', leave that no range" in refused.output
+
+
 @pytest.mark.parametrize(("master", "factor"), [("j1", -1), ("j2", 1), ("j2", -0.5)])
 def test_other_linkages_are_refused(tmp_path: Path, master: str, factor: float) -> None:
     urdf = tmp_path / "linkage.urdf"
@@ -59,6 +75,9 @@ def test_other_linkages_are_refused(tmp_path: Path, master: str, factor: float) 
     ("old", "new", "said"),
     [
         (J2_LIMIT, J2_LIMIT + MIMIC.format("j1", 1, 0), "joint 'j2': it mimics 'j1'"),
+        (J2_LIMIT, J2_LIMIT + MIMIC.format("j3", -1, 0), "joint 'j2': it mimics 'j3'"),
+        (J2_LIMIT, J2_LIMIT + MIMIC.format("j2", -1, 0), "joint 'j2' mimics itself"),
+        (J2_LIMIT, J2_LIMIT + MIMIC.format("j9", -1, 0), "mimics 'j9', which this robot does not have"),
         (
             'name="j2" type="revolute">',
             'name="j2" type="prismatic">' + MIMIC.format("j1", -1, 0),

@@ -16,6 +16,7 @@ from armtempo.kinematics.dynamics import joint_torques
 from armtempo.kinematics.shape import refusals
 from armtempo.model import mesh_files
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import is_range_doubtful
 from armtempo.new_arm import urdf_reader as reader
 from armtempo.new_arm import urdf_rows as dh
 from armtempo.planning.capsules import point_distance
@@ -184,16 +185,29 @@ def test_the_tip_chooses_the_chain(tmp_path: Path) -> None:
 def test_limits_in_degrees_are_suspected_at_import_and_by_check(tmp_path: Path) -> None:
     text = (FOLDER / "three_planar.urdf").read_text()
     urdf, out = tmp_path / "degrees.urdf", tmp_path / "arm.toml"
-    urdf.write_text(text.replace(J2_LIMIT, J2_LIMIT.replace("2.0", "90")))
+    limit = J2_LIMIT.replace("2.0", "90").replace("1.5", "180")
+    urdf.write_text(text.replace(J2_LIMIT, limit))
     result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
     assert result.exit_code == 0, result.output
     assert (
         "joint 'j2': its limits, -90 to 90 rad, are -5156.6 to 5156.6 degrees: are they in degrees?"
         in result.output
     )
+    assert "joint 'j2': its speed, 180 rad/s, is 10313 degrees/s: is it in degrees/s?" in result.output
     checked = run_check("--arm", out)
-    assert "more than two turns; were degrees taken as radians?" in checked.output
+    assert "were degrees taken as radians?" in checked.output
     assert "if so, write range_deg = [-90, 90]" in checked.output
+
+
+@pytest.mark.parametrize(
+    ("limits", "is_doubtful"),
+    [((-10, 10), True), ((0, 12), True), ((-6, 6), False), ((0, 6.283), False), ((-6.2832, 6.2832), False),
+     ((-9.4248, 9.4248), False), ((-12.5, 13.5), True)],
+)  # fmt: skip
+def test_whole_radians_beyond_a_turn_are_doubtful(limits: tuple[float, float], is_doubtful: bool) -> None:
+    low, high = map(math.degrees, limits)
+    for decimals in (12, 4, 1):
+        assert is_range_doubtful((round(low, decimals), round(high, decimals))) == is_doubtful
 
 
 def test_names_of_any_kind_are_written_safely_and_blank_ones_replaced(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A built firmware: the pieces of the flash and what they are, in a folder or in the zip file of a release."""
+"""A built firmware: the pieces of the flash and what they are, in a folder or in a zip file of it."""
 
 from __future__ import annotations
 

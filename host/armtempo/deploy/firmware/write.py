@@ -54,7 +54,7 @@ _PERCENT = re.compile(r"^(?:Down|Up)load\s.*?(\d+)%")
 
 
 def flash(given: Path, port: str | None, tool: str | None, tell: Tell, progress: Progress) -> None:
-    """Put a firmware on a board: the folder that ``build`` made, or the zip file of a release.
+    """Put a firmware on a board: the folder that ``build`` made, or a zip file of it.
 
     ``port``: where the board answers. One that is not there, or None: the board in its bootloader, or at the
     ST-LINK; else the only MicroPython board that is plugged in. ``tool``: one of TOOLS; None: the first that is
