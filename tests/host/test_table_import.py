@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
+from armtempo.kinematics.of_arm import forward, inverse, inverse_many
 from armtempo.model import shipped, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -77,8 +78,21 @@ NEAR = 90.0 + 1e-4 / ARM.driven[0].steps_per_deg
 """Beyond a range to 90 by less than rounding in single precision."""
 
 
+def pose_angles(arm: Arm, first_deg: float) -> list[float]:
+    """The nearest posture for the pose with joint 1 at this angle, of one pose and of many: joints 1 to 3."""
+    pose, near = (
+        forward(arm, (first_deg, -60.0, 40.0, 10.0, 20.0, 30.0)),
+        (80.0, -60.0, 40.0, 10.0, 20.0, 30.0),
+    )
+    one, many = inverse(arm, pose, near)[0], inverse_many(arm, [pose], near)
+    assert one.usable
+    np.testing.assert_allclose(one.angles_deg, many.nearest_deg[0], atol=1e-9)
+    assert one.angles_deg[0] == 90.0
+    return list(one.angles_deg[:3])
+
+
 def test_rounding_beyond_a_range_is_its_end(tmp_path: Path) -> None:
-    """Of a table, a job, a posture of the arm file, a move and a sequence."""
+    """Of a table, a job, a posture of the arm file, a move, a sequence, a pose, and of home_deg."""
     first = replace(ARM.joints[0], range_deg=(-90.0, 90.0))
     arm = replace(ARM, joints=(first, *ARM.joints[1:]))
     table = tmp_path / "via.csv"
@@ -92,6 +106,16 @@ def test_rounding_beyond_a_range_is_its_end(tmp_path: Path) -> None:
     assert arm.angles_problem((NEAR, -60.0, 40.0)) == ""
     assert point_to_point.posture((NEAR, -60.0, 40.0), arm)[0] == 90.0
     assert via_points.posture_deg(arm, ArmPosture("near", (NEAR, -60.0, 40.0)))[0] == 90.0
+    assert pose_angles(arm, NEAR) == pytest.approx([90.0, -60.0, 40.0], abs=1e-4)
+    path = tmp_path / "arm.toml"
+    text = shipped.arm_path().read_text()
+    path.write_text(text.replace("range_deg = [-10.0, 190.0]", "range_deg = [1e-8, 190.0]"))
+    assert Arm.load(path).all_home_deg[0] == 1e-8
+    path.write_text(text.replace("range_deg = [-10.0, 190.0]", "range_deg = [1e-3, 190.0]"))
+    with pytest.raises(
+        InputError, match=r"joint\[1\]\.home_deg = 0\.0 is not allowed; give .* at least 0\.001"
+    ):
+        Arm.load(path)
     for beyond in (90.01, -90.01):
         assert "outside of its range" in arm.angles_problem((beyond, -60.0, 40.0))
         with pytest.raises(InputError, match="outside of its range"):

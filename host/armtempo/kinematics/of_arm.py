@@ -21,7 +21,7 @@ from armtempo.kinematics.forward import forward as forward_rad
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import inverse as inverse_rad
 from armtempo.kinematics.numerical import NumericalSolution, descents
-from armtempo.kinematics.ranges import TOLERANCE_RAD, Ranges
+from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.shape import refusals
 from armtempo.kinematics.solutions import OK
 from armtempo.kinematics.solver import PoseSolver
@@ -234,9 +234,9 @@ def inverse_many(arm: Arm | Path | str, poses: ArrayLike, near_deg: ArrayLike | 
 
 def _placed(ranges: Ranges, angles: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
     """``ranges.placed`` for angles (N, 8, joints), and whether all joints lie in their ranges then: (N, 8)."""
-    low, high = ranges.low, ranges.high
-    least = np.ceil((low - TOLERANCE_RAD - angles) / math.tau)
-    most = np.floor((high + TOLERANCE_RAD - angles) / math.tau)
+    low, high, beyond = ranges.low, ranges.high, ranges.outside_rad
+    least = np.ceil((low - beyond - angles) / math.tau)
+    most = np.floor((high + beyond - angles) / math.tau)
     turns = np.clip(np.round((near - angles) / math.tau), least, most)
     within = np.clip(angles + math.tau * turns, low, high)
     below, above = angles + math.tau * (least - 1.0), angles + math.tau * least

@@ -12,6 +12,7 @@ from armtempo.model import joint_unit, outputs_file
 from armtempo.model.joint_unit import DEG, MM, JointUnit
 from armtempo.model.parts import (
     CURVE,
+    END_STEPS,
     LEAST_MM_PER_REV,
     LEAST_RATIO,
     MOST_MM_PER_REV,
@@ -91,7 +92,7 @@ def joint(table: Table, number: int) -> Joint:
         alpha_deg=table.number("alpha_deg", least=-180.0, most=180.0),
         theta_offset_deg=table.number("theta_offset_deg", 0.0, least=-360.0, most=360.0),
         range_deg=(low, high),
-        home_deg=_home(table, unit, low, high),
+        home_deg=_home(table, unit, low, high, motor),
         limits=limits,
         motor=motor,
         encoder=encoder,
@@ -169,10 +170,15 @@ def loads(top: Table) -> tuple[Load, ...]:
     )
 
 
-def _home(table: Table, unit: JointUnit, low: float, high: float) -> float:
+def _home(table: Table, unit: JointUnit, low: float, high: float, motor: Motor | None) -> float:
     if table.has(unit.key("fixed_deg")):
         return (low + high) / 2
-    return table.number(unit.key("home_deg"), min(max(0.0, low), high), least=low, most=high)
+    key, nearest = unit.key("home_deg"), min(max(0.0, low), high)
+    home = table.number(key, nearest)
+    end = min(max(home, low), high)
+    if motor is not None and abs(home - end) * motor.steps_per_deg <= END_STEPS:
+        return end
+    return table.number(key, nearest, least=low, most=high)
 
 
 def _locked(table: Table, unit: JointUnit) -> tuple[float, float]:

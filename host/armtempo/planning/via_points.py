@@ -87,7 +87,7 @@ class _Setup:
         return cls(
             arm,
             solver,
-            Ranges(low, high, solver.ranges.slides),
+            Ranges(low, high, solver.ranges.slides, solver.ranges.beyond_rad),
             np.array(solver.home_rad),
             driven,
             not solver.refusals,
