@@ -12,6 +12,7 @@ _PROBLEMS = """() => {
   if (view.scrollWidth > view.clientWidth || view.scrollHeight > view.clientHeight) found.push('the page scrolls');
 
   const always = ['.armtempo-stop', '#armtempo-state', '#armtempo-where', '#armtempo-said', '.armtempo-tabs'];
+  if (seen(document.querySelector('.armtempo-banner'))) always.push('.armtempo-banner');
   for (const selector of always) {
     const box = document.querySelector(selector).getBoundingClientRect();
     if (box.left < 0 || box.top < 0 || box.right > view.clientWidth + 1 || box.bottom > view.clientHeight + 1)

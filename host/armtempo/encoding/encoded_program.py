@@ -100,7 +100,7 @@ def table(arm: Arm, found: UserProgram, places: Places) -> dict[str, Any]:
     if arm.coupling:
         raise InputError(
             f"arm {arm.name!r} has coupled joints: the board cannot make moves for it",
-            "let the host move it (board.goto, armtempo run), or plan a sequence",
+            "let the host move it (board.goto, 'armtempo run'), or plan a sequence",
         )
     bare = _postures(arm)
     return {

@@ -210,7 +210,7 @@ def explain(transport: Transport, heard: bytes) -> LinkError:
             return NoProgramError(
                 f"{where} runs MicroPython but not the armtempo program, which is on it: mpremote or an IDE ended it",
                 f"press the board's reset button, or: mpremote connect {transport.name} reset; if it does "
-                "not start then: armtempo deploy",
+                "not start then: 'armtempo deploy'",
             )
         transport.write(_ASK_PARTS)
         if _IN_PARTS in _listen(transport):

@@ -82,7 +82,7 @@ class BoardTab:
             rows = [
                 {
                     "key": words.STATE_KEYS.get(key, key.replace("_", " ")),
-                    "value": words.plain(words.text(values[key])),
+                    "value": words.of_text(words.text(values[key])),
                 }
                 for key in _SHOWN
                 if values[key] != ""
@@ -97,7 +97,10 @@ class BoardTab:
         tested = self._operator.tested
         if tested is not None and tested is not self._tested:
             self._tested = tested
-            self._verdicts.rows = tested.to_json()["lines"]
+            lines = tested.to_json()["lines"]
+            self._verdicts.rows = [
+                {key: words.of_text(line[key]) for key in words.VERDICT_KEYS} for line in lines
+            ]
             self._verdicts.set_visibility(True)
         self._log.look()
         if self._page.client in self._operator.monitors:
@@ -154,7 +157,7 @@ class BoardTab:
                 self._change(press, words.RENAME, lambda: self._operator.board.rename(name, wanted))
 
         with self._page.ask("", words.RENAME, rename).place:
-            new = ui.input(words.NEW_NAME, value=name)
+            new = ui.input(words.NEW_NAME, value=words.plain(name))
 
     def _change(self, press: Press, text: str, call: Callable[[], object]) -> None:
         self._page.do(press, text, call, Needs.COMMAND)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
+
+from armtempo.basics.errors import InputError
 
 
 @dataclass
@@ -34,3 +37,12 @@ class Fields:
             if (now := field.value()) != field.shown:
                 field.shown = now
                 field.show(now)
+
+
+@contextmanager
+def in_words(of: Callable[[str], str]) -> Iterator[None]:
+    """A context whose InputError on a file has its texts by ``of``: with the names of fields, not of keys."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(of(error.problem), of(error.hint)) from None

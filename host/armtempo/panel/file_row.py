@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from armtempo.panel import words
+from armtempo.panel.fields import in_words
 from armtempo.panel.file_editor import FileEditor
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
@@ -19,10 +20,13 @@ if TYPE_CHECKING:
 
 
 class FileRow:
-    """The row; ``look`` shows what has changed, also on another page or in the folder."""
+    """The row; ``look`` shows what has changed, also on another page or in the folder.
 
-    def __init__(self, page: PanelPage, editor: FileEditor, label: str) -> None:
-        self._page, self._editor = page, editor
+    ``of``: gives a text on the file the names of the fields in place of those of its keys.
+    """
+
+    def __init__(self, page: PanelPage, editor: FileEditor, label: str, of: Callable[[str], str]) -> None:
+        self._page, self._editor, self._of = page, editor, of
         self._folder_ns = 0
         with ui.row():
             self._files = ui.select([], label=label, on_change=self._open).classes("armtempo-file")
@@ -40,7 +44,11 @@ class FileRow:
         """Change what is edited, or its file; the last argument is the press."""
         *given, press = arguments
         self._page.operator.check(self._page.client, press, Needs.CONTROL)
-        call(*given)
+        self._call(call, *given)
+
+    def _call(self, call: Callable[..., object], *arguments: Any) -> None:
+        with in_words(self._of):
+            call(*arguments)
 
     def _why_nothing(self) -> str:
         return "" if self._editor.text else words.NOTHING_OPEN
@@ -51,7 +59,7 @@ class FileRow:
     def _open(self, event: Any) -> None:
         if event.value not in (None, self._opened):
             if not self._page.operator.why_not(self._page.client, Needs.CONTROL):
-                self._page.attempt(lambda: self._editor.open(str(event.value)))
+                self._page.attempt(lambda: self._call(self._editor.open, str(event.value)))
             self._files.set_value(self._opened)  # the previous one, if it was refused
 
     @property
@@ -59,7 +67,10 @@ class FileRow:
         return self._editor.file.name if self._editor.file else None
 
     def _save(self, press: Press) -> None:
-        self.change(lambda: ui.notify(words.SAVED.format(path=self._editor.save().name)), press)
+        def save() -> None:
+            ui.notify(words.plain(words.SAVED.format(path=self._editor.save().name)))
+
+        self.change(save, press)
 
     def _ask_name(self, text: str, call: Callable[[str], object], _: Press) -> None:
         def answered(press: Press) -> None:
@@ -74,7 +85,7 @@ class FileRow:
         now_ns = editor.folder.stat().st_mtime_ns
         if now_ns != self._folder_ns:
             self._folder_ns = now_ns
-            self._files.set_options(editor.files(), value=None)
+            self._files.set_options({name: words.plain(name) for name in editor.files()}, value=None)
         opened = self._opened if self._opened in self._files.options else None
         if self._files.value != opened:
             self._files.set_value(opened)

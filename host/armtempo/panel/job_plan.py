@@ -14,6 +14,7 @@ from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.model.job import Job
 from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
+from armtempo.panel.fields import in_words
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
 
@@ -57,10 +58,8 @@ class JobPlan:
 
     def _plan(self, press: Press) -> Awaitable[None]:
         self._operator.check(self._page.client, press, Needs.CONTROL)
-        try:
+        with in_words(words.of_job):
             job = self._jobs.job()
-        except InputError as error:
-            raise InputError(words.of_job(error.problem), words.of_job(error.hint)) from None
         return self._make_plan(job, self._jobs.version)
 
     async def _make_plan(self, job: Job, version: int) -> None:

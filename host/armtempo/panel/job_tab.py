@@ -44,7 +44,7 @@ class JobTab:
         self._built: object = None
         """What the table and the options were built for."""
         page.scene.picked, page.scene.dragged = self._pick, self._drag
-        self._file = FileRow(page, self._jobs, words.JOB_FILE)
+        self._file = FileRow(page, self._jobs, words.JOB_FILE, words.of_job)
         self._table()
         ui.label(words.DRAG_HINT).classes("armtempo-note")
         self._offered = ui.column()
@@ -262,7 +262,7 @@ class JobTab:
             return
         texts = {"": words.DEFAULT, **{str(one): words.CHOICES.get(str(one), str(one)) for one in choices}}
         if value not in texts:
-            texts[value] = value
+            texts[value] = words.plain(value)
         chosen = ui.select(texts, value=value, label=label).props("dense outlined").classes("armtempo-option")
         chosen.on_value_change(lambda event: self._edit(self._jobs.set_option, key, str(event.value or "")))
         self._choices.add(chosen.set_value, partial(self._jobs.option, key))
@@ -304,9 +304,8 @@ def _kind(via: Via) -> str:
 
 def _hint(via: Via) -> str:
     """Its keys."""
-    return (
-        ", ".join(f"{key} = {via.text(key)}" for key in via.values if key != ANGLES) or words.FORMS[via.form]
-    )
+    given = ", ".join(f"{key} = {via.text(key)}" for key in via.values if key != ANGLES)
+    return words.plain(given) or words.FORMS[via.form]
 
 
 def _cell(index: int, via: Via) -> str:

@@ -168,7 +168,7 @@ class PanelBoard:
 
     def _tell(self, text: str) -> None:
         """Store a message about the connection as ``trouble``, until the board reports its state again."""
-        self.trouble = text
+        self.trouble = words.of_text(text)
         self.say(text)
 
     def without_board(self, call: Callable[[], object]) -> None:
@@ -380,7 +380,7 @@ class PanelBoard:
 
     def say(self, text: str) -> None:
         """Append a line to the log."""
-        self.log.add([f"{time.strftime('%H:%M:%S')}  {text}"])
+        self.log.add([f"{time.strftime('%H:%M:%S')}  {words.of_text(text)}"])
 
     # messages of the board
 

@@ -48,7 +48,7 @@ class _Control:
         self.element.set_enabled(not reason)  # type: ignore[attr-defined]
         for hint in self.element.default_slot.children:
             if isinstance(hint, ui.tooltip):
-                hint.set_text(words.plain(reason))
+                hint.set_text(words.of_text(reason))
                 hint.set_visibility(bool(reason))
 
 

@@ -15,7 +15,7 @@ from armtempo import pipeline
 from armtempo.basics.errors import ArmtempoError
 from armtempo.model.steps import position, whole_cycles
 from armtempo.panel import words
-from armtempo.panel.fields import Fields
+from armtempo.panel.fields import Fields, in_words
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
@@ -47,7 +47,7 @@ class SequenceTab:
         self._times: list[ui.label] = []
         self._timed: SequencePlan | None = None
         self._planning = False
-        self._file = FileRow(page, self._editor, words.SEQUENCE_FILE)
+        self._file = FileRow(page, self._editor, words.SEQUENCE_FILE, words.of_sequence)
         with ui.row():
             for text, call, needs, look in (
                 (words.PLAN, self._plan_it, Needs.IDLE, "outline icon=insights"),
@@ -126,7 +126,9 @@ class SequenceTab:
 
     def _field(self, index: int, key: str, value: str, label: str | None, jobs: list[str]) -> None:
         """A field for the value of a key, with what it can name as a list."""
-        box = ui.input(label, value=value, autocomplete=self._editor.choices(key, jobs))
+        # A name that cannot be shown as it is could only be completed to another one
+        choices = [name for name in self._editor.choices(key, jobs) if name == words.plain(name)]
+        box = ui.input(label, value=value, autocomplete=choices)
         named(box.props("dense outlined"), f"{words.STEP} {index + 1}: {key}")
         self._fields.add(box.set_value, lambda: self._editor.steps[index].get(key, ""))
         box.on("change", lambda event: self._set(index, key, str(event.args or "").strip()))
@@ -178,7 +180,8 @@ class SequenceTab:
         """The plan of the present steps."""
         if (plan := self._editor.plan) is None:
             version = self._editor.version
-            plan = pipeline.plan_sequence(self._editor.arm, self._editor.sequence(), self._operator.part)
+            with in_words(words.of_sequence):
+                plan = pipeline.plan_sequence(self._editor.arm, self._editor.sequence(), self._operator.part)
             self._editor.planned(plan, version)
         return plan
 

@@ -249,7 +249,7 @@ SURE_FLASH = (
 )
 
 
-_BUTTONS = {
+COMMANDS = {
     "clear": CLEAR,
     "home": HOMING,
     "goto": TO_START,
@@ -269,7 +269,7 @@ _BUTTONS = {
 }
 """What the panel has instead of a command."""
 _SOLUTIONS = re.compile(r"\n  solution +why not(\n  .*)*")
-_COMMAND = re.compile(r"'armtempo ([a-z-]+)([^']*)'")
+_COMMAND = re.compile(r"'armtempo ([a-z-]+)([^']*)'(?! in a terminal)")
 
 
 def of_error(error: ArmtempoError) -> str:
@@ -286,14 +286,23 @@ def of_job(text: str) -> str:
     return text
 
 
+def of_sequence(text: str) -> str:
+    """A text on the edited sequence, with the names of its fields instead of those of the file's keys."""
+    text = of_text(text)
+    for key, label in {**STEP_KINDS, **STEP_KEYS}.items():
+        # A key that is a usual word too is one only after the number of its step
+        text = re.sub((r"(\b)" if "_" in key else r"(\bstep\[\d+\]\.)") + rf"{key}\b", rf"\1‘{label}’", text)
+    return text
+
+
 def of_text(text: str) -> str:
-    """A text of the library in the words of the panel."""
+    """A text of the library in the words of the panel; one that is in them already stays as it is."""
     return plain(_COMMAND.sub(_button, text))
 
 
 def _button(command: re.Match[str]) -> str:
     """The button that does what a command does, or the command as one of the terminal."""
-    name = _BUTTONS.get(command[1])
+    name = COMMANDS.get(command[1])
     return f"‘{name}’" if name else f"{command[0]} in a terminal"
 
 

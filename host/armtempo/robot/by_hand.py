@@ -32,7 +32,7 @@ class HandGuided:
         if blind:
             raise InputError(
                 f"{', '.join(blind)}: no encoder, so moves by hand cannot be measured",
-                "teach with the keys instead: armtempo teach without --by-hand",
+                "teach with the keys instead: 'armtempo teach' without --by-hand",
             )
         arm_state.posture_deg(client, arm)
         self._client = client

@@ -352,7 +352,7 @@ class Motions:
                 return entry.name
         raise InputError(
             "no motion given, and no default motion is set for the board's button",
-            "give the motion's name: armtempo fetch NAME; 'armtempo list' shows the names",
+            "give the motion's name: 'armtempo fetch NAME'; 'armtempo list' shows the names",
         )
 
     def _posture_deg(self) -> Array:

@@ -76,7 +76,7 @@ class BoardStore:
         """
         data = self._board.client.fetch(stored_name(name))
         if kind := _KINDS.get(data[:KIND_BYTES]):
-            raise InputError(f"{name!r} is a {kind}, not a motion", f"run it with: armtempo run {name}")
+            raise InputError(f"{name!r} is a {kind}, not a motion", f"run it with 'armtempo run {name}'")
         return encoded_motion.of_record(name, data, self._board.known_arm() if arm is None else Arm.of(arm))
 
     def remove(self, name: str) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from armtempo.panel import words
 from armtempo.panel.panel_board import PanelBoard
+from nicegui import ui
 
 from tests.host.panel.fakes import board_state
 from tests.host.panel.pages import Page, pages
@@ -102,3 +103,31 @@ def test_fields_show_what_has_changed(operator: PanelBoard) -> None:
         operator.jobs.delete(2)
         page.look()
         assert not [one for one in page.elements() if one.props.get("aria-label") == "P2 joint 1"]
+
+
+@pytest.mark.parametrize(
+    ("tab", "button", "said"),
+    [
+        (words.TAB_JOB, words.SAVE, "‘Segments’ = 'banana' is not allowed"),
+        (words.TAB_JOB, words.PLAN, "‘Segments’ = 'banana' is not allowed"),
+        (words.TAB_SEQUENCE, words.SAVE, "step[1].‘wait, s’ = 'banana' is not allowed"),
+    ],
+)
+def test_a_wrong_value_is_told_in_the_name_of_its_field(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch, tab: str, button: str, said: str
+) -> None:
+    """Whatever button finds it."""
+    shown: list[str] = []
+    monkeypatch.setattr(ui, "notify", lambda text, **_: shown.append(text))
+    (operator.jobs.folder / "day.toml").write_text('name = "day"\n[[step]]\nwait_s = 1\n')
+    operator.sequences.open("day.toml")
+    with pages(operator) as page:
+        if tab == words.TAB_JOB:
+            opened(page)
+            operator.jobs.set_option("refine", "banana")
+        else:
+            page.show(tab)
+            operator.sequences.set(0, "wait_s", "banana")
+        page.look()
+        page.press(button)
+        assert said in shown[-1]

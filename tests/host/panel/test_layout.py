@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import time
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from armtempo.panel import words
-from armtempo.panel.panel_board import PanelBoard
+from armtempo.panel import layout, words
+from armtempo.panel.arm_scene import ArmShape
+from armtempo.panel.panel_board import FREEZE_AFTER_S, PanelBoard
 
-from tests.host.panel.fakes import board_state, unhomed
+from tests.host.panel.fakes import ARM, Clock, board_state, unhomed
 from tests.host.panel.pages import pages
 
 TABS = (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD)
@@ -72,3 +75,26 @@ def test_pause_and_homing_follow_the_board_on_every_tab(operator: PanelBoard, ta
         page.look()
         assert words.FIRST_HOME not in page.texts()
         assert page.named(words.PAUSE).enabled
+
+
+def test_freeze_is_offered_where_the_arm_does_not_rest_after_a_stop(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its button shows what each message to the pages says."""
+    clock = Clock()
+    times = SimpleNamespace(monotonic=clock, strftime=time.strftime)
+    monkeypatch.setattr("armtempo.panel.panel_board.time", times)
+
+    def offered() -> object:
+        return layout.message(operator, ArmShape(ARM))["freeze"]
+
+    clock.now_s += 10 * FREEZE_AFTER_S  # nothing was stopped
+    assert offered() is False
+    operator.stop()
+    clock.now_s += 0.9 * FREEZE_AFTER_S
+    assert offered() is False
+    clock.now_s += 0.2 * FREEZE_AFTER_S
+    assert offered() is True
+    operator.board.moves = False  # type: ignore[attr-defined]
+    operator.stop()
+    assert offered() is False

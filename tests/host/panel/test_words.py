@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from armtempo.diagnosis.finding import Level
+from armtempo.diagnosis.selftest.result import Measurement, SelfTest
+from armtempo.link.board_messages import StoredMotion
 from armtempo.panel import layout, words
 from armtempo.panel.panel_board import PanelBoard
 from nicegui import ui
 
 from tests.host.panel import fakes
 from tests.host.panel.pages import pages
+
+TABS = (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD)
 
 
 @pytest.mark.parametrize(
@@ -22,6 +28,7 @@ from tests.host.panel.pages import pages
         ("move it there with 'armtempo goto'", "move it there with ‘Go to the start’"),
         ("'armtempo list' shows the names", "‘Stored motions’ shows the names"),
         ("see 'armtempo help recovery'", "see 'armtempo help recovery' in a terminal"),
+        ("see 'armtempo help recovery' in a terminal", "see 'armtempo help recovery' in a terminal"),
         ("nothing to do", "nothing to do"),
     ],
 )
@@ -43,6 +50,13 @@ def test_commands_are_the_panels_buttons(text: str, wanted: str) -> None:
 )
 def test_keys_are_the_panels_fields(text: str, wanted: str) -> None:
     assert words.of_job(text) == wanted
+
+
+def test_keys_of_steps_are_the_panels_fields() -> None:
+    said = "day.toml: step[12].to = 'x' is not allowed; go to 'home'; give wait_s or on_timeout"
+    shown = "day.toml: step[12].‘to’ = 'x' is not allowed; go to 'home'; give ‘wait, s’ or ‘then’"
+    assert words.of_sequence(said) == shown
+    assert words.of_sequence("step[2].output = 'x'") == "step[2].‘set output’ = 'x'"
 
 
 def test_what_turns_the_direction_of_a_line_is_seen() -> None:
@@ -75,12 +89,24 @@ def test_names_from_files_and_boards_turn_no_line_on_any_tab(operator: PanelBoar
     name = 'j"\u202e<b>\x1b'  # an arm file with such a name is refused
     operator.live.state = fakes.board_state(arm=name, fault=name, port=name)
     operator.log.add([name])
+    operator.tested = SelfTest(name, True, 0, [Measurement(name, name, name, name, Level.ERROR, name)])
+    operator.board.stored[:] = [StoredMotion(name, 100, 1, 0, 3, False)]  # type: ignore[attr-defined]
+    folder = operator.jobs.folder
+    for job in ("job", name):
+        (folder / f"{job}.toml").write_text('name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n')
+    for sequence in ("all", f"all{name}"):
+        (folder / f"{sequence}.toml").write_text('name = "all"\n[[step]]\nrun = "job.toml"\n')
+    operator.sequences.open("all.toml")
+    operator.jobs.open("job.toml")
+    operator.jobs.set_option("path", name)
+    operator.jobs.set_key(0, "frame", name)
     (operator.runs / name).mkdir(parents=True)
     (operator.runs / name / "run.json").write_text("{}")
     with pages(operator) as page:
-        for tab in (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD):
+        for tab in TABS:
             page.show(tab)
             page.look()
+        page.press(words.RENAME)
         page.press(words.CLEAR)
         page.done()
         shown = [*map(str, layout.message(operator, page.of.shape)["texts"].values())]
@@ -88,13 +114,47 @@ def test_names_from_files_and_boards_turn_no_line_on_any_tab(operator: PanelBoar
             found = [str(getattr(element, "text", "")), *_texts(element.props)]
             assert not any("\u202e" in one or "\x1b" in one for one in found), (element, found)
             shown += found
-        assert any('j"□<b>□' in text for text in shown)
+        assert {'j"□<b>□.toml', 'allj"□<b>□.toml', 'j"□<b>□'} <= set(shown)
+
+
+def test_each_command_that_the_panel_has_a_button_for_is_that_button(operator: PanelBoard) -> None:
+    cures = " or ".join(f"'armtempo {command} --more'" for command in words.COMMANDS)
+    operator.live.state = fakes.board_state(fault="estop", arm_problem=cures)
+    operator.tested = SelfTest("id", True, 0, [Measurement("pulses", "w", "1", "2", Level.ERROR, cures)])
+    with pages(operator) as page:
+        for trouble in ("", cures):
+            if trouble:
+                operator._tell(trouble)
+            for tab in TABS:
+                page.show(tab)
+                page.look()
+            shown = [*layout.message(operator, page.of.shape)["texts"].values()]
+            for element in page.elements():
+                shown += [str(getattr(element, "text", "")), *_texts(element.props)]
+            left = [text for text in shown if re.search(rf"armtempo ({'|'.join(words.COMMANDS)})", text)]
+            assert left == []
+            assert any(f"‘{words.CLEAR}’" in text for text in shown)
+
+
+def test_commands_in_errors_are_quoted() -> None:
+    """The panel finds no others. Those of the command line's own package are not the panel's."""
+    bare = re.compile(rf"(?<!')(?<!an )\barmtempo ({'|'.join(words.COMMANDS)})\b")
+    package = Path(layout.__file__).parent.parent
+    found = []
+    for path in package.rglob("*.py"):
+        if "cli" in path.relative_to(package).parts or not bare.search(text := path.read_text()):
+            continue
+        for call in ast.walk(ast.parse(text)):
+            if isinstance(call, ast.Call) and ast.unparse(call.func).endswith("Error"):
+                texts = [part.value for part in ast.walk(call) if isinstance(part, ast.Constant)]
+                found += [(path.name, one) for one in texts if bare.search(str(one))]
+    assert found == []
 
 
 def test_hints_are_found_by_the_elements_own_number(operator: PanelBoard) -> None:
     """Quasar looks for the element of a hint by the id that NiceGUI gives it."""
     with pages(operator) as page:
-        for tab in (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD):
+        for tab in TABS:
             page.show(tab)
         targets = {str(hint.props["target"]) for hint in page.elements(ui.tooltip) if "target" in hint.props}
         assert targets

@@ -108,7 +108,7 @@ def test_a_sequence_is_edited_saved_and_run(page: Any, panel: Panel) -> None:
     assert (panel.folder / "day.toml").read_text() == DAY.replace("9", "600")
     press(page, page.get_by_role("button", name="Run", exact=True))
     page.wait_for_selector(".armtempo-lit:has-text('2')")
-    page.keyboard.press("Escape")
+    page.get_by_role("button", name="Stop", exact=True).click()
     page.wait_for_selector("text=stopped: step 2 of cycle 1")
     assert page.locator(".armtempo-lit").count() == 0
 

@@ -76,7 +76,7 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
         control = page.get_by_role("button", name=button, exact=True)
         shown = refusal_of(page, control, partial(control.press, "Enter"))
         said = refusal(folder, file, tomlkit.dumps(content))
-        said = words.of_job(said) if tab == "Job" else said
+        said = (words.of_job if tab == "Job" else words.of_sequence)(said)
         assert said.replace(".0", "") in shown.replace(".0", "")
         field.fill(before)
         if tab == "Sequence":

@@ -108,8 +108,12 @@ _FOCUS = """async () => {
 
 
 def test_each_tab_is_in_view_readable_and_for_the_keyboard(page: Any) -> None:
-    """On a desktop, a tablet and a phone; in the dark the colours alone are others."""
+    """On a desktop, a tablet and a phone, below a banner; in the dark the colours alone are others."""
     home(page)
+    show(page, "Board")
+    panels.press(page, page.get_by_role("button", name="Flash", exact=True))
+    panels.answer(page, "Flash")
+    page.wait_for_selector(".armtempo-fault:has-text('no firmware given')")
     sizes = {"light": [*page_checks.VIEWS.values()], "dark": [page_checks.VIEWS["wide"]]}
     for scheme, views in sizes.items():
         page.emulate_media(color_scheme=scheme)
@@ -127,9 +131,11 @@ def test_each_tab_is_in_view_readable_and_for_the_keyboard(page: Any) -> None:
                 assert found == [], (scheme, tab, width)
     page.emulate_media(color_scheme="light")
     page.set_viewport_size(panels.SMALL)
+    page.get_by_role("button", name="Close", exact=True).click()
+    page.locator(".armtempo-banner").wait_for(state="hidden")
 
 
-_BUTTONS = """() => [...document.querySelectorAll('.armtempo-picture button, .armtempo-tabs button, footer button')]
+_BUTTONS = """() => [...document.querySelectorAll('.armtempo-page button')]
   .filter(one => one.checkVisibility() && !one.disabled)
   .map(one => one.ariaLabel || [...one.querySelectorAll('.block')].map(text => text.textContent).join(' '))"""
 """Names of the buttons that can be pressed."""
@@ -158,12 +164,22 @@ def test_each_button_is_pressed_once(page: Any, panel: Panel) -> None:
             if page.locator(".q-menu").count():
                 page.keyboard.press("Escape")
             if "moving" in page.inner_text("#armtempo-state"):
-                page.keyboard.press(" ")
+                page.keyboard.press("Escape")
                 wait_for(page, "idle")
     for other in opened:
         assert "no such" not in other.inner_text("body")
         other.close()
-    assert {"Home…", "Store…", "Plan", "Paste", "Self-test", "Go to home", "own x +", "Side"} <= pressed
+    assert {
+        "Stop",
+        "Home…",
+        "Store…",
+        "Plan",
+        "Paste",
+        "Self-test",
+        "Go to home",
+        "own x +",
+        "Side",
+    } <= pressed
     assert not errors
     panel.check()
     page.close()  # what is chosen on it is not what the next test expects

@@ -52,7 +52,7 @@ def find(here: Path) -> Path:
     get = "build one with 'armtempo firmware'; 'armtempo help firmware' says how"
     if not found:
         raise InputError(
-            "no firmware given, and none found here", f"{get}; then: armtempo flash --image FILE"
+            "no firmware given, and none found here", f"{get}; then: 'armtempo flash --image FILE'"
         )
     raise InputError(
         f"{len(found)} firmwares found here: {', '.join(map(str, sorted(found)))}", "choose one with --image"
