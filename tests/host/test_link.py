@@ -16,7 +16,7 @@ from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link import Client, traffic
 from armtempo.link.board_messages import RowBegun, Sample
 from armtempo.link.client import harmless_number
-from armtempo.link.follow import Followed, MotionFollower, SequenceFollower
+from armtempo.link.follow import Followed, MotionFollower, SequenceFollower, SequenceWatcher
 from armtempo.link.session import Session
 from armtempo.model.arm import Arm
 from armtempo.planning.point_to_point import straight
@@ -29,7 +29,7 @@ from armtempo.robot.store import store
 from armtempo_shared import sequence, wire
 from armtempo_shared.messages import START_SWITCHES_BIT
 
-from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, started
+from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, replay, started
 from tests.system.relay import ReplayTransport
 
 
@@ -80,7 +80,7 @@ def test_repeated_command_acts_once(tmp_path: Path) -> None:
     lost = [True]
     send = pipe._send
     pipe._send = lambda way, frame: None if way == 1 and lost and lost.pop() else send(way, frame)  # type: ignore[method-assign]
-    run = board.start("feed", wire.record_crc(data)).run
+    run = board.start("feed", wire.record_crc(data))
     assert board.session.repeats == 1
     assert (run, pipe.app.controller.board.engine.calls.count("start")) == (1, 1)
 
@@ -117,7 +117,7 @@ def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> Non
     pipe = Pipe(tmp_path / "flash")
     pipe.run_samples = 500
     board, data = ready(pipe)
-    run = board.start("feed", wire.record_crc(data)).run
+    run = board.start("feed", wire.record_crc(data))
     pipe.wait_away(45.0)
     follower = MotionFollower(board, run)
     samples = list(follower.samples())
@@ -161,7 +161,7 @@ def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) 
     board.home([7, None, None])
     with pytest.raises(BoardError, match="position is unknown"):
         board.start("feed", wire.record_crc(data))
-    run = board.start("feed", wire.record_crc(data), wire.START_HOMING).run
+    run = board.start("feed", wire.record_crc(data), wire.START_HOMING)
     assert board.status().known == 7
     samples = list(MotionFollower(board, run).samples())
     assert samples[0].positions.commanded_steps == (7, 7, 7)
@@ -200,7 +200,7 @@ def test_what_was_to_stop_before_does_not_start(tmp_path: Path) -> None:
     stop = StopRequest()
     stop.wanted = True
     with pytest.raises(KeyboardInterrupt):
-        running.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
+        replay(board, MotionKey("feed", wire.record_crc(data)), stop)
     assert pipe.app.controller.board.engine.calls.count("start") == 0
 
 
@@ -283,7 +283,7 @@ def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:
 def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, old = ready(pipe)
-    run = board.start("feed", wire.record_crc(old)).run
+    run = board.start("feed", wire.record_crc(old))
     pipe.disturb(Noise(f"to {kind}", 0.05, (kind,)), Noise(f"from {kind}", 0.05, (kind,)))
     follower = MotionFollower(board, run)
     indices: list[int] = []
@@ -319,6 +319,13 @@ def sequence_of(pipe: Pipe, times: int) -> tuple[Client, MotionKey]:
     return board, MotionKey("again", wire.record_crc(record))
 
 
+def starting(
+    board: Client, key: MotionKey, on_state: SequenceWatcher = lambda _: None
+) -> Callable[[], SequenceFollower]:
+    """Starts a sequence."""
+    return lambda: SequenceFollower(board, key.name, board.start(key.name, key.crc), on_state)
+
+
 def sequence_samples(
     board: Client, key: MotionKey, at_7: Callable[[], None] = lambda: None
 ) -> SequenceFollower:
@@ -331,7 +338,7 @@ def sequence_samples(
             if len(found) == 8:
                 at_7()
 
-    followed = running.run_sequence(board, key, StopRequest(), take=take)
+    followed = running.follow(board, StopRequest(), starting(board, key), take)
     assert followed.end.ending == "finished"
     assert found == [(run, index) for run in range(1, followed.end.cycle + 1) for index in range(4)]
     return followed
@@ -371,7 +378,9 @@ def test_a_watcher_sees_a_sequence_as_a_motion(tmp_path: Path) -> None:
     encoded = EncodedSequence(key.name, arm, (leg,), rows, board.fetch(key.name))
     folder = recording.new_run(tmp_path / "runs", encoded, "pipe", board)
     seen, states = Counting(), list[str]()
-    recording.sequence(board, encoded, folder, StopRequest(), seen, lambda state: states.append(state.ending))
+    start = starting(board, key, lambda state: states.append(state.ending))
+    with recording.repetition(board, encoded, folder, seen) as recorder:
+        recorder.end_rows(running.follow(board, StopRequest(), start, recorder.take))
     assert seen.samples == [(index, leg.trajectory.duration_s) for index in range(4)] * 2
     assert seen.ended == states[-1:] == ["finished"]
     assert [row.passed for row in Run.load(folder.path).rows] == [1, 2, 3, 4, 5]
@@ -394,11 +403,11 @@ def test_nothing_of_a_run_that_nobody_followed_is_taken_for_the_next_ones(tmp_pa
         pipe.wait(0.1)
     board.home([7, 7, 7])
     passed: list[int] = []
-    running.run_sequence(
+    running.follow(
         board,
-        key,
         StopRequest(),
-        take=lambda event: isinstance(event, RowBegun) and passed.append(event.passed),
+        starting(board, key),
+        lambda event: isinstance(event, RowBegun) and passed.append(event.passed),
     )
     assert passed == [1, 2, 3, 4, 5]
 
