@@ -26,6 +26,11 @@ def test_the_table_says_of_a_command_what_its_docstring_says() -> None:
         assert COMMANDS[name].examples, name
 
 
+def test_no_line_of_the_help_page_is_cut_at_80_columns() -> None:
+    shown = CliRunner().invoke(main, ["--help"], terminal_width=80).output
+    assert [line for line in shown.splitlines()[1:] if line.endswith("...")] == []
+
+
 def test_the_help_page_and_the_tab_key_import_no_command() -> None:
     count = "len([name for name in sys.modules if name.startswith('armtempo.cli.')])"
     code = (

@@ -17,7 +17,7 @@ from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 from armtempo_shared.messages import START_SWITCHES_BIT
 
-from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, started
+from tests.inprocess import ARM, FAULTS, Noise, Pipe, connect, follow, random_motion, ready, replay, started
 
 
 @pytest.mark.slow
@@ -67,7 +67,7 @@ def test_repeated_command_acts_once(tmp_path: Path) -> None:
     lost = [True]
     send = pipe._send
     pipe._send = lambda way, frame: None if way == 1 and lost and lost.pop() else send(way, frame)  # type: ignore[method-assign]
-    run = board.start("feed", wire.record_crc(data)).run
+    run = board.start("feed", wire.record_crc(data))
     assert board.session.repeats == 1
     assert (run, pipe.app.controller.board.engine.calls.count("start")) == (1, 1)
 
@@ -104,7 +104,7 @@ def test_gap_is_counted_where_the_board_ran_out_of_memory(tmp_path: Path) -> Non
     pipe = Pipe(tmp_path / "flash")
     pipe.run_samples = 500
     board, data = ready(pipe)
-    run = board.start("feed", wire.record_crc(data)).run
+    run = board.start("feed", wire.record_crc(data))
     pipe.wait_away(45.0)
     follower = MotionFollower(board, run)
     samples = list(follower.samples())
@@ -148,7 +148,7 @@ def test_homing_motion_starts_anywhere_and_leaves_nothing_known(tmp_path: Path) 
     board.home([7, None, None])
     with pytest.raises(BoardError, match="position is unknown"):
         board.start("feed", wire.record_crc(data))
-    run = board.start("feed", wire.record_crc(data), wire.START_HOMING).run
+    run = board.start("feed", wire.record_crc(data), wire.START_HOMING)
     assert board.status().known == 7
     samples = list(MotionFollower(board, run).samples())
     assert samples[0].positions.commanded_steps == (7, 7, 7)
@@ -187,7 +187,7 @@ def test_what_was_to_stop_before_does_not_start(tmp_path: Path) -> None:
     stop = StopRequest()
     stop.wanted = True
     with pytest.raises(KeyboardInterrupt):
-        running.replay(board, MotionKey("feed", wire.record_crc(data)), stop)
+        replay(board, MotionKey("feed", wire.record_crc(data)), stop)
     assert pipe.app.controller.board.engine.calls.count("start") == 0
 
 
@@ -270,7 +270,7 @@ def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:
 def test_five_percent_is_survived_or_said(tmp_path: Path, kind: str) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, old = ready(pipe)
-    run = board.start("feed", wire.record_crc(old)).run
+    run = board.start("feed", wire.record_crc(old))
     pipe.disturb(Noise(f"to {kind}", 0.05, (kind,)), Noise(f"from {kind}", 0.05, (kind,)))
     follower = MotionFollower(board, run)
     indices: list[int] = []

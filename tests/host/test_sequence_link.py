@@ -13,7 +13,7 @@ from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link import Client
 from armtempo.link.board_messages import RowBegun, Sample
-from armtempo.link.follow import Followed, SequenceFollower
+from armtempo.link.follow import Followed, SequenceFollower, SequenceWatcher
 from armtempo.model.arm import Arm
 from armtempo.planning.point_to_point import straight
 from armtempo.report.run import Run
@@ -39,6 +39,13 @@ def sequence_of(pipe: Pipe, times: int) -> tuple[Client, MotionKey]:
     return board, MotionKey("again", wire.record_crc(record))
 
 
+def starting(
+    board: Client, key: MotionKey, on_state: SequenceWatcher = lambda _: None
+) -> Callable[[], SequenceFollower]:
+    """Starts a sequence."""
+    return lambda: SequenceFollower(board, key.name, board.start(key.name, key.crc), on_state)
+
+
 def sequence_samples(
     board: Client, key: MotionKey, at_7: Callable[[], None] = lambda: None
 ) -> SequenceFollower:
@@ -51,7 +58,7 @@ def sequence_samples(
             if len(found) == 8:
                 at_7()
 
-    followed = running.run_sequence(board, key, StopRequest(), take=take)
+    followed = running.follow(board, StopRequest(), starting(board, key), take)
     assert followed.end.ending == "finished"
     assert found == [(run, index) for run in range(1, followed.end.cycle + 1) for index in range(4)]
     return followed
@@ -91,7 +98,9 @@ def test_a_watcher_sees_a_sequence_as_a_motion(tmp_path: Path) -> None:
     encoded = EncodedSequence(key.name, arm, (leg,), rows, board.fetch(key.name))
     folder = recording.new_run(tmp_path / "runs", encoded, "pipe", board)
     seen, states = Counting(), list[str]()
-    recording.sequence(board, encoded, folder, StopRequest(), seen, lambda state: states.append(state.ending))
+    start = starting(board, key, lambda state: states.append(state.ending))
+    with recording.repetition(board, encoded, folder, seen) as recorder:
+        recorder.end_rows(running.follow(board, StopRequest(), start, recorder.take))
     assert seen.samples == [(index, leg.trajectory.duration_s) for index in range(4)] * 2
     assert seen.ended == states[-1:] == ["finished"]
     assert [row.passed for row in Run.load(folder.path).rows] == [1, 2, 3, 4, 5]
@@ -114,11 +123,11 @@ def test_nothing_of_a_run_that_nobody_followed_is_taken_for_the_next_ones(tmp_pa
         pipe.wait(0.1)
     board.home([7, 7, 7])
     passed: list[int] = []
-    running.run_sequence(
+    running.follow(
         board,
-        key,
         StopRequest(),
-        take=lambda event: isinstance(event, RowBegun) and passed.append(event.passed),
+        starting(board, key),
+        lambda event: isinstance(event, RowBegun) and passed.append(event.passed),
     )
     assert passed == [1, 2, 3, 4, 5]
 
