@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # planner and link take long to import, and many commands nee
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.shared_board import SharedBoard
 
-_ANEW = ", started for this command, its arm where the last one left it; 'armtempo virtual-board' keeps one running"
+_ANEW = ", started for this command; its arm is where it was left"
 
 
 # arm and job

@@ -25,7 +25,7 @@ from armtempo.robot.board import Board
 @options.out
 @options.board(options.arm_of_file, options.replace_arm, options.altered)
 def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, given: BoardOptions) -> None:
-    """Replay a motion and record it, or run a sequence or program.
+    """Run a motion, a sequence or a program, and record it.
 
     WHAT: a trajectory file, a planned sequence, or the name of what is on the board. The samples
     go into a new run folder. The arm must be homed ('armtempo home') and be at the start of the motion
@@ -87,7 +87,7 @@ def run_and_report(
 @options.out
 @options.board(options.arm_of_file, options.altered)
 def fetch(what: str | None, out: Path | None, given: BoardOptions) -> None:
-    """Fetch the samples that the board recorded of its last run, such as one started by its button.
+    """Fetch the samples of the last run from the board.
 
     WHAT: the motion of that run: a trajectory file, or the name of a motion on the board; default: the motion
     that the button starts. Waits for the end of a motion that still runs. The samples can be fetched once.

@@ -113,6 +113,7 @@ def test_the_picture_has_the_tool_and_the_frames(operator: PanelBoard) -> None:
 
 
 def teach(page: Page, kind: str, name: str) -> None:
+    page.unfold(words.TEACH_POINTS)
     page.named(words.WHAT_IS_TAUGHT).value = kind
     page.named(words.NAME_OF_TAUGHT).value = name
     page.press(words.BEGIN)
@@ -192,6 +193,7 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
         operator.jobs.version,
     )  # type: ignore[arg-type]
     with pages(operator) as page:
+        page.unfold(words.TYPED_TARGET)
         page.named(words.FRAME).value = "tray"
         before = operator.jobs.vias[0].angles_deg
         text = (tmp_path / "arm.toml").read_text() + "\n[posture.away]\nangles_deg = [0, 0, 0, 0, 10, 0]\n"
@@ -204,8 +206,10 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
         ) + '\n[frame.bin]\nframe = "tray"\nz_mm = 1\n'.replace("z_mm = 1", "position_mm = [0, 0, 1]")
         operator.arm_changed(arm_of(tmp_path, text))
         page.look()
-        page.named("bin x +")
         assert page.named(words.FRAME).value == "tray"
+        page.named(words.FRAME).value = "bin"
+        page.named("bin x +")
+        page.named(words.FRAME).value = "tray"
         assert operator.jobs.plan_is_old
         assert operator.jobs.vias[0].angles_deg != before
         operator.arm_changed(
