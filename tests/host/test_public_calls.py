@@ -31,7 +31,7 @@ WRONG = (
     *([], [[]], [1.0, 2.0], [1, "x"], [[1, 2, 3], [4]], {}, {"x": object()}),
     *(np.zeros((2, 2)), np.array(["x"])),
 )
-GIVEN_BY_US = {"Board", "BoardState", "Plan", "Run", "SequencePlan", "SequenceRun", "SharedBoard", "Stopped"}
+GIVEN_BY_US = {"Board", "BoardState", "Plan", "Run", "SequencePlan", "SharedBoard", "Stopped"}
 GIVEN_BY_US |= {"StopRequest", "Trajectory", "Watcher", "Result", "VirtualBoard"}
 """Classes that a user makes no objects of, or without arguments."""
 USERS_OWN = {"minimise.function", "minimise.rng", "launch.options"}

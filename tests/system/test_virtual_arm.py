@@ -32,6 +32,7 @@ from armtempo_shared.wire import ERROR_CODES
 from numpy.typing import NDArray
 
 from tests import scripted
+from tests.inprocess import replay
 from tests.system import commandline
 
 SCRIPT = Path(__file__).parent / "scripts" / "cases" / "virtual_arm.py"
@@ -65,7 +66,7 @@ def swing_deg(degree: int) -> float:
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
         stored = store(board, [("feed", encode.motion_record(trajectory, arm))])
-        running.replay(board, stored, stop, lambda sample, _: samples.append(sample))
+        replay(board, stored, stop, samples.append)
     commanded_deg = trajectory(np.array([sample.ticks / TICK_HZ for sample in samples]))[:, 0]
     seen_deg = np.array([sample.positions.counts[0] for sample in samples]) * 360 / FINE_COUNTS
     return float(np.max(np.abs(seen_deg - commanded_deg)[1:7]))
@@ -95,7 +96,7 @@ def run(
         arm_state.home(board, arm)
         stored = store(board, [("move", short_motion(arm))])
         with StopRequest() as stop:
-            end = running.replay(board, stored, stop)
+            end = replay(board, stored, stop)
         return end, board.status()
 
 
@@ -155,7 +156,7 @@ def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float)
         arm_state.home(board, arm)
         for here, there in (places, places[::-1]):
             record = encode.motion_record(point_to_point.straight("move", here, there, arm), arm)
-            end = running.replay(board, store(board, [("move", record)], replace=True), stop)
+            end = replay(board, store(board, [("move", record)], replace=True), stop)
             assert not end.fault
             arm = slower
             arm_state.configure(board, arm, replace=True)  # which declares the encoder, too

@@ -28,12 +28,12 @@ from armtempo.robot.stop_request import Stopped
 @options.force("something else of its name, or of its motions' names, on the board")
 @options.board(options.arm, options.replace_arm)
 def program(file: Path, check: bool, force: bool, given: BoardOptions) -> None:
-    """Check a program in MicroPython, store it on the board, run it, and show what it prints.
+    """Check a program in MicroPython, store it and run it.
 
     FILE: a Python file with 'from armtempo_board import cell'; 'armtempo help programs' explains it. Motions that
-    it names are planned files NAME.json beside it, or on the board. The arm must be homed ('armtempo home'), unless the program homes it.
-    Ctrl-C, or 'armtempo stop' in another terminal, brakes and ends it; 'armtempo status' shows its line.
-    'armtempo upload FILE --default' only stores it, for the board's button.
+    it names are planned files NAME.json beside it, or on the board. The arm must be homed ('armtempo home'), unless
+    the program homes it. Ctrl-C, or 'armtempo stop' in another terminal, brakes and ends it; 'armtempo status' shows
+    its line. 'armtempo upload FILE --default' only stores it, for the board's button.
     """
     arm = resolve.load_arm(given.arm_path)
     found = load(file, arm)

@@ -59,7 +59,7 @@ _PAGE = """\
     armtempo deploy                     # once, for a real board: the board program
     armtempo home --arm arm.toml        # "the arm is in its home posture"; nothing moves
     armtempo run first.json             # replay and record it
-    armtempo report runs/first-001      # how well the arm followed
+    armtempo report                     # how well the arm followed
     armtempo plan sequence.toml         # a sequence: the motion, back home, again and again
     armtempo goto home
     armtempo run cycle.json

@@ -13,7 +13,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan, Search
-from armtempo.planning import checks, lower_bounds, planner, workspace_check
+from armtempo.planning import board_limits, checks, lower_bounds, planner, workspace_check
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
@@ -116,7 +116,7 @@ def _fits(arm: Arm, times: Array, angles: Array, tolerance_deg: float) -> list[_
     segments = max(int(np.ceil(times[-1] / _COARSEST_S)), 2)
     off_deg = np.inf
     found: list[_Fit] = []
-    most = checks.most_segments(arm)
+    most = board_limits.most_segments(arm)
     while segments <= most and len(found) < _CANDIDATES:
         inside = 0.0
         for _ in range(_TRIES):

@@ -17,7 +17,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.joint_unit import DEG, MM, names
 from armtempo.model.plan import Plan, Search
-from armtempo.planning import checks, path_deviation, rest_to_rest, torque
+from armtempo.planning import board_limits, checks, path_deviation, rest_to_rest, torque
 from armtempo.planning.free import free_plan
 from armtempo.report.replayed import JointResult
 from armtempo.splines.trajectory import Trajectory
@@ -68,7 +68,7 @@ def _details(plan: Plan) -> list[str]:
         *(_polished(search) for search in plan.searches if search.optimum_s),
         *(_started(search) for search in plan.searches if len(search.starts_s)),
         f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes",
-        checks.format_rate(checks.step_rates(plan.arm, plan.extremes)),
+        board_limits.format_rate(board_limits.step_rates(plan.arm, plan.extremes)),
     ]
 
 

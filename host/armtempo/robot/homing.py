@@ -19,13 +19,14 @@ from armtempo_shared.messages import START_HOMING, START_SWITCHES_BIT
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.encoding import encoded_motion
 from armtempo.link import Client
+from armtempo.link.follow import MotionFollower
 from armtempo.model import home_switches
 from armtempo.model.arm import Arm
 from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.parts import Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
-from armtempo.robot.running import put_once, raise_fault, replay
+from armtempo.robot.running import follow, put_once, raise_fault
 from armtempo.robot.stop_request import StopRequest
 
 HomingProgress = Callable[[str, int, int], object]
@@ -242,7 +243,12 @@ class _GroupHoming:
         slow_arm = _slowed(self.arm, fraction)
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
         motion = encoded_motion.of_trajectory(trajectory, self.arm)
-        end = replay(self.client, put_once(self.client, motion.data), self.stop, flags=self._flags(turns_deg))
+        key, flags = put_once(self.client, motion.data), self._flags(turns_deg)
+        end = follow(
+            self.client,
+            self.stop,
+            lambda: MotionFollower(self.client, self.client.start(key.name, key.crc, flags)),
+        ).end
         tripped = self.client.status().fault_joint
         raise_fault(end)
         self.stop.check()

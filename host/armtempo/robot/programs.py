@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from armtempo_shared.program import SUFFIX
+
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
@@ -13,7 +15,7 @@ from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.link import Client
 from armtempo.link.board_messages import Notice, SequenceState
-from armtempo.link.follow import Followed, SequenceWatcher
+from armtempo.link.follow import Followed, SequenceFollower, SequenceWatcher
 from armtempo.model.arm import Arm
 from armtempo.model.job import is_name
 from armtempo.model.parts import PROGRAM
@@ -145,6 +147,12 @@ class Programs:
                 if isinstance(event, Notice):
                     listener(event.text)
 
-            end = running.run_sequence(client, key, wanted, watcher, take, program=True).end
+            name = key.name + SUFFIX  # the board's name of it
+            end = running.follow(
+                client,
+                wanted,
+                lambda: SequenceFollower(client, name, client.start(key.name, key.crc), watcher),
+                take,
+            ).end
             running.raise_sequence_failure(client, end, program=True)
             return end

@@ -15,7 +15,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.planning import checks
+from armtempo.planning import board_limits, checks
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import legs as cut
 from armtempo.planning.line.between import Between
@@ -143,7 +143,7 @@ def proven_paths(
     """
     legs = cut.of_job(job)
     led = {number: one for number, one in parts.items() if isinstance(one, Led)}
-    most = checks.most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
+    most = board_limits.most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
     pieces = [
         one.segments if isinstance(one, Between) else _LINE_PIECES * len(leg.tool_segments)
         for leg, (_, one) in zip(legs, sorted(parts.items()), strict=True)
