@@ -12,7 +12,7 @@ from nicegui import ui
 
 from armtempo.model.frame import TOOL
 from armtempo.model.tool_pose import BASE
-from armtempo.panel import floor, homing, targets, teach_points, teaching, words
+from armtempo.panel import floor, homing, names, targets, teach_points, teaching, words
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import PanelPage, named
 from armtempo.planning.jog.jog_line import axis_of
@@ -43,6 +43,7 @@ class MoveTab:
         floor.build(page)
         targets.build(page)
         teach_points.build(page)
+        names.build(page)
         self._home_and_teach()
         _outputs(page)
         _inputs(page)
@@ -116,11 +117,11 @@ class MoveTab:
         page.control(choice, Needs.IDLE)
 
         def choose(press: Press, wanted: Any) -> None:
-            names = [*self._tool_names()]
+            tools = [*self._tool_names()]
             number = wanted.get("value") if isinstance(wanted, dict) else None
             try:
-                if type(number) is int and 0 <= number < len(names):
-                    operator.choose_tool(page.client, press, names[number])
+                if type(number) is int and 0 <= number < len(tools):
+                    operator.choose_tool(page.client, press, tools[number])
             finally:
                 look()
 
@@ -139,8 +140,8 @@ class MoveTab:
 
     def _changed(self) -> None:
         """Show the frames that the arm has now."""
-        names = self._frame_names()
-        self._frames.set_options(names, value=self._frames.value if self._frames.value in names else JOINTS)
+        frames = self._frame_names()
+        self._frames.set_options(frames, value=self._frames.value if self._frames.value in frames else JOINTS)
         for frame in [*self._places][1:]:
             self._places.pop(frame).delete()
         self._show_jogs()
