@@ -89,7 +89,9 @@ class LinearRows:
 
     def backward(self, weights: Array) -> Array:
         values = self._weights * self._per_row(weights, -1.0)[:, None]
-        return np.bincount(self._window.ravel(), values.ravel(), minlength=self._size).astype(float, copy=False)
+        return np.bincount(self._window.ravel(), values.ravel(), minlength=self._size).astype(
+            float, copy=False
+        )
 
     def hessian(self, weights: Array, _: Array, __: bool) -> Array:
         """See there; the entries are at ``rows`` and ``columns``."""

@@ -71,6 +71,7 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
     """The motion from one posture (J,) to another; errors as in ``go_to``."""
     if not pace.line:
         found = point_to_point.straight(_NAME, here_deg, target_deg, arm, pace.speed)
+        point_to_point.check_switches(here_deg, target_deg, arm)
         workspace_check.tell_start(arm, here_deg)
         workspace_check.check(arm, found, outwards=True)
         return found
