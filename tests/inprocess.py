@@ -8,7 +8,7 @@ from __future__ import annotations
 import random
 import sys
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -17,10 +17,13 @@ from typing import Any
 from unittest.mock import patch
 
 from armtempo.basics.errors import LinkError
+from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client, greet
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import MotionFollower, RunEnd
 from armtempo.link.session import Session
+from armtempo.robot import running
+from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import motion, wire
 
 from tests.board.scripts.rigs import stand_in
@@ -271,8 +274,19 @@ def ready(pipe: Pipe) -> tuple[Client, bytes]:
 def started(pipe: Pipe) -> MotionFollower:
     """A run of ``feed`` that has just begun on a board made ready for it."""
     board, data = ready(pipe)
-    run = board.start("feed", wire.record_crc(data)).run
+    run = board.start("feed", wire.record_crc(data))
     return MotionFollower(board, run)
+
+
+def replay(
+    board: Client, key: MotionKey, stop: StopRequest, take: Callable[[Sample], object] = lambda _: None
+) -> RunEnd:
+    """Start a motion and follow it to its end; ``take`` gets its samples."""
+
+    def start() -> MotionFollower:
+        return MotionFollower(board, board.start(key.name, key.crc))
+
+    return running.follow(board, stop, start, lambda event: isinstance(event, Sample) and take(event)).end
 
 
 def follow(follower: MotionFollower) -> tuple[list[Sample], RunEnd]:

@@ -27,7 +27,7 @@ from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from tests.benchmark import firmware, room
-from tests.benchmark.loop import CORE_HZ, CYCLES
+from tests.benchmark.loop_board import CORE_HZ, CYCLES
 
 PROBE = "import probe\n\nprobe.replace()\n" + firmware.START
 _COUNTED = ("-icount", "shift=0,sleep=off")

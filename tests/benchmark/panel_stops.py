@@ -137,8 +137,12 @@ def _ended(window: Any, panel: Panel, ear: Ear, how: Any) -> float:
 _VIEW = """setInterval(() => {
   const place = document.getElementById('armtempo-where'), panel = window.armtempo;
   if (!window.seen && place?.textContent) window.seen = performance.now();
-  if (!window.drawn && panel?.renderer && panel.to && panel.turned) window.drawn = performance.now();
+  const placed = panel?.parts && getElement(panel.parts.scene)?.objects.get(panel.parts.ghost[0])?.placed;
+  const frame = panel?.renderer?.info.render.frame;
+  if ((panel?.to || placed) && panel.turned && window.before === undefined) window.before = frame;
+  if (!window.drawn && frame > window.before) window.drawn = performance.now();
 }, 10)"""
+"""An arm that is not homed is drawn as a ghost, where it may be; the next frame shows what was put in its place."""
 
 
 def first_view(browser: Any, address: str) -> tuple[float, float]:

@@ -85,7 +85,7 @@ def test_store_commands(run: Run, file: str) -> None:
     assert "stored" in run("upload", file, "--default").output
     listing = run("list").output
     assert "small *" in listing
-    assert [line.split()[:2] for line in listing.splitlines()[-2:]] == [["from", "joint"], ["to", "joint"]]
+    assert "    from 0.00, -60.00, 40.00°" in listing.splitlines()
     assert "small-2" in run("rename", "small", "small-2").output
     shown = run("show", "small-2").output
     assert "from joint 1 0.00° (0 steps), joint 2 -60.00° (-5333 steps), joint 3 40.00° (" in shown
@@ -369,7 +369,8 @@ def test_with_a_board(project: Path, board: None) -> None:
     assert said("remove", "two") == {"removed": ["two"]}
     run = said("run", "short.json")
     assert run["complete"]
-    report = said("report", run["folder"])
+    report = said("report")
+    assert [one["folder"] for one in report["runs"]] == [run["folder"]]
     assert report["runs"][0]["verdict"] in ("good", "open")
     assert report["comparison"] is None
     assert said("goto", "home")["joints"][0]["steps"] == 0

@@ -24,6 +24,7 @@ from armtempo.planning.line.tool_path import ToolPath
 from armtempo.robot import goto
 from armtempo.splines import bspline
 
+from tests.host.arms import PLANAR_3
 from tests.host.problems import faults
 from tests.host.random_lines import allowed, line_faults, random_lines, tool_poses
 
@@ -113,6 +114,17 @@ def test_faults_of_a_line_are_seen(plan: Plan) -> None:
     assert line_faults(replace(plan, job=replace(plan.job, tool_segments=ways)))
     ways = (replace(plan.job.tool_segments[0], tolerance_mm=0.01), plan.job.tool_segments[1])
     assert line_faults(replace(plan, job=replace(plan.job, tool_segments=ways)))
+
+
+def test_a_redundant_arm_accelerates_its_tool_as_the_closed_form_does() -> None:
+    """Its joints move far and the tool hardly, so the proof needs short pieces, which rounding must not hide."""
+    here = (10.0, 40.0, 50.0)
+    start, end = tool_poses(PLANAR_3, np.array([here, (30.0, 20.0, 40.0)]))
+    segment = ToolSegment(1, True, acceleration_mm_s2=3.0)
+    to = Pose(tuple(map(tuple, end.tolist())), fixed=())
+    plan = planner.plan(PLANAR_3, Job("slow", via=(here, to), tool_segments=(segment,), refine=4))
+    distance_mm = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+    assert 1.0 <= plan.total_s / (2.0 * np.sqrt(distance_mm / 3.0)) < 1.02
 
 
 def test_the_bound_holds_and_is_sharp() -> None:

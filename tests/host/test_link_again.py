@@ -16,11 +16,11 @@ from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import MotionFollower, RunEnd
 from armtempo.link.transport import SerialTransport
-from armtempo.robot import running
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import wire
 
+from tests import inprocess
 from tests.inprocess import Pipe, connect, random_motion, ready
 
 
@@ -36,12 +36,12 @@ def replay(
     """Run it; ``at_20`` is called with the sample number 20."""
     indices: list[int] = []
 
-    def take(sample: Sample, duration_s: float) -> None:
+    def take(sample: Sample) -> None:
         indices.append(sample.index)
         if sample.index == 20:
             at_20()
 
-    return running.replay(board, stored, stop or StopRequest(), take), indices
+    return inprocess.replay(board, stored, stop or StopRequest(), take), indices
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_a_wanted_stop_shortens_the_waiting(tmp_path: Path, trouble: str) -> Non
 def test_cable_out_during_a_run_costs_no_sample(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     board, data = ready(pipe)
-    run = board.start("feed", wire.record_crc(data)).run
+    run = board.start("feed", wire.record_crc(data))
     indices = []
     follower = MotionFollower(board, run)
     for sample in follower.samples():

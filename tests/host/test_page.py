@@ -191,9 +191,9 @@ def test_the_state_of_a_sequence_or_program_is_one_line(
 ) -> None:
     printed: list[str] = []
     line = StateLine(lambda state: f"step {state.step}", printed.append)
-    for step, cycle in ((1, 0), (2, 0), (3, 1)):
+    for step, cycle in ((0, 0), (2, 0), (1, 1), (3, 1), (3, 2)):
         line(SequenceState("running", 0, step, 0, cycle, "pick"))
-    assert printed == ["step 1", "step 3"]  # without a terminal: each new cycle
+    assert printed == ["1 whole cycle finished", "2 whole cycles finished"]  # without a terminal
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     line(SequenceState("running", 0, 4, 0, 2, "pick"))
     line.clear()

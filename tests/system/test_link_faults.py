@@ -33,7 +33,7 @@ from armtempo_shared import limits, wire
 from armtempo_shared.messages import MAX_COMMAND
 
 from tests import interpreters
-from tests.inprocess import Noise, clean
+from tests.inprocess import Noise, clean, replay
 from tests.system import commandline
 from tests.system.commandline import SLOW_S, armtempo, small_plan, start, wait_for
 from tests.system.relay import Relay, ReplayTransport
@@ -149,9 +149,8 @@ def test_samples_wait_for_a_host_that_does_not_read() -> None:
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
         stored = store(board, [("slow", encoded_motion.of_trajectory(motion, arm).data)])
-        started = board.start(stored.name, stored.crc)
-        assert started.duration_s > 50.0
-        follower = MotionFollower(board, started.run)
+        assert motion.duration_s > 50.0
+        follower = MotionFollower(board, board.start(stored.name, stored.crc))
         time.sleep(AWAY_S)
         indices = [sample.index for sample in follower.samples()]
     assert follower.ended
@@ -220,7 +219,7 @@ def _recorded(path: Path) -> Recording:
         arm_state.home(board, commandline.ARM)
         stored = store(board, [("go", data)])
         with StopRequest() as stop:
-            running.replay(board, stored, stop, lambda sample, _: made.samples.append(sample))
+            replay(board, stored, stop, made.samples.append)
         board.status()
         board.rename("go", "gone")
         assert [entry.name for entry in board.stored()] == ["gone"]

@@ -10,7 +10,6 @@ import pytest
 from armtempo.basics.errors import LinkError
 from armtempo.encoding import encode, encoded_motion
 from armtempo.link import Client, open_board
-from armtempo.link.client import Started
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
 from armtempo.simulator import LaunchOptions, edgelog, launch
@@ -102,27 +101,28 @@ def test_while_it_moves_nobody_gets_in(flash: Path) -> None:
     ) as process:
         with open_board(process.port) as board:
             arm_state.home(board, commandline.ARM)
-            started = _start(board)
+            run, duration_s = _start(board)
             begun_s = time.monotonic()
         # A pseudo terminal: without one its read waits for ever
         port = SerialTransport(process.port, timeout=0.05)
         with pytest.raises(TransportError, match="could not enter raw repl"):
-            port.enter_raw_repl(timeout_overall=started.duration_s / 2)
+            port.enter_raw_repl(timeout_overall=duration_s / 2)
         port.close()
         with open_board(process.port) as board:
-            still_moving = time.monotonic() - begun_s < started.duration_s - 0.2
+            still_moving = time.monotonic() - begun_s < duration_s - 0.2
             assert board.status().moving or not still_moving
             commandline.wait_for(lambda: not board.status().moving, "the end of the motion")
             status = board.status()
         assert (status.state, status.run, list(status.positions.commanded_steps)) == (
             "idle",
-            started.run,
+            run,
             steps(AWAY_DEG),
         )
         assert mpremote(process.port, "resume", "exec", "print('in')") == "in\n"
 
 
-def _start(board: Client) -> Started:
+def _start(board: Client) -> tuple[int, float]:
+    """The number of the run, and how long it takes."""
     stored = board.find("go")
     assert stored is not None
-    return board.start("go", stored.crc)
+    return board.start("go", stored.crc), stored.duration_s

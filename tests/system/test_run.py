@@ -69,7 +69,7 @@ def test_stored_motion_keeps_its_place_in_a_sim_folder(tmp_path: Path) -> None:
     armtempo("upload", file, "--port", "sim:flash", folder=tmp_path)
     done = commandline.run("run", "small", "--port", "sim:flash", folder=tmp_path)
     assert "samples-01.csv: complete" in done.output
-    assert done.errors.count("started for this command, its arm where the last one left it") == 1
+    assert done.errors.count("started for this command; its arm is where it was left") == 1
     assert "started for this command" not in done.output
 
 

@@ -15,7 +15,7 @@ from armtempo.diagnosis import arm_check, figures
 from armtempo.diagnosis.figures import JointFigures, table
 from armtempo.diagnosis.finding import Finding, Level
 from armtempo.model.arm import Arm
-from armtempo.planning.checks import format_rate
+from armtempo.planning.board_limits import format_rate
 from armtempo.report import arm_picture, drawing
 
 
@@ -31,10 +31,10 @@ from armtempo.report import arm_picture, drawing
 def check(
     arm_path: Path | None, job_path: Path | None, picture: Path | None, force: bool, as_json: bool
 ) -> None:
-    """Check an arm file, and a job if given, for likely mistakes, and say how to correct them.
+    """Check an arm file and a job for likely mistakes.
 
-    Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring. Exit code 1 if there are errors; 0
-    with warnings and notes only.
+    Steps, step rates, resolution at the tool, torque, encoders, ranges, wiring; each finding says what corrects it.
+    Exit code 1 if there are errors; 0 with warnings and notes only.
     """
     _check_picture(picture, force)
     path = resolve.arm_file(arm_path)

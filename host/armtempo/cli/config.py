@@ -24,7 +24,7 @@ from armtempo.ports.names import SIM
 def config(
     arm_path: Path | None, port: str | None, job_path: Path | None, out: Path | None, as_json: bool
 ) -> None:
-    """Show which arm, port, job and run folder a command in this folder would use, and why.
+    """Show the arm, port, job and run folder of this folder.
 
     An option overrides a variable (ARMTEMPO_ARM, ARMTEMPO_PORT, ARMTEMPO_JOB, ARMTEMPO_RUNS), which overrides
     armtempo.toml in this folder or the nearest one above it.

@@ -37,7 +37,7 @@ _GROUP = "sudo usermod -a -G dialout $USER, then log in again"
 @options.port
 @options.as_json
 def doctor(arm_path: Path | None, port: str | None, as_json: bool) -> None:
-    """Check Python, packages, ports, permissions, project, arm file and board; advise on each problem.
+    """Check the installation, the project and the board.
 
     Nothing is changed and nothing moves. Without a port it checks the one board that is plugged in, if any.
     Exit code 1 if something is wrong.

@@ -64,7 +64,7 @@ def import_table(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Make a job file from a table of via points, or from a ROS JointTrajectory.
+    """Make a job file from a table or a ROS JointTrajectory.
 
     TABLE: a text file with one line per via point, or the trajectory.
 
@@ -153,9 +153,9 @@ def export(
     altered: bool,
     as_json: bool,
 ) -> None:
-    """Write a motion as CSV or as a ROS JointTrajectory, sampled at any rate.
+    """Write a motion as CSV or as a ROS JointTrajectory.
 
-    TRAJECTORY: a trajectory file, as 'armtempo plan' writes it.
+    TRAJECTORY: a trajectory file, as 'armtempo plan' writes it. It is sampled at --rate.
     """
     if as_json and output is None:
         raise InputError("--json needs -o FILE", "give -o FILE, or leave out --json")
@@ -191,12 +191,13 @@ def export(
 def import_urdf(
     urdf: Path, out: Path, base: str | None, tip: str | None, meshes: bool, force: bool, as_json: bool
 ) -> None:
-    """Make an arm file from a URDF's revolute and prismatic joints: Denavit-Hartenberg rows and ranges.
+    """Make an arm file from a URDF.
 
     URDF: the robot's description, a .urdf or .xacro file.
 
-    The rows are checked against the URDF's own forward kinematics at 1000 random postures before anything is written.
-    Motors, which a URDF does not describe, are comments to fill in. Needs the extra 'urdf'.
+    Its revolute and prismatic joints become Denavit-Hartenberg rows with their ranges. The rows are checked against
+    the URDF's own forward kinematics at 1000 random postures before anything is written. Motors, which a URDF does
+    not describe, are comments to fill in. Needs the extra 'urdf'.
     """
     if out.exists() and not force:
         raise InputError(f"{out}: already exists", "choose another name, or --force to replace it")

@@ -101,11 +101,11 @@ def _values(made: Image) -> dict[str, Any]:
 )
 @options.as_json
 def flash(given: Path | None, port: str | None, tool: str | None, as_json: bool) -> None:
-    """Flash MicroPython with the board program built in; 'armtempo deploy' comes next.
+    """Flash MicroPython with the board program built in.
 
-    A board that runs MicroPython is put into its bootloader first, unless a motion runs. A board in its
-    bootloader, or with an ST-LINK, needs no port. The flash is read back and compared. Files on the board are
-    kept.
+    'armtempo deploy' comes next. A board that runs MicroPython is put into its bootloader first, unless a motion
+    runs. A board in its bootloader, or with an ST-LINK, needs no port. The flash is read back and compared. Files
+    on the board are kept.
     """
     chosen = given or image.find(Path())
     found = ProjectSettings().get(PORT, port).value or None

@@ -64,7 +64,7 @@ def jog(
     gamepad: bool,
     given: BoardOptions,
 ) -> None:
-    """Jog: move a joint or the tool by a step or while a key is held, within the ranges.
+    """Move a joint or the tool by a step, or while a key is held.
 
     Without --joint, --axis and --about, keys move the arm, and one line shows the position. With one of them
     and --by, the arm moves once. Axes are those of the base, of the tool at its present orientation (tool-x, …)

@@ -73,11 +73,11 @@ def ik(
     tolerance_deg: float | None,
     **given: Any,
 ) -> None:
-    """Print all solutions of the inverse kinematics for a pose, or for each pose of a file.
+    """Print all solutions of the inverse kinematics for a pose.
 
-    The solution marked * is the one nearest to the previous posture within the joint ranges. A pose with free
-    components, or an arm without a closed form, is solved by a numerical search over the joints that have a
-    motor. Exit code 1 if a pose has no solution.
+    Of a pose, or of each pose of a file. The solution marked * is the one nearest to the previous posture within
+    the joint ranges. A pose with free components, or an arm without a closed form, is solved by a numerical search
+    over the joints that have a motor. Exit code 1 if a pose has no solution.
     """
     found_poses = _poses(matrix, poses, TypedPose(**given))
     solver = PoseSolver(resolve.arm_or_paper(arm_path, for_shape=True).with_tool(tool))
@@ -116,9 +116,9 @@ def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
     angles = numbers(previous, "--previous")
     if len(angles) != len(solver.home_rad):
         raise InputError(
-            f"--previous: {len(angles)} {solver.arm.position_word}s given, the arm has "
+            f"--previous: {len(angles)} {solver.arm.texts.position}s given, the arm has "
             f"{len(solver.home_rad)} joints",
-            f"give one {solver.arm.position_word} for each joint, base first",
+            f"give one {solver.arm.texts.position} for each joint, base first",
         )
     return [math.radians(angle) for angle in angles]
 
@@ -173,7 +173,7 @@ def fk(
     altered: bool,
     as_json: bool,
 ) -> None:
-    """Print the tool's pose and every frame for given joint angles.
+    """Print the tool's pose and every frame for joint angles.
 
     WHERE: angles in degrees ('0,-60,40', or as separate numbers; of sliding joints mm), of all joints or of those
     with a motor (the others are at their home angles); a posture of the arm file; a via point such as P0; or a
@@ -237,7 +237,7 @@ def _values(arm: Arm, angles_deg: Array, frame: str) -> dict[str, Any]:
     return {
         "arm": arm.name,
         "frame": frame,
-        arm.list_key("angles_deg"): angles_deg.tolist(),
+        arm.texts.list_key("angles_deg"): angles_deg.tolist(),
         "tool": {**tool_values(frames[-1]), "quaternion": list(to_quaternion(frames[-1]))},
         "frames": [
             {"name": name, **tool_values(frame)} for name, frame in zip(_names(arm), frames, strict=True)

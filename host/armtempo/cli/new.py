@@ -52,9 +52,9 @@ def new(
     port: str | None,
     as_json: bool,
 ) -> None:
-    """Make a project folder: arm file, first job, settings, and a page with the next commands.
+    """Make a project folder: arm file, first job and settings.
 
-    FOLDER: a new or an empty folder.
+    FOLDER: a new or an empty folder. Its README.md has the next commands.
 
     In a terminal, it asks for what the options do not give: '?' explains, '<' goes back.
     """

@@ -40,7 +40,7 @@ _LOOPBACK = "127.0.0.1"
 def panel(
     arm_path: Path | None, job_path: Path | None, port: str | None, host: str, web_port: int, show: bool
 ) -> None:
-    """Open the panel in a browser: see, move, teach, run and watch the arm.
+    """Open the panel in a browser: move, teach, plan and run.
 
     Ctrl-C ends the panel and brakes a motion. Closing a page while a button is held stops the arm. One page
     controls the arm, others watch; Stop works on all. The printed addresses hold a token, without which nobody

@@ -24,7 +24,7 @@ from armtempo.paper.printed import Claim
 )
 @options.as_json
 def paper(quick: bool, out: Path, as_json: bool) -> None:
-    """Repeat the paper: every number next to the printed one, on one page.
+    """Repeat the paper: every number next to the printed one.
 
     The replays run on the virtual board.
     """

@@ -94,7 +94,7 @@ def plan(
     as_json: bool,
     **changes: Any,
 ) -> None:
-    """Plan a job and write its trajectory file, or plan a sequence.
+    """Plan a job or a sequence, and write its trajectory file.
 
     FILE: a sequence file, or a job file, as with --job.
     If neither an arm nor a job is set, it plans the demo's job for the paper's arm.

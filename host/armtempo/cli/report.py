@@ -11,15 +11,13 @@ import click
 from armtempo import pipeline
 from armtempo.basics.atomic_file import check_replaceable
 from armtempo.basics.errors import InputError, RunFolderError
-from armtempo.cli import options, results
-from armtempo.report import run_report, verdict
+from armtempo.cli import options, resolve, results
+from armtempo.report import run_reader, run_report, verdict
 from armtempo.report.evaluation import Evaluation, evaluate
 
 
 @click.command("report")
-@click.argument(
-    "runs", nargs=-1, required=True, type=click.Path(exists=True, file_okay=False, path_type=Path)
-)
+@click.argument("runs", nargs=-1, type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option(
     "--out",
     type=options.FILE,
@@ -29,10 +27,12 @@ from armtempo.report.evaluation import Evaluation, evaluate
 @options.force("any other file too")
 @options.as_json
 def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool) -> None:
-    """Write report.html and its figures into a run folder, of a motion or a sequence.
+    """Write report.html and its figures into a run folder.
 
-    RUNS: run folders. With two or more, one more page compares them, and names those that cannot be read.
+    RUNS: run folders; default: the newest one. With two or more, one more page compares them, and names those that
+    cannot be read.
     """
+    runs = runs or _newest()
     if len(runs) == 1 and out is not None:
         raise InputError(
             "--out needs two or more runs", "leave it out: the page of one run is report.html in its folder"
@@ -52,6 +52,15 @@ def report(runs: tuple[Path, ...], out: Path | None, force: bool, as_json: bool)
     compared = pipeline.compare(runs, out) if len(runs) > 1 else None
     values = {"runs": found, "comparison": str(compared) if compared else None}
     results.show(as_json, values, [f"wrote {page}" for page in (*pages, compared) if page])
+
+
+def _newest() -> tuple[Path]:
+    """The run that was written last. Raises InputError if there is none."""
+    place = resolve.runs(None)
+    found = run_reader.folders(place)
+    if not found:
+        raise InputError(f"no run in {place}", "give a run folder, or record one: 'armtempo run'")
+    return (found[0],)
 
 
 def _values(run: Evaluation, folder: Path, page: Path) -> dict[str, Any]:

@@ -30,12 +30,12 @@ from armtempo.robot.motor_test import ARM_FILE
 )
 @options.board(options.arm_of_board)
 def selftest(given: BoardOptions, out: Path | None, force: bool, with_motors: bool) -> None:
-    """Let the board measure itself: clocks, flash, memory, link, pulses, E-stop.
+    """Let the board measure itself: clocks, flash, pulses.
 
-    Nothing needs to be connected, and nothing moves: the drivers must be off, and stay off. The board is
-    reset at the end, and the arm's position is unknown afterwards. With --with-motors it asks, then moves
-    each joint of the homed arm and compares directions and encoders with the arm file. Exit code 1 if
-    anything is wrong.
+    Clocks, flash, memory, link, pulses, E-stop. Nothing needs to be connected, and nothing moves: the drivers must
+    be off, and stay off. The board is reset at the end, and the arm's position is unknown afterwards. With
+    --with-motors it asks, then moves each joint of the homed arm and compares directions and encoders with the arm
+    file. Exit code 1 if anything is wrong.
     """
     if out is not None:
         page.check_free(out, force)

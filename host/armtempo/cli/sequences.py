@@ -125,7 +125,7 @@ def _made_of(share: Any) -> str:
 class StateLine:
     """A watcher that keeps the state of a running sequence or program on the last line of a terminal.
 
-    Without a terminal it prints a line for each new cycle of a sequence.
+    Without a terminal it prints a line for each finished cycle of a sequence.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class StateLine:
     ) -> None:
         self._describe = describe
         self._say = say
-        self._cycle = -1
+        self._cycle = 0
         self.last: SequenceState | None = None
 
     def __call__(self, state: SequenceState) -> None:
@@ -141,7 +141,7 @@ class StateLine:
         if sys.stderr.isatty():
             click.echo(f"\r\x1b[K{self._describe(state)}", nl=False, err=True)
         elif state.cycle != self._cycle and self._say is not None:
-            self._say(self._describe(state))
+            self._say(f"{whole_cycles(state.cycle)} finished")
         self._cycle = state.cycle
 
     def clear(self) -> None:

@@ -19,9 +19,9 @@ from armtempo.robot.shared_board import SharedBoard
 @click.argument("percent", type=click.FloatRange(1, 100))
 @options.board()
 def speed(percent: float, given: BoardOptions) -> None:
-    """Change the speed of the running motion to PERCENT of the planned one.
+    """Change the speed of the running motion, in percent.
 
-    PERCENT: 1 to 100.
+    PERCENT: 1 to 100, of the planned speed.
 
     The arm stays on its path; the speed changes smoothly, within the motion's brake time. If another armtempo
     program has the port, that program changes it, and uses the speed for its next motions too.
@@ -69,9 +69,10 @@ def _ask(given: BoardOptions, asked: _Asked) -> str | None:
 @click.command("pause")
 @options.board()
 def pause(given: BoardOptions) -> None:
-    """Bring the running motion to rest on its path; 'armtempo resume' continues it, 'armtempo stop' ends it.
+    """Bring the running motion to rest on its path.
 
-    The drivers keep their current. A run with its pauses can last at most 1 h 49 min.
+    'armtempo resume' continues it, 'armtempo stop' ends it. The drivers keep their current. A run with its pauses
+    can last at most 1 h 49 min.
     """
     _change(given, _Asked("pause", lambda board: board.pause(), "paused", 0.0))
 

@@ -16,7 +16,6 @@ from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
 from armtempo.encoding import encoded_program, encoded_sequence, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion
-from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.robot.board import Board
@@ -30,7 +29,7 @@ from armtempo.robot.board_state import record_crc
 @options.force("another motion of this name on the board")
 @options.board(options.arm_of_file, options.replace_arm, options.altered)
 def upload(file: Path, name: str | None, as_default: bool, force: bool, given: BoardOptions) -> None:
-    """Store a trajectory file, a planned sequence or a program, with their motions, on the board.
+    """Store a motion, a sequence or a program on the board.
 
     FILE: written by 'armtempo plan', or a program in MicroPython ('armtempo help programs'), NAME.py.
     """
@@ -46,25 +45,22 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
         with ProgressBar("uploading") as progress:
             board.upload(encoded, default=as_default, progress=progress, replace=force)
         virtual = board.info.virtual
-    sequence = isinstance(encoded, EncodedSequence)
-    if isinstance(encoded, EncodedSequence):
-        size, stored = (
-            {"motions": len(encoded.motions)},
-            f"sequence and {len(encoded.motions)} motions stored",
-        )
-    else:
-        size, stored = {"size_bytes": len(encoded.data)}, f"{len(encoded.data)} bytes stored"
+    size, stored = {"size_bytes": len(encoded.data)}, f"{len(encoded.data)} bytes stored"
+    if encoded.is_sequence:
+        number = len(encoded.motions)
+        size, stored = {"motions": number}, f"sequence and {number} motions stored"
     where = " on a virtual board" if virtual else ""
-    values = {"name": encoded.name, "sequence": sequence, **size, "virtual": virtual}
+    values = {"name": encoded.name, "sequence": encoded.is_sequence, **size, "virtual": virtual}
     results.show(given.as_json, values, [f"{encoded.name}: {stored}{where}"])
 
 
 @click.command("list")
 @options.board(options.arm_of_board)
 def list_motions(given: BoardOptions) -> None:
-    """List the motions and sequences on the board, their first and last postures, and what is old.
+    """List what is stored on the board, and what is old.
 
-    The default, which the board's button starts, is marked *.
+    Motions with their first and last postures, sequences and programs. The default, which the board's button
+    starts, is marked *.
     """
     with resolve.board(given) as board:
         found = board.list()
@@ -73,8 +69,9 @@ def list_motions(given: BoardOptions) -> None:
             values = [{**_listed(one), "old": _old(board, one, arm)} for one in found]
             results.show_json({"virtual": board.info.virtual, "motions": values})
             return
-        virtual = "  on a virtual board" if board.info.virtual else ""
-        results.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum{virtual}")
+        if board.info.virtual:
+            results.echo("on a virtual board:")
+        results.echo(f"{'name':<26}{'bytes':>8}{'joints':>8}{'seconds':>10}  checksum")
         for entry in found:
             results.echo(_row(entry))
             for line in (*_ends(board, entry, arm), *filter(None, [_old(board, entry, arm)])):
@@ -132,7 +129,7 @@ def _old(board: Board, entry: StoredMotion, arm: Arm | None) -> str:
 
 
 def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:
-    """The first and last posture of a motion, in degrees and steps, if the arm is known."""
+    """The first and last posture of a motion, if the arm is known."""
     if arm is None or not entry.joints:
         return []
     try:
@@ -140,7 +137,10 @@ def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:
     except InputError as error:
         return [str(error)]
     ends = ("from", trajectory(0.0)), ("to", trajectory(trajectory.duration_s))
-    return [f"{word:<5}{posture.format_angles(angles_deg, arm)}" for word, angles_deg in ends]
+    return [
+        f"{word:<5}{arm.texts.listed(f'{round(angle, 2) + 0.0:.2f}' for angle in angles)}"
+        for word, angles in ends
+    ]
 
 
 @click.command("show")
@@ -173,8 +173,8 @@ def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
         "duration_s": trajectory.duration_s,
         "degree": trajectory.joints[0].degree,
         "timing": "shared" if trajectory.shared else "per-joint",
-        motion.arm.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
-        motion.arm.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
+        motion.arm.texts.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
+        motion.arm.texts.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
         "joints": [
             {
                 "name": joint.name,

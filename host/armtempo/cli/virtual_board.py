@@ -47,7 +47,7 @@ def virtual_board(
     ideal: bool,
     seed: int,
 ) -> None:
-    """Start a virtual board, print its port, and run it until Ctrl-C.
+    """Start a virtual board, and run it until Ctrl-C.
 
     The port can be opened like a serial device, by armtempo (--port) and by any other program. Its motors are
     those of the arm file; without an arm file they are ideal and fit any arm.

@@ -23,9 +23,10 @@ _STATE_S = 0.5
 @click.command("watch")
 @options.board()
 def watch(given: BoardOptions) -> None:
-    """Show samples, states and events of another armtempo program that has the port.
+    """Show what another armtempo program does with the port.
 
-    If no program has the port, it prints the board's state. Ctrl-C ends it; a running motion continues.
+    Samples, states and events. If no program has the port, it prints the board's state. Ctrl-C ends it; a running
+    motion continues.
     """
     given = resolve.any_port(given)
     with resolve.shared_or_own(given, any_program=True) as board:

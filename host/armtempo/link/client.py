@@ -6,7 +6,7 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armtempo_shared import limits, wire
+from armtempo_shared import wire
 from armtempo_shared.messages import MAX_COMMAND, MAX_PAYLOAD, PERMILLE, PROGRAM, SEQUENCE, START_HELD
 
 from armtempo.basics.errors import BoardError, InputError, LinkError, NoAnswerError, OtherBoardError
@@ -26,15 +26,6 @@ PIECE_TIMEOUT_S = 0.5
 _CTRL_C = 3
 _GREETINGS = 8
 """Number of a session's first frames that can be ``hello``."""
-
-
-@dataclass(frozen=True)
-class Started:
-    """The board's answer to ``start``."""
-
-    run: int
-    """Number of the run, which its samples and events carry."""
-    duration_s: float
 
 
 @dataclass(frozen=True)
@@ -258,20 +249,21 @@ class Client:
         tail = b"".join((value or 0).to_bytes(4, "little", signed=True) for value in steps)
         self.session.command("home", (mask,), tail)
 
-    def start(self, name: str, crc: int, flags: int = 0) -> Started:
-        """Start a motion at ``rate``, stored or put by ``put_once``.
+    def start(self, name: str, crc: int, flags: int = 0) -> int:
+        """Start a motion at ``rate``, stored or put by ``put_once``, or a sequence or program.
 
-        ``crc`` is the record's own checksum, ``flags`` of START_HOMING and START_HELD.
+        ``crc`` is the record's own checksum, ``flags`` of START_HOMING and START_HELD. Returns the number of the run,
+        which its samples and events carry; for a sequence or program that of the run before its first.
         """
         if flags & START_HELD:
             self.need("jog", "moving by hand")
         if self.rate != PERMILLE:
             self.need("speed", "another speed than planned")
             self.session.command("speed", (self.rate,))
-        (run, duration), _ = self.session.command(
+        (run, _), _ = self.session.command(
             "start", (flags, crc), name, silence_timeout_s=FLASH_TIMEOUT_S, answer_timeout_s=FLASH_TIMEOUT_S
         )
-        return Started(run, duration / limits.TICK_HZ)
+        return int(run)
 
     def stop(self, now: bool = False) -> None:
         """Brake along the path, or freeze."""

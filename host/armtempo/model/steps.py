@@ -190,8 +190,11 @@ def _check_wait(wait_s: float) -> None:
 
 
 def position(step: int, finished: int) -> str:
-    """Describe where a sequence is; ``finished``: the cycles before this one, which is counted from 1."""
-    return f"step {step} of cycle {finished + 1}"
+    """Describe where a sequence is; ``finished``: the cycles before this one, which is counted from 1.
+
+    ``step``: from 1; 0 before the first step, where it is on its way to that one.
+    """
+    return f"step {max(step, 1)} of cycle {finished + 1}"
 
 
 def whole_cycles(finished: int) -> str:

@@ -59,7 +59,7 @@ _PAGE = """\
     armtempo deploy                     # once, for a real board: the board program
     armtempo home --arm arm.toml        # "the arm is in its home posture"; nothing moves
     armtempo run first.json             # replay and record it
-    armtempo report runs/first-001      # how well the arm followed
+    armtempo report                     # how well the arm followed
     armtempo plan sequence.toml         # a sequence: the motion, back home, again and again
     armtempo goto home
     armtempo run cycle.json
@@ -143,9 +143,9 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
     if arm.arm.driven_indices:
         files["first.toml"] = _JOB.format(
-            what=arm.arm.position_word,
-            units=arm.arm.unit_words,
-            key=arm.arm.list_key("via_deg"),
+            what=arm.arm.texts.position,
+            units=arm.arm.texts.unit_words,
+            key=arm.arm.texts.list_key("via_deg"),
             rows=_rows(arm.arm),
         )
         files["sequence.toml"] = _SEQUENCE

@@ -34,11 +34,11 @@ class PastRun:
 
 def listed(folder: Path) -> list[PastRun]:
     """The runs in a folder, the newest first."""
-    found = [(file.stat().st_mtime_ns, file) for file in folder.glob(f"*/{META}")]
-    return [_read(file, changed_ns) for changed_ns, file in sorted(found, reverse=True)]
+    return [_read(found / META) for found in run_reader.folders(folder)]
 
 
-def _read(file: Path, changed_ns: int) -> PastRun:
+def _read(file: Path) -> PastRun:
+    changed_ns = file.stat().st_mtime_ns
     if (known := _known.get(file)) is None or known[0] != changed_ns:
         _known[file] = known = changed_ns, _row(file)
     return known[1]

@@ -67,7 +67,7 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
         ) from None
     if found.shape != (len(arm.driven),):
         raise InputError(
-            f"a posture of arm {arm.name!r} has {len(arm.driven)} {arm.position_word}s, not {found.size}",
+            f"a posture of arm {arm.name!r} has {len(arm.driven)} {arm.texts.position}s, not {found.size}",
             "give one for each joint with a motor",
         )
     found = np.array(arm.placed(found))

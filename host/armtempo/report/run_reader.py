@@ -144,6 +144,12 @@ def load(path: Path) -> RunData:
     return RunData(path, meta, joints, repetitions, entries, legs, rows)
 
 
+def folders(runs: Path) -> list[Path]:
+    """The run folders in a folder, the one that was written last first; empty if there is none."""
+    found = [(file.stat().st_mtime_ns, file.parent) for file in runs.glob(f"*/{META}")]
+    return [folder for _, folder in sorted(found, reverse=True)]
+
+
 def description(folder: Path) -> dict[str, Any]:
     """The content of a folder's run.json, as of this version.
 

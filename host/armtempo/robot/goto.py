@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,21 +14,21 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_motion
-from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
-from armtempo.encoding.encoded_sequence import Encoded, EncodedSequence
+from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
+from armtempo.link.follow import Followed, MotionFollower
 from armtempo.model.arm import Arm
-from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan, load_plan
+from armtempo.model.sequence_plan import AnyPlan, load_plan
 from armtempo.planning import point_to_point, via_points, workspace_check
 from armtempo.ports.names import is_sim
 from armtempo.robot import arm_state
-from armtempo.robot.running import SampleSink, put_once, raise_fault, replay
+from armtempo.robot.running import follow, put_once, raise_fault
 from armtempo.robot.stop_request import StopRequest
 from armtempo.splines.trajectory import Trajectory
 
-Where = Plan | SequencePlan | Encoded | Path | str | ArrayLike
+Where = AnyPlan | Encoded | Path | str | ArrayLike
 """A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
 (or of its file) or sequence."""
 _NAME = "goto"
@@ -61,7 +62,8 @@ def go_to(
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
         trajectory = motion(arm, here, target_deg, pace or MovePace())
-        move_once(client, encoded_motion.of_trajectory(trajectory, arm).data, stop, progress)
+        data = encoded_motion.of_trajectory(trajectory, arm).data
+        move_once(client, data, stop, _shown(progress, trajectory.duration_s))
 
 
 def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Trajectory:
@@ -79,28 +81,34 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
     return replace(planner.slower(trajectory, pace.speed), name=_NAME)
 
 
-def move_once(client: Client, data: bytes, stop: StopRequest, progress: Progress | None = None) -> None:
+def move_once(
+    client: Client, data: bytes, stop: StopRequest, take: Callable[[Followed], object] = lambda _: None
+) -> None:
     """Run a motion record once, from the board's memory; raises BoardError if a fault ends it.
 
     One that is larger than that is stored and removed again.
     """
-    if len(data) <= client.info.once_bytes:
-        raise_fault(replay(client, put_once(client, data), stop, shown(progress)))
-        return
-    client.upload(_STORED, data)
+    stored = len(data) > client.info.once_bytes
+    if stored:
+        client.upload(_STORED, data)
+        key = MotionKey(_STORED, wire.record_crc(data))
+    else:
+        key = put_once(client, data)
     try:
-        raise_fault(replay(client, MotionKey(_STORED, wire.record_crc(data)), stop, shown(progress)))
+        end = follow(client, stop, lambda: MotionFollower(client, client.start(key.name, key.crc)), take).end
     finally:
-        with suppress(LinkError):  # do not hide the earlier error
-            client.remove(_STORED)
+        if stored:
+            with suppress(LinkError):  # do not hide the earlier error
+                client.remove(_STORED)
+    raise_fault(end)
 
 
-def shown(progress: Progress | None) -> SampleSink:
-    """A sink that reports the progress in seconds of the motion's own time."""
+def _shown(progress: Progress | None, duration_s: float) -> Callable[[Followed], object]:
+    """Reports samples as the progress in seconds of the motion's own time."""
 
-    def show(sample: Sample, duration_s: float) -> None:
-        if progress is not None:
-            progress(sample.path_ticks / limits.TICK_HZ, duration_s)
+    def show(event: Followed) -> None:
+        if progress is not None and isinstance(event, Sample):
+            progress(event.path_ticks / limits.TICK_HZ, duration_s)
 
     return show
 
@@ -140,7 +148,7 @@ def posture_deg(where: Where, arm: Arm) -> Array:
     """
     if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
         where = load_plan(where)
-    if isinstance(where, Plan | SequencePlan | EncodedMotion | EncodedSequence):
+    if isinstance(where, AnyPlan | Encoded):
         start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
         return point_to_point.posture(start_deg, where.arm)
     if isinstance(where, str):

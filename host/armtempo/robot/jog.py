@@ -103,7 +103,7 @@ class HeldJog:
         with ExitStack() as ends:
             # Nothing holds the jog while a broken port is waited for
             ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
-            self._run = client.start(key.name, key.crc, START_HELD).run
+            self._run = client.start(key.name, key.crc, START_HELD)
             self.moving = True
             self._said_s = client.session.clock()
             for _ in range(_FIRST):

@@ -12,13 +12,13 @@ from armtempo.basics.arguments import checked_as
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_sequence, made_with
+from armtempo.encoding import encoded_motion, encoded_sequence, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.encoding.encoded_sequence import Encoded, EncodedSequence
 from armtempo.link.board_messages import SequenceState
-from armtempo.link.follow import SequenceWatcher
+from armtempo.link.follow import MotionFollower, SequenceFollower, SequenceWatcher
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan, load_plan
+from armtempo.model.sequence_plan import AnyPlan, SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, by_of_joint, move_of, number_of_joint
@@ -161,7 +161,7 @@ class Motions:
 
     def run(
         self,
-        motion: Plan | SequencePlan | Encoded | Path | str,
+        motion: AnyPlan | Encoded | Path | str,
         repeat: int = 1,
         out: Path | str = "runs",
         progress: Progress | None = None,
@@ -183,9 +183,7 @@ class Motions:
             raise InputError(f"repeat: {repeat} is not in the range 1<=x<={MOST_REPETITIONS}", "change it")
         if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
             motion = load_plan(motion)
-        if isinstance(motion, SequencePlan | EncodedSequence) or (
-            isinstance(motion, str) and self._is_sequence(motion)
-        ):
+        if self._is_sequence(motion) if isinstance(motion, str) else motion.is_sequence:
             if repeat != 1 or progress is not None:
                 raise InputError(
                     "run: a sequence takes no repeat or progress", "leave them out; its steps repeat it"
@@ -199,10 +197,31 @@ class Motions:
         with self._board.stoppable(stop) as wanted:
             store(self._board.client, encoded.records)
             self._take_start(encoded, wanted)
-            folder = self._recorded(encoded, Path(out))
+            folder = self._new_folder(encoded, Path(out))
             seen.begin(encoded, folder)
-            recording.repeat(self._board.client, encoded, folder, repeat, wanted, seen)
+            self._repeat(encoded, folder, repeat, wanted, seen)
         return Run.load(folder.path)
+
+    def _repeat(
+        self, encoded: EncodedMotion, folder: RunFolder, times: int, stop: StopRequest, watcher: Watcher
+    ) -> None:
+        """Replay a motion so often, and backwards in between, until a stop is wanted; raises BoardError at a fault."""
+        client, key = self._board.client, encoded.key
+        back = encoded_motion.way_back(encoded) if times > 1 else b""
+        for number in range(times):
+            if number:
+                goto.move_once(client, back, stop)
+            if stop.wanted:
+                return
+            with recording.repetition(client, encoded, folder, watcher) as recorder:
+                end = running.follow(
+                    client,
+                    stop,
+                    lambda: MotionFollower(client, client.start(key.name, key.crc)),
+                    recorder.take,
+                ).end
+                recorder.end(end, stop.wanted)
+            running.raise_fault(end)
 
     def _is_sequence(self, name: str) -> bool:
         found = self._board.client.find(stored_name(name))
@@ -228,7 +247,7 @@ class Motions:
 
     def _run_sequence(
         self,
-        sequence: SequencePlan | EncodedSequence | str,
+        sequence: AnyPlan | Encoded | str,
         on_state: SequenceWatcher,
         stop: StopRequest | None,
         replace: bool,
@@ -243,16 +262,23 @@ class Motions:
                 encoded = self._store.upload(sequence, replace=replace)
                 key = encoded.key
                 self._take_start(encoded, wanted)
+
+            def start() -> SequenceFollower:
+                return SequenceFollower(client, key.name, client.start(key.name, key.crc), on_state)
+
             if out is None:
-                end = running.run_sequence(client, key, wanted, on_state).end
-                running.raise_sequence_failure(client, end)
-                return end
-            if isinstance(sequence, str):
-                encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
-            folder = self._recorded(encoded, Path(out))
-            self._last_sequence = folder.path
-            watcher.begin(encoded, folder)
-            return recording.sequence(client, encoded, folder, wanted, watcher, on_state)
+                followed = running.follow(client, wanted, start)
+            else:
+                if isinstance(sequence, str):
+                    encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
+                folder = self._new_folder(encoded, Path(out))
+                self._last_sequence = folder.path
+                watcher.begin(encoded, folder)
+                with recording.repetition(client, encoded, folder, watcher) as recorder:
+                    followed = running.follow(client, wanted, start, recorder.take)
+                    recorder.end_rows(followed)
+            running.raise_sequence_failure(client, followed.end)
+            return followed.end
 
     def _stored_sequence(self, name: str) -> MotionKey:
         """The key of a sequence on the board; a virtual arm is at home."""
@@ -267,11 +293,11 @@ class Motions:
     def _take_start(self, encoded: Encoded, stop: StopRequest) -> None:
         """Move a virtual arm to its start; raises LinkError if a real arm is not there."""
         name, advice = repr(encoded.name), "move it there with 'armtempo goto'"
-        if not isinstance(encoded, EncodedMotion):
+        if encoded.is_sequence:
             name, advice = f"sequence {name}", f"{advice} and the sequence's file"
         self._board.start.take(encoded.arm, encoded.start_deg, name, advice, stop)
 
-    def _recorded(self, encoded: Encoded, out: Path) -> RunFolder:
+    def _new_folder(self, encoded: Encoded, out: Path) -> RunFolder:
         """A new run folder in ``out``, that of ``last_run``."""
         folder = recording.new_run(out, encoded, self._board.port, self._board.client)
         self._last_folder = folder.path
@@ -332,7 +358,7 @@ class Motions:
         """Continue along the path at the speed before the pause; raises BoardError if nothing moves."""
         change_speed(self._board.client, RESUME)
 
-    def _motion(self, what: Plan | EncodedMotion | Path | str) -> EncodedMotion:
+    def _motion(self, what: AnyPlan | Encoded | Path | str) -> EncodedMotion:
         """The motion for a board that is set up for its arm."""
         plan = (
             load_plan(what)
@@ -340,11 +366,11 @@ class Motions:
             else what
         )
         found = self._store.read(plan) if isinstance(plan, str) else self._board.encoded(plan)
-        if isinstance(found, EncodedMotion):
-            return found
-        raise InputError(
-            f"{what} is a sequence, not a motion", "record it with 'armtempo run' or run_sequence"
-        )
+        if found.is_sequence:
+            raise InputError(
+                f"{what} is a sequence, not a motion", "record it with 'armtempo run' or run_sequence"
+            )
+        return found
 
     def _default(self) -> str:
         for entry in self._board.client.stored():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 
@@ -11,21 +13,24 @@ from armtempo_shared.sequence import MOVE
 
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion
 from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
-from armtempo.link.board_messages import RowBegun, Sample, SequenceState
-from armtempo.link.follow import Followed, MotionFollower, RunEnd, SequenceWatcher, number_in_run
+from armtempo.link.board_messages import RowBegun, Sample
+from armtempo.link.follow import Followed, MotionFollower, RunEnd, SequenceFollower, number_in_run
 from armtempo.model import arm_json
-from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequenceRow
 from armtempo.report import run_folder
-from armtempo.report.run_folder import COMPLETE, FAULT, INTERRUPTED, Repetition, RunFolder, RunRow
-from armtempo.robot import running
-from armtempo.robot.goto import move_once
-from armtempo.robot.running import fault_name, raise_fault, readable, replay
-from armtempo.robot.stop_request import StopRequest
+from armtempo.report.run_folder import (
+    COMPLETE,
+    FAULT,
+    INTERRUPTED,
+    Recording,
+    Repetition,
+    RunFolder,
+    RunRow,
+)
+from armtempo.robot.running import fault_name, readable
 
 _END_S = 1e-3
 """A run that ended earlier than its motion by more than this was stopped."""
@@ -58,8 +63,8 @@ class ProgressWatcher(Watcher):
 
     def on_sample(self, sample: Sample, duration_s: float) -> None:
         if self._progress is not None:
-            before_s = self._ended * duration_s
-            self._progress(before_s + sample.path_ticks / TICK_HZ, self._repetitions * duration_s)
+            done_s = min(sample.path_ticks / TICK_HZ, duration_s)  # the board ends at a whole tick
+            self._progress(self._ended * duration_s + done_s, self._repetitions * duration_s)
         self._inner.on_sample(sample, duration_s)
 
     def end(self, repetition: Repetition) -> None:
@@ -80,7 +85,7 @@ def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFol
         if plan is None:
             arm_json.save(arm, path / run_folder.ARM)
         else:
-            plan.save(path / (run_folder.TRAJECTORY if isinstance(plan, Plan) else run_folder.SEQUENCE))
+            plan.save(path / (run_folder.SEQUENCE if encoded.is_sequence else run_folder.TRAJECTORY))
         folder.write()
     return folder
 
@@ -89,84 +94,57 @@ def _row(row: SequenceRow) -> RunRow:
     return RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words)
 
 
-def sequence(
-    client: Client,
-    encoded: Encoded,
-    folder: RunFolder,
-    stop: StopRequest,
-    watcher: Watcher,
-    on_state: SequenceWatcher,
-) -> SequenceState:
-    """Run a stored sequence, and record its rows and samples in the run folder; returns its last state.
+class Recorder:
+    """Writes what a follower passes on into a repetition of a run folder."""
 
-    Raises BoardError if a fault ends it, or the board refuses one of its motions.
-    """
-    legs_s = [math.nan, *(motion.trajectory.duration_s for motion in encoded.motions)]
-    clock = client.session.clock
-    begun_s = clock()
-    row_of_run: dict[int, int] = {}  # of each run that was reported and may have more samples
-    with folder.begin_repetition(with_rows=True) as file:
+    def __init__(
+        self, client: Client, encoded: Encoded, folder: RunFolder, file: Recording, watcher: Watcher
+    ) -> None:
+        self._client = client
+        self._folder = folder
+        self._file = file
+        self._watcher = watcher
+        self._sequence = encoded.is_sequence
+        self._legs_s = [math.nan, *(motion.trajectory.duration_s for motion in encoded.motions)]
+        self._begun_s = client.session.clock()
+        self._row_of_run: dict[int, int] = {}  # of each run that was reported and may have more samples
 
-        def take(event: Followed) -> None:
-            if isinstance(event, RowBegun):
-                file.begin_row(event, clock() - begun_s)
-                if event.row < len(folder.rows) and folder.rows[event.row].leg:
-                    row_of_run[event.run] = event.row
-            elif isinstance(event, Sample):
-                row = row_of_run.get(event.run)
-                file.append(event, row)
-                watcher.on_sample(event, legs_s[0 if row is None else folder.rows[row].leg])
-                for run in [run for run in row_of_run if run < event.run]:
-                    del row_of_run[run]
+    def take(self, event: Followed) -> None:
+        """Write a sample or the begin of a row; others are written at the end."""
+        if isinstance(event, RowBegun):
+            self._file.begin_row(event, self._client.session.clock() - self._begun_s)
+            if event.row < len(self._folder.rows) and self._folder.rows[event.row].leg:
+                self._row_of_run[event.run] = event.row
+        elif isinstance(event, Sample):
+            row = self._row_of_run.get(event.run) if self._sequence else 0
+            self._file.append(event, row)
+            self._watcher.on_sample(event, self._legs_s[0 if row is None else self._folder.rows[row].leg])
+            for run in [run for run in self._row_of_run if run < event.run]:
+                del self._row_of_run[run]
 
-        followed = running.run_sequence(client, encoded.key, stop, on_state, take)
-        end = followed.end
-        file.repetition.end_rows(
-            end, fault_name(end.code), client.counters(), clock() - begun_s, followed.lost
+    def end(self, end: RunEnd, stopped: bool) -> None:
+        """A motion has ended; ``stopped``: a stop was wanted."""
+        state = FAULT if end.fault else INTERRUPTED if stopped else COMPLETE
+        self._file.repetition.end(state, fault_name(end.fault), end.ticks, end.positions, end.lost)
+        self._file.repetition.notices = readable(end.notices)
+
+    def end_rows(self, followed: SequenceFollower) -> None:
+        """A sequence has ended."""
+        end, taken_s = followed.end, self._client.session.clock() - self._begun_s
+        self._file.repetition.end_rows(
+            end, fault_name(end.code), self._client.counters(), taken_s, followed.lost
         )
-        watcher.end(file.repetition)
-        running.raise_sequence_failure(client, end)
-    return end
 
 
-def repeat(
-    client: Client,
-    motion: EncodedMotion,
-    folder: RunFolder,
-    times: int,
-    stop: StopRequest,
-    watcher: Watcher,
-) -> None:
-    """Replay a stored motion ``times`` times into the run folder, and backwards in between.
+@contextmanager
+def repetition(client: Client, encoded: Encoded, folder: RunFolder, watcher: Watcher) -> Iterator[Recorder]:
+    """One start of a motion or sequence, recorded in the run folder, also if it ends early; then the watcher is told.
 
-    A stop request ends the series; a fault raises BoardError.
+    If neither ``end`` nor ``end_rows`` is called, it was interrupted, or its connection is broken.
     """
-    back = encoded_motion.way_back(motion) if times > 1 else b""
-    for number in range(times):
-        if number:
-            move_once(client, back, stop)
-        if stop.wanted:
-            return
-        end = _recorded(client, motion, folder, stop, watcher)
-        watcher.end(folder.repetitions[-1])
-        raise_fault(end)
-
-
-def _recorded(
-    client: Client, motion: EncodedMotion, folder: RunFolder, stop: StopRequest, watcher: Watcher
-) -> RunEnd:
-    """Record one repetition in the run folder, also if it ends early."""
-    with folder.begin_repetition() as file:
-
-        def take(sample: Sample, duration_s: float) -> None:
-            file.append(sample)
-            watcher.on_sample(sample, duration_s)
-
-        end = replay(client, motion.key, stop, take)
-        state = FAULT if end.fault else INTERRUPTED if stop.wanted else COMPLETE
-        file.repetition.end(state, fault_name(end.fault), end.ticks, end.positions, end.lost)
-        file.repetition.notices = readable(end.notices)
-    return end
+    with folder.begin_repetition(with_rows=encoded.is_sequence) as file:
+        yield Recorder(client, encoded, folder, file, watcher)
+    watcher.end(file.repetition)
 
 
 def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> RunFolder:
@@ -188,11 +166,9 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
             "the last run was that of a sequence, whose samples are not kept", "record it with 'armtempo run'"
         )
     folder = new_run(folder_in, motion, port, client)
-    with folder.begin_repetition() as file:
+    with repetition(client, motion, folder, Watcher()) as recorder:
         for sample in chain([first] if first else [], samples):
-            file.append(sample)
+            recorder.take(sample)
         end = follower.end
-        cut = end.path_ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S
-        state = FAULT if end.fault else INTERRUPTED if cut else COMPLETE
-        file.repetition.end(state, fault_name(end.fault), end.ticks, end.positions, end.lost)
+        recorder.end(end, end.path_ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S)
     return folder

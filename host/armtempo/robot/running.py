@@ -7,30 +7,18 @@ from contextlib import suppress
 from typing import TypeVar
 
 from armtempo_shared import wire
-from armtempo_shared.messages import ONCE_NAME, PERMILLE
-from armtempo_shared.program import SUFFIX
+from armtempo_shared.messages import ONCE_NAME
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.encoding.encoded_motion import MotionKey
 from armtempo.link import Client
-from armtempo.link.board_messages import Sample, SequenceState
-from armtempo.link.follow import (
-    CHECK_S,
-    Followed,
-    Follower,
-    MotionFollower,
-    RunEnd,
-    SequenceFollower,
-    SequenceWatcher,
-    where,
-)
+from armtempo.link.board_messages import SequenceState
+from armtempo.link.follow import CHECK_S, Followed, Follower, RunEnd, where
 from armtempo.link.refusal import refusal
 from armtempo.link.session import RECONNECT_S, OnLoss
 from armtempo.robot.stop_request import StopRequest
 
 _Follower = TypeVar("_Follower", bound=Follower)
-SampleSink = Callable[[Sample, float], object]
-"""Called with each sample and the duration of the motion in seconds."""
 
 BRAKE_S = 5.0
 """A board that is not at rest after this time, nor _LATER_S after the announced time, is told to freeze."""
@@ -46,66 +34,18 @@ def put_once(client: Client, data: bytes) -> MotionKey:
     return MotionKey(ONCE_NAME, client.put_once(data))
 
 
-def replay(
-    client: Client,
-    motion: MotionKey,
-    stop: StopRequest,
-    sink: SampleSink = lambda *_: None,
-    flags: int = 0,
-) -> RunEnd:
-    """Start a motion and follow it to its end; a stop request makes the board brake.
-
-    Any error here stops the board. Raises BoardError if the board refuses to start, LinkError if it cannot be
-    reached any more, Stopped if the stop was requested before the start.
-    """
-    motion_s = 0.0
-
-    def start() -> MotionFollower:
-        nonlocal motion_s
-        started = client.start(motion.name, motion.crc, flags)
-        motion_s = started.duration_s * client.rate / PERMILLE
-        return MotionFollower(client, started.run)
-
-    def take(event: Followed) -> None:
-        if isinstance(event, Sample):
-            sink(event, motion_s)
-
-    try:
-        return follow(client, stop, start, take).end
-    except OtherBoardError as error:
-        raise LinkError(
-            f"{error.problem}; what happened after the last sample is not known", f"{error.hint}"
-        ) from error
-
-
-def run_sequence(
-    client: Client,
-    key: MotionKey,
-    stop: StopRequest,
-    on_state: SequenceWatcher = lambda _: None,
-    take: Callable[[Followed], object] = lambda _: None,
-    program: bool = False,
-) -> SequenceFollower:
-    """Start a stored sequence (or ``program``) and follow it to its end; see ``follow``.
-
-    Raises BoardError if the board refuses to start.
-    """
-
-    def start() -> SequenceFollower:
-        before = client.start(key.name, key.crc).run
-        return SequenceFollower(client, key.name + SUFFIX if program else key.name, before, on_state)
-
-    return follow(client, stop, start, take)
-
-
 def follow(
-    client: Client, stop: StopRequest, start: Callable[[], _Follower], take: Callable[[Followed], object]
+    client: Client,
+    stop: StopRequest,
+    start: Callable[[], _Follower],
+    take: Callable[[Followed], object] = lambda _: None,
 ) -> _Follower:
     """Start something and follow it to its end; a stop request makes the board brake. Any error stops the board.
 
-    ``take`` is called with its samples and other events. If the cable is pulled or the board falls silent, it is
-    waited for up to RECONNECT_S, or STOPPING_RECONNECT_S if the stop is wanted; a sequence goes on meanwhile. Raises
-    Stopped if the stop was wanted before, LinkError if the board cannot be reached any more, and what ``start`` raises.
+    ``start`` starts it, by ``Client.start``; ``take`` is called with its samples and other events. If the cable is
+    pulled or the board falls silent, it is waited for up to RECONNECT_S, or STOPPING_RECONNECT_S if the stop is
+    wanted; a sequence goes on meanwhile. Raises Stopped if the stop was wanted before, LinkError if the board cannot be
+    reached any more, and what ``start`` raises.
     """
     session = client.session
     brake = Brake(client, stop)
@@ -118,8 +58,10 @@ def follow(
                 for event in follower.events(brake):
                     take(event)
                 return follower
-            except OtherBoardError:
-                raise
+            except OtherBoardError as error:
+                raise LinkError(
+                    f"{error.problem}; what happened after the last sample is not known", f"{error.hint}"
+                ) from error
             except NoAnswerError as error:  # silent although its port exists: treated like a pulled cable
                 if not stop.wanted:  # otherwise the stop continues until it is abandoned
                     if session.clock() - follower.heard_s > RECONNECT_S:

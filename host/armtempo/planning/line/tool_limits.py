@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import comb
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.progress import alive
 from armtempo.planning.fixed_path import Along
-from armtempo.planning.line.deviation import derivatives, halved
+from armtempo.planning.line.deviation import halved
 from armtempo.planning.tool import Tool
 from armtempo.splines import bspline
 
@@ -97,37 +100,59 @@ def _largest(
     angles_deg: Array, times_s: Array, tool: Tool, group: np.ndarray, groups: int
 ) -> tuple[Array, Array]:
     """Bounds of speed and acceleration over the pieces of each group, (groups,): branch and bound by halves."""
-    best = np.zeros((groups, 2))
+    best, width = np.zeros((groups, 2)), 1.0
+    pieces = _Pieces(_derived(angles_deg), _derived(times_s[:, :, None]))
     while True:
         alive()
-        most, here = _bounds(angles_deg, times_s, tool)
+        most, here = _bounds(pieces, width, tool)
         np.maximum.at(best, group, here)
         open_ = np.any(most > best[group] * (1.0 + _SHARP) + 1e-9, axis=1)
         if not open_.any() or 2 * np.count_nonzero(open_) > _MOST_PIECES:
             best = best * (1.0 + _SHARP) + 1e-9
             np.maximum.at(best, group, most)
             return best[:, 0], best[:, 1]
-        angles_deg, group = halved(angles_deg[open_]), np.repeat(group[open_], 2)
-        times_s = halved(times_s[open_, :, None])[:, :, 0]
+        pieces, group = pieces.halved(open_), np.repeat(group[open_], 2)
+        width *= 0.5
 
 
-def _bounds(angles_deg: Array, times_s: Array, tool: Tool) -> tuple[Array, Array]:
-    """Bounds of speed and acceleration over pieces, and their values in the middle: each (N, 2)."""
-    q, t = (_middle(pieces, order) for pieces, order in ((angles_deg, 2), (times_s[:, :, None], 2)))
-    first, second = tool.moved(*q)
-    t1, t2 = t[1], t[2]
+class _Pieces(NamedTuple):
+    """Bernstein coefficients of angles and time with their first three derivatives, each (N, .., J) or (N, .., 1).
+
+    All are by the u of the whole segment, and halved each on its own: as differences of the coefficients of shorter
+    and shorter pieces, derivatives would be lost in rounding.
+    """
+
+    angles: list[Array]
+    times: list[Array]
+
+    def halved(self, which: NDArray[np.bool_]) -> _Pieces:
+        """Both halves of some pieces."""
+        return _Pieces(*([halved(each[which]) for each in kind] for kind in self))
+
+
+def _derived(pieces: Array) -> list[Array]:
+    """Bernstein pieces (N, k + 1, J) and their first three derivatives."""
+    found = [pieces]
+    for _ in range(3):
+        found.append((found[-1].shape[1] - 1) * np.diff(found[-1], axis=1))
+    return found
+
+
+def _bounds(pieces: _Pieces, width: float, tool: Tool) -> tuple[Array, Array]:
+    """Bounds of speed and acceleration over pieces of a ``width``, and their values in the middle: each (N, 2)."""
+    first, second = tool.moved(*map(_middle, pieces.angles[:3]))
+    t1, t2 = map(_middle, pieces.times[1:3])
     bend = second * t1 - first * t2
-    d1, d2, d3 = derivatives(np.radians(angles_deg @ tool.turns.T), 3)
+    d1, d2, d3 = (np.radians(np.abs(each @ tool.turns.T).max(axis=1)) for each in pieces.angles[1:])
     outer = np.minimum(tool.reach_mm[:, None], tool.reach_mm[None, :])
     pairs = np.einsum("nk,kj,nj->n", d1, outer, d1)
     jump = d2 @ tool.reach_mm + pairs
     third = d3 @ tool.reach_mm + 3.0 * np.einsum("nk,kj,nj->n", d2, outer, d1) + d1.sum(axis=1) * pairs
-    slopes = np.diff(times_s, axis=1) * (times_s.shape[1] - 1)
-    least, largest = slopes.min(axis=1), slopes.max(axis=1)
-    jerk = derivatives(times_s[:, :, None], 3)[2][:, 0]
+    least, largest = pieces.times[1].min(axis=(1, 2)), pieces.times[1].max(axis=(1, 2))
+    jerk = np.abs(pieces.times[3]).max(axis=(1, 2))
     here = np.linalg.norm(first, axis=1)
-    fastest = here + 0.5 * jump
-    most_bend = np.linalg.norm(bend, axis=1) + 0.5 * (third * largest + fastest * jerk)
+    fastest = here + 0.5 * width * jump
+    most_bend = np.linalg.norm(bend, axis=1) + 0.5 * width * (third * largest + fastest * jerk)
     t1 = t1[:, 0]
     return (
         np.stack([fastest / least, most_bend / least**3], axis=1),
@@ -135,14 +160,8 @@ def _bounds(angles_deg: Array, times_s: Array, tool: Tool) -> tuple[Array, Array
     )
 
 
-def _middle(pieces: Array, orders: int) -> list[Array]:
-    """Value and derivatives at the middle of Bernstein pieces (N, 6, J): each (N, J)."""
-    found, scale = [], 1.0
-    for _ in range(orders + 1):
-        degree = pieces.shape[1] - 1
-        binomials = np.array([1.0])
-        for _ in range(degree):  # halving each time
-            binomials = np.convolve(binomials, [0.5, 0.5])
-        found.append(scale * np.einsum("b,nbj->nj", binomials, pieces))
-        scale, pieces = scale * degree, np.diff(pieces, axis=1)
-    return found
+def _middle(pieces: Array) -> Array:
+    """Value at the middle of Bernstein pieces (N, k + 1, J): (N, J)."""
+    degree = pieces.shape[1] - 1
+    binomials = np.array([comb(degree, number) for number in range(degree + 1)]) / 2.0**degree
+    return np.asarray(np.einsum("b,nbj->nj", binomials, pieces))
