@@ -46,6 +46,9 @@ if TYPE_CHECKING:
         def brake(self) -> None:
             """Brake the motion."""
 
+        def home(self, plan: "dict[str, Any]") -> None:
+            """Home the arm by its switches; ``plan``: as the record has it. Raises CellError."""
+
         def steps(self) -> "list[int]":
             """Position of the joints."""
 
@@ -93,6 +96,14 @@ class Cell:
         self._pallets: "dict[str, Pallet]" = {}
 
     # moving
+
+    def home(self) -> None:
+        """Home all joints by their switches, in the order of the arm file, and move to the home posture."""
+        plan = self._table.get("homing")
+        if not plan:
+            raise CellError("the program's text has no call of home")
+        self._rest()
+        self._work.home(plan)
 
     def goto(self, posture: "str | Place | Sequence[float]", speed: float = 1.0, wait: bool = True) -> None:
         """Move to a posture, all joints together; ``speed``: 0.01 to 1.

@@ -19,6 +19,7 @@ from armtempo.model import (
     channels,
     coupled,
     drive_limits,
+    home_switches,
     outputs_file,
     parts_file,
     pin_use,
@@ -35,7 +36,7 @@ from armtempo.model.frame import ArmFrame
 from armtempo.model.joint_unit import PositionTexts
 from armtempo.model.outputs import Input, Output
 from armtempo.model.pallet import ArmPallet
-from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
+from armtempo.model.parts import NOTHING, PROGRAM, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
 from armtempo.model.tool import ArmTool
 from armtempo.model.tool_pose import Pose
@@ -143,6 +144,7 @@ class Arm:
         _check_channels(arm, path)
         for problem in pin_use.problems(arm):
             raise InputError(f"{path}: {problem.where}: {problem.what}", problem.next_step)
+        _check_power_up(arm, path)
         return arm
 
     @classmethod
@@ -402,6 +404,22 @@ class Arm:
         if away_mm > reach_mm + posture.where.tolerance_mm + _REACHES_MM:
             return f"{away_mm:g} mm from the base, but all links together are {reach_mm:g} mm long"
         return ""
+
+
+def _check_power_up(arm: Arm, path: Path) -> None:
+    """Raise InputError for an arm that must not move by itself at power-up, although its file says so."""
+    if arm.safety.at_power_up != PROGRAM:
+        return
+    where = f'{path}: safety.at_power_up = "{PROGRAM}"'
+    if not arm.safety.estop_fitted:
+        raise InputError(
+            f"{where}: the arm would move by itself, without an E-stop that the board knows",
+            "wire one and set estop_fitted = true",
+        )
+    try:
+        home_switches.check_board_can_home(arm)
+    except InputError as error:
+        raise InputError(f"{where}: {error.problem}", error.hint) from None
 
 
 def _driven(joint: Joint, limits: Limits) -> DrivenJoint:
