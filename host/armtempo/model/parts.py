@@ -16,6 +16,8 @@ from armtempo.model import joint_unit
 from armtempo.model.joint_unit import DEG, JointUnit
 
 LEVELS = ("low", "high")
+PROGRAM = "program"
+AT_POWER_UP = ("nothing", PROGRAM)
 NOTHING = "nothing"
 """What an arm holds that holds no load."""
 _LEAST_LIMIT = 0.001
@@ -418,4 +420,10 @@ class Safety:
     )
     link_timeout_ms: int = field(
         default=1000, metadata=key("time without a message after which the host counts as lost", 200, 60_000)
+    )
+    at_power_up: str = field(
+        default="nothing",
+        metadata=key(
+            "what starts by itself at power-up: the default, if it is a program", choices=AT_POWER_UP
+        ),
     )

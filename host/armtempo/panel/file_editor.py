@@ -124,6 +124,11 @@ class FileEditor(ABC):
         return self.option("name")
 
     @property
+    def content(self) -> dict[str, Any]:
+        """What the text says."""
+        return self._values
+
+    @property
     def is_saved(self) -> bool:
         """Whether the file has every change."""
         return self.file is not None and self.text == self._saved

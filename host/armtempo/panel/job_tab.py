@@ -216,7 +216,7 @@ class JobTab:
         """Take the posture that is nearest to the via point's, and offer the others."""
         angles = self._jobs.vias[number].angles_deg
         postures = moved_tool_deg(self._jobs.tooled_arm, np.array(angles), position_mm.tolist())
-        texts = [self._operator.arm.listed(f"{angle:.1f}" for angle in posture) for posture in postures]
+        texts = [self._operator.arm.texts.listed(f"{angle:.1f}" for angle in posture) for posture in postures]
         self._offered.clear()
         with self._offered:
             ui.label(words.POSTURES_OF.format(number=number, count=len(postures)))

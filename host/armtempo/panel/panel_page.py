@@ -206,6 +206,27 @@ class PanelPage:
         asked.open()
         return Asked(asked, place)
 
+    def build(self, tab: str, call: Callable[[], object]) -> None:
+        """Build a part of a tab."""
+        self.built = tab
+        try:
+            call()
+        finally:
+            self.built = ""
+
+    def expansion(self, text: str, call: Callable[[], object]) -> ui.expansion:
+        """A folded part that ``call`` builds when it is first opened: the first view does not wait for it."""
+        tab = self.built
+        place = ui.expansion(text).props("dense").classes("armtempo-expansion")
+
+        def opened() -> None:
+            if not place.default_slot.children:
+                with place:
+                    self.build(tab, call)
+
+        place.on_value_change(opened)
+        return place
+
     def on_look(self, listener: Callable[[], None]) -> None:
         """Call ``listener`` every LOOK_S; from within a tab, only while that is shown."""
         self.listeners.append((self.built, listener))

@@ -17,7 +17,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.joint_unit import DEG, MM, names
 from armtempo.model.plan import Plan, Search
-from armtempo.planning import checks, path_deviation, rest_to_rest, torque
+from armtempo.planning import board_limits, checks, path_deviation, rest_to_rest, torque
 from armtempo.planning.free import free_plan
 from armtempo.report.replayed import JointResult
 from armtempo.splines.trajectory import Trajectory
@@ -46,7 +46,7 @@ def lines(plan: Plan, verbose: bool = False) -> list[str]:
     """
     job = plan.job
     text = [f"{job.name}: {plan.total_s:.4f} s{_at_least(plan)}; {', '.join(_settings(plan, verbose))}"]
-    units = tuple(text.replace("deg", plan.arm.units) for text in _HEAD[1])
+    units = tuple(text.replace("deg", plan.arm.texts.units) for text in _HEAD[1])
     rows = [_HEAD[0], units, *(_row(plan, joint) for joint in range(len(plan.extremes)))]
     text += aligned([row[:1] + row[3:] for row in rows] if plan.trajectory.shared else rows, _widths(plan))
     text += _faster(plan)
@@ -68,7 +68,7 @@ def _details(plan: Plan) -> list[str]:
         *(_polished(search) for search in plan.searches if search.optimum_s),
         *(_started(search) for search in plan.searches if len(search.starts_s)),
         f"record: {record_bytes(plan)} bytes of the {MAX_MOTION_BYTES} that the board takes",
-        checks.format_rate(checks.step_rates(plan.arm, plan.extremes)),
+        board_limits.format_rate(board_limits.step_rates(plan.arm, plan.extremes)),
     ]
 
 

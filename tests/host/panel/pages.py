@@ -60,8 +60,16 @@ class Page:
         found = [
             one for one in self.elements() if _name(one) == name and not isinstance(one, ui.label | ui.tab)
         ]
-        assert found, (name, sorted({_name(one) for one in self.elements()}))
+        assert found, (name, self.names())
         return found[0]
+
+    def names(self) -> list[str]:
+        """The names of all controls."""
+        return sorted({_name(one) for one in self.elements()})
+
+    def unfold(self, text: str) -> None:
+        """Open a folded part."""
+        self._call(lambda: next(one for one in self.elements(ui.expansion) if one.text == text).open())
 
     def texts(self) -> list[str]:
         """All texts that are in view."""

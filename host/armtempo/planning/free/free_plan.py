@@ -14,7 +14,7 @@ from armtempo.model.job import GRADIENT, Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Search
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import checks, lower_bounds, through_plan
+from armtempo.planning import board_limits, checks, lower_bounds, through_plan
 from armtempo.planning.fixed_path import FixedPath
 from armtempo.planning.free import corridor, free_path
 from armtempo.planning.free.angle_bounds import of_path
@@ -138,7 +138,7 @@ def _axis_s(demand: Demand, spline: Planned, pieces: int) -> Array:
 
 def _most_segments(arm: Arm, job: Job, vias: int) -> int:
     """The most segments of a free path that the board's record can hold; raises InputError if too few."""
-    most = checks.most_segments(arm, job.timing == "shared")
+    most = board_limits.most_segments(arm, job.timing == "shared")
     pieces = job.refine if isinstance(job.refine, int) else LEAST_PIECES
     needed = uniform(vias, pieces, {stop.via: stop.dwell_s for stop in job.stops}).segments
     if needed > most:

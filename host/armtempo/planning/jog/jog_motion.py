@@ -191,10 +191,13 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
     assert move.joint is not None
     joint = arm.driven[move.joint]
     end, ends = _end_deg(joint, start[move.joint], move.by)
-    found = move_law.law(abs(end - start[move.joint]), move_law.of_joints([joint.limits], [1.0], speed))
+    there = start.copy()
+    there[move.joint] = end
+    begin = start + point_to_point.ahead(start, there, arm) * (there - start)
+    found = move_law.law(abs(end - begin[move.joint]), move_law.of_joints([joint.limits], [1.0], speed))
     turned = math.copysign(1.0, end - start[move.joint]) * found.distance
     rows = [
-        start[index] + (turned if index == move.joint else np.zeros_like(turned))
+        begin[index] + (turned if index == move.joint else np.zeros_like(turned))
         for index in range(len(arm.driven))
     ]
     return found.trajectory(name, rows), ends
@@ -247,17 +250,28 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
     """The motion along the line; None if a joint would leave its range, or the tool the line."""
     arm = followed.line.arm
     limits = _line_limits(followed, length, speed)
+    begin = _line_begin(followed, length)
     for parts in LINE_PARTS:
-        law = move_law.law(length, limits, length / parts)
-        angles = followed.at(np.clip(law.at_knots, 0.0, length))
+        law = move_law.law(length - begin, limits, length / parts)
+        angles = followed.at(np.clip(begin + law.at_knots, begin, length))
         points = bspline.fit(angles, DEGREE)
         trajectory = law.trajectory(name, list(points.T))
         if not _within(trajectory, arm):
             return None
-        stray = followed.stray(points, law.distance)
+        stray = followed.stray(points, begin + law.distance)
         if stray.position_mm <= STRAY_MM and stray.rotation_deg <= STRAY_DEG:
             return _slowed(trajectory, arm, speed)
     return None
+
+
+def _line_begin(followed: FollowedLine, length: float) -> float:
+    """Where on the line the motion begins: ahead of where the motors stand (``point_to_point.ahead``)."""
+    arm = followed.line.arm
+    first, second = np.degrees(followed.angles_rad[:2][:, list(arm.driven_indices)])
+    there = first + (second - first) * (length / float(followed.distances[1]))
+    begin = length * point_to_point.ahead(first, there, arm)
+    off = arm.transmission.steps(followed.at(np.array([begin]))[0]) - np.rint(arm.transmission.steps(first))
+    return begin if np.all(np.abs(off) <= 0.5) else 0.0
 
 
 def _line_limits(followed: FollowedLine, length: float, speed: float) -> MoveLimits:
