@@ -4,6 +4,8 @@ Names are those of the arm file. What the calls do is done by a ``Work``: the bo
 (``armtempo.testing``).
 """
 
+from armtempo_shared.limits import MAX_NAME
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -223,6 +225,8 @@ class Cell:
     def count(self, name: str) -> int:
         """Increment a counter, which 'armtempo status' shows; returns its value."""
         self._work.check()
+        if not 0 < len(name.encode()) <= MAX_NAME:
+            raise CellError("count: the name %r has not 1 to %d bytes" % (name, MAX_NAME))
         return self._work.count(name)
 
     def say(self, *values: object) -> None:

@@ -10,7 +10,6 @@ import sys
 import time
 
 from armtempo_shared import codes, messages, program, sequence
-from armtempo_shared.limits import MAX_NAME
 from armtempo_shared.rest_to_rest import Move, TooLongError
 from armtempo_shared.sequence import MAX_COUNTERS
 from micropython import const
@@ -263,7 +262,7 @@ class UserProgram(Sequencer):
 
     def count(self, name: str) -> int:
         """Increment a counter."""
-        number = self._command.named(name.encode()[:MAX_NAME], MAX_COUNTERS)
+        number = self._command.named(name.encode(), MAX_COUNTERS)
         if number < 0:
             raise CellError("more than %d counters" % MAX_COUNTERS)
         return self._command.count(number)

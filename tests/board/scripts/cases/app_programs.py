@@ -155,6 +155,7 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("goto([0.1, 0])", "goto is refused: too_long, 100"),
         ("run('back')", "run('back') is refused: wrong_start"),
         ("run('none')", "run('none') is refused: not_found"),
+        ("count('n' * 25)", "count: the name 'nnnnnnnnnnnnnnnnnnnnnnnnn' has not 1 to 24 bytes"),
     ):
         world = World(
             "try:\n    cell.%s\nexcept cell.Error as error:\n    print(error)\n" % call,
