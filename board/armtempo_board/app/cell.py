@@ -4,6 +4,8 @@ Names are those of the arm file. What the calls do is done by a ``Work``: the bo
 (``armtempo.testing``).
 """
 
+from armtempo_shared.limits import MAX_NAME
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -43,6 +45,9 @@ if TYPE_CHECKING:
 
         def brake(self) -> None:
             """Brake the motion."""
+
+        def home(self, plan: "dict[str, Any]") -> None:
+            """Home the arm by its switches; ``plan``: as the record has it. Raises CellError."""
 
         def steps(self) -> "list[int]":
             """Position of the joints."""
@@ -91,6 +96,14 @@ class Cell:
         self._pallets: "dict[str, Pallet]" = {}
 
     # moving
+
+    def home(self) -> None:
+        """Home all joints by their switches, in the order of the arm file, and move to the home posture."""
+        plan = self._table.get("homing")
+        if not plan:
+            raise CellError("the program's text has no call of home")
+        self._rest()
+        self._work.home(plan)
 
     def goto(self, posture: "str | Place | Sequence[float]", speed: float = 1.0, wait: bool = True) -> None:
         """Move to a posture, all joints together; ``speed``: 0.01 to 1.
@@ -212,6 +225,8 @@ class Cell:
     def count(self, name: str) -> int:
         """Increment a counter, which 'armtempo status' shows; returns its value."""
         self._work.check()
+        if not 0 < len(name.encode()) <= MAX_NAME:
+            raise CellError("count: the name %r has not 1 to %d bytes" % (name, MAX_NAME))
         return self._work.count(name)
 
     def say(self, *values: object) -> None:

@@ -6,6 +6,8 @@ from armtempo_shared.messages import MAX_PAYLOAD
 from armtempo_shared.table import offset, rows
 from micropython import const
 
+from armtempo_board import features
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_board.app.controller import Controller
@@ -46,6 +48,19 @@ class Events:
         """As ``note``, for at most MAX_PAYLOAD bytes; allocates nothing."""
         if not self.notice:
             self.notice = text
+
+    if features.SEQUENCES:
+
+        def note_failure(self, text: str) -> None:
+            """Keep the end of a program's failure, for this host and for later ones until the fault is cleared."""
+            self._board.failure = text.encode()[-MAX_PAYLOAD:]
+            self._board.failure_waits = True
+
+        def take_failure(self) -> None:
+            """Make it the notice that is to be sent, unless this host was told."""
+            if self._board.failure_waits and not self.notice:
+                self._board.failure_waits = False
+                self.notice = self._board.failure
 
     def push(self) -> bool:
         """Give pending events to the link, at most one sample; returns whether there was a sample."""
@@ -100,6 +115,8 @@ class Events:
 
     def _push_notice(self) -> None:
         link = self._link
+        if features.SEQUENCES:
+            self.take_failure()
         if self.notice and link.room(len(self.notice)):
             at = link.payload()
             link.out[at : at + len(self.notice)] = self.notice

@@ -26,6 +26,7 @@ from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any, Protocol
 
     from armtempo_shared.motion import MotionHead
@@ -45,7 +46,9 @@ if TYPE_CHECKING:
 
         def release_memory(self) -> None: ...
 
-        def begin_motion(self, name: str, crc: "int | None", rate: int) -> None: ...
+        def home(self, mask: int, steps: "Sequence[int]") -> None: ...
+
+        def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0) -> None: ...
 
         def stop(self, now: int) -> None: ...
 

@@ -34,7 +34,7 @@ from armtempo.new_arm import urdf_reader as reader
 @options.frame
 @click.option(
     "--tolerance-deg",
-    type=float,
+    type=options.FiniteNumber(),
     metavar="DEG",
     help="Leave out lines that change the path by less than DEG, or as many mm of sliding joints. Default for a "
     "table with a column time_s: 0.1.",
@@ -133,7 +133,14 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     help="csv: degrees (sliding joints mm), one line per time; ros: trajectory_msgs/JointTrajectory in YAML, radians "
     "(metres).",
 )
-@click.option("--rate", type=float, default=100.0, show_default=True, metavar="HZ", help="Points a second.")
+@click.option(
+    "--rate",
+    type=options.FiniteNumber(),
+    default=100.0,
+    show_default=True,
+    metavar="HZ",
+    help="Points a second.",
+)
 @click.option("--frame-id", default="", help="header.frame_id of the ROS message.")
 @options.file(
     "-o",

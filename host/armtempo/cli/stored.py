@@ -138,7 +138,8 @@ def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:
         return [str(error)]
     ends = ("from", trajectory(0.0)), ("to", trajectory(trajectory.duration_s))
     return [
-        f"{word:<5}{arm.listed(f'{round(angle, 2) + 0.0:.2f}' for angle in angles)}" for word, angles in ends
+        f"{word:<5}{arm.texts.listed(f'{round(angle, 2) + 0.0:.2f}' for angle in angles)}"
+        for word, angles in ends
     ]
 
 
@@ -172,8 +173,8 @@ def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
         "duration_s": trajectory.duration_s,
         "degree": trajectory.joints[0].degree,
         "timing": "shared" if trajectory.shared else "per-joint",
-        motion.arm.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
-        motion.arm.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
+        motion.arm.texts.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
+        motion.arm.texts.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
         "joints": [
             {
                 "name": joint.name,

@@ -21,7 +21,7 @@ from armtempo.model.boards import TimerOutput, pin_number
 from armtempo.model.drive_limits import Crossing
 from armtempo.model.joint_unit import REVOLUTE
 from armtempo.model.outputs import SERVO, Output
-from armtempo.model.parts import DrivenJoint
+from armtempo.model.parts import PROGRAM, DrivenJoint
 from armtempo.model.pin_use import Period
 from armtempo.planning import board_limits
 from armtempo.planning.brake_time import BrakeTimes
@@ -54,10 +54,12 @@ def step_rates(arm: Arm) -> list[int]:
     return [with_margin(rate) for rate in board_limits.highest_rates(arm)]
 
 
-def move_limits(arm: Arm) -> list[list[int]]:
-    """Speed, acceleration and jerk of each driven joint in steps, rounded down (``armtempo_shared.rest_to_rest``)."""
+def move_limits(arm: Arm, fraction: float = 1.0) -> list[list[int]]:
+    """Speed, acceleration and jerk of each driven joint in steps, times ``fraction``, rounded down
+    (``armtempo_shared.rest_to_rest``)."""
     return [
-        [max(1, int(limit * joint.steps_per_deg)) for limit in joint.limits.values] for joint in arm.driven
+        [max(1, int(fraction * limit * joint.steps_per_deg)) for limit in joint.limits.values]
+        for joint in arm.driven
     ]
 
 
@@ -125,6 +127,7 @@ def _head(arm: Arm) -> dict[str, Any]:
         (armrecord.FLAG_STOP_ON_LINK_LOSS, safety.on_link_loss == "stop"),
         (armrecord.FLAG_ESTOP_ACTIVE_HIGH, safety.estop_active == "high"),
         (armrecord.FLAG_ESTOP_FITTED, safety.estop_fitted),
+        (armrecord.FLAG_POWER_UP, safety.at_power_up == PROGRAM),
     ):
         flags |= flag if wanted else 0
     ticks = {

@@ -41,7 +41,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
         raise InputError(f"posture {name!r}: {problem}", "choose another name")
     if problem := arm.angles_problem(angles_deg):
         raise InputError(f"posture {name!r}: {problem}", "move the arm into its ranges")
-    save_table(path, (_POSTURE, name), {arm.list_key("angles_deg"): angles_deg}, replace)
+    save_table(path, (_POSTURE, name), {arm.texts.list_key("angles_deg"): angles_deg}, replace)
 
 
 def save_table(path: Path, place: tuple[str, str], values: Mapping[str, Any], replace: bool) -> None:
@@ -204,6 +204,6 @@ def of_points(name: str, points_deg: Sequence[Sequence[float]], arm: Arm) -> str
             f"{len(points_deg)} via point{'' if len(points_deg) == 1 else 's'} are no motion, so no job was written",
             "store at least 2 points with different postures",
         )
-    key = arm.list_key("angles_deg")
+    key = arm.texts.list_key("angles_deg")
     vias = [_VIA.format(key=key, angles=", ".join(f"{angle:.12g}" for angle in row)) for row in points_deg]
     return "".join([_HEAD.format(name=name), *vias])

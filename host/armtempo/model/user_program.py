@@ -21,6 +21,7 @@ from armtempo_shared.sequence import MAX_COUNTERS
 from armtempo.basics import number_table
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
+from armtempo.model import home_switches
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.parts import NOTHING
@@ -45,6 +46,8 @@ class UserProgram:
     counters: dict[str, int]
     pallets: dict[str, int]
     tools: dict[str, int]
+    homes: int = 0
+    """The line in which it homes the arm; 0: it does not."""
 
     @property
     def file(self) -> str:
@@ -81,7 +84,7 @@ class UserProgram:
         except RecursionError:
             raise _too_deep(path) from None
         named = reader.postures, reader.motions, reader.counters, reader.pallets, reader.tools
-        return cls(path.stem, path, source, marked, *named)
+        return cls(path.stem, path, source, marked, *named, reader.homes)
 
 
 def _too_deep(path: Path) -> InputError:
@@ -110,6 +113,7 @@ class _Reader:
     counters: dict[str, int] = field(default_factory=dict)
     pallets: dict[str, int] = field(default_factory=dict)
     tools: dict[str, int] = field(default_factory=dict)
+    homes: int = 0
 
     def read(self, tree: ast.Module) -> None:
         """Check all calls."""
@@ -137,6 +141,12 @@ class _Reader:
 
     def _check(self, node: ast.Call, name: str) -> None:
         given = self._arguments(node, name)
+        if name == "home":
+            try:
+                home_switches.check_board_can_home(self.arm)
+            except InputError as error:
+                raise InputError(f"{self._place(node)}{error.problem}", error.hint) from None
+            self.homes = self.homes or node.lineno
         first = next(iter(given.values()), None)
         if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
             return

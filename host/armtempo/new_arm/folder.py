@@ -143,9 +143,9 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
     if arm.arm.driven_indices:
         files["first.toml"] = _JOB.format(
-            what=arm.arm.position_word,
-            units=arm.arm.unit_words,
-            key=arm.arm.list_key("via_deg"),
+            what=arm.arm.texts.position,
+            units=arm.arm.texts.unit_words,
+            key=arm.arm.texts.list_key("via_deg"),
             rows=_rows(arm.arm),
         )
         files["sequence.toml"] = _SEQUENCE

@@ -46,7 +46,7 @@ class CurveChart:
         self._place = ui.element("div").classes("full-width")
         self._place.set_visibility(False)  # until there is something to show
         with self._place:
-            ui.label(title.replace(DEG.name, arm.units)).classes("text-caption")
+            ui.label(title.replace(DEG.name, arm.texts.units)).classes("text-caption")
             self.chart = ui.echart(options, renderer="svg").classes("armtempo-chart")
 
     def show(self, times_s: Array, values: Array, reference: Array | None = None) -> None:

@@ -88,7 +88,7 @@ class JobEditor(FileEditor):
     def new_text(self, name: str) -> str:
         """A job that rests at home."""
         row = ", ".join(f"{float(angle):g}" for angle in self.arm.home_deg)
-        return f'name = "{name}"\n{self.arm.list_key("via_deg")} = [\n    [{row}],\n    [{row}],\n]\n'
+        return f'name = "{name}"\n{self.arm.texts.list_key("via_deg")} = [\n    [{row}],\n    [{row}],\n]\n'
 
     def is_one(self, path: Path) -> bool:
         """Whether a file describes a job."""
@@ -173,7 +173,9 @@ class JobEditor(FileEditor):
 
     def _written(self, values: dict[str, Any]) -> dict[str, Any]:
         """The keys of a via point as a file of this arm has them."""
-        return {self.arm.list_key(key) if key == ANGLES else key: value for key, value in values.items()}
+        return {
+            self.arm.texts.list_key(key) if key == ANGLES else key: value for key, value in values.items()
+        }
 
     def take_arm(self, arm: Arm) -> None:
         """Take another version of the arm; a plan that it makes old is old."""

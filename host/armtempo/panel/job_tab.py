@@ -221,7 +221,7 @@ class JobTab:
         postures = await self._page.threaded(lambda: moved_tool_deg(arm, angles, position_mm.tolist()))
         if postures is None or jobs.version != version:  # nothing reaches it, or it is another one by now
             return
-        texts = [arm.listed(f"{angle:.1f}" for angle in posture) for posture in postures]
+        texts = [arm.texts.listed(f"{angle:.1f}" for angle in posture) for posture in postures]
         self._offered.clear()
         with self._offered:
             ui.label(words.POSTURES_OF.format(number=number, count=len(postures)))

@@ -157,7 +157,7 @@ class LiveArm:
         if isinstance(event, Sample):
             self.heard_s = time.monotonic()
             sample = sample_json(event, self.arm)
-            keys = {name: self.arm.list_key(name) for name in ("commanded_deg", "angle_deg")}
+            keys = {name: self.arm.texts.list_key(name) for name in ("commanded_deg", "angle_deg")}
             if keys["commanded_deg"] in sample:
                 sample |= {name: sample[key] for name, key in keys.items()}
                 if sample["run"] != self.curves.run:

@@ -227,8 +227,8 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
     if via_deg.ndim != 2 or len(via_deg) < 2 or via_deg.shape[1] != len(arm.driven):
         raise InputError(
             f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} "
-            f"{arm.position_word}s each, one for each driven joint",
-            f"give each via point all of these {arm.position_word}s",
+            f"{arm.texts.position}s each, one for each driven joint",
+            f"give each via point all of these {arm.texts.position}s",
         )
     if not np.all(np.isfinite(via_deg)):
         raise InputError(

@@ -79,7 +79,7 @@ def plan(
         floor_s=floor.time_s,
         floor_kind=floor.kind,
     )
-    kept = f"follows the recording on its own times, within {off_deg:.2g} {arm.units} at its points"
+    kept = f"follows the recording on its own times, within {off_deg:.2g} {arm.texts.units} at its points"
     long = checks.long_ways(arm, angles_deg, [f"{time:g} s" for time in times_s])
     return Plan(arm, job, via_deg, (kept, *notes, *long), trajectory, (search,), reached, planner.versions())
 
@@ -133,8 +133,8 @@ def _fits(arm: Arm, times: Array, angles: Array, tolerance_deg: float) -> list[_
     if found:
         return found
     raise PlanError(
-        f"a spline from rest to rest stays {off_deg:.2g} {arm.unit_words} from the recording, {tolerance_deg:g} are "
-        "allowed",
+        f"a spline from rest to rest stays {off_deg:.2g} {arm.texts.unit_words} from the recording, "
+        f"{tolerance_deg:g} are allowed",
         "record from rest to rest within the ranges, give a larger --tolerance-deg, or cut it into several",
     )
 

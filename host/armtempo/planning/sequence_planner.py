@@ -311,7 +311,7 @@ class _Compiler:
         return self._motions[id(motion)]
 
     def _listed(self, angles: Angles) -> str:
-        return self.arm.listed(f"{round(angle, 3) + 0.0:g}" for angle in angles)
+        return self.arm.texts.listed(f"{round(angle, 3) + 0.0:g}" for angle in angles)
 
     def _target(self, step: kinds.Goto) -> _Place:
         target = step.target

@@ -46,7 +46,7 @@ def lines(plan: Plan, verbose: bool = False) -> list[str]:
     """
     job = plan.job
     text = [f"{job.name}: {plan.total_s:.4f} s{_at_least(plan)}; {', '.join(_settings(plan, verbose))}"]
-    units = tuple(text.replace("deg", plan.arm.units) for text in _HEAD[1])
+    units = tuple(text.replace("deg", plan.arm.texts.units) for text in _HEAD[1])
     rows = [_HEAD[0], units, *(_row(plan, joint) for joint in range(len(plan.extremes)))]
     text += aligned([row[:1] + row[3:] for row in rows] if plan.trajectory.shared else rows, _widths(plan))
     text += _faster(plan)

@@ -68,14 +68,16 @@ def go_to(
 
 def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Trajectory:
     """The motion from one posture (J,) to another; errors as in ``go_to``."""
+    target = point_to_point.posture(target_deg, arm)
     if not pace.line:
-        found = point_to_point.straight(_NAME, here_deg, target_deg, arm, pace.speed)
+        begin_deg = here_deg + point_to_point.ahead(here_deg, target, arm) * (target - here_deg)
+        found = point_to_point.straight(_NAME, begin_deg, target, arm, pace.speed)
+        point_to_point.check_switches(here_deg, target, arm)
         workspace_check.tell_start(arm, here_deg)
         workspace_check.check(arm, found, outwards=True)
         return found
     from armtempo.planning import planner  # imported here, because it loads everything that plans
 
-    target = point_to_point.posture(target_deg, arm)
     trajectory = planner.straight_line(arm, here_deg.tolist(), target.tolist())
     return replace(planner.slower(trajectory, pace.speed), name=_NAME)
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import PlanError
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import shipped
+from armtempo.model import home_switches, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.frame import ArmFrame
 from armtempo.model.pose import from_rpy
@@ -20,7 +20,6 @@ from armtempo.model.tool_pose import BASE
 from armtempo.panel import teaching, words
 from armtempo.panel.move_tab import JOINTS
 from armtempo.panel.panel_board import PanelBoard
-from armtempo.robot import homing
 
 from tests.host import arms
 from tests.host.panel.fakes import ARM, board_state, press, unhomed
@@ -70,9 +69,9 @@ def test_no_page_waits_while_a_typed_pose_is_searched_for(
 
 
 def test_what_the_switches_home_is_named_in_its_order() -> None:
-    assert homing.order(ARM) == []
+    assert home_switches.order(ARM) == []
     ar4 = Arm.of("ar4")
-    groups = homing.order(ar4)
+    groups = home_switches.order(ar4)
     assert sorted(name for group in groups for name in group) == sorted(joint.name for joint in ar4.driven)
     assert groups[: len(ar4.homing)] == list(ar4.homing)
 

@@ -100,7 +100,7 @@ def _followed(arm: Arm, job: Job, leg: Leg, via_deg: Array) -> Followed:
         raise PlanError(
             f"{leg.name}: along the line the arm comes to P{leg.last} with {arm.driven[worst].name} at "
             f"{found.end_deg[worst]:.4g} {arm.driven[worst].unit.word}, not {via_deg[leg.last, worst]:.4g}",
-            f"give P{leg.last} as a pose, or the {arm.position_word}s of the branch of "
+            f"give P{leg.last} as a pose, or the {arm.texts.position}s of the branch of "
             f"P{leg.first}; or leave line out",
         )
     return found

@@ -142,7 +142,7 @@ def case_what_a_lost_host_was_not_told_gives_way_to_the_traceback():
     assert world.start()[0] == "ok"
     world.host.turn = lambda times=1: [world.app.run_once() for _ in range(times)]
     world.execute()
-    assert b"ZeroDivisionError" in world.app.events.notice, world.app.events.notice
+    assert b"ZeroDivisionError" in world.board.failure and world.board.failure_waits
 
 
 cases.run(globals())
