@@ -143,6 +143,7 @@ def test_all_code_of_an_image_is_aligned() -> None:
     length = int.from_bytes(data[12:14], "little")
     lines = data[14 : 14 + length].decode().split("\n")[1:]
     needed = lines[: lines.index("later")]
+    assert max(map(len, lines)) < 64, "the board reads lines in pieces of this size"
     assert "board/app/program" in needed[-1]
     assert any(line.startswith("board/app/standalone ") for line in lines)
     found = 0

@@ -30,6 +30,13 @@ def case_an_exception_brakes_and_is_a_fault_with_its_line():
     assert world.host.ask("clear")[0] == "ok"
 
 
+def case_a_long_text_of_an_exception_hides_neither_its_name_nor_its_line():
+    world = World("\nraise ValueError('x' * 3000)\n")
+    assert world.run()[0] == "fault"
+    (text,) = world.said()
+    assert text.startswith('  File "pick.py", line 3') and "ValueError: xxx" in text, text
+
+
 def case_a_text_just_before_an_exception_does_not_hide_it():
     world = World("cell.sleep(0.2)\nprint('here')\n1 // 0\n")
     assert world.run()[0] == "fault"
