@@ -74,6 +74,8 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("cell.set('', 1)\n", 2, "no output ''"),
         ("cell.tool('')\n", 2, "the name of the tool is empty"),
         ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
+        ("\nname = input('which? ')\n", 3, "waits for a terminal"),
+        ("\nimport pick\n", 3, "the board gets this file alone, not pick.py beside it"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_line(text: str, line: int, problem: str, tmp_path: Path) -> None:

@@ -149,5 +149,5 @@ class JobPlan:
             return words.NO_PLAN
         if self._jobs.plan_is_old:
             return words.PLAN_IS_OLD
-        bound = max(search.floor_s for search in plan.searches)
+        bound = max(search.lower_bound_s for search in plan.searches)
         return words.MOTION_TIME.format(total=plan.total_s, bound=bound)
