@@ -57,7 +57,6 @@ __all__ = [
     "Safety",
     "Sequence",
     "SequencePlan",
-    "SequenceRun",
     "SetOutput",
     "SharedBoard",
     "Spline",
@@ -143,7 +142,7 @@ if TYPE_CHECKING:
     from armtempo.model.tool_segment import ToolSegment
     from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
     from armtempo.ports.board_port import find_ports
-    from armtempo.report.run import Run, SequenceRun
+    from armtempo.report.run import Run
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.recording import Watcher
@@ -205,7 +204,7 @@ _HOMES = {
     "armtempo.robot.board": ("Board",),
     "armtempo.robot.board_state": ("BoardState",),
     "armtempo.robot.recording": ("Watcher",),
-    "armtempo.report.run": ("Run", "SequenceRun"),
+    "armtempo.report.run": ("Run",),
     "armtempo.robot.shared_board": ("SharedBoard", "attach"),
     "armtempo.robot.stop_request": ("StopRequest", "Stopped"),
     "armtempo.splines.bspline": ("Spline",),

@@ -25,7 +25,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan, load_plan
+from armtempo.model.sequence_plan import AnyPlan, SequencePlan, load_plan
 from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
 from armtempo.report import comparison, text_summary
@@ -93,7 +93,7 @@ def summary(plan: Plan, verbose: bool = False) -> list[str]:
     return text_summary.lines(plan, verbose)
 
 
-def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan | SequencePlan:
+def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> AnyPlan:
     """The plan of a file, of a motion or a sequence.
 
     ``altered``: accept a file that was altered after it had been written. Raises InputError if it is no

@@ -25,6 +25,7 @@ import numpy as np
 from armtempo_board.app.cell import Cell, CellError, Ended
 from armtempo_board.app.pallet import Place
 from armtempo_shared.program import EACH, MARK
+from armtempo_shared.rest_to_rest import PERCENT
 
 from armtempo.basics.errors import InputError
 from armtempo.encoding import encode, encoded_program, planned_for
@@ -45,8 +46,8 @@ class ProgramRun:
     """What a program did."""
 
     calls: list[tuple[Any, ...]] = field(default_factory=list)
-    """("goto", name or angles), ("run", motion), ("set", output, value), ("tool", name), in order; ``start`` counts as
-    "run", and a place of a pallet has the name "row 1, column 1, layer 1 of pallet 'tray'"."""
+    """("home",), ("goto", name or angles), ("run", motion), ("set", output, value), ("tool", name), in order; ``start``
+    counts as "run", and a place of a pallet has the name "row 1, column 1, layer 1 of pallet 'tray'"."""
     said: list[str] = field(default_factory=list)
     """What it printed."""
     counters: dict[str, int] = field(default_factory=dict)
@@ -128,6 +129,10 @@ class _Recorded(Cell):
         where = posture.name if isinstance(posture, Place) else posture
         self._run.calls.append(("goto", where if isinstance(where, str) else tuple(where)))
 
+    def home(self) -> None:
+        super().home()
+        self._run.calls.append(("home",))
+
     def tool(self, name: str) -> None:
         super().tool(name)
         self._run.calls.append(("tool", name))
@@ -205,6 +210,9 @@ class _Work:
             if not low <= steps <= high:
                 raise CellError(f"goto: joint {joint} would leave its range")
         self._move(list(target), percent)
+
+    def home(self, plan: dict[str, Any]) -> None:
+        self._move(self._arm.transmission.whole_steps(self._arm.home_deg), PERCENT)
 
     def _move(self, target: list[int], percent: int) -> None:
         if self._ends.moves and self.run.moves >= self._ends.moves:

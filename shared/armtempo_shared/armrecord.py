@@ -42,6 +42,7 @@ FLAG_ESTOP_RELEASES = 2  # an E-stop also releases ENABLE
 FLAG_STOP_ON_LINK_LOSS = 4  # brake when the host no longer answers; otherwise finish the motion
 FLAG_ESTOP_ACTIVE_HIGH = 8  # E-stop input trips when high (else when low)
 FLAG_ESTOP_FITTED = 16
+FLAG_POWER_UP = 32  # the default starts by itself at power-up, if it is a program that homes the arm
 
 JOINT = (
     ("channel", "B"),  # STEP/DIR channel, 0 to 5
@@ -101,7 +102,7 @@ VERSION_WITH_BACKLASH = 4
 """Version of a record with a joint with backlash, and perhaps outputs or inputs."""
 _VERSION_AT, _JOINTS_AT = 4, 5
 _LIMITS = ("min_steps", "max_steps", "max_rate", "following_counts", "link_timeout_ms")
-"""Fields that do not affect the joints' positions, as FLAG_STOP_ON_LINK_LOSS."""
+"""Fields that do not affect the joints' positions, as FLAG_STOP_ON_LINK_LOSS and FLAG_POWER_UP."""
 
 
 class ArmRecordError(ValueError):
@@ -138,7 +139,7 @@ def _packed(rows: "Rows", fields: "Fields") -> bytes:
 def without_limits(head: "dict[str, int]", joints: "list[dict[str, int]]") -> int:
     """crc32 without the limits: equal for records of the same arm with different limits."""
     rows = [dict(head)] + [dict(joint) for joint in joints]
-    rows[0]["flags"] &= ~FLAG_STOP_ON_LINK_LOSS
+    rows[0]["flags"] &= ~(FLAG_STOP_ON_LINK_LOSS | FLAG_POWER_UP)
     for row in rows:
         for name in _LIMITS:
             row.pop(name, 0)

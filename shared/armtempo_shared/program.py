@@ -23,7 +23,12 @@ The table has
 - ``inputs``: {name: number};
 - ``pallets``: {name: [rows, columns, layers, {tool: number of its first place above, from 0}]};
 - ``tools``: {name: {posture: [steps of each joint]}} of the postures that are others with this tool;
-- ``counters``: [names] that the source counts.
+- ``counters``: [names] that the source counts;
+- ``homing``: {} of a program that does not home the arm; else ``fast`` and ``slow``, as ``limits``, for both
+  approaches, and ``groups``: of joints that are homed together a list of [joint, side (-1: low end, 1: high), steps
+  where its switch trips, those of the range's end there, length of the range, of the longest approach, of the last way
+  back, of that between both approaches, the farthest that the switch may stay pressed, and how near its end a motion
+  counts as not stopped].
 """
 
 import json

@@ -9,19 +9,24 @@ that. The flash is read as on the chip; USB is not there, and the clock is not s
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
 from armtempo.deploy import program_files
 from armtempo.deploy.firmware import frozen
 from armtempo.encoding import encode
 from armtempo.model.arm import Arm
+from armtempo.planning import point_to_point
+from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog.jog_motion import JogMove
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
-from tests.benchmark import firmware, room
+from tests.benchmark import arm_heap, firmware
 from tests.benchmark.loop_board import CORE_HZ, CYCLES
 
 PROBE = "import probe\n\nprobe.replace()\n" + firmware.START
@@ -37,7 +42,14 @@ def image(folder: Path) -> Path:
     joints, whole = len(Arm.paper().driven), range(1, MAX_SEGMENTS + 1)
     largest = max(count for count in whole if motion.size(5, joints, True, count, 1) <= MAX_MOTION_BYTES)
     for name, segments in (("go", 40), ("large", largest)):
-        (tree / "armtempo" / f"{name}.atm").write_bytes(room.motion_record(arm, segments))
+        (tree / "armtempo" / f"{name}.atm").write_bytes(arm_heap.motion_record(arm, segments))
+    here_deg = list(Arm.paper().home_deg)
+    moved = jog_motion.plan("jog", Arm.paper(), here_deg, JogMove(math.inf, joint=0))
+    target_deg = np.array(here_deg) + np.array([20.0, 10.0, -20.0])
+    far = point_to_point.straight("goto", here_deg, target_deg, Arm.paper())
+    records = {"jog": (moved.trajectory, moved.brakes), "goto": (far, None)}
+    for name, (trajectory, brakes) in records.items():
+        (tree / "armtempo" / f"{name}.atm").write_bytes(encode.motion_record(trajectory, Arm.paper(), brakes))
     for path, data in program_files.start_files().items():
         (tree / Path(path).name).write_text(data.decode().replace(firmware.START, PROBE))
     return firmware.make_image(tree, "firmware_costs.py")

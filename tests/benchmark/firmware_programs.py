@@ -21,6 +21,7 @@ from armtempo.basics.errors import BoardError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.outputs import Input, Output
+from armtempo.model.parts import LimitSwitches
 from armtempo.planning import planner
 from armtempo.robot.board import Board
 from armtempo.robot.connect import connect
@@ -29,18 +30,32 @@ from armtempo.robot.stop_request import Stopped, StopRequest
 from tests.benchmark import firmware_run
 from tests.system import sequences
 
+PAPER = firmware_run.unwatched(Arm.paper())
+SWITCHES = iter(("PC1", "PC2", "PC3"))
 ARM = replace(
-    firmware_run.unwatched(Arm.paper()),
+    PAPER,
+    joints=tuple(
+        replace(joint, switches=LimitSwitches(low=next(SWITCHES), low_deg=joint.range_deg[0]))
+        if joint.motor
+        else joint
+        for joint in PAPER.joints
+    ),
     outputs=(Output("gripper", "switch", "PB8", 0.0, (("open", 0.0), ("closed", 1.0))),),
     inputs=(Input("part", "PD0", "low"), Input("full", "PD1", "high")),
 )
-"""All inputs are low."""
+"""All inputs are low, and all switches pressed."""
 THERE = Job("there", (ARM.home_deg, (2.0, -59.0, 42.0)), path="through", population=5, iterations=20)
 AWAY = "[3, -58, 38]"
 HEAD = "from armtempo_board import cell\n"
 
 
 PIECE = 256
+HOMES = """{}keep = [bytearray(240) for _ in range({})]
+try:
+    cell.home()
+except cell.Error as error:
+    print(error)
+"""
 HOLDS = """{}keep = [bytearray(240) for _ in range({})]
 cell.goto([2, -59, 42])
 cell.goto("home", speed=0.5)
@@ -115,6 +130,7 @@ CASES = {
         0,
         ("MemoryError",),
     ),
+    "homes": Case("cell.home()\n", "program_failed", 2, ("the switch of joint 1 stays pressed",)),
     "recurses": Case("def f(n):\n    return f(n + 1) + 1\n\nf(0)\n", "program_failed", 3, ("RuntimeError",)),
 }
 
@@ -139,8 +155,10 @@ def run_case(board: Board, name: str, case: Case, folder: Path) -> str:
     assert (found.fault or end.ending) in case.ending.split(), (end, found.fault, text)
     assert not case.line or end.step == case.line, (end, text)
     assert all(part in text for part in case.said), text
-    assert all(joint.known for joint in found.joints)
+    assert all(joint.known for joint in found.joints) or name == "homes"
     board.clear()
+    if name == "homes":
+        board.home(ARM)
     board.goto("home")
     return f"{found.fault or end.ending}; says {text!r}"
 
@@ -196,18 +214,19 @@ def sequence(board: Board, folder: Path) -> None:
     assert (end.ending, end.cycle) == ("finished", 2), end
 
 
-def spare(board: Board, folder: Path) -> int:
+def spare(board: Board, folder: Path, program: str = HOLDS) -> int:
     """The most bytes, in pieces, that a program with all kinds of calls can hold; to 512."""
     low, high = 0, 256
     while high - low > 2:
         middle = (low + high) // 2
-        (folder / "holds.py").write_text(HOLDS.format(HEAD, middle))
+        (folder / "holds.py").write_text(program.format(HEAD, middle))
         try:
             low = middle if board.run_program(folder / "holds.py").ending == "finished" else low
         except BoardError:
             high = middle
             board.clear()
-            board.goto("home")
+            board.home(ARM)
+        board.goto("home")
     return low * PIECE
 
 
@@ -233,7 +252,11 @@ def main(micropython: Path, folder: Path) -> None:
         board.upload(planner.plan(ARM, THERE))
         free = board.client.hello().free_heap
         held = spare(board, Path(name))
-        print(f"{free} bytes free; a program can hold {held}", flush=True)
+        while_homing = spare(board, Path(name), HOMES)
+        print(
+            f"{free} bytes free; a program can hold {held}, and one that homes the arm {while_homing}",
+            flush=True,
+        )
         for case, program in CASES.items():
             free = board.client.hello().free_heap
             ended = run_case(board, case, program, Path(name))

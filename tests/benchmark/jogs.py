@@ -4,17 +4,20 @@ For every shipped arm, joint and percent of the speed: the way of a held jog aft
 velocity interface; the duration of steps of 0.1 to 100 degrees over ruckig's; and the time to rest after a release at
 these times over the shortest, of the same limits too. It needs ruckig. ``--table``: the ways in the tests instead;
 ``--lines``: instead, jogs of AR4's tool at full speed over the fastest motion that the planner finds on the same line,
-within the same limits (half a minute).
+within the same limits (half a minute). ``--first``: instead, when the first step of a jog comes.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
+from contextlib import suppress
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import ruckig
+from armtempo.basics.errors import InputError
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.planning import brake_time, move_law, planner
@@ -22,6 +25,9 @@ from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.planning.move_law import MoveLimits
 from armtempo.splines.trajectory import JointSpline, Trajectory
+
+if TYPE_CHECKING:
+    import ruckig
 
 TIMES_S = (0.1, 0.2, 0.5, 1.0, 2.0)
 PERCENTS = (1, 2, 5, 10, 25, 50, 75, 100)
@@ -36,7 +42,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--table", action="store_true")
     parser.add_argument("--lines", action="store_true")
+    parser.add_argument("--first", action="store_true")
     options = parser.parse_args()
+    if options.first:
+        for name in shipped.files():
+            first_steps(name, Arm.load(name))
+        return
     if options.lines:
         lines(Arm.load("ar4"))
         return
@@ -85,6 +96,31 @@ def compare(name: str, arm: Arm) -> None:
     )
 
 
+def first_step_s(arm: Arm, trajectory: Trajectory) -> float:
+    """When the first motor makes a step, from the motion's time 0."""
+    times = np.linspace(0.0, min(trajectory.duration_s, 1.0), 10_001)
+    moved = np.rint(arm.transmission.steps(trajectory(times))) != np.rint(
+        arm.transmission.steps(trajectory(0.0))
+    )
+    return float(times[np.argmax(moved.any(axis=1))])
+
+
+def first_steps(name: str, arm: Arm) -> None:
+    """Print when jogs of an arm make their first step: of joints from home, of AR4's tool."""
+    found = []
+    moves = [JogMove(sign * math.inf, joint=joint) for joint in range(len(arm.driven)) for sign in (1, -1)]
+    here = arm.transmission.angles_of_steps(arm.transmission.whole_steps(arm.home_deg))
+    if name == "ar4":
+        here = arm.transmission.angles_of_steps(arm.transmission.whole_steps(ELBOW_DEG))
+        moves += [JogMove(sign * math.inf, axis=axis) for axis in ("x", "y", "tool-z") for sign in (1, -1)]
+    for move in moves:
+        for speed in (0.25, 1.0):
+            with suppress(InputError):  # at the end of its range
+                motion = jog_motion.plan("jog", arm, here.tolist(), move, speed)
+                found.append(1000 * first_step_s(arm, motion.trajectory))
+    print(f"{name}: {min(found):.0f} to {max(found):.0f} ms, of {len(found)}", flush=True)
+
+
 def lines(arm: Arm) -> None:
     """Print the ratio of each line, and the processor time of both plans."""
     joints = [
@@ -126,6 +162,8 @@ def limits_of(arm: Arm, joint: int, speed: float) -> MoveLimits:
 
 
 def _input(limits: MoveLimits) -> ruckig.InputParameter:
+    import ruckig
+
     given = ruckig.InputParameter(1)
     given.max_velocity, given.max_acceleration, given.max_jerk = (
         [limits.speed],
@@ -136,6 +174,8 @@ def _input(limits: MoveLimits) -> ruckig.InputParameter:
 
 
 def _solved(given: ruckig.InputParameter) -> ruckig.Trajectory:
+    import ruckig
+
     found = ruckig.Trajectory(1)
     ruckig.Ruckig(1).calculate(given, found)
     return found
@@ -143,6 +183,8 @@ def _solved(given: ruckig.InputParameter) -> ruckig.Trajectory:
 
 def held_deg(limits: MoveLimits) -> np.ndarray:
     """Ruckig's way after TIMES_S from rest to the speed."""
+    import ruckig
+
     given = _input(limits)
     given.control_interface = ruckig.ControlInterface.Velocity
     given.target_velocity = [limits.speed]
@@ -152,6 +194,8 @@ def held_deg(limits: MoveLimits) -> np.ndarray:
 
 def rest_s(limits: MoveLimits, speed: float, acceleration: float) -> float:
     """Ruckig's shortest time to rest."""
+    import ruckig
+
     given = _input(limits)
     given.control_interface = ruckig.ControlInterface.Velocity
     given.current_velocity, given.current_acceleration = [speed], [acceleration]

@@ -32,13 +32,12 @@ from urllib.parse import urlencode
 import numpy as np
 from armtempo.link import board_messages
 from armtempo.link.board_messages import Done, Fault, Sample
-from armtempo.model.arm import Arm
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
-from armtempo.splines.trajectory import Trajectory
 from armtempo_shared import wire
 from armtempo_shared.limits import TICK_HZ
 
+from tests.benchmark.jogs import first_step_s
 from tests.system import panels
 from tests.system.panels import Panel, Panels
 from tests.system.relay import Cable
@@ -138,8 +137,12 @@ def _ended(window: Any, panel: Panel, ear: Ear, how: Any) -> float:
 _VIEW = """setInterval(() => {
   const place = document.getElementById('armtempo-where'), panel = window.armtempo;
   if (!window.seen && place?.textContent) window.seen = performance.now();
-  if (!window.drawn && panel?.renderer && panel.to && panel.turned) window.drawn = performance.now();
+  const placed = panel?.parts && getElement(panel.parts.scene)?.objects.get(panel.parts.ghost[0])?.placed;
+  const frame = panel?.renderer?.info.render.frame;
+  if ((panel?.to || placed) && panel.turned && window.before === undefined) window.before = frame;
+  if (!window.drawn && frame > window.before) window.drawn = performance.now();
 }, 10)"""
+"""An arm that is not homed is drawn as a ghost, where it may be; the next frame shows what was put in its place."""
 
 
 def first_view(browser: Any, address: str) -> tuple[float, float]:
@@ -164,14 +167,6 @@ def begun(ear: Ear, act: Callable[[], object]) -> float:
         assert time.monotonic() < begin_s + _PATIENCE_S, "no motion"
         time.sleep(0.001)
     return ear.began_s - begin_s
-
-
-def first_step_s(arm: Arm, trajectory: Trajectory) -> float:
-    """When the first joint has moved by half a step."""
-    times = np.linspace(0.0, min(trajectory.duration_s, 1.0), 2001)
-    steps = np.array([joint.steps_per_deg for joint in arm.driven])
-    moved = np.abs(trajectory(times) - trajectory(0.0)) * steps >= 0.5
-    return float(times[np.argmax(moved.any(axis=1))])
 
 
 def presses(page: Any, ear: Ear, times: int) -> list[float]:

@@ -24,7 +24,8 @@ from armtempo.robot.connect import connect
 from armtempo.simulator import LaunchOptions, launch
 from armtempo_shared.limits import TICK_HZ
 
-from tests.benchmark.panel_stops import Ear, first_step_s
+from tests.benchmark.jogs import first_step_s
+from tests.benchmark.panel_stops import Ear
 from tests.benchmark.stop_latency import python_starts
 from tests.system.relay import Cable, Relay
 

@@ -24,7 +24,7 @@ SUBJECTS = [
     *(SCRIPTS / "cases" / f"app_{name}.py" for name in ("commands", "once", "runs", "faults", "start")),
     *(
         SCRIPTS / "cases" / f"app_{name}.py"
-        for name in ("sequence_start", "sequences", "sequence_ahead", "programs", "program_ends")
+        for name in ("sequence_start", "sequences", "sequence_ahead", "programs", "program_ends", "homing")
     ),
 ]
 

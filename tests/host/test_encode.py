@@ -13,7 +13,7 @@ from armtempo.encoding import decode, encode, engine_heap
 from armtempo.encoding.engine_heap import CORE, IN_FIRMWARE, EngineHeap
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
-from armtempo.planning import checks, move_law, point_to_point
+from armtempo.planning import board_limits, move_law, point_to_point
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared import armrecord, engine_memory, limits, motion
@@ -150,9 +150,9 @@ def test_numbers_that_the_board_cannot_hold_are_refused_as_it_does() -> None:
 def test_an_angle_of_more_steps_than_the_board_counts_is_refused() -> None:
     """It counts below 2**27, here in small segments."""
     most_deg = 2**27 / max(joint.steps_per_deg for joint in ARM.driven)
-    checks.check_held(spread(1.0, most_deg * 0.999, segments=100), ARM)
+    board_limits.check_held(spread(1.0, most_deg * 0.999, segments=100), ARM)
     with pytest.raises(PlanError, match="more steps than the board can count"):
-        checks.check_held(spread(1.0, most_deg * 1.001, segments=100), ARM)
+        board_limits.check_held(spread(1.0, most_deg * 1.001, segments=100), ARM)
 
 
 # moves without a search, and motion records read back
@@ -289,7 +289,7 @@ def test_rings_last_as_long_as_there_is_memory_for() -> None:
 
 
 def test_the_largest_rings_find_their_places_first() -> None:
-    """Else the small joint's would be in the only block that has room for the large one's."""
+    """Else the small joint's would be in the only block that has space for the large one's."""
     assert engine_memory.lasting_ms([5_000, 240_000], 1960) == 12
 
 

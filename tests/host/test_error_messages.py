@@ -19,7 +19,7 @@ from armtempo.basics import errors, toml_table
 from armtempo.basics.errors import BoardError, InputError, LinkError, MissingPackageError
 from armtempo.cli import LazyGroup, state
 from armtempo.cli.help import TOPICS, page
-from armtempo.link.refusal import refusal
+from armtempo.link.refusal import describe_notice, refusal
 from armtempo.link.transport import SerialTransport
 from armtempo.robot import board_state, speed
 from armtempo.robot.board import Board
@@ -392,3 +392,12 @@ def test_a_command_for_which_the_board_has_no_memory(tmp_path: Path, monkeypatch
     monkeypatch.setattr(pipe._later["armtempo_board.storage.store"].Store, "motion", short_of_memory)
     with pytest.raises(BoardError, match=r"refused 'start'.*ran out of memory in this command"):
         board.start("feed", wire.record_crc(data))
+
+
+def test_a_start_that_the_board_refused_is_told_in_words() -> None:
+    code = wire.ERROR_CODES["unhomed"]
+    assert describe_notice(f"power-up: error {code}").startswith(
+        "power-up: the position is unknown; move the arm"
+    )
+    for text in ("Traceback: error", "x: error 999", "my own words: error 19 times"):
+        assert describe_notice(text) == text

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 import random
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.encoding import encode
+from armtempo.model import shipped
 from armtempo.model.arm import Arm
-from armtempo.planning import brake_time, move_law
+from armtempo.model.parts import LimitSwitches
+from armtempo.planning import brake_time, move_law, point_to_point
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.planning.move_law import MoveLimits
+from armtempo.robot import goto
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import JointSpline, Trajectory
 from armtempo_shared.engine_memory import ONCE_BYTES
@@ -106,10 +110,29 @@ OPTIMUM_DEG = {
             100: (0.021, 0.168, 2.4184, 13.347, 62.204),
         },
     ),
+    "community_rail": (
+        0,
+        {
+            1: (0.062204, 0.1622, 0.4622, 0.9622, 1.9622),
+            5: (0.1158, 0.57742, 2.0774, 4.5774, 9.5774),
+            25: (0.11667, 0.93302, 7.7754, 20.275, 45.275),
+            100: (0.11667, 0.93333, 12.25, 57.321, 157.32),
+        },
+    ),
+    "scara_z": (
+        0,
+        {
+            1: (0.009264, 0.046194, 0.16619, 0.36619, 0.76619),
+            5: (0.0093333, 0.074642, 0.62204, 1.622, 3.622),
+            25: (0.0093333, 0.074667, 1.0748, 5.4464, 15.446),
+            100: (0.0093333, 0.074667, 1.0748, 5.932, 27.646),
+        },
+    ),
 }
 OPTIMUM_DEG["thor"] = OPTIMUM_DEG["moveo"]  # the same limits
-"""Of the joint with the most of speed * jerk / acceleration² of each arm: by percent of its speed, the way after
-TIMES_S at the limits of a jog, by ruckig's velocity interface (``python -m tests.benchmark.jogs --table``)."""
+"""Of the joint with the most of speed * jerk / acceleration² of each arm, or its slide (mm): by percent of its speed,
+the way after TIMES_S at the limits of a jog, by ruckig's velocity interface (``python -m tests.benchmark.jogs
+--table``)."""
 
 
 def held(arm: Arm, joint: int, speed: float) -> Array:
@@ -181,6 +204,37 @@ def test_the_board_reads_what_was_planned(speed: float) -> None:
             assert -1e-9 <= found_s - length_s <= 1.01 * unit_s + 0.02 * length_s
 
 
+@pytest.mark.parametrize("name", shipped.files())
+def test_the_first_step_comes_within_50_ms(name: str) -> None:
+    """As a move begins ahead by nearly half a step, which no motor exceeds: jogs of joints, of the tool, and a goto."""
+    arm = Arm.load(name)
+    here = np.array(on_steps(arm, ELBOW_DEG if name == "ar4" else list(arm.home_deg)))
+    stands = np.rint(arm.transmission.steps(here))
+    moves = [JogMove(by, joint=joint) for joint in range(len(arm.driven)) for by in (3.0, -INF)]
+    if name == "ar4":
+        moves += [JogMove(by, axis=axis) for by in (0.3, -INF) for axis in ("x", "tool-y")]
+    found = []
+    for move in moves:
+        with suppress(InputError):  # at the end of its range
+            found.append(jog_motion.plan("x", arm, here.tolist(), move).trajectory)
+    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    found.append(goto.motion(arm, here, np.clip(here + 5.0, low, high), goto.MovePace(0.25)))
+    assert len(found) > len(arm.driven)
+    for trajectory in found:
+        begin, soon = arm.transmission.steps(trajectory(np.array([0.0, 0.05]))) - stands
+        assert np.abs(begin).max() == pytest.approx(point_to_point.AHEAD_STEPS, abs=0.005)
+        assert np.any(np.rint(soon) != 0.0)
+
+
+def test_a_way_of_a_step_begins_where_the_arm_stands() -> None:
+    here = np.array(on_steps(PAPER, [0.0, -60.0, 40.0]))
+    for way in (1e-6, 1.0 / PAPER.driven[0].steps_per_deg):
+        motion = jog_motion.plan("x", PAPER, here.tolist(), JogMove(way, joint=0))
+        np.testing.assert_allclose(motion.trajectory(0.0), here, atol=1e-9)
+    off = here + 0.4 / np.array([joint.steps_per_deg for joint in PAPER.driven])
+    assert point_to_point.ahead(off, off + 5.0, PAPER) == 0.0
+
+
 @pytest.mark.slow
 def test_a_joint_goes_to_the_end_of_its_range_and_not_beyond_and_stops_soon() -> None:
     """Braking from a constant speed takes what EXCESS of the limits allows, as the rise of a jog uses half of them."""
@@ -213,6 +267,25 @@ def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
     assert not jog_motion.problem(PAPER, end.tolist(), JogMove(-INF, joint=1))
     back = jog_motion.plan("x", PAPER, end, JogMove(-1.0, joint=1))
     assert back.end_deg[1] == pytest.approx(end[1] - 1.0)
+
+
+def test_no_move_by_hand_goes_on_to_a_switch_within_the_range() -> None:
+    switches = LimitSwitches(low=1, low_deg=-1.0, high="PD0", high_deg=5.0)
+    arm = replace(PAPER, joints=(replace(PAPER.joints[0], switches=switches), *PAPER.joints[1:]))
+    here = on_steps(arm, [0.0, -60.0, 40.0])
+    jog = jog_motion.plan("x", arm, here, JogMove(-30.0, joint=0))
+    assert -1.0 <= jog.end_deg[0] < -1.0 + 1.0 / arm.driven[0].steps_per_deg
+    assert jog.ends == "joint 1 is at its low switch, -1 degrees"
+    with pytest.raises(InputError, match="joint 1 is at its low switch"):
+        jog_motion.plan("x", arm, jog.end_deg, JogMove(-1.0, joint=0))
+    along = jog_motion.plan("x", arm, here, JogMove(-INF, axis="y"))
+    assert along.ends == "joint 1 is at its low switch"
+    assert along.end_deg[0] >= -1.0
+    for start, end in ((0.0, -8.0), (-2.0, -3.0)):
+        with pytest.raises(PlanError, match=f"joint 1 would go to {end:g} degrees, beyond its low switch"):
+            goto.motion(arm, np.array([start, -60, 40]), np.array([end, -60, 40]), goto.MovePace())
+    for start, end in ((0.0, 30.0), (-3.0, -2.0)):  # the other switch is read while homing only
+        goto.motion(arm, np.array([start, -60, 40]), np.array([end, -60, 40]), goto.MovePace())
 
 
 @pytest.mark.slow

@@ -103,7 +103,7 @@ def test_a_wait_after_a_line_and_a_free_path_after_it() -> None:
     assert faults(plan) + line_faults(plan) == []
     times_s = plan.trajectory.joints[0].via_times_s
     assert np.ptp(plan.trajectory(np.linspace(times_s[1], times_s[1] + 1.5, 50)), axis=0).max() < 1e-9
-    assert plan.searches[0].floor_s < plan.trajectory.duration_s == plan.searches[0].total_s
+    assert plan.searches[0].lower_bound_s < plan.trajectory.duration_s == plan.searches[0].total_s
     spline = planner.plan(ARM, Job("spline", via=(tuple(plan.via_deg[1]), *vias), timing="shared", refine=6))
     assert times_s[-1] - times_s[1] - 1.5 < 0.99 * spline.trajectory.duration_s
 

@@ -127,3 +127,13 @@ def test_run_and_upload_refuse_an_old_plan_before_a_port_is_opened(
                 result.output.split()
             )
             assert "nowhere" not in result.output
+
+
+def test_fetch_refuses_a_sequence_before_a_port_is_opened(
+    tmp_path: Path, planned: tuple[Plan, SequencePlan]
+) -> None:
+    planned[1].save(tmp_path / "sequence.json")
+    result = cli("fetch", str(tmp_path / "sequence.json"), "--port", "nowhere")
+    assert (result.exit_code, "samples of a sequence are not kept" in result.output) == (2, True), (
+        result.output
+    )

@@ -31,14 +31,13 @@ WRONG = (
     *([], [[]], [1.0, 2.0], [1, "x"], [[1, 2, 3], [4]], {}, {"x": object()}),
     *(np.zeros((2, 2)), np.array(["x"])),
 )
-GIVEN_BY_US = {"Board", "BoardState", "Plan", "Run", "SequencePlan", "SequenceRun", "SharedBoard", "Stopped"}
+GIVEN_BY_US = {"Board", "BoardState", "Plan", "Run", "SequencePlan", "SharedBoard", "Stopped"}
 GIVEN_BY_US |= {"StopRequest", "Trajectory", "Watcher", "Result", "VirtualBoard"}
 """Classes that a user makes no objects of, or without arguments."""
 USERS_OWN = {"minimise.function", "minimise.rng", "launch.options"}
 """What these raise or start is the user's affair."""
 NO_CALLS = {"BoardState.of_json", "StopRequest.ask", "StopRequest.check"}
-NO_CALLS |= {"Arm.of_table", "Job.of_table", "Sequence.of_table"}
-NO_CALLS |= {f"Arm.{name}" for name in ("given_key", "list_key", "listed")}  # of files and tables
+NO_CALLS |= {"Arm.of_table", "Job.of_table", "Sequence.of_table", "Arm.read_posture"}
 NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "on_sample", "end")}
 
 

@@ -242,7 +242,7 @@ def test_a_gantry_as_the_page_has_it_moves_two_belts_by_sum_and_difference() -> 
     drive += "steps_per_rev = 200, microsteps = 16, mm_per_rev = 40 }}\n"
     rows = re.sub(r"(?m)^range_mm.*\n", lambda found: found[0] + drive.format(next(numbers)), rows)
     gantry = arm_of(f'name = "gantry"\n{rows}\n{coupling}')
-    assert gantry.units == "mm"
+    assert gantry.texts.units == "mm"
     at = [100.0, 50.0, -20.0]
     pose = armtempo.forward(gantry, at)
     np.testing.assert_allclose(pose[:3], np.column_stack([np.eye(3), at]), atol=TOLERANCE)

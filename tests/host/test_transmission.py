@@ -20,7 +20,7 @@ from armtempo.model.job import Job
 from armtempo.model.parts import Driver, Dynamics, Encoder, LimitSwitches
 from armtempo.model.plan import Plan
 from armtempo.model.transmission import Transmission
-from armtempo.planning import checks, planner, point_to_point, torque
+from armtempo.planning import board_limits, checks, planner, point_to_point, torque
 from armtempo.planning.jog import jog_motion
 from armtempo.report import evaluation, run_folder, run_reader, run_report, verdict
 from armtempo.report.run import Run
@@ -214,7 +214,7 @@ def test_a_time_axis_for_each_joint_is_refused() -> None:
 def test_a_joints_jog_turns_both_of_its_motors() -> None:
     move = jog_motion.move_of(THOR, "joint 5", None, 10.0, None)
     found = jog_motion.plan("jog", THOR, [0.0, 0.0, 0.0, 0.0, 5.0, 30.0], move, 0.3)
-    points = checks.motor_points_steps(found.trajectory, THOR)
+    points = board_limits.motor_points_steps(found.trajectory, THOR)
     splines = [replace(j, angle_points_deg=p) for j, p in zip(found.trajectory.joints, points, strict=True)]
     turned = [spline(spline.duration_s) - spline(0.0) for spline in splines]
     np.testing.assert_allclose(turned, [0, 0, 0, 0, -10 * 80 / 9, 10 * 80 / 9], atol=1e-9)

@@ -14,18 +14,20 @@ import pytest
 from armtempo import testing
 from armtempo.basics.errors import InputError, LinkError, PlanError
 from armtempo.deploy import program_files
-from armtempo.encoding import encoded_motion, encoded_program
+from armtempo.encoding import encode, encoded_motion, encoded_program
 from armtempo.kinematics.of_arm import forward
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
+from armtempo.model.parts import LimitSwitches
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.model.user_program import UserProgram
 from armtempo.model.workspace import KeepOut, Workspace
 from armtempo.robot import programs
 from armtempo_board.app.cell import CellError
+from armtempo_shared import armrecord
 from armtempo_shared.program import ProgramRecord, needed_bytes
 
 from tests.host import test_pallets as pallets
@@ -72,6 +74,8 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("cell.set('', 1)\n", 2, "no output ''"),
         ("cell.tool('')\n", 2, "the name of the tool is empty"),
         ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
+        ("\nname = input('which? ')\n", 3, "waits for a terminal"),
+        ("\nimport pick\n", 3, "the board gets this file alone, not pick.py beside it"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_line(text: str, line: int, problem: str, tmp_path: Path) -> None:
@@ -79,6 +83,62 @@ def test_what_is_wrong_is_named_with_its_line(text: str, line: int, problem: str
     with pytest.raises(InputError, match=problem) as raised:
         UserProgram.load(path, ARM)
     assert f"pick.py, line {line}: " in str(raised.value)
+
+
+def with_switches(*joints: int, **safety: object) -> Arm:
+    """The arm with a switch at the low end of some joints, from 1."""
+    fitted = [
+        replace(joint, switches=LimitSwitches(low=number, low_deg=joint.range_deg[0] + 1.0))
+        if number in joints
+        else joint
+        for number, joint in enumerate(ARM.joints, 1)
+    ]
+    return replace(ARM, joints=tuple(fitted), safety=replace(ARM.safety, **safety))  # type: ignore[arg-type]
+
+
+def test_only_an_arm_with_switches_is_homed_by_a_program(tmp_path: Path) -> None:
+    path = written("\ncell.home()\n", tmp_path)
+    with pytest.raises(InputError, match=r"pick.py, line 3: joint 2: no limit switch whose angle is known"):
+        UserProgram.load(path, with_switches(1, 3))
+    arm = with_switches(1, 2, 3)
+    found = UserProgram.load(path, arm)
+    table = Record(encoded_program.of_program(found, arm).data).table()
+    assert [[row[0] for row in group] for group in table["homing"]["groups"]] == [[0], [1], [2]]
+    number, side, trip, edge, *_ = table["homing"]["groups"][1][0]
+    joint = arm.driven[number]
+    assert (side, edge) == (-1, round(joint.range_deg[0] * joint.steps_per_deg))
+    assert trip == round((joint.range_deg[0] + 1.0) * joint.steps_per_deg)
+    assert testing.run(path, arm).calls == [("home",)]
+    plain = encoded_program.of_program(UserProgram.load(written("cell.goto('home')\n", tmp_path), arm), arm)
+    assert Record(plain.data).table()["homing"] == {}
+    with pytest.raises(InputError, match="does not home the arm"):
+        programs.check_default(replace(plain, arm=with_switches(1, 2, 3, at_power_up="program")))
+    programs.check_default(plain)
+
+
+@pytest.mark.parametrize(
+    ("safety", "switches", "problem"),
+    [
+        ("estop_fitted = true", 0, "joint 1, joint 2, joint 3: no limit switch"),
+        ("", 3, "without an E-stop"),
+        ("estop_fitted = true", 3, ""),
+    ],
+)
+def test_what_moves_by_itself_has_switches_and_an_estop(
+    safety: str, switches: int, problem: str, tmp_path: Path
+) -> None:
+    before, *joints = shipped.arm_path().read_text().split("[[joint]]")
+    for number in range(switches):
+        joints[number] += f"\n[joint.switches]\nlow = {number + 1}\nlow_deg = 0\n"
+    table = f'[safety]\nat_power_up = "program"\n{safety}\n'
+    before = re.sub(r"^\[safety\]\n(?:[^\[]*)", "", before, flags=re.MULTILINE) + table
+    (tmp_path / "arm.toml").write_text("[[joint]]".join((before, *joints)))
+    if not problem:
+        record = encode.arm_record(Arm.load(tmp_path / "arm.toml"))
+        assert armrecord.unpack(record)[0]["flags"] & armrecord.FLAG_POWER_UP
+        return
+    with pytest.raises(InputError, match=f'arm.toml: safety.at_power_up = "program": .*{problem}'):
+        Arm.load(tmp_path / "arm.toml")
 
 
 def test_other_refusals(tmp_path: Path) -> None:
@@ -166,9 +226,9 @@ def test_check_needs_no_board(tmp_path: Path) -> None:
     done.said("pick.py, line 2", "hom")
 
 
-@pytest.mark.parametrize("name", ["pick_place.py", "pallet.py", "polling.py"])
+@pytest.mark.parametrize("name", ["pick_place.py", "pallet.py", "polling.py", "alone.py"])
 def test_the_pages_examples_fit_on_the_chip(name: str, tmp_path: Path) -> None:
-    found = UserProgram.load(example(name, tmp_path), ARM)
+    found = UserProgram.load(example(name, tmp_path), with_switches(1, 2, 3))
     assert needed_bytes(len(found.marked.encode())) <= CHIP_BYTES
 
 

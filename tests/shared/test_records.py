@@ -147,7 +147,7 @@ def test_other_versions_are_refused_even_with_a_right_checksum(offset: int, valu
 
 def test_each_flag_is_a_bit_of_its_own() -> None:
     flags = [value for name, value in vars(armrecord).items() if name.startswith("FLAG_")]
-    assert len(flags) == 5
+    assert len(flags) == 6
     assert sorted(flags) == [1 << bit for bit in range(len(flags))]
 
 

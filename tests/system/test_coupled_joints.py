@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.link import Client, open_board
-from armtempo.model import engine_pins
+from armtempo.model import engine_pins, home_switches
 from armtempo.model.arm import Arm
 from armtempo.model.parts import LimitSwitches
 from armtempo.planning.jog.jog_motion import move_of
@@ -120,8 +120,8 @@ SWITCHED = {1: switch("PD0", low_deg=-171.0), 2: switch("PD1", high_deg=101.0)}
 def test_homing_of_a_pair(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Joint 2 rests on its switch, which is not to end motions of joint 3, although the motor of joint 2 turns."""
     start_deg, order = (0.0, -172.0, 90.0), ("joint 3", "joint 2")
-    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
-    monkeypatch.setattr(homing, "SLOW", 0.2)
+    monkeypatch.setattr(home_switches, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(home_switches, "SLOW", 0.2)
     arm = coupled(DIFFERENTIAL, SWITCHED, homing=tuple((name,) for name in order))
 
     def act(board: Client, stop: StopRequest) -> None:

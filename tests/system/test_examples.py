@@ -36,7 +36,7 @@ README = ROOT / "README.md"
 PAGES = (README, *sorted((ROOT / "host" / "docs").glob("*.md")))
 PORT = "/dev/ttyACM0"
 SOURCES_BLOCKS = 1200
-"""A flash that has room for a firmware's program too."""
+"""A flash that has space for a firmware's program too."""
 COMMANDS = ("README.md", "cli.md")
 ONCE = ((r"repeat=\d+", "repeat=1"), (r"--repeat \d+", "--repeat 1"))
 """Repetitions take time and show nothing new here."""
@@ -100,7 +100,7 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def board(folder: Path, firmware: bool) -> Iterator[str]:
-    """A board with MicroPython alone on it, where the examples say PORT; the program in a firmware takes more room."""
+    """A board with MicroPython alone on it, where the examples say PORT; the program in a firmware takes more space."""
     options = LaunchOptions(
         folder / "flash",
         deployed=True,

@@ -252,7 +252,7 @@ def test_after_a_power_failure_the_folder_says_where_it_stood(tmp_path: Path) ->
     assert "of cycle 3" in told.line
     with (found.path / "rows-01.csv").open("a") as file:
         file.write("99,1")  # cut in the midst of a line
-    assert armtempo.SequenceRun.load(found.path).rows == found.rows
+    assert armtempo.Run.load(found.path).rows == found.rows
 
 
 @pytest.mark.long

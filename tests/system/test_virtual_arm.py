@@ -17,7 +17,7 @@ from armtempo.encoding import encode
 from armtempo.link import Client, open_board
 from armtempo.link.board_messages import Sample, Status
 from armtempo.link.follow import RunEnd
-from armtempo.model import engine_pins, shipped
+from armtempo.model import engine_pins, home_switches, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import DrivenJoint, JointModel
@@ -258,7 +258,7 @@ def unhomed(
 def test_homing_run_finds_where_the_arm_stands(
     tmp_path: Path, angle: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(home_switches, "FAST", 1.0)  # as the simulation takes its time
     found = switched_arm(tmp_path, angle)
     with unhomed(found) as (board, stop):
         arm_state.home(board, found, np.array([30.0, -60.0, 40.0]))  # wrong: it is at 0
@@ -279,8 +279,8 @@ HOMED_FROM = (-24, -141, 113, 100, -85, 185)
 def test_six_joints_by_their_switches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Homing from far off ends at home; so say the board and, by their pulses, the motors."""
     found, log = Arm.load("parol6"), tmp_path / "log"
-    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
-    monkeypatch.setattr(homing, "SLOW", 0.2)
+    monkeypatch.setattr(home_switches, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(home_switches, "SLOW", 0.2)
     options = LaunchOptions(arm=found, start_deg=HOMED_FROM, edge_log=log)
     with launch(options) as virtual, open_board(virtual.port) as board, StopRequest() as stop:
         arm_state.configure(board, found, replace=True)
@@ -304,8 +304,8 @@ def test_homing_crosses_the_backlash(tmp_path: Path, start: float, monkeypatch: 
         replace(joint.model, backlash_deg=1.0, scatter_deg=0.0),
     )
     found = first_joint(found, motor=motor, model=model, home_deg=start)
-    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
-    monkeypatch.setattr(homing, "SLOW", 0.2)
+    monkeypatch.setattr(home_switches, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(home_switches, "SLOW", 0.2)
     with launch(LaunchOptions(arm=found, edge_log=log)) as virtual, open_board(virtual.port) as board:
         arm_state.configure(board, found, replace=True)
         with StopRequest() as stop:
@@ -350,8 +350,8 @@ def test_homing_from_beyond_the_range_and_from_beyond_the_switch(
 ) -> None:
     """The range is -10 to 190, the switch at -11.5."""
     found = switched_arm(tmp_path, -11.5)
-    monkeypatch.setattr(homing, "FAST", 1.0)  # as the simulation takes its time
-    monkeypatch.setattr(homing, "SLOW", 0.2)
+    monkeypatch.setattr(home_switches, "FAST", 1.0)  # as the simulation takes its time
+    monkeypatch.setattr(home_switches, "SLOW", 0.2)
     with unhomed(found, start_deg=(start, -60.0, 40.0)) as (board, stop):
         arm_state.home(board, found)  # wrong: joint 1 is elsewhere
         homing.home_to_switches(board, found, stop)
@@ -361,7 +361,7 @@ def test_homing_from_beyond_the_range_and_from_beyond_the_switch(
 def test_homing_to_a_switch_of_the_other_level_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(homing, "FAST", 1.0)
+    monkeypatch.setattr(home_switches, "FAST", 1.0)
     found = switched_arm(tmp_path)
     first = found.joints[0]
     other = replace(first, switches=replace(first.switches, active="high"))
@@ -382,7 +382,7 @@ def test_switch_that_trips_in_a_motion_is_a_fault(tmp_path: Path) -> None:
 @pytest.mark.parametrize("by_switches", [True, False])
 def test_a_joint_alone_is_homed(tmp_path: Path, by_switches: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is said of the others, nor do they move."""
-    monkeypatch.setattr(homing, "FAST", 1.0)
+    monkeypatch.setattr(home_switches, "FAST", 1.0)
     found = switched_arm(tmp_path)
     with launch(LaunchOptions(arm=found)) as virtual, armtempo.connect(virtual.port, found) as board:
         if by_switches:

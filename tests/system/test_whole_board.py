@@ -12,6 +12,7 @@ from armtempo.deploy import program_files
 from armtempo.encoding import encode, encoded_motion, encoded_program
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.parts import Limits, LimitSwitches
 from armtempo.model.user_program import UserProgram
 from armtempo.planning import planner
 from armtempo_shared.limits import TICK_HZ
@@ -31,6 +32,11 @@ cell.goto({(HOME_DEG + 1.0).tolist()})
 print("first\\nsecond")
 while True:
     cell.sleep(1)
+"""
+ALONE = f"""from armtempo_board import cell
+cell.home()
+print("homed")
+cell.goto({(HOME_DEG + 1.0).tolist()})
 """
 FEWER = {"micropython": 8, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
@@ -88,10 +94,41 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         program = encoded_program.of_program(UserProgram.load(folder / "pick.py", arm), arm)
         (folder / name / "armtempo" / "pick.atm").write_bytes(program.data)
     _add_legs(folder / "legs" / "armtempo")
+    _add_alone(folder / "alone" / "armtempo")
     (folder / "ticks").write_text(str(round(trajectory.duration_s * TICK_HZ)))
     shutil.copytree(folder / "finish", folder / "broken")
     (folder / "broken" / "main.py").write_text("raise ValueError('broken')\n")
     return folder
+
+
+def _add_alone(folder: Path) -> None:
+    """A flash of an arm that homes itself at power-up: joint 2 first, then the others together.
+
+    Its switches trip half a degree within the low ends of narrow ranges around home, and it is quick.
+    """
+    folder.mkdir(parents=True)
+    joints = []
+    for number, joint in enumerate(ARM.joints, 1):
+        if joint.motor and joint.limits and joint.encoder:
+            low, high = joint.home_deg - 2.0, joint.home_deg + 4.0
+            joint = replace(
+                joint,
+                range_deg=(low, high),
+                limits=Limits(*(30.0 * each for each in joint.limits.values)),
+                switches=LimitSwitches(low=number, low_deg=low + 0.5),
+                encoder=None,
+            )
+        joints.append(joint)
+    safety = replace(ARM.safety, estop_fitted=True, at_power_up="program")
+    names = [joint.name for joint in joints]
+    arm = replace(ARM, joints=tuple(joints), safety=safety, homing=((names[1],), (names[0], names[2])))
+    (folder / "arm.ata").write_bytes(encode.arm_record(arm))
+    (folder / "alone.py").write_text(ALONE)
+    program = encoded_program.of_program(UserProgram.load(folder / "alone.py", arm), arm)
+    (folder / "alone.atm").write_bytes(program.data)
+    (folder / "default.txt").write_text(f"alone {program.data[-4:].hex()}\n")
+    low = [round((joint.range_deg[0] + 0.5) * joint.steps_per_deg) for joint in arm.driven]
+    (folder.parent / "trips").write_text(",".join(map(str, low)))
 
 
 def _add_legs(folder: Path) -> None:

@@ -106,6 +106,8 @@ def _take(board: "Board", record: "Record") -> None:
         if features.BACKLASH:  # noqa: SIM102
             if sides:
                 backlash_drive.take_sides(board.engine.drives, sides)
+    if features.SEQUENCES:
+        board.starts_alone = head["flags"] & armrecord.FLAG_POWER_UP
     board.silence_ms = head["link_timeout_ms"] if stops else NEVER_MS
     board.joints = len(joints)
     board.arm_crc = crc

@@ -12,6 +12,7 @@ from armtempo_shared.messages import NO_JOINT
 from armtempo_shared.table import offset
 from micropython import const
 
+from armtempo_board import features
 from armtempo_board.app import memory_shares
 from armtempo_board.app.sample_buffer import SampleBuffer
 from armtempo_board.buffers import COMMANDED, pack_offsets, sample_to_wire
@@ -60,6 +61,10 @@ class Board:
         self.silence_ms = NEVER_MS  # of the host's silence, after which a run is stopped
         self.raw = array("i", [0] * COMMANDED)  # a sample of the arm
         self.pending = fault
+        if features.SEQUENCES:
+            self.starts_alone = 0  # the arm record lets the default start at power-up
+            self.failure = b""  # what a program failed with: for each host, until the fault is cleared
+            self.failure_waits = False  # the present host is to be told
 
     # the store, there only while needed: it takes memory that a motion needs
 
@@ -130,6 +135,8 @@ class Board:
         if self.engine and not self.engine.clear():
             raise Refused(codes.FAULT_PENDING, self.fault_joint(), self.fault())
         self.pending = 0
+        if features.SEQUENCES:
+            self.failure = b""
 
     def put_snapshot(self, target: bytearray, ticks_at: int, joints_at: int) -> int:
         """Write the present motion clock, steps and counts in wire format; returns the number of bytes of the

@@ -195,6 +195,8 @@ class Commands:
         self._session = session
         self.link.forget()
         self.board.samples.skip()
+        if features.SEQUENCES:
+            self.board.failure_waits = True
         if features.SPEED:
             self.controller.forget_speed()
         self.board.forget_store()

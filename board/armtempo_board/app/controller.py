@@ -16,6 +16,7 @@ from armtempo_shared.limits import HOLD_TIMEOUT_MS
 from armtempo_shared.messages import (
     MOTION,
     ONCE_NAME,
+    PROGRAM,
     RESUME,
     SAMPLE_BRAKING,
     SEQUENCE,
@@ -145,6 +146,16 @@ class Controller:
         """Take the arm record that was uploaded; Refused if it cannot be, and the one in force stays that."""
         arm_setup.take_new(self.board)
 
+    def check_homed(self) -> None:
+        """Raise Refused while the position of a joint is unknown."""
+        unknown = self._unknown()
+        if unknown:
+            raise Refused(codes.UNHOMED, _lowest(unknown))
+
+    def _unknown(self) -> int:
+        """One bit per joint of unknown position."""
+        return self.board.all_joints_mask() & ~self.board.known()
+
     def home(self, mask: int, steps: "Sequence[int]") -> None:
         """Declare the positions of the joints in ``mask``; ``steps`` has an entry for every joint."""
         engine = self.board.engine
@@ -163,13 +174,14 @@ class Controller:
         gc.collect()  # objects that stay during the run should lie at low addresses
         return board.checked(store.motion(name), crc)
 
-    def _assume(self, motion: "MotionHead", unknown: int) -> int:
+    def _assume(self, motion: "MotionHead") -> int:
         """Assume that the joints are at the start of a homing motion; those of unknown position are unknown
         after it too.
 
         Returns one bit per joint that moves.
         """
         board = self.board
+        unknown = self._unknown()
         board.engine.snapshot(board.raw)
         moving = 0
         for joint in range(board.joints):
@@ -194,25 +206,25 @@ class Controller:
         board.check_ready()
         if flags & START_HELD and not features.JOG:
             raise Refused(codes.NEEDS_FIRMWARE)
-        homing = bool(flags & START_HOMING)
-        unknown = board.all_joints_mask() & ~board.known()
-        if unknown and not homing:
-            raise Refused(codes.UNHOMED, _lowest(unknown))
+        if not name:  # no default is set
+            raise Refused(codes.NOT_FOUND)
+        kind = MOTION
+        if features.SEQUENCES and name != ONCE_NAME:
+            kind = self._kind(name)
+        if kind != PROGRAM and not flags & START_HOMING:  # a program may home the arm itself
+            self.check_homed()
         self._by_host = crc is not None
         rate = _PERMILLE
         if features.SPEED and self._by_host:
             rate = self._next_rate
             self.forget_speed()
-        if not name:  # no default is set
-            raise Refused(codes.NOT_FOUND)
-        if features.SEQUENCES and name != ONCE_NAME:
-            kind = self._kind(name)
+        if features.SEQUENCES:  # noqa: SIM102  the core is without what is behind a constant alone
             if kind != MOTION:
                 self._new_sequence(kind, name, crc, rate, flags)
                 self.sequence.begin()
                 board.samples.clear()
                 return
-        self.begin_motion(name, crc, rate, flags, unknown)
+        self.begin_motion(name, crc, rate, flags)
 
     if features.SEQUENCES:
 
@@ -240,11 +252,8 @@ class Controller:
             self.release_memory()
             return int(self.board.store().kind(name))
 
-    def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0, unknown: int = 0) -> None:
-        """Start a motion at ``rate`` thousandths of its speed, or refuse.
-
-        ``flags``, ``crc`` as for ``begin``; ``unknown``: joints of unknown position.
-        """
+    def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0) -> None:
+        """Start a motion at ``rate`` thousandths of its speed, or refuse; ``flags``, ``crc`` as for ``begin``."""
         board = self.board
         is_short = board.engine_memory.is_short
         heap.collect_often(heap.OFTEN if is_short else heap.SELDOM)
@@ -255,7 +264,7 @@ class Controller:
             release()
             homing = 0
             if flags & START_HOMING:
-                moving = self._assume(motion, unknown)
+                moving = self._assume(motion)
                 homing = flags >> START_SWITCHES_BIT or moving
             board.engine.load(motion, rate, None, homing)
         except Refused:

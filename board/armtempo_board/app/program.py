@@ -46,11 +46,16 @@ def main(root: str = ROOT) -> None:
     leds = Leds()
     button = Button()  # before the engine, which may take its pin for a sixth joint
     port = pyb.USB_VCP()
+    if features.SEQUENCES:
+        at_power_up = app is None and machine.reset_cause() == machine.PWRON_RESET and not button.held()
     app = app or _build(port, root)
     app.enter()
     watchdog = Watchdog()
     _detach(port)
     try:
+        if features.SEQUENCES:  # noqa: SIM102  the core is without what is behind a constant alone
+            if at_power_up and app.controller.board.starts_alone:
+                _start_alone()
         run(leds, button, watchdog)
     finally:
         watchdog.leave()
@@ -104,15 +109,25 @@ def _serve_panel(leds: "Leds", button: "Button", watchdog: "Watchdog") -> None:
     if controller.moving():
         return
     if pressed:
-        _replay_default()
+        _start_default("button")
     machine.idle()
 
 
-def _replay_default() -> None:
+if features.SEQUENCES:
+
+    def _start_alone() -> None:
+        """Start the default at power-up: as the position is unknown, only a program that homes the arm."""
+        try:
+            _start_default("power-up")
+        except Exception as error:
+            app.fail(error)
+
+
+def _start_default(by: str) -> None:
     try:
         app.controller.begin(app.controller.board.store().default(), 0)
     except Refused as refused:
-        app.events.note("button: error %d" % refused.code)
+        app.events.note("%s: error %d" % (by, refused.code))
 
 
 def _detach(port: "Any") -> None:

@@ -30,6 +30,9 @@ def user_program(controller: "Any", name: str, crc: "int | None", rate: int) -> 
         if missing > 0:
             raise Refused(codes.NO_SEQUENCE_MEMORY, value=missing)
     try:
-        return UserProgram(controller, record, name.encode(), rate)
+        found = UserProgram(controller, record, name.encode(), rate)
     except ValueError:
         raise Refused(codes.BAD_RECORD)
+    if not found.table.get("homing"):  # absent in a record of an older host
+        controller.check_homed()
+    return found

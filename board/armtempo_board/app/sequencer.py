@@ -26,6 +26,7 @@ from armtempo_board.errors import Refused
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any, Protocol
 
     from armtempo_shared.motion import MotionHead
@@ -45,7 +46,9 @@ if TYPE_CHECKING:
 
         def release_memory(self) -> None: ...
 
-        def begin_motion(self, name: str, crc: "int | None", rate: int) -> None: ...
+        def home(self, mask: int, steps: "Sequence[int]") -> None: ...
+
+        def begin_motion(self, name: str, crc: "int | None", rate: int, flags: int = 0) -> None: ...
 
         def stop(self, now: int) -> None: ...
 
@@ -114,7 +117,7 @@ class Sequencer:
         self.tell = self._command.tell
 
     def begin(self) -> None:
-        """Begin with the next pass; raises Refused if the heap has no room for a motion."""
+        """Begin with the next pass; raises Refused if the heap has no space for a motion."""
         controller = self._controller
         controller.release_memory()
         free = gc.mem_free() if hasattr(gc, "mem_free") else self.start_bytes

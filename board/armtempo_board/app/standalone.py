@@ -99,6 +99,8 @@ def _follow(app: "App", controller: "Controller", watchdog: "Watchdog") -> None:
 
 def _show(events: "Events") -> None:
     """What is said to a host is shown here."""
+    if features.SEQUENCES:
+        events.take_failure()
     if events.notice:
         print(events.notice.decode())
         events.notice = b""

@@ -10,7 +10,6 @@ import sys
 import time
 
 from armtempo_shared import codes, messages, program, sequence
-from armtempo_shared.limits import MAX_NAME
 from armtempo_shared.rest_to_rest import Move, TooLongError
 from armtempo_shared.sequence import MAX_COUNTERS
 from micropython import const
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
 _PERCENT = const(100)
 _MOST_SKIPPED = const(16)
 _SAY_MS = const(500)  # longest wait until a host has taken the text before,
+_LONGEST_ROW = const(120)
 _ALONE_MS = const(20)  # and if none was heard so long
 
 
@@ -117,9 +117,8 @@ class UserProgram(Sequencer):
             self.status[STEP] = line or self.status[STEP]
         except MemoryError:
             text = "MemoryError in line %d" % self.status[STEP]
-        if not self._is_said():
-            self._app.events.notice = b""  # the host is gone, and the next one is to be told what happened
-        self._app.events.note(text)
+        self._is_said()
+        self._app.events.note_failure(text)
 
     def _print(self, *values: object, sep: str = " ", end: str = "\n", file: object = None) -> None:
         self.serve()
@@ -173,29 +172,69 @@ class UserProgram(Sequencer):
             row = board.engine.limits[joint]
             if not row["min_steps"] <= steps <= row["max_steps"]:
                 raise CellError("goto: joint %d would leave its range" % (joint + 1))
-        limits = [
-            (min(speed, step_rates.one), acceleration, jerk)
-            for speed, acceleration, jerk in self.table["limits"]
-        ]
+        self._make_move(self.steps(), target, self.table["limits"], percent, "goto")
+
+    def _make_move(
+        self,
+        start: "Sequence[int]",
+        target: "Sequence[int]",
+        limits: "Sequence[Sequence[int]]",
+        percent: int,
+        what: str,
+        flags: int = 0,
+    ) -> None:
+        """Start a move; ``flags``: as for ``Controller.begin``, ``what``: the call, for errors."""
+        board = self._controller.board
+        most = [(min(speed, step_rates.one), acceleration, jerk) for speed, acceleration, jerk in limits]
         try:
-            move = Move(self.steps(), target, limits, step_rates.together, percent)
+            move = Move(start, target, most, step_rates.together, percent)
         except TooLongError:
-            raise CellError("goto: it would take longer than the board can make a move") from None
+            raise CellError("%s: it would take longer than the board can make a move" % what) from None
         at = 0
         try:
             for piece in move.pieces(board.arm_crc):
                 at = board.once.put(at, move.size, piece)
         except Refused as refused:
-            raise _cell_error("goto", refused) from None
+            raise _cell_error(what, refused) from None
         del move
-        self._begin(messages.ONCE_NAME, None, _PERCENT, "goto")
+        self._begin(messages.ONCE_NAME, None, _PERCENT, what, flags)
 
-    def _begin(self, name: str, crc: "int | None", percent: int, what: str) -> None:
+    def _begin(self, name: str, crc: "int | None", percent: int, what: str, flags: int = 0) -> None:
         try:
             self._percent = percent
-            self._controller.begin_motion(name, crc, self._share(self._rate))
+            self._controller.begin_motion(name, crc, self._share(self._rate), flags)
         except Refused as refused:
             raise _cell_error(what, refused) from None
+
+    def home(self, plan: "dict[str, Any]") -> None:
+        """Home the arm."""
+        from armtempo_board.app import homing  # here, as most programs are started on an arm that is homed
+
+        homing.home(self, plan)
+
+    def move_homing(
+        self, start: "Sequence[int]", target: "Sequence[int]", limits: "Sequence[Sequence[int]]"
+    ) -> int:
+        """Make a move of homing from where the joints are taken to be; returns the joint whose switch ended it, or
+        NO_JOINT."""
+        self._make_move(start, target, limits, _PERCENT, "home", messages.START_HOMING)
+        moves = True
+        while moves:
+            moves = self.moving()
+            self.serve()  # once more at rest: joints that were taken to be somewhere are unknown again
+        return self._controller.board.fault_joint()
+
+    def declare(self, mask: int, steps: "Sequence[int]") -> None:
+        """The joints in ``mask`` are at these steps."""
+        try:
+            self._controller.home(mask, steps)
+        except Refused as refused:
+            raise _cell_error("home", refused) from None
+
+    def range_steps(self, joint: int) -> "tuple[int, int]":
+        """The ends of a joint's range."""
+        row = self._controller.board.engine.limits[joint]
+        return row["min_steps"], row["max_steps"]
 
     def _share(self, rate: int) -> int:
         return max(rate * self._percent // _PERCENT, messages.SLOWEST_PERMILLE)
@@ -223,7 +262,7 @@ class UserProgram(Sequencer):
 
     def count(self, name: str) -> int:
         """Increment a counter."""
-        number = self._command.named(name.encode()[:MAX_NAME], MAX_COUNTERS)
+        number = self._command.named(name.encode(), MAX_COUNTERS)
         if number < 0:
             raise CellError("more than %d counters" % MAX_COUNTERS)
         return self._command.count(number)
@@ -294,5 +333,5 @@ def _traceback(error: "BaseException", file: str) -> "tuple[str, int]":
             line = int(number)
         elif row.startswith((" ", "Traceback")) or not row:
             continue
-        found.append(row)
+        found.append(row[:_LONGEST_ROW])  # what the host is told is cut at its begin
     return "\n".join(found), line

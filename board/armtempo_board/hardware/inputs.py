@@ -175,6 +175,10 @@ class Inputs:
         """Whether the E-stop is tripped."""
         return self._estop is not None and self._estop.value() == self._estop_level
 
+    def enabled(self) -> bool:
+        """Whether the drivers are on."""
+        return int(self.enable_pin.value()) == self.on_level
+
     def enable(self, on: bool) -> None:
         """Drivers on or off."""
         self.enable_pin.value(self.on_level if on else 1 - self.on_level)

@@ -40,8 +40,10 @@ if TYPE_CHECKING:
 
     from armtempo_board.motion.engine_parts import EngineParts
 
-LEAD_TICKS = const(1680000)
-"""Time from the start of the counters to time 0: 20 ms, in which drivers switch on and DIR settles."""
+_LEAD_TICKS = const(1680000)
+"""Time from the start of the counters to time 0: 20 ms, in which drivers switch on,"""
+_SHORT_LEAD_TICKS = const(168000)
+"""and 2 ms if they are on, in which DIR settles."""
 
 _PREFILLS = const(32)
 _ROUNDS = const(8)  # rounds of filling the queues before other work
@@ -151,7 +153,7 @@ class Engine:
             raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
         override = ready.override if ready else self._override(rate, motion)
         self.rates.begin(override, motion)
-        self.clock.set(-(ready.lead_ticks() if ready else LEAD_TICKS))
+        self.clock.set(-self._lead_ticks())
         self.inputs.enable(True)
         self._sampler.plan(self.rates.duration_ticks)
         self._readings.begin(override)
@@ -168,6 +170,11 @@ class Engine:
         self._homing = homing
         self.fault_joint = NO_JOINT
         self.inputs.watch(homing or _ALL_JOINTS)
+
+    def _lead_ticks(self) -> int:
+        if not self.inputs.enabled():
+            return _LEAD_TICKS
+        return max(_SHORT_LEAD_TICKS, max([joint.gap_ticks for joint in self.drives]))
 
     def _override(self, rate: int, motion: "MotionHead") -> "Any":
         """Check the motion; returns its time law."""

@@ -1,7 +1,7 @@
 """Prepares the next motion, with its first steps, while another one runs.
 
 It has its own step generators. The running motion, pins, rings and clock are not touched before
-``hand_over``, when nothing moves. Imported for sequences, if the heap has room
+``hand_over``, when nothing moves. Imported for sequences, if the heap has space
 (``armtempo_shared.engine_memory.ahead_bytes``).
 """
 
@@ -17,7 +17,6 @@ from armtempo_board.errors import Refused
 from armtempo_board.hardware import isr
 from armtempo_board.memory import Memory
 from armtempo_board.motion import endpoints
-from armtempo_board.motion.engine import LEAD_TICKS
 from armtempo_board.stepgen.override import Override
 from armtempo_board.stepgen.step_generator import StepGenerator
 
@@ -38,14 +37,13 @@ the running motion may need the loop afterwards."""
 _FAST_PART = const(4)
 """If the arm's rates exceed this fraction of the highest rates, the running motion needs the loop until its
 last step is queued."""
-_LEAD_TICKS = const(168000)  # 2 ms
 _PERMILLE = const(1000)
 
 
 class NextMotion:
     """The next motion of an engine. ``is_ready``: it is loaded, to start at ``expected``.
 
-    Raises MemoryError if the heap has no room.
+    Raises MemoryError if the heap has no space.
     """
 
     def __init__(self, engine: "Engine") -> None:
@@ -128,13 +126,6 @@ class NextMotion:
             if not engine.known >> joint & 1 or engine.commanded(joint) != expected:
                 return False
         return self.is_ready
-
-    def lead_ticks(self) -> int:
-        """Lead time from the start of the counters: DIR must settle, but the drivers are already on."""
-        inputs = self._engine.inputs
-        if inputs.enable_pin.value() != inputs.on_level:
-            return LEAD_TICKS
-        return max(_LEAD_TICKS, max([joint.gap_ticks for joint in self._engine.drives]))
 
     def hand_over(self, number: int, joint: "JointDrive") -> None:
         """Exchange a joint's generator for the prepared one; nothing moves."""

@@ -19,11 +19,14 @@ if TYPE_CHECKING:
 
 
 class NoPin:
-    """Replaces ENABLE, so that the engine cannot switch the drivers on."""
+    """Replaces ENABLE, so that the engine cannot switch the drivers on; it reads as ``off``."""
+
+    def __init__(self, off: int) -> None:
+        self._off = off
 
     def value(self, level: "int | None" = None) -> int:
-        """Nothing."""
-        return 0
+        """Only this."""
+        return self._off
 
 
 _SEEN_TICKS = 168  # 2 us: two samples of a capture at 1 MHz
@@ -68,7 +71,7 @@ def make_engine(
     else:
         memory_shares.resize(engine_memory, len(joints))
     engine = Engine(EngineParts(head, joints, engine_memory))
-    engine.inputs.enable_pin = NoPin()  # type: ignore[assignment]
+    engine.inputs.enable_pin = NoPin(1 - engine.inputs.on_level)  # type: ignore[assignment]
     if head["flags"] & armrecord.FLAG_ESTOP_FITTED:
         pull_inactive(engine)
     return engine, joints
@@ -102,7 +105,7 @@ def pull_inactive(engine: "Any") -> None:
 
 
 def serve(engine: "Engine", idle_us: int) -> None:
-    """A turn of the loop. ``idle_us``: its duration in simulated time."""
+    """A pass of the loop. ``idle_us``: its duration in simulated time."""
     engine.service()
     if idle_us:
         time.sleep_us(idle_us)

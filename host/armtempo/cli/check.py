@@ -15,7 +15,7 @@ from armtempo.diagnosis import arm_check, figures
 from armtempo.diagnosis.figures import JointFigures, table
 from armtempo.diagnosis.finding import Finding, Level
 from armtempo.model.arm import Arm
-from armtempo.planning.checks import format_rate
+from armtempo.planning.board_limits import format_rate
 from armtempo.report import arm_picture, drawing
 
 

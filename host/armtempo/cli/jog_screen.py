@@ -242,7 +242,7 @@ class JogScreen:
     def _where(self, angles_deg: list[float]) -> list[str]:
         """Angles and tool pose, the selected ones first."""
         pose = forward(self._arm, angles_deg)
-        angles = self._arm.listed((f"{angle + 0.0:.2f}" for angle in angles_deg), " ")
+        angles = self._arm.texts.listed((f"{angle + 0.0:.2f}" for angle in angles_deg), " ")
         position = " ".join(f"{value + 0.0:.1f}" for value in pose[:3, 3]) + " mm"
         turned = "rpy " + " ".join(f"{value + 0.0:.1f}" for value in to_rpy_deg(pose)) + "°"
         return [angles, position, turned] if self.choice.joint is not None else [position, turned, angles]

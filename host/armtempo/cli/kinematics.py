@@ -44,12 +44,12 @@ from armtempo.model.tool_pose import BASE, Pose
 )
 @click.option(
     "--tolerance-mm",
-    type=click.FloatRange(1e-6, 1000.0),
+    type=options.FiniteRange(1e-6, 1000.0),
     help="Distance at which the position counts as reached.  [default: 0.1]",
 )
 @click.option(
     "--tolerance-deg",
-    type=click.FloatRange(1e-6, 180.0),
+    type=options.FiniteRange(1e-6, 180.0),
     help="The same for the orientation.  [default: 0.1]",
 )
 @click.option(
@@ -116,9 +116,9 @@ def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
     angles = numbers(previous, "--previous")
     if len(angles) != len(solver.home_rad):
         raise InputError(
-            f"--previous: {len(angles)} {solver.arm.position_word}s given, the arm has "
+            f"--previous: {len(angles)} {solver.arm.texts.position}s given, the arm has "
             f"{len(solver.home_rad)} joints",
-            f"give one {solver.arm.position_word} for each joint, base first",
+            f"give one {solver.arm.texts.position} for each joint, base first",
         )
     return [math.radians(angle) for angle in angles]
 
@@ -237,7 +237,7 @@ def _values(arm: Arm, angles_deg: Array, frame: str) -> dict[str, Any]:
     return {
         "arm": arm.name,
         "frame": frame,
-        arm.list_key("angles_deg"): angles_deg.tolist(),
+        arm.texts.list_key("angles_deg"): angles_deg.tolist(),
         "tool": {**tool_values(frames[-1]), "quaternion": list(to_quaternion(frames[-1]))},
         "frames": [
             {"name": name, **tool_values(frame)} for name, frame in zip(_names(arm), frames, strict=True)

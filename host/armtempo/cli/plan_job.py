@@ -16,7 +16,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import is_sequence
-from armtempo.planning import checks, torque
+from armtempo.planning import board_limits, torque
 from armtempo.report import text_summary
 
 
@@ -76,7 +76,7 @@ def _plans(arm: Arm, job: Job, split: bool, use_torque: bool) -> list[Plan]:
         else:
             plans = pipeline.split(arm, job, progress) if split else [pipeline.plan(arm, job, progress)]
     for plan in plans:
-        checks.check_held(plan.trajectory, arm)
+        board_limits.check_held(plan.trajectory, arm)
     return plans
 
 

@@ -31,9 +31,9 @@ def program(file: Path, check: bool, force: bool, given: BoardOptions) -> None:
     """Check a program in MicroPython, store it and run it.
 
     FILE: a Python file with 'from armtempo_board import cell'; 'armtempo help programs' explains it. Motions that
-    it names are planned files NAME.json beside it, or on the board. The arm must be homed ('armtempo home').
-    Ctrl-C, or 'armtempo stop' in another terminal, brakes and ends it; 'armtempo status' shows its line.
-    'armtempo upload FILE --default' only stores it, for the board's button.
+    it names are planned files NAME.json beside it, or on the board. The arm must be homed ('armtempo home'), unless
+    the program homes it. Ctrl-C, or 'armtempo stop' in another terminal, brakes and ends it; 'armtempo status' shows
+    its line. 'armtempo upload FILE --default' only stores it, for the board's button.
     """
     arm = resolve.load_arm(given.arm_path)
     found = load(file, arm)
@@ -107,12 +107,15 @@ def _show_check(encoded: EncodedProgram, as_json: bool) -> None:
         "pallets": {name: len(next(iter(each.values()))) for name, each in encoded.places.items()},
         "off_line_mm": encoded_program.off_line_mm(encoded),
         "touches": _warn(encoded),
+        "homes": bool(found.homes),
     }
     lines = [f"{found.file}: {len(encoded.data)} bytes, {encoded.heap_bytes} bytes of heap on the board"]
     lines += [f"pallet {name}: {places} places" for name, places in values["pallets"].items()]
     if encoded.places:
         beside = f"{values['off_line_mm']:.2g} mm beside the straight line"
         lines.append(f"on the way from above a place to it the tool is up to {beside}")
+    if found.homes:
+        lines.append("it homes the arm itself, so that it may be started before that")
     lines += [f"must be on the board: {name}" for name in values["not_beside_it"]]
     results.show(as_json, values, lines)
 

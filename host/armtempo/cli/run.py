@@ -12,7 +12,6 @@ from armtempo.cli.options import BoardOptions
 from armtempo.cli.run_progress import RunProgress, repetition_line
 from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.report import text_summary
 from armtempo.report.run import Run
 from armtempo.robot.board import Board
@@ -35,23 +34,24 @@ def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, g
     there too.
     """
     plan = resolve.load_plan(Path(what), given.arm_path, given.altered) if resolve.is_file(what) else None
-    if isinstance(plan, SequencePlan):
+    if plan and plan.is_sequence:
         _refuse_repeat(repeat)
     named = plan.arm if plan else resolve.named_arm(given.arm_path)
     with resolve.board(given, named) as board:
         arm = resolve.arm_of_board(board, named)
         board.configure(arm, replace=given.replace_arm)
         results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(arm)}")
-        motion = board.upload(plan, replace=force) if isinstance(plan, Plan) else what
-        board.speed(percent / 100)
         stored = board.client.find(what) if plan is None else None
-        if isinstance(plan, SequencePlan) or (stored and stored.sequence):
+        if stored and (stored.sequence or stored.program):
             _refuse_repeat(repeat)
-            sequence = plan if isinstance(plan, SequencePlan) else what
-            sequences.run_and_report(board, sequence, force, resolve.runs(out), given.as_json)
-        elif stored and stored.program:
-            _refuse_repeat(repeat)
+        motion = board.upload(plan, replace=force) if plan and not plan.is_sequence else what
+        board.speed(percent / 100)
+        if stored and stored.program:
             programs.run_and_report(board, what, given.as_json)
+        elif plan and plan.is_sequence:
+            sequences.run_and_report(board, plan, force, resolve.runs(out), given.as_json)
+        elif stored and stored.sequence:
+            sequences.run_and_report(board, what, force, resolve.runs(out), given.as_json)
         else:
             run_and_report(board, motion, repeat, resolve.runs(out), given.as_json)
 
@@ -97,13 +97,11 @@ def fetch(what: str | None, out: Path | None, given: BoardOptions) -> None:
         if what and resolve.is_file(what)
         else None
     )
+    if plan is not None and plan.is_sequence:
+        raise InputError(f"{what}: the samples of a sequence are not kept", "record it with 'armtempo run'")
     named = plan.arm if plan else resolve.named_arm(given.arm_path)
     with resolve.board(given, named) as board:
         board.configure(resolve.arm_of_board(board, named))
-        if isinstance(plan, SequencePlan):
-            raise InputError(
-                f"{what}: the samples of a sequence are not kept", "record it with 'armtempo run'"
-            )
         run = board.fetch(plan or what, resolve.runs(out))
         lines = [f"{run.name}: {run.path}", repetition_line(run.entries[-1])]
         results.show(given.as_json, run.to_json(), lines)

@@ -89,6 +89,9 @@ def motion_lines(state: BoardState) -> list[str]:
     found += [" " * _INDENT + line for line in joint_lines(state)]
     if state.sequence:
         found.append(_sequence(state.sequence))
+    if state.said:
+        first, *others = state.said.strip().split("\n")
+        found += [f"said      {first}", *(" " * _INDENT + line for line in others)]
     found.append(f"link      {_link(state)}")
     return found
 

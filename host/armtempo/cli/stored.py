@@ -16,7 +16,6 @@ from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
 from armtempo.encoding import encoded_program, encoded_sequence, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion
-from armtempo.encoding.encoded_sequence import EncodedSequence
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.robot.board import Board
@@ -46,16 +45,12 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
         with ProgressBar("uploading") as progress:
             board.upload(encoded, default=as_default, progress=progress, replace=force)
         virtual = board.info.virtual
-    sequence = isinstance(encoded, EncodedSequence)
-    if isinstance(encoded, EncodedSequence):
-        size, stored = (
-            {"motions": len(encoded.motions)},
-            f"sequence and {len(encoded.motions)} motions stored",
-        )
-    else:
-        size, stored = {"size_bytes": len(encoded.data)}, f"{len(encoded.data)} bytes stored"
+    size, stored = {"size_bytes": len(encoded.data)}, f"{len(encoded.data)} bytes stored"
+    if encoded.is_sequence:
+        number = len(encoded.motions)
+        size, stored = {"motions": number}, f"sequence and {number} motions stored"
     where = " on a virtual board" if virtual else ""
-    values = {"name": encoded.name, "sequence": sequence, **size, "virtual": virtual}
+    values = {"name": encoded.name, "sequence": encoded.is_sequence, **size, "virtual": virtual}
     results.show(given.as_json, values, [f"{encoded.name}: {stored}{where}"])
 
 
@@ -143,7 +138,8 @@ def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:
         return [str(error)]
     ends = ("from", trajectory(0.0)), ("to", trajectory(trajectory.duration_s))
     return [
-        f"{word:<5}{arm.listed(f'{round(angle, 2) + 0.0:.2f}' for angle in angles)}" for word, angles in ends
+        f"{word:<5}{arm.texts.listed(f'{round(angle, 2) + 0.0:.2f}' for angle in angles)}"
+        for word, angles in ends
     ]
 
 
@@ -177,8 +173,8 @@ def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
         "duration_s": trajectory.duration_s,
         "degree": trajectory.joints[0].degree,
         "timing": "shared" if trajectory.shared else "per-joint",
-        motion.arm.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
-        motion.arm.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
+        motion.arm.texts.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
+        motion.arm.texts.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
         "joints": [
             {
                 "name": joint.name,

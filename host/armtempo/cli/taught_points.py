@@ -61,7 +61,7 @@ class TaughtPoints:
     def tell(self) -> None:
         """Print the points if the file cannot be written, so that they are not lost."""
         for point in self.points_deg:
-            click.echo(f"[[via]]\n{self._arm.list_key('angles_deg')} = [{row(point)}]", err=True)
+            click.echo(f"[[via]]\n{self._arm.texts.list_key('angles_deg')} = [{row(point)}]", err=True)
 
 
 class JobPoints(TaughtPoints):

@@ -41,7 +41,7 @@ _IN_FIRMWARE = (
     *(f"{PACKAGES[0]}.motion.{name}" for name in ("next_motion", "backlash_drive", "crossing")),
     *(f"{PACKAGES[0]}.hardware.{name}" for name in ("outputs", "digital_inputs")),
     *(f"{PACKAGES[0]}.app.output_{name}" for name in ("commands", "setup")),
-    *(f"{PACKAGES[0]}.app.{name}" for name in ("cell", "pallet", "program_start", "user_program")),
+    *(f"{PACKAGES[0]}.app.{name}" for name in ("cell", "homing", "pallet", "program_start", "user_program")),
     *(f"{PACKAGES[0]}.storage.{name}" for name in ("sequence_file", "program_file", "measured_rates")),
     *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
     *(f"{PACKAGES[1]}.{name}" for name in ("program", "rest_to_rest", "shapes")),

@@ -10,7 +10,7 @@ from armtempo.encoding import encode
 from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
-from armtempo.planning.checks import ESTIMATED, format_rate
+from armtempo.planning.board_limits import ESTIMATED, format_rate
 
 _MICROSTEPS = {*(1 << n for n in range(9)), 5, 10, 20, 25, 40, 50, 100, 125, 200, 250}
 """Microstep settings of stepper drivers: powers of 2, and decimal ones."""

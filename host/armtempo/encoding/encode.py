@@ -21,9 +21,9 @@ from armtempo.model.boards import TimerOutput, pin_number
 from armtempo.model.drive_limits import Crossing
 from armtempo.model.joint_unit import REVOLUTE
 from armtempo.model.outputs import SERVO, Output
-from armtempo.model.parts import DrivenJoint
+from armtempo.model.parts import PROGRAM, DrivenJoint
 from armtempo.model.pin_use import Period
-from armtempo.planning import checks
+from armtempo.planning import board_limits
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.splines.trajectory import Trajectory
 
@@ -51,13 +51,15 @@ def motor_rows(arm: Arm) -> list[dict[str, Any]]:
 
 def step_rates(arm: Arm) -> list[int]:
     """The highest step rates of the motors in the arm record, steps/s; raises as ``arm_record``."""
-    return [with_margin(rate) for rate in checks.highest_rates(arm)]
+    return [with_margin(rate) for rate in board_limits.highest_rates(arm)]
 
 
-def move_limits(arm: Arm) -> list[list[int]]:
-    """Speed, acceleration and jerk of each driven joint in steps, rounded down (``armtempo_shared.rest_to_rest``)."""
+def move_limits(arm: Arm, fraction: float = 1.0) -> list[list[int]]:
+    """Speed, acceleration and jerk of each driven joint in steps, times ``fraction``, rounded down
+    (``armtempo_shared.rest_to_rest``)."""
     return [
-        [max(1, int(limit * joint.steps_per_deg)) for limit in joint.limits.values] for joint in arm.driven
+        [max(1, int(fraction * limit * joint.steps_per_deg)) for limit in joint.limits.values]
+        for joint in arm.driven
     ]
 
 
@@ -77,11 +79,12 @@ def motion_record(trajectory: Trajectory, arm: Arm, brakes: BrakeTimes | None = 
             "plan it for this arm",
         )
     angles = [
-        _fixed(points, limits.STEP_FRACTION_BITS) for points in checks.motor_points_steps(trajectory, arm)
+        _fixed(points, limits.STEP_FRACTION_BITS)
+        for points in board_limits.motor_points_steps(trajectory, arm)
     ]
     axes = trajectory.joints[:1] if trajectory.shared else trajectory.joints
     times = [_fixed(spline.time_points_s * limits.TICK_HZ, limits.TICK_FRACTION_BITS) for spline in axes]
-    checks.check_held(trajectory, arm)
+    board_limits.check_held(trajectory, arm)
     first = trajectory.joints[0]
     crc = record_crc(arm_record(arm))
     return motion.pack(first.degree, angles, times, first.refine, _ramps(brakes), crc)
@@ -124,6 +127,7 @@ def _head(arm: Arm) -> dict[str, Any]:
         (armrecord.FLAG_STOP_ON_LINK_LOSS, safety.on_link_loss == "stop"),
         (armrecord.FLAG_ESTOP_ACTIVE_HIGH, safety.estop_active == "high"),
         (armrecord.FLAG_ESTOP_FITTED, safety.estop_fitted),
+        (armrecord.FLAG_POWER_UP, safety.at_power_up == PROGRAM),
     ):
         flags |= flag if wanted else 0
     ticks = {
@@ -213,7 +217,7 @@ def backlash(arm: Arm) -> list[dict[str, Any]]:
 
     Raises InputError if the board cannot cross one.
     """
-    checks.check_crossings(arm)
+    board_limits.check_crossings(arm)
     rows = [_backlash(motor, crossing) for motor, crossing in zip(arm.motors, arm.crossings, strict=True)]
     return rows if armrecord.backlash_count(rows) else []
 

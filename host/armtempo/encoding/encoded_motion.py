@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from armtempo_shared.limits import MAX_NAME
 from armtempo_shared.wire import record_crc
@@ -38,6 +39,7 @@ class EncodedMotion:
     """The motion record (layout: ``armtempo_shared.motion``)."""
     plan: Plan | None = None
     """The plan, if known."""
+    is_sequence: ClassVar[Literal[False]] = False
 
     @property
     def key(self) -> MotionKey:

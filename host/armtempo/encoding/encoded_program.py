@@ -16,9 +16,12 @@ from armtempo.encoding import encode, encoded_motion, planned_for
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.of_arm import forward
+from armtempo.model import home_switches
 from armtempo.model.arm import Arm
+from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.outputs import SWITCH, Output
 from armtempo.model.pallet import ArmPallet
+from armtempo.model.parts import DrivenJoint
 from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME
 from armtempo.model.user_program import UserProgram
@@ -113,7 +116,34 @@ def table(arm: Arm, found: UserProgram, places: Places) -> dict[str, Any]:
         "inputs": {entry.name: number for number, entry in enumerate(arm.inputs)},
         "pallets": _shapes(arm, places),
         "tools": {tool: _others(bare, _postures(arm.with_tool(tool))) for tool in found.tools},
+        "homing": _homing(arm) if found.homes else {},
     }
+
+
+def _homing(arm: Arm) -> dict[str, Any]:
+    """How the board homes an arm by itself (``armtempo_shared.program``)."""
+    return {
+        "fast": encode.move_limits(arm, home_switches.FAST),
+        "slow": encode.move_limits(arm, home_switches.SLOW),
+        "groups": [
+            [_home_switch(arm.driven[joint], joint, switch) for joint, switch in group.items()]
+            for group in home_switches.groups(arm)
+        ],
+    }
+
+
+def _home_switch(joint: DrivenJoint, number: int, switch: HomeSwitch) -> list[int]:
+    whole = (
+        switch.trip_deg,
+        switch.edge_deg,
+        switch.span_deg,
+        switch.farthest_deg,
+        switch.away_deg,
+        home_switches.BACK_DEG,
+        home_switches.MOST_PRESSED_DEG,
+        home_switches.TOLERANCE_DEG,
+    )
+    return [number, switch.side, *(round(each * joint.steps_per_deg) for each in whole)]
 
 
 def _others(bare: dict[str, list[int]], now: dict[str, list[int]]) -> dict[str, list[int]]:
@@ -237,6 +267,7 @@ def _touching(found: EncodedProgram, arm: Arm, tool: str) -> list[str]:
     problems = []
     for here, start, there, end in moves:
         try:
+            point_to_point.check_switches(start, end, arm)
             workspace_check.check(arm, point_to_point.straight("goto", start, end, arm))
         except PlanError as error:
             problems.append(f"between {here} and {there}: {error.problem}")
@@ -292,6 +323,8 @@ def check_stored(name: str, data: bytes, arm: Arm) -> None:
 def _change(record: _Record, then: dict[str, Any], arm: Arm) -> str:
     source = record.source()
     named = {name: steps for name, steps in then["postures"].items() if name in source}
+    if then.get("homing") and then["homing"] != _homing(arm):
+        return "homing is another now"
     for tool, others in ("", {}), *then.get("tools", {}).items():
         try:
             now = _postures(arm.with_tool(tool))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from armtempo_shared import sequence, sequence_check
 from armtempo_shared.sequence import ACTIVE, FAULT_THEN, NEXT_THEN, SequenceData, SequenceError
@@ -15,7 +16,7 @@ from armtempo.encoding import encode, encoded_motion, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan, SequenceRow, rows_of
+from armtempo.model.sequence_plan import AnyPlan, SequencePlan, SequenceRow, rows_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,7 @@ class EncodedSequence:
     """The sequence record (layout: ``armtempo_shared.sequence``)."""
     plan: SequencePlan | None = None
     """The plan, if known."""
+    is_sequence: ClassVar[Literal[True]] = True
 
     @property
     def key(self) -> MotionKey:
@@ -53,7 +55,7 @@ Encoded = EncodedMotion | EncodedSequence
 """What a host stores, runs and records."""
 
 
-def encoded(plan: Plan | SequencePlan, name: str | None = None) -> Encoded:
+def encoded(plan: AnyPlan, name: str | None = None) -> Encoded:
     """Encode the plan of a motion or sequence; ``name``: of the motion on the board, default from the job's name.
 
     Raises InputError for an invalid name, or one for a sequence, and as ``of_plan``.

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import struct
 from binascii import crc32
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -23,8 +22,7 @@ from armtempo.basics.errors import InputError
 from armtempo.model import frame
 from armtempo.model.arm import Arm
 from armtempo.model.parts import NOTHING, Joint
-from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import AnyPlan
 from armtempo.planning import workspace_check
 from armtempo.planning.workspace_check import Bodies
 
@@ -40,27 +38,26 @@ _DECIMALS = 6
 """Of lengths in mm: a frame within others is a product of matrices."""
 
 
-def of_plan(plan: Plan | SequencePlan) -> MadeWith:
+def of_plan(plan: AnyPlan) -> MadeWith:
     """What a plan was made with."""
-    if isinstance(plan, SequencePlan):
-        tools: Iterable[str] = [on.tool.name for on, _ in plan.loaded_legs if on.tool]
-        loads, pallets = plan.loads, plan.pallets
-    else:
-        tools = [plan.arm.tool.name] if plan.arm.tool else []
-        loads, pallets = (plan.job.holds,), ()
-    keys = [*(f"frame {name}" for name in plan.frames), *(f"tool {name}" for name in tools)]
-    keys += [f"load {name}" for name in loads if name not in ("", NOTHING)]
-    keys += [f"pallet {name}" for name in pallets]
+    keys = [f"frame {name}" for name in plan.frames]
+    keys += [f"tool {on.tool.name}" for on, _ in plan.loaded_legs if on.tool]
+    keys += [f"load {name}" for name in plan.loads if name not in ("", NOTHING)]
+    keys += [f"pallet {name}" for name in plan.pallets]
     keys += [ROWS, WORKSPACE]  # last, as its boxes may be in the frames
     return {key: _checksum(plan.arm, key) or 0 for key in dict.fromkeys(keys)}
 
 
-def changed(then: MadeWith, arm: Arm) -> str:
-    """Describe the first of these that is not in ``arm`` as it was; "" if all are."""
+def changed(then: MadeWith, arm: Arm, before: Arm | None = None) -> str:
+    """Describe the first of these that is not in ``arm`` as it was; "" if all are.
+
+    ``before``: the arm as it was, if it is known; then it says by how much a frame has moved.
+    """
     for key, was in then.items():
         if _checksum(arm, key) != was:
             kind, _, name = key.partition(" ")
-            return _WORDS.get(key, f"{kind} {name!r} has changed since, or is gone")
+            moved = frame.changed(before.frames, arm.frames, [name]) if before and kind == "frame" else ""
+            return moved or _WORDS.get(key, f"{kind} {name!r} has changed since, or is gone")
     return ""
 
 

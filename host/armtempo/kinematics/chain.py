@@ -33,8 +33,8 @@ def spread_deg(arm: Arm, angles_deg: ArrayLike, what: str = "") -> Array:
         return all_angles_deg(arm, angles)
     driven = "" if len(arm.driven) == len(arm.joints) else f", of which {len(arm.driven)} have a motor"
     raise InputError(
-        f"{what}{count} {arm.position_word}s given, but arm {arm.name!r} has {len(arm.joints)} joints{driven}",
-        f"give one {arm.position_word} for each",
+        f"{what}{count} {arm.texts.position}s given, but arm {arm.name!r} has {len(arm.joints)} joints{driven}",
+        f"give one {arm.texts.position} for each",
     )
 
 

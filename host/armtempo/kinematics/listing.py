@@ -144,13 +144,13 @@ def values(answer: Answer) -> dict[str, Any]:
         "tolerance_deg": target.tolerance_deg,
         "success": answer.success,
         "reason": answer.reason,
-        answer.arm.list_key("angles_deg"): _degrees(answer.angles_rad),
+        answer.arm.texts.list_key("angles_deg"): _degrees(answer.angles_rad),
         "tool": tool_values(answer.tool),
         "miss": answer.miss._asdict(),
         "miss_driven": answer.miss_driven._asdict(),
     }
     if answer.search and (answer.success or not answer.choice):
-        return found | _numerical_values(answer.search, answer.arm.list_key("angles_deg"))
+        return found | _numerical_values(answer.search, answer.arm.texts.list_key("angles_deg"))
     assert answer.choice is not None
     return found | _closed_form_values(answer.choice)
 

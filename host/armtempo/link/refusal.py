@@ -30,6 +30,15 @@ def describe_fault(name: str) -> str:
     return next(found, name)
 
 
+def describe_notice(text: str) -> str:
+    """A text that the board sent; the code of a start that it refused ("button: error 19") in words."""
+    by, found, code = text.partition(": error ")
+    if not found or not code.isdigit() or int(code) not in wire.ERRORS:
+        return text
+    _, meaning, cure = wire.ERRORS[int(code)]
+    return f"{by}: {meaning}; {cure}"
+
+
 def _describe_detail(name: str, where: str, value: int) -> str:
     if name == "too_long" and where:
         return f"its numbers reach {value}"

@@ -19,12 +19,12 @@ from armtempo.model import (
     channels,
     coupled,
     drive_limits,
-    joint_unit,
+    home_switches,
     outputs_file,
     parts_file,
     pin_use,
+    posture_file,
     shipped,
-    tool_pose,
     transmission,
     workspace,
 )
@@ -33,10 +33,10 @@ from armtempo.model import pallet as pallets_of
 from armtempo.model import posture as named
 from armtempo.model import tool as tool_of
 from armtempo.model.frame import ArmFrame
-from armtempo.model.joint_unit import DEG, MM
+from armtempo.model.joint_unit import PositionTexts
 from armtempo.model.outputs import Input, Output
 from armtempo.model.pallet import ArmPallet
-from armtempo.model.parts import NOTHING, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
+from armtempo.model.parts import NOTHING, PROGRAM, DrivenJoint, Driver, Joint, Limits, Load, Motor, Safety
 from armtempo.model.posture import ArmPosture
 from armtempo.model.tool import ArmTool
 from armtempo.model.tool_pose import Pose
@@ -144,6 +144,7 @@ class Arm:
         _check_channels(arm, path)
         for problem in pin_use.problems(arm):
             raise InputError(f"{path}: {problem.where}: {problem.what}", problem.next_step)
+        _check_power_up(arm, path)
         return arm
 
     @classmethod
@@ -212,7 +213,7 @@ class Arm:
         )
         if not postures:
             return arm
-        return replace(arm, postures=tuple(read_posture(postures, name, arm) for name in postures.names()))
+        return replace(arm, postures=tuple(arm.read_posture(postures, name) for name in postures.names()))
 
     @classmethod
     def paper(cls) -> Arm:
@@ -327,52 +328,13 @@ class Arm:
         return any(joint.slides for joint in self.joints)
 
     @cached_property
-    def units(self) -> str:
-        """The units of its driven joints, for the head of a table: "deg", "mm", or "deg or mm"."""
-        return joint_unit.names(joint.unit for joint in self.table_joints)
-
-    @cached_property
-    def unit_words(self) -> str:
-        """The same in words: "degrees", "mm", or "degrees or mm"."""
-        return " or ".join(dict.fromkeys(joint.unit.word for joint in self.table_joints))
-
-    @cached_property
-    def position_word(self) -> str:
-        """What a position of any of its joints is called: "angle", or "position" if a joint slides."""
-        return (MM if self.slides else DEG).what
-
-    def list_key(self, name: str) -> str:
-        """The key of a list of joint positions in files and results, by its name for arms whose joints all turn."""
-        return joint_unit.NEUTRAL[name] if self.slides else name
-
-    def given_key(self, table: Table, name: str) -> str:
-        """The key by which a file gives a list of joint positions, if it does: ``name``, or that for any unit.
-
-        Raises InputError if it is in degrees for an arm with a sliding joint, or given twice.
-        """
-        neutral = joint_unit.NEUTRAL[name]
-        if table.has(name) and self.slides:
-            raise InputError(
-                f"{table.file}: {table.place}{name}: {self._sliding}, so a list in degrees cannot say where the arm is",
-                f"write {neutral} = [...], in the order of the joints: {self.positions_text}",
-            )
-        if table.has(name) and table.has(neutral):
-            raise table.misplaced(neutral, f"leave it out beside {name}, which says the same")
-        return neutral if table.has(neutral) else name
-
-    @property
-    def _sliding(self) -> str:
-        names = [joint.name for joint in self.joints if joint.slides]
-        return f"{' and '.join(names)} {'slides' if len(names) == 1 else 'slide'}"
-
-    def listed(self, values: Iterable[str], gap: str = ", ") -> str:
-        """Positions of the driven joints (J,) as texts, in one with their units."""
-        return joint_unit.listed(values, (joint.unit for joint in self.table_joints), gap)
-
-    @property
-    def positions_text(self) -> str:
-        """What a list of positions of the driven joints holds, in words."""
-        return ", ".join(f"{joint.name} in {joint.unit.name}" for joint in self.table_joints)
+    def texts(self) -> PositionTexts:
+        """How positions of its driven joints are called and written."""
+        return PositionTexts(
+            tuple(joint.name for joint in self.table_joints),
+            tuple(joint.unit for joint in self.table_joints),
+            tuple(joint.name for joint in self.joints if joint.slides),
+        )
 
     @property
     def all_home_deg(self) -> tuple[float, ...]:
@@ -397,6 +359,15 @@ class Arm:
             )
         return found[0]
 
+    def read_posture(self, tables: Table, name: str) -> ArmPosture:
+        """The posture ``name`` of a file's table [posture]; raises InputError if the arm cannot take it."""
+        found = posture_file.read(tables, name, self.texts, self.frames, self.all_home_deg)
+        if problem := self.posture_problem(found):
+            raise InputError(
+                f"{tables.file}: posture.{name}: {problem}", "give a posture that the arm can take"
+            )
+        return found
+
     def placed(self, angles_deg: Iterable[float]) -> tuple[float, ...]:
         """The driven joints' angles, (J,), those that are only by rounding beyond a range at its end.
 
@@ -408,7 +379,7 @@ class Arm:
         return tuple(joint.placed(float(angle)) for joint, angle in zip(self.driven, angles, strict=True))
 
     def _size_problem(self, count: int) -> str:
-        return f"{count} {self.position_word}s, but {len(self.driven)} joints have a motor"
+        return f"{count} {self.texts.position}s, but {len(self.driven)} joints have a motor"
 
     def angles_problem(self, angles_deg: Iterable[float]) -> str:
         """Why the driven joints cannot be at these angles; "" if they can."""
@@ -435,6 +406,22 @@ class Arm:
         return ""
 
 
+def _check_power_up(arm: Arm, path: Path) -> None:
+    """Raise InputError for an arm that must not move by itself at power-up, although its file says so."""
+    if arm.safety.at_power_up != PROGRAM:
+        return
+    where = f'{path}: safety.at_power_up = "{PROGRAM}"'
+    if not arm.safety.estop_fitted:
+        raise InputError(
+            f"{where}: the arm would move by itself, without an E-stop that the board knows",
+            "wire one and set estop_fitted = true",
+        )
+    try:
+        home_switches.check_board_can_home(arm)
+    except InputError as error:
+        raise InputError(f"{where}: {error.problem}", error.hint) from None
+
+
 def _driven(joint: Joint, limits: Limits) -> DrivenJoint:
     assert joint.motor is not None
     return DrivenJoint(
@@ -447,33 +434,6 @@ def _driven(joint: Joint, limits: Limits) -> DrivenJoint:
         joint.switches,
         joint.model,
     )
-
-
-def read_posture(tables: Table, name: str, arm: Arm) -> ArmPosture:
-    """The posture ``name`` of the table [posture]; raises InputError if the arm cannot take it."""
-    where = f"{tables.file}: posture.{name}"
-    table = tables.table(name)
-    if problem := named.name_problem(name):
-        raise InputError(f"{where}: {problem}", "choose another name")
-    if table is None:
-        raise tables.fail(name, "a table")
-    listed = arm.given_key(table, "angles_deg")
-    forms = [key for key in (listed, "matrix", "position_mm") if table.has(key)]
-    if len(forms) != 1:
-        raise InputError(
-            f"{where}: exactly one of {arm.list_key('angles_deg')}, matrix and position_mm is needed",
-            "give one of them",
-        )
-    if forms == [listed]:
-        found = ArmPosture(name, table.numbers(listed, len(arm.driven)))
-    else:
-        pose = tool_pose.from_table(table, where)
-        pose = frames_of.pose_in_base(pose, arm.frames, frames_of.named(table, arm.frames), where)
-        found = ArmPosture(name, replace(pose, posture_deg=arm.all_home_deg))
-    table.done()
-    if problem := arm.posture_problem(found):
-        raise InputError(f"{where}: {problem}", "give a posture that the arm can take")
-    return found
 
 
 def _check_channels(arm: Arm, path: Path | str) -> None:

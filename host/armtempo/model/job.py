@@ -13,7 +13,7 @@ from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
-from armtempo.model import frame, shipped, tool_segment, via_table
+from armtempo.model import frame, posture_file, shipped, tool_segment, via_table
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import BASE, TOLERANCE_DEG, TOLERANCE_MM, Pose, from_table
 from armtempo.model.tool_segment import POINTS, ToolSegment
@@ -290,19 +290,19 @@ def _vias(
     Poses and points of arcs are turned into the base.
     """
     default = frame.named(top, arm.frames)
-    listed = arm.given_key(top, "via_deg")
+    listed = posture_file.given_key(top, arm.texts, "via_deg")
     if top.has(listed) == top.has("via"):
         if top.has("via"):
             raise top.misplaced(
                 listed, "leave out this list, or the [[via]] tables: both give the via points"
             )
-        what = f"a list of at least 2 lists of {arm.position_word}s"
-        raise top.fail(arm.list_key("via_deg"), f"{what}, or else [[via]] tables")
+        what = f"a list of at least 2 lists of {arm.texts.position}s"
+        raise top.fail(arm.texts.list_key("via_deg"), f"{what}, or else [[via]] tables")
     stops: list[Stop] = []
     segments: list[ToolSegment] = []
     vias: list[tuple[float, ...] | Pose] = []
     if top.has(listed):
-        rows = top.array(listed, f"a list of at least 2 lists of {arm.position_word}s")
+        rows = top.array(listed, f"a list of at least 2 lists of {arm.texts.position}s")
         named = Table({f"{listed} P{n}": row for n, row in enumerate(rows)}, top.file)
         vias.extend(read_angles(named, f"{listed} P{n}", arm) for n in range(len(rows)))
     else:
@@ -341,11 +341,11 @@ def _stop(table: Table, via: int, count: int) -> Stop:
 def _via(table: Table, name: str, arm: Arm, segment: ToolSegment | None) -> tuple[float, ...] | Pose:
     """A via point; of a pose in the frame ``name``, in the base."""
     where = f"{table.file}: {table.place.removesuffix('.')}"
-    listed = arm.given_key(table, "angles_deg")
+    listed = posture_file.given_key(table, arm.texts, "angles_deg")
     forms = [key for key in (listed, "matrix", "position_mm", "posture") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
-            f"{where}: exactly one of {arm.list_key('angles_deg')}, matrix, position_mm and posture is needed",
+            f"{where}: exactly one of {arm.texts.list_key('angles_deg')}, matrix, position_mm and posture is needed",
             "leave all but one of them out",
         )
     in_frame = forms[0] in ("matrix", "position_mm") or any(table.has(key) for key in POINTS)
@@ -359,7 +359,7 @@ def _via(table: Table, name: str, arm: Arm, segment: ToolSegment | None) -> tupl
         found = read_angles(table, listed, arm)
         _done(table, segment)
         return found
-    near = arm.given_key(table, "posture_deg")
+    near = posture_file.given_key(table, arm.texts, "posture_deg")
     posture = table.numbers(near, len(arm.joints)) if table.has(near) else None
     pose = frame.pose_in_base(from_table(table, where), arm.frames, name, where)
     table.done()

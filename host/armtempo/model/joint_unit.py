@@ -94,14 +94,6 @@ def heads(texts: Mapping[str, str], units: Iterable[JointUnit]) -> dict[str, str
     return {head.replace(DEG.sign, signs): text for head, text in texts.items()}
 
 
-def listed(values: Iterable[str], units: Iterable[JointUnit], gap: str = ", ") -> str:
-    """A list of positions: with one sign for all if they are angles, else each with its own."""
-    given, signs = list(values), [unit.sign for unit in units]
-    if len({*signs}) <= 1:
-        return gap.join(given) + (signs[0] if signs else "")
-    return gap.join(value + sign for value, sign in zip(given, signs, strict=True))
-
-
 NEUTRAL = {
     "angles_deg": "joints",
     "via_deg": "via_joints",
@@ -113,3 +105,47 @@ NEUTRAL = {
 }
 """Keys of lists of joint positions in files and results, and those that say nothing of the unit: each position is in
 its joint's. An arm with a sliding joint has only the latter."""
+
+
+@dataclass(frozen=True)
+class PositionTexts:
+    """How positions of an arm's driven joints are called and written."""
+
+    names: tuple[str, ...]
+    of_joints: tuple[JointUnit, ...]
+    """Their units, (J,)."""
+    sliding: tuple[str, ...]
+    """Names of the arm's sliding joints, with which lists of positions are not all in degrees."""
+
+    @property
+    def units(self) -> str:
+        """The units for the head of a table: "deg", "mm", or "deg or mm"."""
+        return names(self.of_joints)
+
+    @property
+    def unit_words(self) -> str:
+        """The same in words: "degrees", "mm", or "degrees or mm"."""
+        return " or ".join(dict.fromkeys(unit.word for unit in self.of_joints))
+
+    @property
+    def position(self) -> str:
+        """What a position of any of the joints is called: "angle", or "position" if a joint slides."""
+        return (MM if self.sliding else DEG).what
+
+    @property
+    def with_units(self) -> str:
+        """What a list of positions holds, in words."""
+        return ", ".join(
+            f"{name} in {unit.name}" for name, unit in zip(self.names, self.of_joints, strict=True)
+        )
+
+    def list_key(self, name: str) -> str:
+        """The key of a list of positions in files and results, by its name for arms whose joints all turn."""
+        return NEUTRAL[name] if self.sliding else name
+
+    def listed(self, values: Iterable[str], gap: str = ", ") -> str:
+        """Positions (J,) as texts in one: with one sign for all if they are angles, else each with its own."""
+        given, signs = list(values), [unit.sign for unit in self.of_joints]
+        if len({*signs}) <= 1:
+            return gap.join(given) + (signs[0] if signs else "")
+        return gap.join(value + sign for value, sign in zip(given, signs, strict=True))

@@ -16,6 +16,8 @@ from armtempo.model import joint_unit
 from armtempo.model.joint_unit import DEG, JointUnit
 
 LEVELS = ("low", "high")
+PROGRAM = "program"
+AT_POWER_UP = ("nothing", PROGRAM)
 NOTHING = "nothing"
 """What an arm holds that holds no load."""
 _LEAST_LIMIT = 0.001
@@ -352,6 +354,17 @@ class DrivenJoint:
         )
 
     @property
+    def travel_deg(self) -> tuple[float, float]:
+        """Its range, as far as a switch within it lets it go."""
+        switches = dict(self.switches_within)
+        low, high = self.range_deg
+        return switches.get("low", low), switches.get("high", high)
+
+    def end_of_travel(self, side: str) -> str:
+        """What ends its travel on a side, "low" or "high"."""
+        return f"its {side} switch" if side in dict(self.switches_within) else "the end of its range"
+
+    @property
     def steps_per_deg(self) -> float:
         """Steps per degree of the joint: how finely it can be placed. Positions of motors: ``Arm.transmission``."""
         return self.motor.steps_per_deg / self.step_share
@@ -407,4 +420,11 @@ class Safety:
     )
     link_timeout_ms: int = field(
         default=1000, metadata=key("time without a message after which the host counts as lost", 200, 60_000)
+    )
+    at_power_up: str = field(
+        default="nothing",
+        metadata={
+            **key("what starts by itself at power-up: the default, if it is a program", choices=AT_POWER_UP),
+            **json_codec.ADDED,
+        },
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from armtempo_shared.basis import BASIS
@@ -54,11 +54,11 @@ class Search:
     motion time after each start."""
     optimum_s: float
     """After polish: lower bound of the local optimum with the same number of intervals; else 0."""
-    floor_s: float
+    lower_bound_s: float = field(metadata={json_codec.KEY: "floor_s"})
     """Proven lower bound of the motion time over all time laws along this path; for a free path, over all
     paths through the via points."""
-    floor_kind: str
-    """How the lower bound was found, see ``lower_bounds.Floor``."""
+    lower_bound_kind: str = field(metadata={json_codec.KEY: "floor_kind"})
+    """How the lower bound was found, see ``lower_bounds.LowerBound``."""
     starts_s: Array = field(default_factory=lambda: np.empty(0), metadata=json_codec.ADDED)
     """For a gradient search, the motion time of each start on few segments; else empty."""
 
@@ -84,6 +84,7 @@ class Plan:
     """Largest speed, acceleration and jerk of each driven joint, as proven bounds."""
     versions: Mapping[str, str]
     """Versions on which the numbers depend: armtempo, numpy, scipy, Python, processor."""
+    is_sequence: ClassVar[Literal[False]] = False
 
     def __repr__(self) -> str:
         return f"<Plan {self.job.name!r} for {self.arm.name!r}: {len(self.via_deg)} via points, {self.total_s:.3f} s>"
@@ -104,9 +105,24 @@ class Plan:
         return self.trajectory(0.0)
 
     @property
+    def loads(self) -> tuple[str, ...]:
+        """What the tool holds in its motion; "": nothing."""
+        return (self.job.holds,)
+
+    @property
+    def pallets(self) -> tuple[str, ...]:
+        """None: those of the arm that a sequence uses."""
+        return ()
+
+    @property
     def holding(self) -> Arm:
         """The arm with what it holds in this motion."""
         return self.arm.holding(self.job.holds)
+
+    @property
+    def loaded_legs(self) -> list[tuple[Arm, Trajectory]]:
+        """Its one leg, with the arm as it is there."""
+        return [(self.holding, self.trajectory)]
 
     @property
     def total_s(self) -> float:

@@ -17,7 +17,7 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
 from armtempo.model import tool_segment
-from armtempo.model.arm import Arm, read_posture
+from armtempo.model.arm import Arm
 from armtempo.model.job import Job, held, is_name, name_of, read_angles, tool_named
 from armtempo.model.pallet import ArmPallet
 from armtempo.model.plan import Plan
@@ -137,7 +137,7 @@ def _postures(top: Table, arm: Arm) -> dict[str, ArmPosture]:
     for name in own.names():
         if name in found:
             raise InputError(f"{top.file}: posture.{name} already exists", "choose another name")
-        found[name] = read_posture(own, name, arm)
+        found[name] = arm.read_posture(own, name)
     return found
 
 
@@ -245,14 +245,14 @@ class _Reader:
         """A posture given by name or as angles."""
         if not isinstance(table.peek(key), str):
             angles = read_angles(table, key, self.arm)
-            return ArmPosture(self.arm.listed(f"{angle:g}" for angle in angles), angles)
+            return ArmPosture(self.arm.texts.listed(f"{angle:g}" for angle in angles), angles)
         name = table.text(key)
         if name not in self.postures:
             near = did_you_mean(name, self.postures)
             raise InputError(
                 f"{_place(table)}{key} = {name!r}: no such posture{near}",
                 f"known here: {', '.join(sorted(self.postures))}; more with [posture.NAME] "
-                f"{self.arm.list_key('angles_deg')} = [...]",
+                f"{self.arm.texts.list_key('angles_deg')} = [...]",
             )
         return self.postures[name]
 

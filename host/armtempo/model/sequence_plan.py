@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar, Literal
 
 from armtempo_shared import sequence as record
 from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
@@ -97,6 +98,7 @@ class SequencePlan:
     """The tool in each leg, "nothing": none; (): that of ``arm`` in all."""
     pallets: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)
     """The pallets of the arm that it uses."""
+    is_sequence: ClassVar[Literal[True]] = True
 
     def __repr__(self) -> str:
         return f"<SequencePlan {self.name!r} for {self.arm.name!r}: {len(self.rows)} rows, {len(self.legs)} motions>"
@@ -169,7 +171,11 @@ class SequencePlan:
         return plan
 
 
-def load_plan(path: Path | str, altered: bool = False) -> Plan | SequencePlan:
+AnyPlan = Plan | SequencePlan
+"""What is planned, stored and run: both have name, arm, start, legs with their loads, frames, notes and a file."""
+
+
+def load_plan(path: Path | str, altered: bool = False) -> AnyPlan:
     """The plan of a file, of a motion or a sequence; raises as ``Plan.load``."""
     return (SequencePlan if FILE.is_at(Path(path)) else Plan).load(path, altered)
 

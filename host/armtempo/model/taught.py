@@ -19,7 +19,8 @@ from armtempo.model.arm import Arm
 _HEADER = re.compile(r"\s*\[\[?[\w.\"' -]+\]\]?\s*(#.*)?")
 _LIST = r"(?m)^(\s*{key}\s*=\s*)\[[^\]]*\]"
 _POSTURE = "posture"
-_MARK = "\ufeff"
+MARK = "\ufeff"
+"""The mark of the byte order, which some editors write first."""
 _HEAD = """\
 # Via points that were taught with 'armtempo teach'; every key: armtempo help files
 name = "{name}"
@@ -40,7 +41,7 @@ def save(path: Path, arm: Arm, name: str, angles_deg: list[float], replace: bool
         raise InputError(f"posture {name!r}: {problem}", "choose another name")
     if problem := arm.angles_problem(angles_deg):
         raise InputError(f"posture {name!r}: {problem}", "move the arm into its ranges")
-    save_table(path, (_POSTURE, name), {arm.list_key("angles_deg"): angles_deg}, replace)
+    save_table(path, (_POSTURE, name), {arm.texts.list_key("angles_deg"): angles_deg}, replace)
 
 
 def save_table(path: Path, place: tuple[str, str], values: Mapping[str, Any], replace: bool) -> None:
@@ -49,14 +50,14 @@ def save_table(path: Path, place: tuple[str, str], values: Mapping[str, Any], re
     ``place``: kind and name; ``values``: its keys. Raises InputError if the file has it and ``replace`` is false, or
     cannot be read, written, or changed in this one place.
     """
-    text = _text(path)
+    text = read_text(path)
     check_free(path, place, replace)
     replace_text(path, with_table(text, place, values, path), newline="")
 
 
 def names(path: Path, kind: str) -> list[str]:
     """The names of the tables ``[KIND.NAME]`` of a file; raises InputError if it cannot be read."""
-    return list(_parsed(_text(path), path).get(kind, {}))
+    return list(parsed(read_text(path), path).get(kind, {}))
 
 
 def check_free(path: Path, place: tuple[str, str], replace: bool) -> None:
@@ -69,7 +70,8 @@ def check_free(path: Path, place: tuple[str, str], replace: bool) -> None:
         )
 
 
-def _text(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """A file with the ends of its lines as they are; raises InputError if it cannot be read."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             return file.read()
@@ -97,11 +99,11 @@ def with_table(text: str, place: tuple[str, str], values: Mapping[str, Any], pat
     end = "\r\n" if "\r\n" in text else "\n"
     kind, name = place
     written = {key: _value(value) for key, value in values.items()}
-    before = _parsed(text, path)
+    before = parsed(text, path)
     wanted = {**before, kind: {**before.get(kind, {}), name: dict(values)}}
     try:
         changed = _changed(text, place, written, end)
-        same = _content(changed) == wanted
+        same = content(changed) == wanted
     except ValueError:
         same = False
     if not same:
@@ -115,7 +117,7 @@ def with_table(text: str, place: tuple[str, str], values: Mapping[str, Any], pat
 def table_of(path: Path, place: tuple[str, str]) -> dict[str, Any]:
     """The keys of the table ``[KIND.NAME]`` of a file as they are written; none if there is no such table."""
     kind, name = place
-    return dict(_parsed(_text(path), path).get(kind, {}).get(name, {}))
+    return dict(parsed(read_text(path), path).get(kind, {}).get(name, {}))
 
 
 def _value(value: str | float | Sequence[float]) -> str:
@@ -152,7 +154,7 @@ def _place(lines: list[str], kind: str, name: str) -> tuple[int, int] | None:
 
 def _is_whole(lines: list[str]) -> bool:
     try:
-        _content("".join(lines))
+        content("".join(lines))
     except ValueError:
         return False
     return True
@@ -174,13 +176,15 @@ def _replaced(table: list[str], values: Mapping[str, str], end: str) -> list[str
     return [*table[:first], *comments, *_lines(values, end), *table[last + 1 :]]
 
 
-def _content(text: str) -> dict[str, Any]:
-    return tomllib.loads(text.removeprefix(_MARK).replace("\r\n", "\n"))
+def content(text: str) -> dict[str, Any]:
+    """What a TOML text says, whatever its lines end with; raises ValueError if it is none."""
+    return tomllib.loads(text.removeprefix(MARK).replace("\r\n", "\n"))
 
 
-def _parsed(text: str, path: Path) -> dict[str, Any]:
+def parsed(text: str, path: Path) -> dict[str, Any]:
+    """What a TOML text says; raises InputError, with the path, if it is none."""
     try:
-        return _content(text)
+        return content(text)
     except ValueError as error:
         raise InputError(f"{path}: not valid TOML: {error}", "correct that place") from None
 
@@ -200,6 +204,6 @@ def of_points(name: str, points_deg: Sequence[Sequence[float]], arm: Arm) -> str
             f"{len(points_deg)} via point{'' if len(points_deg) == 1 else 's'} are no motion, so no job was written",
             "store at least 2 points with different postures",
         )
-    key = arm.list_key("angles_deg")
+    key = arm.texts.list_key("angles_deg")
     vias = [_VIA.format(key=key, angles=", ".join(f"{angle:.12g}" for angle in row)) for row in points_deg]
     return "".join([_HEAD.format(name=name), *vias])

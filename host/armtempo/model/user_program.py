@@ -21,6 +21,7 @@ from armtempo_shared.sequence import MAX_COUNTERS
 from armtempo.basics import number_table
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
+from armtempo.model import home_switches
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.parts import NOTHING
@@ -45,6 +46,8 @@ class UserProgram:
     counters: dict[str, int]
     pallets: dict[str, int]
     tools: dict[str, int]
+    homes: int = 0
+    """The line in which it homes the arm; 0: it does not."""
 
     @property
     def file(self) -> str:
@@ -81,7 +84,7 @@ class UserProgram:
         except RecursionError:
             raise _too_deep(path) from None
         named = reader.postures, reader.motions, reader.counters, reader.pallets, reader.tools
-        return cls(path.stem, path, source, marked, *named)
+        return cls(path.stem, path, source, marked, *named, reader.homes)
 
 
 def _too_deep(path: Path) -> InputError:
@@ -110,12 +113,15 @@ class _Reader:
     counters: dict[str, int] = field(default_factory=dict)
     pallets: dict[str, int] = field(default_factory=dict)
     tools: dict[str, int] = field(default_factory=dict)
+    homes: int = 0
 
     def read(self, tree: ast.Module) -> None:
         """Check all calls."""
         for node in ast.walk(tree):
             if isinstance(node, ast.Attribute) and _is_name(node.value, self.cell):
                 self._known(node)
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                self._check_import(node)
             if isinstance(node, ast.Call):
                 if isinstance(node.func, ast.Attribute) and _is_name(node.func.value, self.cell):
                     self._known(node.func)
@@ -137,6 +143,12 @@ class _Reader:
 
     def _check(self, node: ast.Call, name: str) -> None:
         given = self._arguments(node, name)
+        if name == "home":
+            try:
+                home_switches.check_board_can_home(self.arm)
+            except InputError as error:
+                raise InputError(f"{self._place(node)}{error.problem}", error.hint) from None
+            self.homes = self.homes or node.lineno
         first = next(iter(given.values()), None)
         if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
             return
@@ -187,8 +199,23 @@ class _Reader:
         found.pop("self")
         return found
 
+    def _check_import(self, node: ast.Import | ast.ImportFrom) -> None:
+        """The board gets this file alone."""
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
+        for name in names:
+            if (self.path.parent / f"{name.partition('.')[0]}.py").is_file():
+                raise InputError(
+                    f"{self._place(node)}the board gets this file alone, not {name}.py beside it",
+                    f"write what it needs of {name}.py into this file",
+                )
+
     def _check_sleep(self, node: ast.Call) -> None:
-        """The board does nothing else while MicroPython's sleep lasts: not even the steps of a motion."""
+        """The board does nothing else while MicroPython's sleep lasts, or ``input`` waits: no steps of a motion."""
+        if _is_name(node.func, "input"):
+            raise InputError(
+                f"{self._place(node)}input() waits for a terminal, which the board does not have",
+                f"wait for an input of the arm file: {self.cell}.wait(name)",
+            )
         if (
             isinstance(node.func, ast.Attribute)
             and node.func.attr in _SLEEPS

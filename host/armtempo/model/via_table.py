@@ -148,7 +148,7 @@ def via_points(
         angles, jumps = _unwound(angles, times, arm, where)
         notes += jumps
     if tolerance_deg is None and times is None:
-        return ImportedPath(angles, len(angles), notes=notes, units=arm.units, neutral=arm.slides)
+        return ImportedPath(angles, len(angles), notes=notes, units=arm.texts.units, neutral=arm.slides)
     return _thinned(angles, times, arm, tolerance_deg, notes, where)
 
 
@@ -159,7 +159,7 @@ def _thinned(
     tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
     _check_ranges(where, angles, arm, 0.5 * tolerance)
     ranges = np.array([joint.range_deg for joint in arm.driven])
-    found = thinning.thinned(angles, tolerance, times_s, ranges, arm.unit_words)
+    found = thinning.thinned(angles, tolerance, times_s, ranges, arm.texts.unit_words)
     for place, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
         if left_out_s:
             notes += (f"{left_out_s:.3g} s of rest at the {place} are left out",)
@@ -169,7 +169,7 @@ def _thinned(
         thinned_to_deg=found.off_deg,
         rests_s=found.rests_s,
         notes=notes,
-        units=arm.units,
+        units=arm.texts.units,
         neutral=arm.slides,
     )
 

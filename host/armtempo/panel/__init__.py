@@ -14,7 +14,8 @@
     move_tab.py, job_tab.py, run_tab.py, sequence_tab.py, board_tab.py
     job_plan.py    the part of the job's tab that makes and plays the plan
     floor.py, homing.py, teaching.py  dialogs of the tab where the arm is moved
-    teach_points.py  its part in which frames and tools are taught
+    targets.py, teach_points.py, names.py  its parts: postures and typed targets; frames and tools that are taught;
+                   what is renamed and removed
     job_editor.py  the job that is edited and planned, and its file
     sequence_editor.py  the sequence that is edited, and its file
     fields.py      fields of these that show the file without losing what is being typed

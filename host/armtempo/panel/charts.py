@@ -46,7 +46,7 @@ class CurveChart:
         self._place = ui.element("div").classes("full-width")
         self._place.set_visibility(False)  # until there is something to show
         with self._place:
-            ui.label(title.replace(DEG.name, arm.units)).classes("text-caption")
+            ui.label(title.replace(DEG.name, arm.texts.units)).classes("text-caption")
             self.chart = ui.echart(options, renderer="svg").classes("armtempo-chart")
 
     def show(self, times_s: Array, values: Array, reference: Array | None = None) -> None:
@@ -57,7 +57,8 @@ class CurveChart:
         if reference is not None:
             series += [self._curve(number, times_s, reference[:, number], of_plan=True) for number in joints]
         self._place.set_visibility(True)
-        self.chart.options["series"] = series
+        # Not as an item of NiceGUI's dictionary, which would watch each of thousands of points, in 20 ms
+        dict.__setitem__(self.chart.options, "series", series)
         self.chart.update()
 
     def mark(self, time_s: float) -> None:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from nicegui import ui
 
+from armtempo.model.home_switches import order
 from armtempo.panel import words
 from armtempo.panel.panel_board import Needs
-from armtempo.robot.homing import order
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage

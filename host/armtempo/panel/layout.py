@@ -195,10 +195,8 @@ def _tabs(page: PanelPage) -> None:
         """Build a tab when it is first shown, so that the first view does not wait for charts and tables."""
         page.shown = name
         if part := parts.pop(name, None):
-            page.built = name
             with places[name]:
-                part(page)
-            page.built = ""
+                page.build(name, lambda: part(page))
         page.refresh()
 
     shown.on_value_change(lambda event: show(event.value))

@@ -303,3 +303,7 @@ window.armtempo = {
   },
 };
 document.body.inert = true; // until the server is heard: a press before would be lost in silence
+{ // what the picture is drawn with, 0.8 MB, comes while the page is built
+  const { imports } = JSON.parse(document.querySelector("script[type=importmap]").textContent);
+  document.head.append(Object.assign(document.createElement("link"), { rel: "modulepreload", href: imports["nicegui-scene"] }));
+}

@@ -127,12 +127,13 @@ class PanelBoard:
         """Whether a board with the program answered."""
         return self._board is not None
 
-    def arm_changed(self, arm: Arm) -> None:
+    def arm_changed(self, arm: Arm, tool: str | None = None) -> None:
         """Take another version of the arm that differs in what the board does not know alone: its postures, workspace,
-        frames and tools. The chosen tool stays if it is still there."""
+        frames and tools. The chosen tool, or another one if it is given, stays if it is still there."""
+        wanted = self.tool if tool is None else tool
         self.jobs.take_arm(arm)
         self.sequences.take_arm(arm)
-        self._put_on(self.tool if self.tool in [one.name for one in arm.tools] else "")
+        self._put_on(wanted if wanted in [one.name for one in arm.tools] else "")
 
     @property
     def tool(self) -> str:

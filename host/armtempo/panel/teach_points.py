@@ -32,8 +32,7 @@ class TeachPoints:
         self._points_deg: list[list[float]] = []
         self._said = ""
         """How accurate the last one is."""
-        with ui.expansion(words.TEACH_POINTS).props("dense").classes("armtempo-expansion"):
-            self._steps()
+        page.expansion(words.TEACH_POINTS, self._steps)
 
     @ui.refreshable_method
     def _steps(self) -> None:

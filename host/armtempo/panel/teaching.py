@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import tomlkit
 from nicegui import ui
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
 from armtempo.model import taught
 from armtempo.model.arm import Arm
 from armtempo.model.pose import to_rpy_deg
-from armtempo.model.posture import name_problem
 from armtempo.model.tool_pose import Pose
 from armtempo.panel import words
 from armtempo.panel.panel_board import Needs
@@ -72,42 +69,6 @@ def ask(page: PanelPage) -> None:
         name = ui.input(words.NAME_OF_POSTURE).props("dense outlined")
         replace = ui.switch(words.REPLACE)
         page.button(words.ADD_TO_JOB, add, Needs.CONTROL)
-        for posture in operator.arm.postures:
-            with ui.row():
-                ui.label(words.plain(posture.name))
-                gone = posture.name
-
-                def remove(press: Press, gone: str = gone) -> None:
-                    operator.check(page.client, press, Needs.CONTROL)
-                    _change(page, gone, None)
-                    asked.dialog.close()
-
-                def rename(press: Press, gone: str = gone) -> None:
-                    operator.check(page.client, press, Needs.CONTROL)
-                    _change(page, gone, str(name.value or "").strip())
-                    asked.dialog.close()
-
-                page.button(words.RENAME_POSTURE, rename, Needs.CONTROL, look="flat dense")
-                page.button(
-                    words.REMOVE, remove, Needs.CONTROL, look="flat dense", name=f"{words.REMOVE} {gone}"
-                )
-
-
-def _change(page: PanelPage, name: str, new: str | None) -> None:
-    """Remove a posture from the arm file, or give it another name; its other lines and comments stay."""
-    file = arm_file(page.operator.arm)
-    content = tomlkit.parse(file.read_text(encoding="utf-8"))
-    postures: Any = content["posture"]
-    found = postures[name]
-    if new is not None:
-        if problem := name_problem(new):
-            raise InputError(f"posture {new!r}: {problem}", "type another name")
-        if new in postures:
-            raise InputError(words.HAS_POSTURE.format(name=new), "type another name")
-        postures[new] = found
-    del postures[name]
-    replace_text(file, tomlkit.dumps(content))
-    read_again(page)
 
 
 def read_again(page: PanelPage) -> None:

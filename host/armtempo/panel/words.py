@@ -71,7 +71,7 @@ TARGET_HINT = "Pressed, a target is shown in the picture; held, the arm moves th
 TEACH, TEACH_HINT = "Store…", "Store where the arm is, under a name in the arm file:"
 STORE, NAME_OF_POSTURE, REPLACE = "Store", "Name", "Replace the posture of this name"
 HAS_POSTURE, REPLACE_HINT = "There is a posture {name!r} already", "switch on ‘Replace’, or type another name"
-TAUGHT, ADD_TO_JOB, RENAME_POSTURE = "Stored: {name}", "Add to the job", "Take the name above"
+TAUGHT, ADD_TO_JOB = "Stored: {name}", "Add to the job"
 TEACH_POINTS, TAUGHT_KINDS = "Teach a frame or a tool", {"frame": "Frame", "tool": "Tool"}
 WHAT_IS_TAUGHT, NAME_OF_TAUGHT, BEGIN, LEVEL = "What is taught", "Name of the frame or tool", "Begin", "Level"
 TAUGHT_HINTS = {
@@ -83,6 +83,17 @@ TEACHING = "{kind} {name}:"
 SURE_REPLACE = "The arm file has a {kind} {name!r} already. It stays until the new one is stored."
 TEACH_ANEW, TAKE_POINT, TAKEN, NEXT = "Teach it anew", "Take this point", "  ✓", "  ← bring the arm there"
 ALL_TAKEN, MORE_POINTS = "All points are taken: store them.", "Take all points first."
+NAMES, NO_NAMES = "Rename or remove postures, frames, tools", "The arm file names none."
+NAMED_KINDS = {"posture": "Posture", "frame": "Frame", "tool": "Tool"}
+SURE_RENAME, SURE_REMOVE_NAME = (
+    "{kind} {name}: give it another name?",
+    "{kind} {name}: remove it from the arm file?",
+)
+USED_BY = (
+    "It is used by {users}: what the arm file says of it follows a new name, other files have to be changed."
+)
+NOT_USED = "Nothing in the project folder uses it."
+TOOL_IS_ON, CHOOSE_NO_TOOL = "The tool {name} is jogged now", "choose another one first"
 OTHER_TOOL = "The other points were taken with another tool: choose that again, or begin anew."
 INTO_RANGE = "move the arm into its ranges"
 BY_HAND = "Guide by hand…"

@@ -1,50 +1,29 @@
-"""Checks of job and arm before planning, and of the plan after it."""
+"""Checks of job and arm before planning, and of the plan after it; board_limits has those of the board."""
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from armtempo_shared import motion
-from armtempo_shared.limits import (
-    LONGEST_SPAN_TICKS,
-    LONGEST_TICKS,
-    MAX_BACKLASH_STEPS,
-    MAX_CROSSING_RATE,
-    MAX_MOTION_BYTES,
-    MAX_SEGMENTS,
-    MAX_STEP_RATE,
-    MAX_STEP_RATE_SUM,
-    MOST_SPAN_STEPS,
-    MOST_STEPS,
-    TICK_HZ,
-)
+from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS, MAX_STEP_RATE_SUM
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.model import drive_limits
 from armtempo.model.arm import Arm
-from armtempo.model.drive_limits import Crossing
 from armtempo.model.job import Job
-from armtempo.model.parts import DrivenJoint, Limits
+from armtempo.model.parts import Limits
 from armtempo.model.tool_pose import TOLERANCE_DEG, TOLERANCE_MM, WHOLE, Pose
+from armtempo.planning import board_limits
 from armtempo.splines import bspline, extremes
 from armtempo.splines.extremes import Extremes
-from armtempo.splines.trajectory import JointSpline, Trajectory
-
-ESTIMATED = "(estimated; 'armtempo selftest' measures your board)"
-
-LONGEST_CROSSING_S = 2.0
-"""Of backlash: real gears take tenths of a second; the board's record can hold twice as long."""
+from armtempo.splines.trajectory import Trajectory
 
 TOLERANCE = 1e-9
 """Allowance for rounding: relative excess over a limit, and excess over a range in degrees."""
-
-COUPLED_AXES = "the arm has coupled joints, whose motors need one time axis for all joints"
-SHARE = 'take timing = "shared" (--timing shared)'
 
 MOVE_VIAS = "move the via points away from the end of the range, or add one where it swings out"
 """Hint of ``check_ranges``."""
@@ -73,53 +52,9 @@ def limits_of(arm: Arm) -> list[Limits]:
             f"arm {arm.name!r}: no joint has a motor, so there is nothing to plan",
             "give at least one joint a motor in the arm file",
         )
-    highest_rates(arm)
-    check_crossings(arm)
+    board_limits.highest_rates(arm)
+    board_limits.check_crossings(arm)
     return limits
-
-
-def highest_rates(arm: Arm) -> list[float]:
-    """The step rate of each motor at its speed limit, steps/s, while it crosses its backlash.
-
-    Raises InputError if the board cannot step that fast.
-    """
-    found = []
-    for motor, crossing in zip(arm.motors, arm.crossings, strict=True):
-        speed_deg_s = motor.limits.speed_deg_s + (crossing.speed_deg_s if crossing else 0.0)
-        rate = speed_deg_s * motor.steps_per_deg
-        if rate > MAX_STEP_RATE:
-            raise InputError(
-                f"arm {arm.name!r}: {motor.name} at its speed limit of {speed_deg_s:g} {motor.unit.name}/s needs "
-                f"{rate:.0f} steps/s; the board supports at most {MAX_STEP_RATE} {ESTIMATED}",
-                "check the unit, lower the limit, or use fewer microsteps",
-            )
-        found.append(rate)
-    return found
-
-
-def check_crossings(arm: Arm) -> None:
-    """Raise InputError if the board cannot cross a motor's backlash while its joint moves."""
-    for motor, crossing in zip(arm.motors, arm.crossings, strict=True):
-        if crossing:
-            _check_crossing(arm, motor, crossing)
-
-
-def _check_crossing(arm: Arm, motor: DrivenJoint, crossing: Crossing) -> None:
-    what = f"arm {arm.name!r}: {motor.name}: {motor.unit.key('backlash_deg')} = {crossing.play_deg:g}"
-    if crossing.duration_s > LONGEST_CROSSING_S:
-        raise InputError(
-            f"{what}: to cross it takes {crossing.duration_s:.2g} s at its limits, more than {LONGEST_CROSSING_S:g} s",
-            "check the unit, and the joint's limits",
-        )
-    steps = crossing.play_deg * motor.steps_per_deg
-    gained_deg_s = motor.limits.acceleration_deg_s2 * crossing.duration_s
-    rate = (min(motor.limits.speed_deg_s, gained_deg_s) + crossing.speed_deg_s) * motor.steps_per_deg
-    if rate > MAX_CROSSING_RATE or steps > MAX_BACKLASH_STEPS:
-        raise InputError(
-            f"{what} is {steps:.0f} steps, and until they are made the motor reaches {rate:.0f} steps/s; the board "
-            f"makes at most {MAX_BACKLASH_STEPS} and {MAX_CROSSING_RATE} steps/s",
-            f"use fewer microsteps, or lower {motor.unit.key('acceleration_deg_s2')}",
-        )
 
 
 _LIMITS = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
@@ -138,7 +73,7 @@ def check_job(arm: Arm, job: Job) -> None:
     """Raise InputError for settings that contradict, or that the board cannot hold."""
     refine = 1 if isinstance(job.refine, str) else job.refine
     if arm.coupling and job.timing != "shared":
-        raise InputError(f"job {job.name!r}: {COUPLED_AXES}", SHARE)
+        raise InputError(f"job {job.name!r}: {board_limits.COUPLED_AXES}", board_limits.SHARE)
     if arm.slides and job.corridor_deg is not None:
         raise InputError(
             f"job {job.name!r}: corridor_deg is of arms whose joints all turn, and {arm.name!r} has a sliding one",
@@ -167,12 +102,6 @@ def check_job(arm: Arm, job: Job) -> None:
             f"{MAX_MOTION_BYTES}",
             "lower refine, use shared timing or fewer via points",
         )
-
-
-def most_segments(arm: Arm, shared: bool = True) -> int:
-    """The most segments of quintic splines, with one of time for each of a path, that the board's record can hold."""
-    sizes = [motion.size(5, len(arm.driven), shared, count, 1) for count in range(1, MAX_SEGMENTS + 1)]
-    return bisect_right(sizes, MAX_MOTION_BYTES)
 
 
 def leads_tool(job: Job) -> bool:
@@ -298,8 +227,8 @@ def check_via(arm: Arm, job: Job, via_deg: Array) -> None:
     if via_deg.ndim != 2 or len(via_deg) < 2 or via_deg.shape[1] != len(arm.driven):
         raise InputError(
             f"job {job.name!r}: needs at least 2 via points with {len(arm.driven)} "
-            f"{arm.position_word}s each, one for each driven joint",
-            f"give each via point all of these {arm.position_word}s",
+            f"{arm.texts.position}s each, one for each driven joint",
+            f"give each via point all of these {arm.texts.position}s",
         )
     if not np.all(np.isfinite(via_deg)):
         raise InputError(
@@ -365,25 +294,9 @@ def check_reached(arm: Arm, reached: tuple[Extremes, ...]) -> None:
                 f"reaches {extreme.values}",
                 "angles and limits are too different in magnitude to compute with",
             )
-    rates = step_rates(arm, reached)
+    rates = board_limits.step_rates(arm, reached)
     if rates > MAX_STEP_RATE_SUM:
-        raise PlanError(format_rate(rates), "lower the speed limits or use fewer microsteps")
-
-
-def step_rates(arm: Arm, reached: tuple[Extremes, ...]) -> float:
-    """Sum of the highest step rates of all motors, steps/s; of coupled joints, as if they were fastest together, and
-    with the crossing of backlash."""
-    speeds: list[float] = arm.transmission.largest_motors_deg([most.speed_deg_s for most in reached]).tolist()
-    extra = [crossing.speed_deg_s if crossing else 0.0 for crossing in arm.crossings]
-    return sum(
-        (speed + more) * joint.motor.steps_per_deg
-        for speed, more, joint in zip(speeds, extra, arm.driven, strict=True)
-    )
-
-
-def format_rate(rates: float) -> str:
-    """Text: a sum of step rates compared with the board's."""
-    return f"the joints together need up to {rates:.0f} steps/s; the board supports {MAX_STEP_RATE_SUM} {ESTIMATED}"
+        raise PlanError(board_limits.format_rate(rates), "lower the speed limits or use fewer microsteps")
 
 
 def check_time(trajectory: Trajectory) -> None:
@@ -394,56 +307,3 @@ def check_time(trajectory: Trajectory) -> None:
                 f"trajectory {trajectory.name!r}: no time axis was found that increases everywhere",
                 "via points, limits and dwells are too different in magnitude to compute with",
             )
-
-
-def check_held(trajectory: Trajectory, arm: Arm) -> None:
-    """Raise PlanError if a control point exceeds the range of the board's integers."""
-    all_steps = motor_points_steps(trajectory, arm)
-    for number, (joint_spline, joint, steps) in enumerate(
-        zip(trajectory.joints, arm.driven, all_steps, strict=True)
-    ):
-        where = f"trajectory {trajectory.name!r}, {joint.name}"
-        if not (number and trajectory.shared):
-            _check_times(where, joint_spline)
-        stands = bool(np.all(steps == steps[0]))
-        if np.max(np.abs(steps)) >= MOST_STEPS or (
-            not stands and _span(steps, joint_spline.degree) >= MOST_SPAN_STEPS
-        ):
-            raise PlanError(f"{where}: more steps than the board can count", "use fewer microsteps")
-
-
-def motor_points_steps(trajectory: Trajectory, arm: Arm) -> list[Array]:
-    """The control points of each motor's spline in steps, (n + degree,); exact, as they are linear in the joints'.
-
-    Raises InputError for coupled joints whose time axes differ.
-    """
-    points = [joint.angle_points_deg for joint in trajectory.joints]
-    if arm.coupling:
-        if not trajectory.shared:
-            raise InputError(f"trajectory {trajectory.name!r}: {COUPLED_AXES}", SHARE)
-        points = [*arm.transmission.motors_deg(np.stack(points, axis=-1)).T]
-    return [of_motor * joint.motor.steps_per_deg for of_motor, joint in zip(points, arm.driven, strict=True)]
-
-
-def _check_times(where: str, joint_spline: JointSpline) -> None:
-    ticks = joint_spline.time_points_s * TICK_HZ
-    if np.max(np.abs(ticks)) >= LONGEST_TICKS:
-        longest_s, reached_s = LONGEST_TICKS / TICK_HZ, ticks.max() / TICK_HZ
-        raise PlanError(
-            f"{where}: lasts {joint_spline.duration_s:.0f} s, its time control points reach {reached_s:.0f} s, "
-            f"the board counts to {longest_s:.0f} s",
-            "mark via points with stop = true and plan with --split, or raise refine",
-        )
-    span = _span(ticks, joint_spline.degree)
-    if span >= LONGEST_SPAN_TICKS:
-        raise PlanError(
-            f"{where}: its time segments are so long that {joint_spline.degree} of them span "
-            f"{span / TICK_HZ:.0f} s, the board holds {LONGEST_SPAN_TICKS / TICK_HZ:.0f} s",
-            "raise refine or add via points",
-        )
-
-
-def _span(points: Array, degree: int) -> float:
-    """Largest distance among the degree + 1 control points of one segment."""
-    segments = np.lib.stride_tricks.sliding_window_view(points, degree + 1)
-    return float(np.max(np.ptp(segments, axis=1)))

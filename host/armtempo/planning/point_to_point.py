@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm
 from armtempo.planning import move_law
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _LEAST_DEG, _LEAST_GAIN = 1e-9, 1e-9
+AHEAD_STEPS = 0.5 - 1.0 / 128.0
+"""By how much of a step a move by hand begins ahead of where its motors stand. A step comes where the position passes
+half a step, so that the first one comes after a quarter of the time: the distance rises with the third power of that.
+The board takes starts up to half a step away."""
+_OFF_STEPS = 0.25
+"""A posture that is further from whole steps may have been rounded by the board to other ones."""
 
 
 def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, speed: float = 1.0) -> Trajectory:
@@ -31,6 +37,33 @@ def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, spee
     )
 
 
+def check_switches(start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm) -> None:
+    """Raise PlanError if a joint on its way between two postures (J,) runs into a switch within its range."""
+    for joint, start, end in zip(arm.driven, np.asarray(start_deg), np.asarray(end_deg), strict=True):
+        low, high = joint.travel_deg
+        if end < min(low, start) or end > max(high, start):
+            side, at_deg = ("low", low) if end < low else ("high", high)
+            raise PlanError(
+                f"{joint.name} would go to {end:g} {joint.unit.word}, beyond its {side} switch, which stops it at "
+                f"{at_deg:g}",
+                f"stay on this side of it, or correct {joint.unit.key(f'{side}_deg')} in its [switches]",
+            )
+
+
+def ahead(start_deg: Array, end_deg: Array, arm: Arm) -> float:
+    """The part of the way from one posture (J,), at which the motors stand, to another that a move begins ahead.
+
+    No motor is then further than AHEAD_STEPS from where it stands; 0 for a way of a step or less.
+    """
+    here, there = arm.transmission.steps([start_deg, end_deg])
+    way = there - here
+    off = here - np.rint(here)
+    moving = way != 0.0
+    if not np.any(np.abs(way) > 1.0) or np.any(np.abs(off) > _OFF_STEPS):
+        return 0.0
+    return float(np.min((AHEAD_STEPS - np.sign(way) * off)[moving] / np.abs(way)[moving]))
+
+
 def backwards(trajectory: Trajectory, name: str) -> Trajectory:
     """The reversed motion; every joint starts at time 0."""
     return Trajectory(name, tuple(_backwards(joint) for joint in trajectory.joints), trajectory.shared)
@@ -47,7 +80,7 @@ def posture(angles_deg: ArrayLike, arm: Arm) -> Array:
         ) from None
     if found.shape != (len(arm.driven),):
         raise InputError(
-            f"a posture of arm {arm.name!r} has {len(arm.driven)} {arm.position_word}s, not {found.size}",
+            f"a posture of arm {arm.name!r} has {len(arm.driven)} {arm.texts.position}s, not {found.size}",
             "give one for each joint with a motor",
         )
     found = np.array(arm.placed(found))

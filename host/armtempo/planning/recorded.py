@@ -13,7 +13,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan, Search
-from armtempo.planning import checks, lower_bounds, planner, workspace_check
+from armtempo.planning import board_limits, checks, lower_bounds, planner, workspace_check
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
 
@@ -65,7 +65,7 @@ def plan(
     via_deg = np.einsum("c,scj->sj", bspline.basis(DEGREE)[0, :-1], via)
     job = Job(name, via_deg=via_deg.tolist(), path="through", timing="shared", refine=1, optimiser=GRADIENT)
     moving = np.flatnonzero(np.ptp(points, axis=0) > checks.TOLERANCE)
-    floor = lower_bounds.of_path(
+    bound = lower_bounds.of_path(
         points[:, moving], DEGREE, [limits[joint] for joint in moving], trajectory.duration_s
     )
     search = Search(
@@ -76,10 +76,10 @@ def plan(
         evaluations=1,
         history_s=np.array([trajectory.duration_s]),
         optimum_s=0.0,
-        floor_s=floor.time_s,
-        floor_kind=floor.kind,
+        lower_bound_s=bound.time_s,
+        lower_bound_kind=bound.kind,
     )
-    kept = f"follows the recording on its own times, within {off_deg:.2g} {arm.units} at its points"
+    kept = f"follows the recording on its own times, within {off_deg:.2g} {arm.texts.units} at its points"
     long = checks.long_ways(arm, angles_deg, [f"{time:g} s" for time in times_s])
     return Plan(arm, job, via_deg, (kept, *notes, *long), trajectory, (search,), reached, planner.versions())
 
@@ -116,7 +116,7 @@ def _fits(arm: Arm, times: Array, angles: Array, tolerance_deg: float) -> list[_
     segments = max(int(np.ceil(times[-1] / _COARSEST_S)), 2)
     off_deg = np.inf
     found: list[_Fit] = []
-    most = checks.most_segments(arm)
+    most = board_limits.most_segments(arm)
     while segments <= most and len(found) < _CANDIDATES:
         inside = 0.0
         for _ in range(_TRIES):
@@ -133,8 +133,8 @@ def _fits(arm: Arm, times: Array, angles: Array, tolerance_deg: float) -> list[_
     if found:
         return found
     raise PlanError(
-        f"a spline from rest to rest stays {off_deg:.2g} {arm.unit_words} from the recording, {tolerance_deg:g} are "
-        "allowed",
+        f"a spline from rest to rest stays {off_deg:.2g} {arm.texts.unit_words} from the recording, "
+        f"{tolerance_deg:g} are allowed",
         "record from rest to rest within the ranges, give a larger --tolerance-deg, or cut it into several",
     )
 

@@ -21,7 +21,7 @@ from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import SourceMotion, Step
 from armtempo.model.tool import ArmTool
 from armtempo.model.tool_pose import BASE, Pose
-from armtempo.planning import checks, pallet_places, planner, via_points, workspace_check
+from armtempo.planning import board_limits, checks, pallet_places, planner, via_points, workspace_check
 from armtempo.planning.pallet_places import Place
 from armtempo.splines.trajectory import Trajectory
 
@@ -311,7 +311,7 @@ class _Compiler:
         return self._motions[id(motion)]
 
     def _listed(self, angles: Angles) -> str:
-        return self.arm.listed(f"{round(angle, 3) + 0.0:g}" for angle in angles)
+        return self.arm.texts.listed(f"{round(angle, 3) + 0.0:g}" for angle in angles)
 
     def _target(self, step: kinds.Goto) -> _Place:
         target = step.target
@@ -383,7 +383,7 @@ class _Compiler:
         self._check_tool(self.arm.with_tool(source.tool).tool, where)
         job = replace(source, holds=source.holds or self._holds)
         planned = planner.plan(self.arm, job, self.progress)
-        checks.check_held(planned.trajectory, self.arm)
+        board_limits.check_held(planned.trajectory, self.arm)
         told = checks.hardware_notes(self.arm)
         self.notes.extend(f"{job.name}: {note}" for note in planned.notes if note not in told)
         return planned.trajectory

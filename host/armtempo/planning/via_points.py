@@ -202,8 +202,8 @@ def _spread(setup: _Setup, via: tuple[float, ...], where: str) -> Array:
     """All joints, the driven ones at the angles of a via point."""
     if len(via) != setup.driven.sum():
         raise InputError(
-            f"{where}: {len(via)} {setup.arm.position_word}s, but {setup.driven.sum()} joints have a motor",
-            f"give one {setup.arm.position_word} for each of them",
+            f"{where}: {len(via)} {setup.arm.texts.position}s, but {setup.driven.sum()} joints have a motor",
+            f"give one {setup.arm.texts.position} for each of them",
         )
     posture = setup.home.copy()
     posture[setup.driven] = np.radians(via)
@@ -244,9 +244,9 @@ def _searched(
 def _preferred(setup: _Setup, posture_deg: tuple[float, ...], where: str) -> Array:
     if len(posture_deg) != len(setup.home):
         raise InputError(
-            f"{where}: {setup.arm.list_key('posture_deg')} has {len(posture_deg)} "
-            f"{setup.arm.position_word}s, not {len(setup.home)}",
-            f"give one {setup.arm.position_word} for each joint of the arm",
+            f"{where}: {setup.arm.texts.list_key('posture_deg')} has {len(posture_deg)} "
+            f"{setup.arm.texts.position}s, not {len(setup.home)}",
+            f"give one {setup.arm.texts.position} for each joint of the arm",
         )
     return np.radians(posture_deg)
 

@@ -324,6 +324,6 @@ def _refused(arm: Arm, trajectory: Trajectory, touch: Touch, place: str) -> Plan
         )
     return PlanError(
         f"{trajectory.name}: {touch.description} ({place})",
-        f"add or move a via point, take another branch with {arm.list_key('posture_deg')}, or correct [workspace] in "
-        "the arm file",
+        f"add or move a via point, take another branch with {arm.texts.list_key('posture_deg')}, or correct "
+        "[workspace] in the arm file",
     )

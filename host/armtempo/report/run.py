@@ -164,7 +164,3 @@ class Run:
         Raises RunFolderError if a motion is not known or nothing was recorded, MissingPackageError without matplotlib.
         """
         return run_report.write(self.path)
-
-
-SequenceRun = Run
-"""An earlier name, of a run of a sequence."""

@@ -128,6 +128,9 @@ class BoardState:
     """None if none was started since the board's start."""
     tool: ToolPlace | None = None
     """None if the arm or a position is not known."""
+    said: str = ""
+    """The last text that the board sent and nobody took: a program's failure, or why the button or the power-up started
+    nothing."""
     erasures: dict[str, int] = field(default_factory=dict)
     """Of a virtual board: how often each sector of its flash was erased; a chip's is good for 10 000."""
 
@@ -236,8 +239,17 @@ def read(client: Client, port: str) -> BoardState:
             for number, (steps, counts) in enumerate(pairs, 1)
         ),
         sequence=_sequence(client),
+        said=_said(client),
         erasures=_erasures(port) if info.virtual else {},
     )
+
+
+def _said(client: Client) -> str:
+    from armtempo.link.board_messages import Notice
+    from armtempo.link.refusal import describe_notice
+
+    texts = [event.text for event in client.session.events if isinstance(event, Notice)]
+    return describe_notice(texts[-1]) if texts else ""
 
 
 def _erasures(port: str) -> dict[str, int]:

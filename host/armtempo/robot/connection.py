@@ -13,8 +13,7 @@ from armtempo.encoding.encode import arm_record
 from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
 from armtempo.model.arm import Arm
-from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
+from armtempo.model.sequence_plan import AnyPlan
 from armtempo.robot import arm_state, stop_request
 from armtempo.robot.goto import StartPosition
 from armtempo.robot.stop_request import StopRequest
@@ -42,7 +41,7 @@ class Connection:
         arm_state.configure(self.client, arm, replace)
         self.arm = arm
 
-    def configure_for(self, plan: Plan | SequencePlan) -> None:
+    def configure_for(self, plan: AnyPlan) -> None:
         """Set the board up for the arm of a plan, as ``configure``; InputError if a frame has changed since."""
         if self.arm is None or arm_record(self.arm) != arm_record(plan.arm):
             self.configure(plan.arm)
@@ -50,9 +49,9 @@ class Connection:
         planned_for.check_surroundings(f"plan {plan.name!r}", plan, self.arm)
         self.configure(self.arm)  # it may have postures and frames that the plan's arm has not
 
-    def encoded(self, what: Plan | SequencePlan | Encoded, name: str | None = None) -> Encoded:
+    def encoded(self, what: AnyPlan | Encoded, name: str | None = None) -> Encoded:
         """Encode a plan for the board, which is set up for its arm; ``name``: as ``encoded_sequence.encoded``."""
-        if not isinstance(what, Plan | SequencePlan):
+        if not isinstance(what, AnyPlan):
             self.configure(what.arm)
             return what
         found = encoded_sequence.encoded(what, name)

@@ -14,14 +14,13 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_motion
-from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
-from armtempo.encoding.encoded_sequence import Encoded, EncodedSequence
+from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Followed, MotionFollower
 from armtempo.model.arm import Arm
-from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan, load_plan
+from armtempo.model.sequence_plan import AnyPlan, load_plan
 from armtempo.planning import point_to_point, via_points, workspace_check
 from armtempo.ports.names import is_sim
 from armtempo.robot import arm_state
@@ -29,7 +28,7 @@ from armtempo.robot.running import follow, put_once, raise_fault
 from armtempo.robot.stop_request import StopRequest
 from armtempo.splines.trajectory import Trajectory
 
-Where = Plan | SequencePlan | Encoded | Path | str | ArrayLike
+Where = AnyPlan | Encoded | Path | str | ArrayLike
 """A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
 (or of its file) or sequence."""
 _NAME = "goto"
@@ -69,14 +68,16 @@ def go_to(
 
 def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Trajectory:
     """The motion from one posture (J,) to another; errors as in ``go_to``."""
+    target = point_to_point.posture(target_deg, arm)
     if not pace.line:
-        found = point_to_point.straight(_NAME, here_deg, target_deg, arm, pace.speed)
+        begin_deg = here_deg + point_to_point.ahead(here_deg, target, arm) * (target - here_deg)
+        found = point_to_point.straight(_NAME, begin_deg, target, arm, pace.speed)
+        point_to_point.check_switches(here_deg, target, arm)
         workspace_check.tell_start(arm, here_deg)
         workspace_check.check(arm, found, outwards=True)
         return found
     from armtempo.planning import planner  # imported here, because it loads everything that plans
 
-    target = point_to_point.posture(target_deg, arm)
     trajectory = planner.straight_line(arm, here_deg.tolist(), target.tolist())
     return replace(planner.slower(trajectory, pace.speed), name=_NAME)
 
@@ -148,7 +149,7 @@ def posture_deg(where: Where, arm: Arm) -> Array:
     """
     if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
         where = load_plan(where)
-    if isinstance(where, Plan | SequencePlan | EncodedMotion | EncodedSequence):
+    if isinstance(where, AnyPlan | Encoded):
         start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
         return point_to_point.posture(start_deg, where.arm)
     if isinstance(where, str):

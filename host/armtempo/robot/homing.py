@@ -20,8 +20,10 @@ from armtempo.basics.errors import InputError, LinkError
 from armtempo.encoding import encoded_motion
 from armtempo.link import Client
 from armtempo.link.follow import MotionFollower
+from armtempo.model import home_switches
 from armtempo.model.arm import Arm
-from armtempo.model.parts import DrivenJoint, Limits
+from armtempo.model.home_switches import HomeSwitch
+from armtempo.model.parts import Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
 from armtempo.robot.running import follow, put_once, raise_fault
@@ -29,34 +31,6 @@ from armtempo.robot.stop_request import StopRequest
 
 HomingProgress = Callable[[str, int, int], object]
 """Called with what happens now or was seen, by joint; how many joints are at home, and how many are homed."""
-FAST, SLOW = 0.2, 0.04
-"""Fractions of the joint's limits in the first and in the second approach."""
-BACK_DEG = 3.0
-"""Distance by which a joint backs off from its switch; here and below in mm of a sliding one."""
-MARGIN_DEG = 5.0
-"""How far beyond its range and its switch's angle a joint goes on for it: it may have stood beyond the other end."""
-MOST_PRESSED_DEG = 12.0
-"""Farthest that a joint is taken to have been beyond its switch."""
-_TOLERANCE_DEG = 0.1
-"""A motion that stops this close to its end was not stopped by a switch; more than a step of any joint."""
-
-
-@dataclass(frozen=True)
-class _Switch:
-    """Position of a joint's switch."""
-
-    side: int
-    """-1 at the low end of the range, 1 at the high end."""
-    trip_deg: float
-    edge_deg: float
-    """The end of the range on that side."""
-    far_deg: float
-    """The other end."""
-
-    @property
-    def outside_deg(self) -> float:
-        """Distance beyond the range at which it trips."""
-        return max(0.0, self.side * (self.trip_deg - self.edge_deg))
 
 
 def silent(text: str, done: int, whole: int) -> None:
@@ -77,7 +51,9 @@ def home_to_switches(
     ends it, Stopped after a stop request.
     """
     wanted = range(len(arm.driven)) if joint is None else arm.transmission.group(joint)
-    groups = [{index: group[index] for index in group if index in wanted} for group in _groups(arm)]
+    groups = [
+        {index: group[index] for index in group if index in wanted} for group in home_switches.groups(arm)
+    ]
     groups = [group for group in groups if group]
     _check_coupled(arm, {index for group in groups for index in group})
     if not groups:
@@ -119,31 +95,6 @@ def _check_coupled(arm: Arm, fitted: set[int]) -> None:
             )
 
 
-def _groups(arm: Arm) -> list[dict[int, _Switch]]:
-    """Joints (from 0, among the driven ones) that are homed together, in order, with their switches."""
-    switches = {joint.name: (index, _switch(joint)) for index, joint in enumerate(arm.driven)}
-    named = [name for group in arm.homing for name in group]
-    groups = [*arm.homing, *((name,) for name in switches if name not in named)]
-    found = [[switches[name] for name in group if name in switches] for group in groups]
-    fitted = [{index: switch for index, switch in group if switch is not None} for group in found]
-    return [group for group in fitted if group]
-
-
-def order(arm: Arm) -> list[tuple[str, ...]]:
-    """Names of the joints that are homed by switches, those that are homed together in an entry."""
-    return [tuple(arm.driven[index].name for index in group) for group in _groups(arm)]
-
-
-def _switch(joint: DrivenJoint) -> _Switch | None:
-    low_deg, high_deg = joint.range_deg
-    switches = joint.switches
-    if switches.low is not None and switches.low_deg is not None:
-        return _Switch(-1, switches.low_deg, low_deg, high_deg)
-    if switches.high is not None and switches.high_deg is not None:
-        return _Switch(1, switches.high_deg, high_deg, low_deg)
-    return None
-
-
 @dataclass(frozen=True)
 class _GroupHoming:
     """Homing of some joints together. Distances are positive towards the joint's switch."""
@@ -151,26 +102,23 @@ class _GroupHoming:
     client: Client
     arm: Arm
     stop: StopRequest
-    switches: dict[int, _Switch]
+    switches: dict[int, HomeSwitch]
     found_deg: dict[int, float]
     """Angles of joints that are found, but not declared: their motors turn other joints too."""
     told: _Told
 
     def run(self) -> None:
         """Make both approaches, back off, declare the positions, and move the joints home."""
-        whole = {
-            index: abs(switch.far_deg - switch.edge_deg) + switch.outside_deg + MARGIN_DEG
-            for index, switch in self.switches.items()
-        }
+        whole = {index: switch.farthest_deg for index, switch in self.switches.items()}
         self.told(f"{self._names(whole)}: on the way to the switch")
-        gone_deg = self._approach(whole, FAST)
+        gone_deg = self._approach(whole, home_switches.FAST)
         for index, distance_deg in gone_deg.items():
             sign = self.arm.driven[index].unit.sign
             self.told(
                 f"{self._names([index])}: switch seen after {distance_deg:.1f}{sign}; once more, slowly"
             )
         self._approach_again()
-        away_deg = {index: BACK_DEG + switch.outside_deg for index, switch in self.switches.items()}
+        away_deg = {index: switch.away_deg for index, switch in self.switches.items()}
         self._leave(away_deg)
         for index, distance_deg in away_deg.items():
             switch = self.switches[index]
@@ -187,26 +135,26 @@ class _GroupHoming:
         left = dict.fromkeys(self.switches, 0.0)
         pressed = list(self.switches)
         while pressed:
-            self._leave(dict.fromkeys(pressed, BACK_DEG))
-            moves = self._approach(dict.fromkeys(pressed, 2 * BACK_DEG), SLOW)
+            self._leave(dict.fromkeys(pressed, home_switches.BACK_DEG))
+            moves = self._approach(dict.fromkeys(pressed, 2 * home_switches.BACK_DEG), home_switches.SLOW)
             pressed = []
             for index, distance_deg in moves.items():
-                left[index] += BACK_DEG - distance_deg
-                if distance_deg > 1.5 * BACK_DEG:
+                left[index] += home_switches.BACK_DEG - distance_deg
+                if distance_deg > 1.5 * home_switches.BACK_DEG:
                     raise LinkError(
                         f"{self.arm.driven[index].name}: its limit switch tripped {distance_deg:.2f} "
-                        f"{self.arm.driven[index].unit.word} after it had been left by {BACK_DEG:g}",
+                        f"{self.arm.driven[index].unit.word} after it had been left by {home_switches.BACK_DEG:g}",
                         "check its wiring and that it sits firmly",
                     )
-                if distance_deg < 0.5 * BACK_DEG:
+                if distance_deg < 0.5 * home_switches.BACK_DEG:
                     pressed.append(index)
-            if stuck := [index for index in pressed if left[index] > MOST_PRESSED_DEG]:
+            if stuck := [index for index in pressed if left[index] > home_switches.MOST_PRESSED_DEG]:
                 self._fail_pressed(stuck)
 
     def _fail_pressed(self, stuck: list[int]) -> None:
         levels = ", ".join(f'active = "{self.arm.driven[index].switches.active}"' for index in stuck)
         raise LinkError(
-            f"{self._names(stuck)}: its limit switch is still pressed {MOST_PRESSED_DEG:g} "
+            f"{self._names(stuck)}: its limit switch is still pressed {home_switches.MOST_PRESSED_DEG:g} "
             f"{self.arm.driven[stuck[0]].unit.word} away from where it tripped",
             f"its level is probably inverted: the arm file has {levels}; or it is stuck, or wired to another pin",
         )
@@ -220,7 +168,9 @@ class _GroupHoming:
             for index, distance_deg in moved.items():
                 gone[index] += distance_deg
                 left[index] -= distance_deg
-            missed = [index for index, distance_deg in left.items() if distance_deg <= _TOLERANCE_DEG]
+            missed = [
+                index for index, distance_deg in left.items() if distance_deg <= home_switches.TOLERANCE_DEG
+            ]
             if tripped in left:
                 del left[tripped]
             elif missed:
@@ -229,7 +179,7 @@ class _GroupHoming:
                     f"{self.arm.driven[missed[0]].unit.word}, its range and a margin",
                     "check its wiring, its pin and its level ('active') in the arm file, and where the joint stands",
                 )
-            elif max(moved.values()) <= _TOLERANCE_DEG:
+            elif max(moved.values()) <= home_switches.TOLERANCE_DEG:
                 raise LinkError(
                     f"{self._names(left)}: a switch of another joint stops it",
                     "check the wiring of the switches",
@@ -242,7 +192,7 @@ class _GroupHoming:
         moves = {}
         for index, distance_deg in left.items():
             switch = self.switches[index]
-            step_deg = min(distance_deg, abs(switch.far_deg - switch.edge_deg))
+            step_deg = min(distance_deg, switch.span_deg)
             moves[index] = (switch.edge_deg - switch.side * step_deg, switch.edge_deg)
         ends, tripped = self._move(moves, fraction)
         return {index: abs(end_deg - moves[index][0]) for index, end_deg in ends.items()}, tripped
@@ -252,7 +202,7 @@ class _GroupHoming:
         for index, distance_deg in distances_deg.items():
             switch = self.switches[index]
             moves[index] = (switch.edge_deg, switch.edge_deg - switch.side * distance_deg)
-        self._move(moves, FAST)
+        self._move(moves, home_switches.FAST)
 
     def _declare(self, found: list[int]) -> None:
         """Declare that joints are at the angles that were found for them."""
@@ -264,9 +214,11 @@ class _GroupHoming:
     def _go_home(self, found: list[int]) -> None:
         stands_deg = self._posture_deg()
         moves = {index: (stands_deg[index], self.arm.driven[index].home_deg) for index in found}
-        ends, _ = self._move(moves, FAST)
+        ends, _ = self._move(moves, home_switches.FAST)
         stopped = [
-            index for index, end_deg in ends.items() if abs(end_deg - moves[index][1]) > _TOLERANCE_DEG
+            index
+            for index, end_deg in ends.items()
+            if abs(end_deg - moves[index][1]) > home_switches.TOLERANCE_DEG
         ]
         if stopped:
             raise LinkError(

@@ -18,7 +18,7 @@ from armtempo.encoding.encoded_sequence import Encoded, EncodedSequence
 from armtempo.link.board_messages import SequenceState
 from armtempo.link.follow import MotionFollower, SequenceFollower, SequenceWatcher
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan, load_plan
+from armtempo.model.sequence_plan import AnyPlan, SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, by_of_joint, move_of, number_of_joint
@@ -161,7 +161,7 @@ class Motions:
 
     def run(
         self,
-        motion: Plan | SequencePlan | Encoded | Path | str,
+        motion: AnyPlan | Encoded | Path | str,
         repeat: int = 1,
         out: Path | str = "runs",
         progress: Progress | None = None,
@@ -183,9 +183,7 @@ class Motions:
             raise InputError(f"repeat: {repeat} is not in the range 1<=x<={MOST_REPETITIONS}", "change it")
         if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
             motion = load_plan(motion)
-        if isinstance(motion, SequencePlan | EncodedSequence) or (
-            isinstance(motion, str) and self._is_sequence(motion)
-        ):
+        if self._is_sequence(motion) if isinstance(motion, str) else motion.is_sequence:
             if repeat != 1 or progress is not None:
                 raise InputError(
                     "run: a sequence takes no repeat or progress", "leave them out; its steps repeat it"
@@ -249,7 +247,7 @@ class Motions:
 
     def _run_sequence(
         self,
-        sequence: SequencePlan | EncodedSequence | str,
+        sequence: AnyPlan | Encoded | str,
         on_state: SequenceWatcher,
         stop: StopRequest | None,
         replace: bool,
@@ -295,7 +293,7 @@ class Motions:
     def _take_start(self, encoded: Encoded, stop: StopRequest) -> None:
         """Move a virtual arm to its start; raises LinkError if a real arm is not there."""
         name, advice = repr(encoded.name), "move it there with 'armtempo goto'"
-        if not isinstance(encoded, EncodedMotion):
+        if encoded.is_sequence:
             name, advice = f"sequence {name}", f"{advice} and the sequence's file"
         self._board.start.take(encoded.arm, encoded.start_deg, name, advice, stop)
 
@@ -360,7 +358,7 @@ class Motions:
         """Continue along the path at the speed before the pause; raises BoardError if nothing moves."""
         change_speed(self._board.client, RESUME)
 
-    def _motion(self, what: Plan | EncodedMotion | Path | str) -> EncodedMotion:
+    def _motion(self, what: AnyPlan | Encoded | Path | str) -> EncodedMotion:
         """The motion for a board that is set up for its arm."""
         plan = (
             load_plan(what)
@@ -368,11 +366,11 @@ class Motions:
             else what
         )
         found = self._store.read(plan) if isinstance(plan, str) else self._board.encoded(plan)
-        if isinstance(found, EncodedMotion):
-            return found
-        raise InputError(
-            f"{what} is a sequence, not a motion", "record it with 'armtempo run' or run_sequence"
-        )
+        if found.is_sequence:
+            raise InputError(
+                f"{what} is a sequence, not a motion", "record it with 'armtempo run' or run_sequence"
+            )
+        return found
 
     def _default(self) -> str:
         for entry in self._board.client.stored():

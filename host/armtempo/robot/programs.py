@@ -18,6 +18,7 @@ from armtempo.link.board_messages import Notice, SequenceState
 from armtempo.link.follow import Followed, SequenceFollower, SequenceWatcher
 from armtempo.model.arm import Arm
 from armtempo.model.job import is_name
+from armtempo.model.parts import PROGRAM
 from armtempo.model.user_program import UserProgram
 from armtempo.robot import running
 from armtempo.robot.connection import Connection
@@ -37,6 +38,16 @@ def check_memory(client: Client, encoded: EncodedProgram) -> None:
             f"program {encoded.key.name!r} needs {encoded.heap_bytes} bytes of the board's memory, with this arm "
             f"{free} are free",
             "make it shorter; with the program in the firmware more is free: 'armtempo flash'",
+        )
+
+
+def check_default(encoded: EncodedProgram) -> None:
+    """Raise InputError for a default that is to start at power-up, but does not home the arm."""
+    if encoded.arm.safety.at_power_up == PROGRAM and not encoded.program.homes:
+        raise InputError(
+            f'{encoded.program.path}: the arm file says at_power_up = "{PROGRAM}", but it does not home the arm, so '
+            "that nothing would start",
+            "begin it with cell.home(), or take the line out of the arm file",
         )
 
 
@@ -84,6 +95,8 @@ class Programs:
         """
         if not isinstance(program, EncodedProgram):
             program = self.encode(program, self._board.known_arm())
+        if default:
+            check_default(program)
         self._board.configure(program.arm)
         check_memory(self._board.client, program)
         key = store(self._board.client, program.records, progress, replace)
@@ -114,7 +127,7 @@ class Programs:
         """Run a program, or the stored program of that name; returns its last state.
 
         A stored one is refused if what it or its motions were made with has changed since. ``listener`` is called with
-        each line that it prints, ``watcher`` with each new state. The arm must be homed.
+        each line that it prints, ``watcher`` with each new state. The arm must be homed, unless the program homes it.
         Raises as ``upload``, and BoardError if a fault ends it; its traceback went to ``listener``.
         """
         with self._board.stoppable(stop) as wanted:

@@ -19,7 +19,6 @@ from armtempo.link import Client
 from armtempo.link.board_messages import RowBegun, Sample
 from armtempo.link.follow import Followed, MotionFollower, RunEnd, SequenceFollower, number_in_run
 from armtempo.model import arm_json
-from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequenceRow
 from armtempo.report import run_folder
 from armtempo.report.run_folder import (
@@ -64,8 +63,8 @@ class ProgressWatcher(Watcher):
 
     def on_sample(self, sample: Sample, duration_s: float) -> None:
         if self._progress is not None:
-            before_s = self._ended * duration_s
-            self._progress(before_s + sample.path_ticks / TICK_HZ, self._repetitions * duration_s)
+            done_s = min(sample.path_ticks / TICK_HZ, duration_s)  # the board ends at a whole tick
+            self._progress(self._ended * duration_s + done_s, self._repetitions * duration_s)
         self._inner.on_sample(sample, duration_s)
 
     def end(self, repetition: Repetition) -> None:
@@ -86,7 +85,7 @@ def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFol
         if plan is None:
             arm_json.save(arm, path / run_folder.ARM)
         else:
-            plan.save(path / (run_folder.TRAJECTORY if isinstance(plan, Plan) else run_folder.SEQUENCE))
+            plan.save(path / (run_folder.SEQUENCE if encoded.is_sequence else run_folder.TRAJECTORY))
         folder.write()
     return folder
 
@@ -105,7 +104,7 @@ class Recorder:
         self._folder = folder
         self._file = file
         self._watcher = watcher
-        self._sequence = bool(encoded.rows)
+        self._sequence = encoded.is_sequence
         self._legs_s = [math.nan, *(motion.trajectory.duration_s for motion in encoded.motions)]
         self._begun_s = client.session.clock()
         self._row_of_run: dict[int, int] = {}  # of each run that was reported and may have more samples
@@ -143,7 +142,7 @@ def repetition(client: Client, encoded: Encoded, folder: RunFolder, watcher: Wat
 
     If neither ``end`` nor ``end_rows`` is called, it was interrupted, or its connection is broken.
     """
-    with folder.begin_repetition(with_rows=bool(encoded.rows)) as file:
+    with folder.begin_repetition(with_rows=encoded.is_sequence) as file:
         yield Recorder(client, encoded, folder, file, watcher)
     watcher.end(file.repetition)
 

@@ -163,8 +163,8 @@ def sample_json(sample: Sample, arm: Arm | None) -> dict[str, Any]:
         found["joints"] = [joint.name for joint in arm.driven]
         if arm.slides:
             found["units"] = [joint.unit.name for joint in arm.driven]
-        found[arm.list_key("commanded_deg")] = gears.angles_of_steps(steps).tolist()
-        found[arm.list_key("angle_deg")] = [
+        found[arm.texts.list_key("commanded_deg")] = gears.angles_of_steps(steps).tolist()
+        found[arm.texts.list_key("angle_deg")] = [
             angle if seen else None for angle, seen in zip(angles, gears.measured, strict=True)
         ]
     return found

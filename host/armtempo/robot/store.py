@@ -18,8 +18,7 @@ from armtempo.link import Client
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
-from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan, load_plan
+from armtempo.model.sequence_plan import AnyPlan, SequencePlan, load_plan
 from armtempo.robot.connection import Connection
 
 _KINDS = {sequence.MAGIC[:KIND_BYTES]: "sequence", program.MAGIC[:KIND_BYTES]: "program"}
@@ -35,7 +34,7 @@ class BoardStore:
 
     def upload(
         self,
-        motion: Plan | SequencePlan | Encoded | Path | str,
+        motion: AnyPlan | Encoded | Path | str,
         name: str | None = None,
         default: bool = False,
         progress: Progress | None = None,

@@ -14,6 +14,7 @@ from armtempo.model.tool_pose import BASE
 from armtempo.panel import layout, words
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.panel_board import PanelBoard
+from nicegui import ui
 
 from tests.host.panel.fakes import board_state, press
 from tests.host.panel.pages import Page, pages
@@ -113,6 +114,7 @@ def test_the_picture_has_the_tool_and_the_frames(operator: PanelBoard) -> None:
 
 
 def teach(page: Page, kind: str, name: str) -> None:
+    page.unfold(words.TEACH_POINTS)
     page.named(words.WHAT_IS_TAUGHT).value = kind
     page.named(words.NAME_OF_TAUGHT).value = name
     page.press(words.BEGIN)
@@ -185,6 +187,9 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
                 "name": "feed",
                 "arm": operator.arm,
                 "frames": ("tray",),
+                "loaded_legs": (),
+                "loads": (),
+                "pallets": (),
                 "job": type("Job", (), {"name": "feed", "holds": ""}),
                 "total_s": 1.0,
                 "trajectory": None,
@@ -193,7 +198,9 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
         operator.jobs.version,
     )  # type: ignore[arg-type]
     with pages(operator) as page:
+        page.unfold(words.TYPED_TARGET)
         page.named(words.FRAME).value = "tray"
+        operator.jobs.solve()
         before = operator.jobs.vias[0].angles_deg
         text = (tmp_path / "arm.toml").read_text() + "\n[posture.away]\nangles_deg = [0, 0, 0, 0, 10, 0]\n"
         operator.arm_changed(arm_of(tmp_path, text))
@@ -205,9 +212,12 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
         ) + '\n[frame.bin]\nframe = "tray"\nz_mm = 1\n'.replace("z_mm = 1", "position_mm = [0, 0, 1]")
         operator.arm_changed(arm_of(tmp_path, text))
         page.look()
-        page.named("bin x +")
         assert page.named(words.FRAME).value == "tray"
+        page.named(words.FRAME).value = "bin"
+        page.named("bin x +")
+        page.named(words.FRAME).value = "tray"
         assert operator.jobs.plan_is_old
+        operator.jobs.solve()
         assert operator.jobs.vias[0].angles_deg != before
         operator.arm_changed(
             arm_of(tmp_path, text.replace("[frame.tray]", "[frame.table]").replace('"tray"', '"table"'))
@@ -215,6 +225,41 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
         page.look()
         assert page.named(words.FRAME).value != "tray"
         assert page.named(words.FRAME_OF_POSE).value == BASE
+
+
+def test_a_name_is_changed_or_removed_after_a_question_that_says_what_uses_it(
+    operator: PanelBoard, tmp_path: Path
+) -> None:
+    file = tmp_path / "arm.toml"
+    text = file.read_text(encoding="utf-8")
+    (tmp_path / "feed.toml").write_text(JOB)
+    operator.jobs.load(tmp_path / "feed.toml")
+    operator.jobs.set_option("tool", "pen")  # not saved
+    with pages(operator) as page:
+        choose(page, "pen")
+        page.unfold(words.NAMES)
+        page.press("Rename frame tray")
+        assert any("It is used by feed.toml" in said for said in page.texts())
+        page.answer(words.RENAME)  # to the same name
+        assert file.read_text(encoding="utf-8") == text
+        page.named(words.NEW_NAME).value = "plate"
+        page.answer(words.RENAME)
+        assert file.read_text(encoding="utf-8") == text.replace("[frame.tray]", "[frame.plate]")
+        page.press("Rename tool pen")
+        assert any("It is used by feed.toml" in said for said in page.texts())
+        new = [one for one in page.elements(ui.input) if one.props.get("label") == words.NEW_NAME]
+        new[-1].value = "nib"  # of this dialog
+        page.answer(words.RENAME)
+        assert operator.tool == page.named(words.TOOL).value == "nib"  # it stays on the arm
+        page.press("Remove tool nib")
+        page.answer(words.REMOVE)
+        assert operator.tool == "nib"  # which is jogged
+        page.press("Remove frame plate")
+        assert any(words.NOT_USED in said for said in page.texts())
+        page.answer(words.REMOVE)
+        assert not operator.arm.frames
+        assert "Remove frame plate" not in page.names()
+        assert "radius_mm = 8" in file.read_text(encoding="utf-8")
 
 
 def arm_of(folder: Path, text: str) -> Arm:

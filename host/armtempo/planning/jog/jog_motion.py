@@ -191,33 +191,35 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
     assert move.joint is not None
     joint = arm.driven[move.joint]
     end, ends = _end_deg(joint, start[move.joint], move.by)
-    found = move_law.law(abs(end - start[move.joint]), move_law.of_joints([joint.limits], [1.0], speed))
+    there = start.copy()
+    there[move.joint] = end
+    begin = start + point_to_point.ahead(start, there, arm) * (there - start)
+    found = move_law.law(abs(end - begin[move.joint]), move_law.of_joints([joint.limits], [1.0], speed))
     turned = math.copysign(1.0, end - start[move.joint]) * found.distance
     rows = [
-        start[index] + (turned if index == move.joint else np.zeros_like(turned))
+        begin[index] + (turned if index == move.joint else np.zeros_like(turned))
         for index in range(len(arm.driven))
     ]
     return found.trajectory(name, rows), ends
 
 
 def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
-    """The end of a joint's jog, degrees (a whole step, if the range ends it), and why it ends there.
+    """The end of a joint's jog, degrees (a whole step, if its travel ends it), and why it ends there.
 
     InputError if it cannot move that way.
     """
-    low, high = joint.range_deg
+    low, high = joint.travel_deg
     wanted = here + by
     if low <= wanted <= high:
         return wanted, ""
+    at_end = f"{joint.name} is at {joint.end_of_travel('high' if by > 0 else 'low')}"
     edge = min(high, wanted) if by > 0 else max(low, wanted)
     scale = joint.steps_per_deg
     inside = math.floor(edge * scale + 1e-9) / scale if by > 0 else math.ceil(edge * scale - 1e-9) / scale
     end = max(inside, here) if by > 0 else min(inside, here)
     if abs(end - here) * scale < _INSIDE_STEPS:
-        raise InputError(
-            f"{joint.name} is at the end of its range, {end:g} {joint.unit.word}", "jog it the other way"
-        )
-    return end, f"{joint.name} is at the end of its range, {edge:g} {joint.unit.word}"
+        raise InputError(f"{at_end}, {end:g} {joint.unit.word}", "jog it the other way")
+    return end, f"{at_end}, {edge:g} {joint.unit.word}"
 
 
 def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
@@ -248,17 +250,28 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
     """The motion along the line; None if a joint would leave its range, or the tool the line."""
     arm = followed.line.arm
     limits = _line_limits(followed, length, speed)
+    begin = _line_begin(followed, length)
     for parts in LINE_PARTS:
-        law = move_law.law(length, limits, length / parts)
-        angles = followed.at(np.clip(law.at_knots, 0.0, length))
+        law = move_law.law(length - begin, limits, length / parts)
+        angles = followed.at(np.clip(begin + law.at_knots, begin, length))
         points = bspline.fit(angles, DEGREE)
         trajectory = law.trajectory(name, list(points.T))
         if not _within(trajectory, arm):
             return None
-        stray = followed.stray(points, law.distance)
+        stray = followed.stray(points, begin + law.distance)
         if stray.position_mm <= STRAY_MM and stray.rotation_deg <= STRAY_DEG:
             return _slowed(trajectory, arm, speed)
     return None
+
+
+def _line_begin(followed: FollowedLine, length: float) -> float:
+    """Where on the line the motion begins: ahead of where the motors stand (``point_to_point.ahead``)."""
+    arm = followed.line.arm
+    first, second = np.degrees(followed.angles_rad[:2][:, list(arm.driven_indices)])
+    there = first + (second - first) * (length / float(followed.distances[1]))
+    begin = length * point_to_point.ahead(first, there, arm)
+    off = arm.transmission.steps(followed.at(np.array([begin]))[0]) - np.rint(arm.transmission.steps(first))
+    return begin if np.all(np.abs(off) <= 0.5) else 0.0
 
 
 def _line_limits(followed: FollowedLine, length: float, speed: float) -> MoveLimits:
@@ -279,7 +292,7 @@ def _line_limits(followed: FollowedLine, length: float, speed: float) -> MoveLim
 def _within(trajectory: Trajectory, arm: Arm) -> bool:
     powers = np.vander(np.linspace(0.0, 1.0, 9), DEGREE + 1, increasing=True).T
     angles = np.stack([(joint.angle_polynomials @ powers).ravel() for joint in trajectory.joints], axis=1)
-    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    low, high = np.array([joint.travel_deg for joint in arm.driven]).T
     low, high = np.minimum(low, angles[0]), np.maximum(high, angles[0])  # a whole step may lie just beyond
     return bool(np.all(angles >= low - 1e-9) and np.all(angles <= high + 1e-9))
 

@@ -181,7 +181,7 @@ def _check_range(course: Course, distance: float, angles_deg: Array) -> None:
             raise PlanError(
                 f"{course.place(distance)}: {joint.name} reaches the end of its range, {end:g} {joint.unit.word}, so "
                 "the tool cannot follow",
-                f"move the line, or give {course.arm.list_key('posture_deg')} of another branch at its start",
+                f"move the line, or give {course.arm.texts.list_key('posture_deg')} of another branch at its start",
             )
 
 

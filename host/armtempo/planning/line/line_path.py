@@ -15,7 +15,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.planning import checks
+from armtempo.planning import board_limits, checks
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import legs as cut
 from armtempo.planning.line.between import Between
@@ -100,7 +100,7 @@ def _followed(arm: Arm, job: Job, leg: Leg, via_deg: Array) -> Followed:
         raise PlanError(
             f"{leg.name}: along the line the arm comes to P{leg.last} with {arm.driven[worst].name} at "
             f"{found.end_deg[worst]:.4g} {arm.driven[worst].unit.word}, not {via_deg[leg.last, worst]:.4g}",
-            f"give P{leg.last} as a pose, or the {arm.position_word}s of the branch of "
+            f"give P{leg.last} as a pose, or the {arm.texts.position}s of the branch of "
             f"P{leg.first}; or leave line out",
         )
     return found
@@ -143,7 +143,7 @@ def proven_paths(
     """
     legs = cut.of_job(job)
     led = {number: one for number, one in parts.items() if isinstance(one, Led)}
-    most = checks.most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
+    most = board_limits.most_segments(arm) - DWELL_SEGMENTS * sum(stop.dwell_s > 0.0 for stop in job.stops)
     pieces = [
         one.segments if isinstance(one, Between) else _LINE_PIECES * len(leg.tool_segments)
         for leg, (_, one) in zip(legs, sorted(parts.items()), strict=True)

@@ -21,6 +21,7 @@ ROOT = "/flash/armtempo"
 BACKUP_SRAM = 0x2002F000
 """Memory of the emulator's that the chip has not, in the place of the backup SRAM that the emulator has not."""
 RECORD_BYTES = 16384
+GAP_TICKS = 3000
 ROUNDS = 5
 
 began = array("i", [0])
@@ -124,6 +125,48 @@ def costs():
     cost("store", store.Store, ROOT)
     cost("crc32", crc32, bytes(RECORD_BYTES // 4))
     cost("collect", gc.collect)
+    start("jog")
+    start("goto")
+
+
+def start(name):
+    """Of the parts of a start from memory, with the arm of the flash."""
+    from armtempo_board import heap
+    from armtempo_board.memory import Memory
+    from armtempo_board.motion import endpoints, motion_check, rate_check
+    from armtempo_board.stepgen.step_generator import StepGenerator
+    from armtempo_board.storage.once import Once
+    from armtempo_shared import armrecord, engine_memory
+
+    heap.collect_often(16)  # as at a start
+    _, rows, _ = armrecord.unpack(whole(ROOT + "/arm.ata"))[:3]
+    record = whole("%s/%s.atm" % (ROOT, name))
+    once = Once(len(record))
+    once.put(0, len(record), record)
+    say("bytes_" + name, len(record))
+    cost("record_" + name, once.motion, None)
+    motion = once.motion(None)
+    generator = StepGenerator(Memory([engine_memory.GENERATOR_WORDS]))
+    cost("check_" + name, motion_check.check, motion, rows, GAP_TICKS, generator.subintervals)
+    cost("sum_" + name, rate_check.check_sum, motion, rows, 63, generator.subintervals)
+    for is_time, at in (
+        (True, motion.time_offset(0)),
+        (False, motion.angle_offset(0)),
+        (False, motion.angle_offset(1)),
+    ):
+        cost("spline_" + name, motion_check._check_spline, motion, 0, at, motion.segments, is_time)
+    cost("ends_" + name, endpoints.start_offset, motion, 0, 0)
+    cost("duration_" + name, endpoints.duration_ticks, motion)
+    for joint in range(motion.joints):
+        at = endpoints.at_start(motion, joint) // 64
+        cost("load_" + name, generator.load, motion, joint, at, 420, GAP_TICKS)
+        generator.close()
+
+
+def whole(path):
+    """The bytes of a file."""
+    with open(path, "rb") as file:
+        return file.read()
 
 
 def replace():

@@ -79,14 +79,14 @@ def case_a_program_acts_while_a_motion_runs():
 def case_without_a_host_texts_take_little_time():
     def script(world):
         if world.turns == 1:
-            world.host.port.room = 0
+            world.host.port.space = 0
 
     world = World("cell.sleep(1)\nfor i in range(20):\n    print(i)\n", script)
     assert world.start()[0] == "ok"
     try:
         world.execute()
     finally:
-        world.host.port.room = 1 << 30
+        world.host.port.space = 1 << 30
     assert world.stands()[0] == "finished"
     assert world.turns < 80, world.turns
 
@@ -134,6 +134,12 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("goto('nowhere')", "the arm has no posture 'nowhere'; it has away, home, there"),
         ("goto('away')", "goto: joint 2 would leave its range"),
         ("goto([1, 2, 3])", "a posture has 2 angles, not 3"),
+        ("goto(5)", "a posture has 2 angles, not 5"),
+        ("goto([1, 'a'])", "a posture has 2 angles, not [1, 'a']"),
+        ("goto([float('inf'), 0])", "a posture has 2 angles, not [inf, 0]"),
+        ("goto('there', speed='fast')", "speed = 'fast' is not within 0.01 to 1"),
+        ("set('gripper', None)", "output 'gripper': None is not within 0.0 to 1.0"),
+        ("sleep('1')", "'1' s is not within 0 to 3600"),
         ("goto('there', speed=2)", "speed = 2 is not within 0.01 to 1"),
         ("set('gripper', 'shut')", "output 'gripper' has no state 'shut'; it has closed, open"),
         ("set('gripper', 2)", "output 'gripper': 2 is not within 0.0 to 1.0"),
@@ -149,6 +155,7 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("goto([0.1, 0])", "goto is refused: too_long, 100"),
         ("run('back')", "run('back') is refused: wrong_start"),
         ("run('none')", "run('none') is refused: not_found"),
+        ("count('n' * 25)", "count: the name 'nnnnnnnnnnnnnnnnnnnnnnnnn' has not 1 to 24 bytes"),
     ):
         world = World(
             "try:\n    cell.%s\nexcept cell.Error as error:\n    print(error)\n" % call,
@@ -286,6 +293,35 @@ def case_the_button_starts_it_but_not_before_homing():
     assert not world.app.events.notice and not world.said()  # nothing of it for the next host
     world.app.commands.greeted = True
     assert world.stands()[0] == "stopped" and world.turns == 30
+
+
+def case_one_that_homes_the_arm_starts_before_that_and_moves_nothing_else():
+    row = [0, -1, -990, -1000, 2000, 2050, 30, 30, 120, 1]
+    plan = {"fast": TABLE["limits"], "slow": TABLE["limits"], "groups": [[row]]}
+    world = World(
+        "try:\n    cell.goto('there')\nexcept cell.Error as error:\n    print(error)\ncell.home()\n",
+        homing=plan,
+    )
+    world.board.engine.known = 0
+    assert world.start()[0] == "ok"
+    world.board.engine.refusal = (
+        wire.ERROR_CODES["unhomed"],
+        0,
+    )  # the engine's answer to a joint of unknown position
+    world.execute()
+    ending, _, line = world.stands()
+    assert (ending, line) == ("fault", 6), (ending, line)
+    assert world.said()[0] == "goto is refused: unhomed, joint 1", world.said()
+    assert world.said()[1].endswith("home is refused: unhomed, joint 1"), world.said()
+    assert not sequence_rig.runs(world.app) and world.board.engine.known == 0
+    world.host.events.clear()
+    for session, told in ((2, 1), (3, 1)):  # each host that comes learns it, until the fault is cleared
+        assert world.host.hello(session)[0] == "ok"
+        world.host.turn(5)
+        assert len(world.said()) == told * (session - 1), world.said()
+    assert world.host.ask("clear")[0] == "ok" and world.host.hello(4)[0] == "ok"
+    world.host.turn(5)
+    assert len(world.said()) == 2
 
 
 cases.run(globals())

@@ -28,9 +28,9 @@ PLACES = [[10 * number, 20, 10 * number + 1, 21] for number in range(9)]
 
 
 class World:
-    """What goes on around a program: ``script`` is called with it in each turn of the loop."""
+    """What goes on around a program: ``script`` is called with it in each pass of the loop."""
 
-    def __init__(self, source, script=lambda world: None, legs=LEGS):
+    def __init__(self, source, script=lambda world: None, legs=LEGS, **more):
         self.app, self.host = connected()
         self.controller = self.app.controller
         self.board = self.controller.board
@@ -39,7 +39,7 @@ class World:
         self.turns = 0
         for name in sorted(legs):
             assert self.host.upload(name, legs[name])[-1][0] == "ok"
-        table = dict(TABLE)
+        table = dict(TABLE, **more)
         table["motions"] = {name: wire.record_crc(legs[name]) for name in legs}
         self.data = program.pack(ARM_CRC, table, HEAD + source, PLACES)
 

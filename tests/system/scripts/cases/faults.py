@@ -20,7 +20,7 @@ from chip.processor import TICKS_PER_MS
 FLASHES, PROGRAM, HOME, DURATION, FEWER = whole_board.arguments()
 SEED = 20265
 KNOWN = 7
-LEAD_TICKS = 1_680_000
+LEAD_TICKS = 168_000  # of a start with the drivers on
 GO = whole_board.read(FLASHES + "/finish/armtempo/go.atm")
 
 
@@ -46,7 +46,7 @@ class Trial:
 
     def moment(self, end=DURATION):
         """Some time from the start of the counters on."""
-        return self.numbers.randrange(-LEAD_TICKS + 84_000, end)
+        return self.numbers.randrange(-LEAD_TICKS // 2, end)
 
     def end(self, *faults, home=True, alive=False):
         """It has come to rest with one of these faults ("": none, and at home); gives the status.

@@ -272,6 +272,90 @@ def case_before_homing_no_program_starts(world):  # not compiled
     assert told == ["button: error %d" % wire.ERROR_CODES["unhomed"]], told
 
 
+class Switches:
+    """The low switches of the arm that homes itself: it stands at some steps, and inputs fall where they trip."""
+
+    PINS = ("D8", "D9", "D10")
+
+    def __init__(self, world, works=(1, 1, 1)):
+        self.world = world
+        self.trips = [int(steps) for steps in whole_board.read(FLASHES + "/alone/trips").decode().split(",")]
+        self.stood = [trip + 150 for trip in self.trips]
+        self.works = works
+        self.moved = False
+        self.look()
+
+    def stands(self):
+        return [stood + steps for stood, steps in zip(self.stood, self.world.steps())]
+
+    def look(self):
+        for pin, at, trip, works in zip(self.PINS, self.stands(), self.trips, self.works):
+            whole_board.set_level(pin, int(at > trip or not works))
+
+    def until_it_ends(self, ms=60_000):
+        """Nothing is sent to the board; its switches do what they do, until no step was made for a second."""
+        quiet = 0
+        before = self.world.steps()
+        while quiet < 1000:
+            yield
+            self.look()
+            steps = self.world.steps()
+            quiet = quiet + 1 if steps == before else 0
+            self.moved = self.moved or steps != before
+            before = steps
+            ms -= 1
+            assert ms, "it does not end"
+
+
+def case_it_homes_itself_when_powered_and_runs_its_program(world):  # not compiled
+    """Joint 2 first, then the others; where it is at last the pins say, too."""
+    switches = Switches(world)
+    yield from switches.until_it_ends()
+    assert switches.moved
+    yield from world.hello()
+    status = yield from world.status()
+    assert (status["state"], status["fault"], status["known"]) == ("idle", "", 7), status
+    assert status["steps"] == switches.stands(), (status["steps"], switches.stands())
+    assert all(steps > home for steps, home in zip(status["steps"], HOME)), status
+
+
+def case_a_switch_that_never_trips_ends_it_in_words_when_powered(world):  # not compiled
+    switches = Switches(world, (1, 0, 1))
+    yield from switches.until_it_ends()
+    assert switches.moved
+    for session in (1, 2):
+        yield from world.hello(session)
+        status = yield from world.status()
+        assert (status["state"], status["fault"], status["known"]) == ("fault", "program_failed", 0), status
+        (told,) = notices(world)
+        assert "line 2" in told and "no switch of joint 2 tripped" in told, told
+    steps = world.steps()
+    yield from world.ask("clear")
+    yield from switches.until_it_ends()
+    assert world.steps() == steps
+
+
+def case_with_its_button_held_at_power_up_it_does_not_move_when_powered(world):  # not compiled
+    """Nor after a soft reset, nor with its E-stop pressed."""
+    for session in (1, 2):
+        yield from Switches(world).until_it_ends()
+        yield from world.hello(session)
+        status = yield from world.status()
+        assert (status["run"], status["known"], world.steps()) == (0, 0, [0, 0, 0]), status
+        world.press(0)
+        if session == 1:
+            yield from world.ask("leave")
+            yield from world.until(lambda: world.attached)
+            world.type(b"\x04")
+            yield from world.until(lambda: not world.attached)
+    whole_board.set_level("E15", 0)
+    yield from world.wait(100)
+    yield from tap(world)
+    yield from Switches(world).until_it_ends()
+    status = yield from world.status()
+    assert (status["fault"], world.steps()) == ("estop", [0, 0, 0]), status
+
+
 def case_level_present_at_power_up(world):
     yield from ready(world)
     yield from unmoved(world)
@@ -291,6 +375,6 @@ def case_a_failing_start_is_a_fault_not_the_end(world):  # not compiled
 
 for name in cases.wanted(globals()):
     held = (lambda world: world.press()) if "power_up" in name else None
-    flash = FLASHES + ("/stop" if "no_host" in name else "/finish")
+    flash = FLASHES + ("/stop" if "no_host" in name else "/alone" if "when_powered" in name else "/finish")
     whole_board.run(globals()[name], flash, PROGRAM, held)
     print(name)

@@ -1,0 +1,119 @@
+"""The switches by which joints are homed: which, in what order, and how far they are approached and left.
+
+The host drives homing by them (``robot/homing.py``), or the board alone, for a user's program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from armtempo.basics.errors import InputError
+from armtempo.model.parts import DrivenJoint
+
+FAST, SLOW = 0.2, 0.04
+"""Fractions of the joint's limits in the first and in the second approach."""
+BACK_DEG = 3.0
+"""Distance by which a joint backs off from its switch; here and below in mm of a sliding one."""
+MARGIN_DEG = 5.0
+"""How far beyond its range and its switch's angle a joint goes on for it: it may have stood beyond the other end."""
+MOST_PRESSED_DEG = 12.0
+"""Farthest that a joint is taken to have been beyond its switch."""
+TOLERANCE_DEG = 0.1
+"""A motion that stops this close to its end was not stopped by a switch; more than a step of any joint."""
+
+
+class HomedArm(Protocol):
+    """What is needed of an ``Arm``."""
+
+    @property
+    def name(self) -> str:
+        """Of the arm."""
+
+    @property
+    def homing(self) -> tuple[tuple[str, ...], ...]:
+        """Names of joints in the order of homing, those of an entry together."""
+
+    @property
+    def coupling(self) -> tuple[tuple[float, ...], ...]:
+        """Of the joints; () if none are coupled."""
+
+    @property
+    def driven(self) -> tuple[DrivenJoint, ...]:
+        """The joints with a motor."""
+
+
+@dataclass(frozen=True)
+class HomeSwitch:
+    """Position of a joint's switch."""
+
+    side: int
+    """-1 at the low end of the range, 1 at the high end."""
+    trip_deg: float
+    edge_deg: float
+    """The end of the range on that side."""
+    far_deg: float
+    """The other end."""
+
+    @property
+    def span_deg(self) -> float:
+        """The whole range."""
+        return abs(self.far_deg - self.edge_deg)
+
+    @property
+    def outside_deg(self) -> float:
+        """Distance beyond the range at which it trips."""
+        return max(0.0, self.side * (self.trip_deg - self.edge_deg))
+
+    @property
+    def farthest_deg(self) -> float:
+        """Longest approach."""
+        return self.span_deg + self.outside_deg + MARGIN_DEG
+
+    @property
+    def away_deg(self) -> float:
+        """Distance by which it is left at last, into the range."""
+        return BACK_DEG + self.outside_deg
+
+
+def groups(arm: HomedArm) -> list[dict[int, HomeSwitch]]:
+    """Joints (from 0, among the driven ones) that are homed together, in order, with their switches."""
+    switches = {joint.name: (index, _of_joint(joint)) for index, joint in enumerate(arm.driven)}
+    named = [name for group in arm.homing for name in group]
+    listed = [*arm.homing, *((name,) for name in switches if name not in named)]
+    found = [[switches[name] for name in group if name in switches] for group in listed]
+    fitted = [{index: switch for index, switch in group if switch is not None} for group in found]
+    return [group for group in fitted if group]
+
+
+def order(arm: HomedArm) -> list[tuple[str, ...]]:
+    """Names of the joints that are homed by switches, those that are homed together in an entry."""
+    return [tuple(arm.driven[index].name for index in group) for group in groups(arm)]
+
+
+def check_board_can_home(arm: HomedArm) -> None:
+    """Raise InputError if the board cannot home all joints of an arm by itself."""
+    if arm.coupling:
+        raise InputError(
+            f"arm {arm.name!r} has coupled joints: the board cannot home them by itself",
+            "home it from the host: 'armtempo home --switches'",
+        )
+    fitted = {index for group in groups(arm) for index in group}
+    missing = [joint.name for index, joint in enumerate(arm.driven) if index not in fitted]
+    if missing:
+        low, high = arm.driven[0].unit.key("low_deg"), arm.driven[0].unit.key("high_deg")
+        raise InputError(
+            f"{', '.join(missing)}: no limit switch whose angle is known, so the board cannot home arm {arm.name!r} by "
+            "itself",
+            f"give each of them {low} or {high} in its [switches], or home from the host",
+        )
+
+
+def _of_joint(joint: DrivenJoint) -> HomeSwitch | None:
+    low_deg, high_deg = joint.range_deg
+    switches = joint.switches
+    if switches.low is not None and switches.low_deg is not None:
+        return HomeSwitch(-1, switches.low_deg, low_deg, high_deg)
+    if switches.high is not None and switches.high_deg is not None:
+        return HomeSwitch(1, switches.high_deg, high_deg, low_deg)
+    return None

@@ -1,0 +1,114 @@
+"""Names of an arm file: what uses them, giving another one, removing; everything else stays as it is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from armtempo.basics.errors import InputError
+from armtempo.model import arm_names, shipped
+from armtempo.model.arm import Arm
+
+TABLES = """
+# where the tray stands
+[frame.tray]  # mine
+position_mm = [250, 0, 20]
+# measured in May
+
+# the bin is beside it
+[frame.bin]
+frame = "tray"  # of the tray
+position_mm = [0, 100, 0]
+
+[posture.away] # up
+angles_deg = [0, 0, 0, 0, 10, 0]
+
+# a pen
+[tool.pen]
+position_mm = [10, 0, 120]
+"""
+JOB = 'name = "feed"\ntool = "pen"\n[[via]]\nposition_mm = [260, 100, 220]\nframe = "tray"\n[[via]]\nposture = "away"\n'
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    made = tmp_path / "arm.toml"
+    made.write_bytes((shipped.files()["ar4"].read_text(encoding="utf-8") + TABLES).encode())
+    (tmp_path / "feed.toml").write_text(JOB)
+    (tmp_path / "day.toml").write_text('name = "day"\n[[step]]\ngoto = "away"\n[[step]]\ntool = "pen"\n')
+    (tmp_path / "turn.py").write_text('cell.tool("pen")\n')
+    (tmp_path / "broken.toml").write_text('frame = "tray"\n[')
+    return made
+
+
+def test_what_uses_a_name_is_told(file: Path) -> None:
+    expected = {
+        ("frame", "tray"): ["frame.bin", "feed.toml"],
+        ("frame", "bin"): [],
+        ("tool", "pen"): ["day.toml", "feed.toml", "turn.py"],
+        ("posture", "away"): ["day.toml", "feed.toml"],
+    }
+    assert {place: arm_names.users(file, file.parent, *place) for place in expected} == expected
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_another_name_is_given_where_the_file_uses_it(file: Path, end: str) -> None:
+    text = file.read_text(encoding="utf-8").replace("\n", end)
+    file.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    arm = arm_names.rename(file, "frame", "tray", "plate")
+    expected = text.replace("[frame.tray]", "[frame.plate]").replace('frame = "tray"', 'frame = "plate"')
+    assert file.read_bytes() == b"\xef\xbb\xbf" + expected.encode()
+    assert [one.name for one in arm.frames] == ["plate", "bin"]
+    assert Arm.load(file).frames == arm.frames
+    arm_names.rename(file, "tool", "pen", "brush")
+    arm_names.rename(file, "posture", "away", "up")
+    expected = expected.replace("[tool.pen]", "[tool.brush]").replace("[posture.away]", "[posture.up]")
+    assert file.read_bytes() == b"\xef\xbb\xbf" + expected.encode()
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "new", "problem"),
+    [
+        ("frame", "tray", "bin", "there is a frame 'bin' already"),
+        ("frame", "tray", "base", "is the frame of the arm itself"),
+        ("tool", "pen", "nothing", "means no tool"),
+        ("posture", "away", "home", "home_deg"),
+        ("posture", "away", "P1", "via point"),
+        ("posture", "away", "it's", "not a valid name"),
+    ],
+)
+def test_a_name_that_is_not_possible_is_refused(
+    file: Path, kind: str, name: str, new: str, problem: str
+) -> None:
+    before = file.read_bytes()
+    with pytest.raises(InputError, match=problem):
+        arm_names.rename(file, kind, name, new)
+    assert file.read_bytes() == before
+
+
+def test_what_is_removed_goes_with_its_comments_alone(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+    with pytest.raises(InputError, match=r"frame\.bin\.frame: uses the frame 'tray'"):
+        arm_names.remove(file, "frame", "tray")
+    assert file.read_text(encoding="utf-8") == text
+    arm = arm_names.remove(file, "posture", "away")
+    assert not arm.postures
+    assert file.read_text(encoding="utf-8") == text.replace(
+        "[posture.away] # up\nangles_deg = [0, 0, 0, 0, 10, 0]\n\n", ""
+    )
+    arm_names.remove(file, "frame", "bin")
+    assert not arm_names.remove(file, "frame", "tray").frames
+    assert file.read_text(encoding="utf-8").endswith("# a pen\n[tool.pen]\nposition_mm = [10, 0, 120]\n")
+    assert "# the bin is" not in file.read_text(encoding="utf-8")
+
+
+def test_what_is_written_otherwise_is_refused(file: Path) -> None:
+    text = file.read_text(encoding="utf-8").replace("[tool.pen]\n", "[tool]\npen.")
+    file.write_text(text, encoding="utf-8")
+    for call in (
+        lambda: arm_names.remove(file, "tool", "pen"),
+        lambda: arm_names.rename(file, "tool", "pen", "nib"),
+    ):
+        with pytest.raises(InputError, match="cannot be changed here"):
+            call()
+    assert file.read_text(encoding="utf-8") == text
