@@ -15,6 +15,7 @@ from armtempo.diagnosis import drives, figures, torque
 from armtempo.diagnosis.arm_check import check, check_arm
 from armtempo.diagnosis.finding import Level
 from armtempo.kinematics.chain import chains_mm, outline_mm
+from armtempo.kinematics.of_arm import forward
 from armtempo.link.program_version import own_crc
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
@@ -234,6 +235,22 @@ def test_what_looks_wrong_about_a_job(tmp_path: Path, via: str, level: str, said
     _, found = check(shipped.arm_path(), path)
     assert any(said in finding.what and finding.level.value == level for finding in found), found
     assert run_check("--job", path).exit_code == (1 if level == "error" else 0)
+
+
+def test_an_arc_that_the_arm_cannot_follow_is_an_error(tmp_path: Path) -> None:
+    arm = Arm.load("ar4")
+    here = arm.placed([10.0, 20.0, 10.0, 10.0, 40.0, 20.0])
+    x_mm, y_mm, z_mm = forward(arm, here)[:3, 3].tolist()
+    path = tmp_path / "job.toml"
+    for off_mm, errors in ((20.0, 0), (2000.0, 1)):
+        path.write_text(
+            f'name = "j"\n[[via]]\nangles_deg = {list(here)}\n[[via]]\nposition_mm = [{x_mm}, {y_mm + 40}, {z_mm}]\n'
+            f"arc_through_mm = [{x_mm}, {y_mm + 20}, {z_mm + off_mm}]\n"
+        )
+        _, found = check(shipped.find("ar4").path, path)
+        told = [one for one in found if one.where == "job" and one.level.value == "error"]
+        assert len(told) == errors, found
+        assert all("P0 to P1" in one.what for one in told)
 
 
 def test_a_job_is_not_looked_at_before_its_arm_is_right(tmp_path: Path) -> None:

@@ -419,3 +419,26 @@ def test_firmware(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("armtempo.deploy.firmware.write.flash", lambda *_: None)
     assert said("flash", "--image", "folder", "--port", "x") == {"image": "folder", "port": "x"}
     assert Path(said("firmware", "--program", "program")["manifest"]).exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("goto P99 --job {job}", "no via point P99"),
+        ("home P99 --job {job}", "no via point P99"),
+        ("goto 1,2", "has 3 angles, not 2"),
+        ("home 1,2", "has 3 angles, not 2"),
+        ("goto parc", "no posture 'parc'"),
+        ("goto --position nan 0 0", "nan is not a finite number"),
+        ("jog --joint 1 --by nan", "nan is not a finite number"),
+        ("jog --joint 9 --by 1", "drives no joint '9'"),
+        ("speed nan", "nan is not a finite number"),
+    ],
+)
+def test_what_is_wrong_is_said_before_a_port_is_opened(words: str, said: str) -> None:
+    given = words.format(job=shipped.job_path()).split()
+    arm = [] if words.startswith("speed") else ["--arm", str(shipped.arm_path())]
+    result = CliRunner().invoke(main, [*given, *arm, "--port", "nowhere"])
+    assert result.exit_code == 2, result.output
+    assert said in result.output
+    assert "nowhere" not in result.output

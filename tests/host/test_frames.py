@@ -85,6 +85,8 @@ def test_frames_may_be_in_each_other_in_any_order(tmp_path: Path) -> None:
         ("[frame.base]\nposition_mm = [0, 0, 0]", "frame.base: 'base' is the frame of the arm itself"),
         ("[frame.tool]\nposition_mm = [0, 0, 0]", "frame.tool: 'tool' is the frame of its tool"),
         ("[frame.'a b']\nposition_mm = [0, 0, 0]", "frame.a b: the name is not allowed"),
+        ('[frame."a\\nb\\u001b"]\nposition_mm = [0, 0, 0]', r"frame.a\nb\x1b: the name is not allowed"),
+        ('[frame.a]\nposition_mm = [0, 0, 0]\n"b\\nc" = 1', r"frame.a.b\nc: unknown key"),
         ("[frame.a]", "frame.a.position_mm is missing"),
         ("[frame.a]\nposition_mm = [0, 0]", "frame.a.position_mm = [0, 0] is not allowed"),
         ("[frame.a]\nposition_mm = [0, 0, 0]\nrpy = [0, 0, 0]", "frame.a.rpy: unknown key"),

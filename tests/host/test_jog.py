@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.encoding import encode
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
+from armtempo.model.parts import LimitSwitches
 from armtempo.planning import brake_time, move_law, point_to_point
 from armtempo.planning.jog import jog_motion
 from armtempo.planning.jog.jog_motion import JogMove
@@ -149,7 +150,9 @@ def test_a_held_jog_comes_close_to_the_optimum(name: str) -> None:
         assert ratio.max() <= 1.001
 
 
-@pytest.mark.parametrize("name", OPTIMUM_DEG)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "paper")) for name in OPTIMUM_DEG]
+)
 def test_a_held_jog_goes_never_less_far_at_a_higher_speed(name: str) -> None:
     arm = Arm.load(name)
     for joint in range(len(arm.driven)):
@@ -264,6 +267,25 @@ def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
     assert not jog_motion.problem(PAPER, end.tolist(), JogMove(-INF, joint=1))
     back = jog_motion.plan("x", PAPER, end, JogMove(-1.0, joint=1))
     assert back.end_deg[1] == pytest.approx(end[1] - 1.0)
+
+
+def test_no_move_by_hand_goes_on_to_a_switch_within_the_range() -> None:
+    switches = LimitSwitches(low=1, low_deg=-1.0, high="PD0", high_deg=5.0)
+    arm = replace(PAPER, joints=(replace(PAPER.joints[0], switches=switches), *PAPER.joints[1:]))
+    here = on_steps(arm, [0.0, -60.0, 40.0])
+    jog = jog_motion.plan("x", arm, here, JogMove(-30.0, joint=0))
+    assert -1.0 <= jog.end_deg[0] < -1.0 + 1.0 / arm.driven[0].steps_per_deg
+    assert jog.ends == "joint 1 is at its low switch, -1 degrees"
+    with pytest.raises(InputError, match="joint 1 is at its low switch"):
+        jog_motion.plan("x", arm, jog.end_deg, JogMove(-1.0, joint=0))
+    along = jog_motion.plan("x", arm, here, JogMove(-INF, axis="y"))
+    assert along.ends == "joint 1 is at its low switch"
+    assert along.end_deg[0] >= -1.0
+    for start, end in ((0.0, -8.0), (-2.0, -3.0)):
+        with pytest.raises(PlanError, match=f"joint 1 would go to {end:g} degrees, beyond its low switch"):
+            goto.motion(arm, np.array([start, -60, 40]), np.array([end, -60, 40]), goto.MovePace())
+    for start, end in ((0.0, 30.0), (-3.0, -2.0)):  # the other switch is read while homing only
+        goto.motion(arm, np.array([start, -60, 40]), np.array([end, -60, 40]), goto.MovePace())
 
 
 @pytest.mark.slow

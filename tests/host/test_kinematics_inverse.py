@@ -186,8 +186,23 @@ def test_rounded_poses_are_put_right_and_the_first_wrong_one_is_named() -> None:
         armtempo.inverse_many(arm, wrong)
     with pytest.raises(armtempo.InputError, match="are not a list of poses"):
         armtempo.inverse_many(arm, pose)
-    with pytest.raises(armtempo.InputError, match="no closed-form"):
-        armtempo.inverse_many("community", [pose])
+
+
+def test_many_poses_of_an_arm_without_a_closed_form_are_solved_too() -> None:
+    """One with a sliding joint, also out of reach."""
+    arm = armtempo.Arm.load("scara_z")
+    near = np.array(arm.home_deg) + 3.0
+    poses = np.array([armtempo.forward(arm, near), armtempo.forward(arm, near)])
+    poses[1, :3, 3] *= 9.0
+    found = armtempo.inverse_many(arm, poses, near)
+    assert found.angles_deg.shape == (2, 8, 4)
+    assert found.nearest_deg[0] == pytest.approx(near, abs=1e-4)
+    one = armtempo.inverse(arm, poses[0], near)
+    assert np.array(found.angles_deg[0][found.usable[0]]) == pytest.approx(
+        np.array([each.angles_deg for each in one if each.usable]), abs=1e-7
+    )
+    assert not found.usable[1].any()
+    assert np.isnan(found.nearest_deg[1]).all()
 
 
 # the postures that bring the tool to another place

@@ -10,7 +10,6 @@ import sys
 import time
 
 from armtempo_shared import codes, messages, program, sequence
-from armtempo_shared.limits import MAX_NAME
 from armtempo_shared.rest_to_rest import Move, TooLongError
 from armtempo_shared.sequence import MAX_COUNTERS
 from micropython import const
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
 _PERCENT = const(100)
 _MOST_SKIPPED = const(16)
 _SAY_MS = const(500)  # longest wait until a host has taken the text before,
+_LONGEST_ROW = const(120)
 _ALONE_MS = const(20)  # and if none was heard so long
 
 
@@ -262,7 +262,7 @@ class UserProgram(Sequencer):
 
     def count(self, name: str) -> int:
         """Increment a counter."""
-        number = self._command.named(name.encode()[:MAX_NAME], MAX_COUNTERS)
+        number = self._command.named(name.encode(), MAX_COUNTERS)
         if number < 0:
             raise CellError("more than %d counters" % MAX_COUNTERS)
         return self._command.count(number)
@@ -333,5 +333,5 @@ def _traceback(error: "BaseException", file: str) -> "tuple[str, int]":
             line = int(number)
         elif row.startswith((" ", "Traceback")) or not row:
             continue
-        found.append(row)
+        found.append(row[:_LONGEST_ROW])  # what the host is told is cut at its begin
     return "\n".join(found), line

@@ -29,6 +29,11 @@ def visible(text: str) -> str:
     )
 
 
+def on_one_line(text: str) -> str:
+    r"""The same, with line ends escaped too: for names within a sentence."""
+    return visible(text).replace("\n", "\\n")
+
+
 def aligned(rows: Sequence[Sequence[str]], widths: Sequence[int], most: int = 80) -> list[str]:
     """The rows as lines: the first column flush left, the others flush right, with a space between at least.
 

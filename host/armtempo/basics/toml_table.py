@@ -12,7 +12,7 @@ from typing import Any
 
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError
-from armtempo.basics.text import did_you_mean, is_plain, misspelt
+from armtempo.basics.text import did_you_mean, is_plain, misspelt, on_one_line
 
 _REQUIRED: Any = object()
 
@@ -70,7 +70,7 @@ class Table:
 
     def fail(self, key: str, allowed: str) -> InputError:
         """The error for a key, with its value and what is allowed."""
-        name = f"{self.place}{key}"
+        name = f"{self.place}{on_one_line(key)}"
         if key not in self._values:
             return InputError(
                 f"{self.file}: {name} is missing", f"write {name} = {allowed}{self._misspelt(key)}"
@@ -81,7 +81,7 @@ class Table:
     def misplaced(self, key: str, cure: str) -> InputError:
         """The error for a key that may not be given beside the others."""
         value = reprlib.repr(self._values[key])
-        return InputError(f"{self.file}: {self.place}{key} = {value} is not allowed here", cure)
+        return InputError(f"{self.file}: {self.place}{on_one_line(key)} = {value} is not allowed here", cure)
 
     def _misspelt(self, key: str) -> str:
         """A note about a similar key in the table; "" if there is none."""
@@ -188,7 +188,7 @@ class Table:
             return None
         if not isinstance(value, dict):
             raise self.fail(key, "a table")
-        return Table(value, self.file, f"{self.place}{key}.")
+        return Table(value, self.file, f"{self.place}{on_one_line(key)}.")
 
     def named_tables(self, key: str) -> list[tuple[str, Table]]:
         """The tables [key.NAME] with their names, in the order of the file; empty if the key is not given."""
@@ -226,7 +226,8 @@ class Table:
             meant = did_you_mean(key, self._asked).removeprefix("; ")
             known = f"known here: {', '.join(sorted(set(self._asked)))}"
             raise InputError(
-                f"{self.file}: {self.place}{key}: unknown key", f"{meant} {known}" if meant else known
+                f"{self.file}: {self.place}{on_one_line(key)}: unknown key",
+                f"{meant} {known}" if meant else known,
             )
 
 

@@ -34,7 +34,7 @@ from armtempo.new_arm import urdf_reader as reader
 @options.frame
 @click.option(
     "--tolerance-deg",
-    type=float,
+    type=options.FiniteNumber(),
     metavar="DEG",
     help="Leave out lines that change the path by less than DEG, or as many mm of sliding joints. Default for a "
     "table with a column time_s: 0.1.",
@@ -133,7 +133,14 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
     help="csv: degrees (sliding joints mm), one line per time; ros: trajectory_msgs/JointTrajectory in YAML, radians "
     "(metres).",
 )
-@click.option("--rate", type=float, default=100.0, show_default=True, metavar="HZ", help="Points a second.")
+@click.option(
+    "--rate",
+    type=options.FiniteNumber(),
+    default=100.0,
+    show_default=True,
+    metavar="HZ",
+    help="Points a second.",
+)
 @click.option("--frame-id", default="", help="header.frame_id of the ROS message.")
 @options.file(
     "-o",
@@ -235,14 +242,7 @@ def import_urdf(
         "links' shapes",
         f"wrote {out}; add the motors, then: armtempo check --arm {out}",
     ]
-    lines += [
-        f"note: {doubt} A URDF has radians; correct it, or the joint in {out}" for doubt in chain.doubts
-    ]
-    lines += [f"note: {said}" for said in (*chain.narrowed, *chain.unclear)]
-    if chain.couplings:
-        lines.append(
-            f"the URDF's transmissions couple joints: [coupling] in {out} is to be used with the motors"
-        )
+    lines += [f"note: {text}" for text in arm_text.notes(chain, out)]
     if meshes:
         lines.append(f"wrote {len(written)} meshes into {mesh_files.folder_of(out)}")
     if len(chain.joints) > MAX_JOINTS:

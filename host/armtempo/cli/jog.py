@@ -16,7 +16,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.frame import TOOL
 from armtempo.model.tool_pose import BASE
 from armtempo.planning.jog.jog_line import axis_of
-from armtempo.planning.jog.jog_motion import by_of_joint
+from armtempo.planning.jog.jog_motion import by_of_joint, number_of_joint
 from armtempo.ports.names import is_sim
 from armtempo.robot.board import Board
 
@@ -36,13 +36,16 @@ _AXES = click.Choice(["x", "y", "z", "tool-x", "tool-y", "tool-z"])
     metavar="NAME",
     help="Frame whose axes are meant: one of the arm file, or 'tool'.  [default: base]",
 )
-@click.option("--by", type=float, metavar="NUMBER", help="Distance: degrees or mm.")
+@click.option("--by", type=options.FiniteNumber(), metavar="NUMBER", help="Distance: degrees or mm.")
 @click.option(
-    "--to", type=float, metavar="NUMBER", help="With --joint, where to move it, in its unit, instead of --by."
+    "--to",
+    type=options.FiniteNumber(),
+    metavar="NUMBER",
+    help="With --joint, where to move it, in its unit, instead of --by.",
 )
 @click.option(
     "--speed",
-    type=click.FloatRange(1, 100),
+    type=options.FiniteRange(1, 100),
     default=25,
     show_default=True,
     help="Percent of the speed limits.",
@@ -77,8 +80,10 @@ def jog(
     if frame is not None and (joint is not None or "-" in (chosen or "")):
         raise InputError("--frame says whose x, y or z is meant", "for example --frame tray --axis x --by 10")
     arm = resolve.named_arm(given.arm_path)
-    if arm is not None:  # a wrong name is reported before a port is opened
+    if arm is not None:  # what is wrong is reported before a port is opened
         arm.with_tool(tool).holding(holds).frame(BASE if frame in (None, TOOL) else frame)
+        if joint is not None:
+            number_of_joint(arm, joint)
     with resolve.board(given, arm) as board:
         prepare(board, resolve.arm_of_board(board, arm).with_tool(tool).holding(holds), given.replace_arm)
         made_for = board.arm

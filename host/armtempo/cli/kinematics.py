@@ -44,12 +44,12 @@ from armtempo.model.tool_pose import BASE, Pose
 )
 @click.option(
     "--tolerance-mm",
-    type=click.FloatRange(1e-6, 1000.0),
+    type=options.FiniteRange(1e-6, 1000.0),
     help="Distance at which the position counts as reached.  [default: 0.1]",
 )
 @click.option(
     "--tolerance-deg",
-    type=click.FloatRange(1e-6, 180.0),
+    type=options.FiniteRange(1e-6, 180.0),
     help="The same for the orientation.  [default: 0.1]",
 )
 @click.option(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -30,6 +31,24 @@ def not_empty(ctx: click.Context, param: click.Parameter, name: str | None) -> s
     if name is not None and not name.strip():
         raise InputError(f"{param.opts[0]}: the name is empty", "give one, or leave the option out")
     return name
+
+
+class _Finite:
+    """Refuses nan and inf."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        found = super().convert(value, param, ctx)  # type: ignore[misc]
+        if not math.isfinite(found):
+            raise click.BadParameter(f"{value} is not a finite number", ctx, param)
+        return found
+
+
+class FiniteNumber(_Finite, click.types.FloatParamType):
+    """A finite number."""
+
+
+class FiniteRange(_Finite, click.FloatRange):
+    """A finite number in a range."""
 
 
 class TakesNumbers(click.Command):
@@ -147,7 +166,7 @@ altered = click.option(
 speed = click.option(
     "--speed",
     "percent",
-    type=click.FloatRange(1, 100),
+    type=FiniteRange(1, 100),
     default=100.0,
     show_default=True,
     metavar="PERCENT",

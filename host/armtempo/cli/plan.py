@@ -38,13 +38,13 @@ def _refine(ctx: click.Context, param: click.Parameter, value: str | None) -> in
 )
 @click.option(
     "--corridor-deg",
-    type=click.FloatRange(0),
+    type=options.FiniteRange(0),
     metavar="DEG",
     help="Largest distance of a joint from the spline.",
 )
 @click.option(
     "--corridor-mm",
-    type=click.FloatRange(0),
+    type=options.FiniteRange(0),
     metavar="MM",
     help="Largest distance of the tool from the spline.",
 )

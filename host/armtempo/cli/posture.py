@@ -69,16 +69,10 @@ def goto(
     wanted = typed or NamedPosture.of(where[0], given.arm_path, given.altered)
     named = wanted.arm if isinstance(wanted, NamedPosture) else resolve.named_arm(given.arm_path)
     if named is not None:  # what is wrong is reported before a port is opened
-        named.with_tool(tool).holding(holds)
-        if isinstance(wanted, Pose):
-            named.in_base(wanted, frame)
+        _target(wanted, named.with_tool(tool).holding(holds), frame, job_path)
     with resolve.board(given, named) as board:
         arm = resolve.arm_of_board(board, named).with_tool(tool).holding(holds)
-        target: Array | Pose = (
-            wanted.angles_deg(arm, job_path)
-            if isinstance(wanted, NamedPosture)
-            else arm.in_base(wanted, frame)
-        )
+        target = _target(wanted, arm, frame, job_path)
         board.configure(arm, replace=given.replace_arm)
         try:
             with ProgressBar("moving") as progress:
@@ -87,6 +81,13 @@ def goto(
             print_position(board, given.as_json)
             raise
         print_position(board, given.as_json)
+
+
+def _target(wanted: NamedPosture | Pose, arm: Arm, frame: str, job_path: Path | None) -> Array | Pose:
+    """Where to go; raises InputError if the arm has no such place."""
+    return (
+        wanted.angles_deg(arm, job_path) if isinstance(wanted, NamedPosture) else arm.in_base(wanted, frame)
+    )
 
 
 @click.command("home", cls=options.TakesNumbers)
@@ -114,6 +115,8 @@ def home(where: str, switches: bool, joint: str | None, job_path: Path | None, g
             "give the present posture as WHERE, or --switches to move to the limit switches",
         )
     wanted = NamedPosture.of(where, given.arm_path, given.altered)
+    if wanted.arm is not None:  # what is wrong is reported before a port is opened
+        wanted.angles_deg(wanted.arm, job_path)
     with resolve.board(given, wanted.arm) as board:
         arm = resolve.arm_of_board(board, wanted.arm)
         angles_deg = wanted.angles_deg(arm, job_path)
@@ -171,10 +174,7 @@ class NamedPosture:
             return cls(text, plan.arm, plan)
         if not is_named(text):
             _numbers(text)  # a wrong posture is reported before a port is opened
-        arm = resolve.named_arm(arm_path)
-        if arm is not None and is_named(text) and not is_via(text):
-            arm.posture(text)  # the same
-        return cls(text, arm, None)
+        return cls(text, resolve.named_arm(arm_path), None)
 
     def angles_deg(self, arm: Arm, job_path: Path | None) -> Array:
         """Angles in degrees (J,); raises InputError if the text is not a posture or does not fit the arm."""

@@ -16,7 +16,7 @@ from armtempo.robot.shared_board import SharedBoard
 
 
 @click.command("speed")
-@click.argument("percent", type=click.FloatRange(1, 100))
+@click.argument("percent", type=options.FiniteRange(1, 100))
 @options.board()
 def speed(percent: float, given: BoardOptions) -> None:
     """Change the speed of the running motion, in percent.

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from armtempo.basics.errors import InputError
-from armtempo.cli.options import FC
+from armtempo.cli.options import FC, FiniteNumber
 from armtempo.model.pose import from_quaternion
 from armtempo.model.tool_pose import WHOLE, Pose
 
@@ -20,30 +20,42 @@ Four = tuple[float, float, float, float]
 _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--position",
-        type=float,
+        type=FiniteNumber(),
         nargs=3,
         metavar="X Y Z",
         help="Tool position in mm; alone, or with an orientation.",
     ),
     click.option(
-        "--rpy", type=float, nargs=3, metavar="R P Y", help="Roll, pitch, yaw in deg: the whole orientation."
+        "--rpy",
+        type=FiniteNumber(),
+        nargs=3,
+        metavar="R P Y",
+        help="Roll, pitch, yaw in deg: the whole orientation.",
     ),
-    click.option("--quaternion", type=float, nargs=4, metavar="W X Y Z", help="The same as a quaternion."),
     click.option(
-        "--roll", type=float, metavar="DEG", help="Roll in deg; alone or with the pitch (the rest is free)."
+        "--quaternion", type=FiniteNumber(), nargs=4, metavar="W X Y Z", help="The same as a quaternion."
+    ),
+    click.option(
+        "--roll",
+        type=FiniteNumber(),
+        metavar="DEG",
+        help="Roll in deg; alone or with the pitch (the rest is free).",
     ),
     click.option(
         "--pitch",
-        type=float,
+        type=FiniteNumber(),
         metavar="DEG",
         help="Pitch in deg; alone or with roll or yaw, the rest is free.",
     ),
     click.option(
-        "--yaw", type=float, metavar="DEG", help="Yaw in deg; alone or with the pitch, the rest is free."
+        "--yaw",
+        type=FiniteNumber(),
+        metavar="DEG",
+        help="Yaw in deg; alone or with the pitch, the rest is free.",
     ),
     click.option(
         "--approach",
-        type=float,
+        type=FiniteNumber(),
         nargs=3,
         metavar="X Y Z",
         help="Direction of the tool's z axis; rotation about it is free.",

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import ArmtempoError
+from armtempo.basics.errors import ArmtempoError, PlanError
 from armtempo.diagnosis import units
 from armtempo.diagnosis.finding import Finding, error, note, warning
 from armtempo.kinematics import Geometry
@@ -15,6 +15,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import checks, planner, workspace_check
+from armtempo.planning.line import follow, line_path
 
 
 def findings(arm: Arm, path: Path) -> list[Finding]:
@@ -30,7 +31,20 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
         text = "correct that; the rest of the job was not checked"
         return [*suspected, error("job", str(refused), text)]
     poses = [note("job", text, "change the pose, or accept it") for text in notes]
-    return [*suspected, *poses, *_steps(arm, via_deg), *_touching(arm.holding(job.holds), via_deg)]
+    touching = _touching(arm.holding(job.holds), via_deg)
+    return [*suspected, *poses, *_steps(arm, via_deg), *touching, *_lines(arm, job, via_deg)]
+
+
+def _lines(arm: Arm, job: Job, via_deg: Array) -> list[Finding]:
+    """Lines and arcs of the tool that the arm cannot follow, or only near a singular posture."""
+    if not job.tool_segments:
+        return []
+    try:
+        led = line_path.led_legs(arm, job, via_deg)
+    except PlanError as refused:
+        return [error("job", refused.problem, refused.hint)]
+    texts = [text for one in led.values() for text in follow.passed(one.followed)]
+    return [note("job", text, "move the line, or turn the tool differently") for text in texts]
 
 
 def _touching(arm: Arm, via_deg: Array) -> list[Finding]:

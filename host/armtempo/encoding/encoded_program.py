@@ -267,6 +267,7 @@ def _touching(found: EncodedProgram, arm: Arm, tool: str) -> list[str]:
     problems = []
     for here, start, there, end in moves:
         try:
+            point_to_point.check_switches(start, end, arm)
             workspace_check.check(arm, point_to_point.straight("goto", start, end, arm))
         except PlanError as error:
             problems.append(f"between {here} and {there}: {error.problem}")

@@ -37,6 +37,8 @@ _UNUSABLE_RAD = 1e6
 """Larger than the distance of any usable posture."""
 _COST = 2.0
 """Cost (as in ``descent``) of a posture at the limit of both tolerances."""
+_MOST = 8
+"""Number of branches of a closed form, and of solutions of a pose in ``ManySolutions``."""
 _kept: tuple[Arm, PoseSolver] | None = None
 
 
@@ -197,7 +199,7 @@ class ManySolutions:
 
     angles_deg: Array
     """(N, 8, joints): whole turns added to lie in the ranges, nearest to the posture to stay near to; NaN if out of
-    reach."""
+    reach. Without a closed form those of ``inverse``, at most 8, and then NaN."""
     usable: NDArray[np.bool_]
     """(N, 8): within reach and all ranges, and not equal to an earlier one."""
     nearest_deg: Array
@@ -210,26 +212,35 @@ def inverse_many(arm: Arm | Path | str, poses: ArrayLike, near_deg: ArrayLike | 
     for rejection.
 
     ``poses``: (N, 4, 4) or (N, 3, 4), lengths in mm; ``near_deg``, (joints,) or (J,): the posture to stay near to;
-    None: home. Raises InputError for what is not a pose, and for an arm without a closed form.
+    None: home. For an arm without a closed form, such as one with a sliding joint, each pose takes the search of
+    ``inverse``. Raises InputError for what is not a pose.
     """
     arm = Arm.shape(arm)
     geometry, ranges = Geometry.of(arm), Ranges.of(arm)
-    if reasons := refusals(geometry):
-        raise InputError(
-            f"arm {arm.name!r} has no closed-form inverse: {'; '.join(reasons)}",
-            "use armtempo.inverse for each pose",
-        )
+    given = checked_all(poses)
+    if refusals(geometry):
+        return _each(arm, given, near_deg)
     near = np.array(arm.all_home_deg) if near_deg is None else np.asarray(near_deg, dtype=float)
     if near.ndim != 1:
         raise InputError("near_deg must be one posture", "give an angle for each joint")
     near = np.radians(spread_deg(arm, near, "near_deg: "))
-    found = inverse_rad(geometry, checked_all(poses), near)
+    found = inverse_rad(geometry, given, near)
     angles, inside = _placed(ranges, found.angles_rad, near)
     usable = inside & (found.outcome == OK)
     distance = np.where(usable, np.linalg.norm(angles - near, axis=2), np.inf)
     best = angles[np.arange(len(angles)), distance.argmin(axis=1)]
     nearest = np.where(usable.any(axis=1)[:, None], best, np.nan)
     return ManySolutions(np.degrees(angles), usable, np.degrees(nearest))
+
+
+def _each(arm: Arm, poses: Array, near_deg: ArrayLike | None) -> ManySolutions:
+    """The solutions of ``inverse`` for each of the poses (N, 4, 4)."""
+    angles = np.full((len(poses), _MOST, len(arm.joints)), np.nan)
+    usable = np.zeros(angles.shape[:2], dtype=bool)
+    for number, pose in enumerate(poses):
+        for place, one in enumerate(inverse(arm, pose, near_deg)[:_MOST]):
+            angles[number, place], usable[number, place] = one.angles_deg, one.usable
+    return ManySolutions(angles, usable, np.where(usable[:, :1], angles[:, 0], np.nan))
 
 
 def _placed(ranges: Ranges, angles: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -8,7 +8,7 @@ from typing import Any
 from armtempo_shared.limits import MAX_INPUTS, MAX_OUTPUTS
 
 from armtempo.basics.errors import InputError
-from armtempo.basics.text import is_number
+from armtempo.basics.text import is_number, on_one_line
 from armtempo.basics.toml_table import Table
 from armtempo.model.outputs import KINDS, PWM, SERVO, SWITCH, Input, Output
 
@@ -36,7 +36,7 @@ def named(top: Table, key: str, most: int | None = None) -> list[tuple[str, Tabl
     """The tables [key.NAME] of a file, of which the board takes ``most``; raises as ``outputs``."""
     found = top.named_tables(key)
     if most is not None and len(found) > most:
-        raise InputError(f"{top.file}: {len(found)} tables [{key}.NAME]", f"the board has room for {most}")
+        raise InputError(f"{top.file}: {len(found)} tables [{key}.NAME]", f"the board has space for {most}")
     for name, _ in found:
         check_name(f"{top.file}: {key}.{name}", name)
     return found
@@ -46,7 +46,8 @@ def check_name(where: str, name: str) -> None:
     """Raise InputError, which begins with ``where``, for a name that a table may not have."""
     if not _NAME.fullmatch(name):
         raise InputError(
-            f"{where}: the name is not allowed", "choose one of 1 to 24 letters, digits, '-' and '_'"
+            f"{on_one_line(where)}: the name is not allowed",
+            "choose one of 1 to 24 letters, digits, '-' and '_'",
         )
 
 

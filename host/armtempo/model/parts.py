@@ -354,6 +354,17 @@ class DrivenJoint:
         )
 
     @property
+    def travel_deg(self) -> tuple[float, float]:
+        """Its range, as far as a switch within it lets it go."""
+        switches = dict(self.switches_within)
+        low, high = self.range_deg
+        return switches.get("low", low), switches.get("high", high)
+
+    def end_of_travel(self, side: str) -> str:
+        """What ends its travel on a side, "low" or "high"."""
+        return f"its {side} switch" if side in dict(self.switches_within) else "the end of its range"
+
+    @property
     def steps_per_deg(self) -> float:
         """Steps per degree of the joint: how finely it can be placed. Positions of motors: ``Arm.transmission``."""
         return self.motor.steps_per_deg / self.step_share
@@ -412,7 +423,8 @@ class Safety:
     )
     at_power_up: str = field(
         default="nothing",
-        metadata=key(
-            "what starts by itself at power-up: the default, if it is a program", choices=AT_POWER_UP
-        ),
+        metadata={
+            **key("what starts by itself at power-up: the default, if it is a program", choices=AT_POWER_UP),
+            **json_codec.ADDED,
+        },
     )

@@ -15,7 +15,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.planning.collocation import Ratios
 from armtempo.planning.linear_rows import WindowRows
-from armtempo.planning.variables import MotionVariables, angle_basis, time_basis
+from armtempo.planning.variables import MotionVariables, angle_basis, by_differences
 from armtempo.splines.trajectory import by_time
 
 
@@ -58,7 +58,7 @@ class LimitRows:
         self._kinds = [np.flatnonzero(at.kind == kind) for kind in range(3)]
         self._limits = limits[at.joint, at.kind] * at.share
         self._angle_basis = angle_basis(variables.degree, at.points.u)
-        self._time_basis = time_basis(variables.degree, at.points.u)
+        self._time_basis = by_differences(self._angle_basis)
         window = at.points.segment[:, None] + np.arange(variables.degree + 1)
         self._angles = window + (at.joint * variables.angles)[:, None]
         self._times = variables.difference_index[window[:, :-1]]
@@ -102,14 +102,15 @@ class LinearisedLimits:
 
     def __init__(self, windows: WindowRows, weights: Array) -> None:
         self._windows, self._weights = windows, weights
+        self._matrix = windows.matrix(weights)
 
     def forward(self, step: Array) -> Array:
-        change = self._windows.forward(self._weights, step)
+        change = np.asarray(self._matrix @ step)
         return np.concatenate([-change, change])
 
     def backward(self, weights: Array) -> Array:
         upper, lower = np.split(weights, 2)
-        return self._windows.backward(self._weights, lower - upper)
+        return np.asarray(self._matrix.T @ (lower - upper))
 
     def hessian(self, weights: Array, _: Array, __: bool) -> Array:
         """See there, without the second derivatives; the entries are at ``LimitRows.rows`` and ``columns``."""

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.planning.variables import Index
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _CHUNK = 8
 """Rows of the same variables whose products are summed together."""
@@ -18,7 +23,9 @@ class WindowRows:
     """
 
     def __init__(self, size: int, columns: Index, group: Index) -> None:
-        self._size, self._columns = size, columns
+        self._size = size
+        self._indices = columns.ravel().astype(np.int32)
+        self._starts = columns.shape[1] * np.arange(len(columns) + 1, dtype=np.int32)
         order = np.argsort(group, kind="stable")
         starts = np.flatnonzero(np.diff(group[order], prepend=-1))
         place = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
@@ -31,13 +38,11 @@ class WindowRows:
         self.rows = np.repeat(own, width, axis=1).ravel()
         self.columns = np.tile(own, (1, width)).ravel()
 
-    def forward(self, weights: Array, x: Array) -> Array:
-        """The sums: (R,)."""
-        return np.asarray(np.einsum("rw,rw->r", weights, x[self._columns]))
+    def matrix(self, weights: Array) -> csr_array:
+        """The rows: (R, size)."""
+        from scipy.sparse import csr_array  # imported here, because that takes longer than most commands
 
-    def backward(self, weights: Array, of_rows: Array) -> Array:
-        """The sum over all rows with factors (R,): (size,)."""
-        return sum_at(self._columns, weights * of_rows[:, None], self._size)
+        return csr_array((weights.ravel(), self._indices, self._starts), shape=(len(weights), self._size))
 
     def hessian(self, weights: Array, of_rows: Array) -> Array:
         """Sums of the rows' outer products with factors (R,), at ``rows`` and ``columns``."""
@@ -83,7 +88,10 @@ class LinearRows:
         return self._split(self._sums(step), 0.0, 0.0)
 
     def backward(self, weights: Array) -> Array:
-        return sum_at(self._window, self._weights * self._per_row(weights, -1.0)[:, None], self._size)
+        values = self._weights * self._per_row(weights, -1.0)[:, None]
+        return np.bincount(self._window.ravel(), values.ravel(), minlength=self._size).astype(
+            float, copy=False
+        )
 
     def hessian(self, weights: Array, _: Array, __: bool) -> Array:
         """See there; the entries are at ``rows`` and ``columns``."""
@@ -102,8 +110,3 @@ class LinearRows:
         rows[self._lower] = weights[:split]
         rows[self._upper] += sign * weights[split:]
         return rows
-
-
-def sum_at(columns: Index, values: Array, size: int) -> Array:
-    """The sums (size,) of the values at each column; both (R, w)."""
-    return np.bincount(columns.ravel(), values.ravel(), minlength=size).astype(float, copy=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armtempo.basics.errors import InputError
+from armtempo.basics.errors import InputError, PlanError
 from armtempo.model.arm import Arm
 from armtempo.planning import move_law
 from armtempo.splines.bspline import Array
@@ -35,6 +35,19 @@ def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, spee
     return law.trajectory(
         name, [here + (to - here) / longest * law.distance for here, to in zip(start, end, strict=True)]
     )
+
+
+def check_switches(start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm) -> None:
+    """Raise PlanError if a joint on its way between two postures (J,) runs into a switch within its range."""
+    for joint, start, end in zip(arm.driven, np.asarray(start_deg), np.asarray(end_deg), strict=True):
+        low, high = joint.travel_deg
+        if end < min(low, start) or end > max(high, start):
+            side, at_deg = ("low", low) if end < low else ("high", high)
+            raise PlanError(
+                f"{joint.name} would go to {end:g} {joint.unit.word}, beyond its {side} switch, which stops it at "
+                f"{at_deg:g}",
+                f"stay on this side of it, or correct {joint.unit.key(f'{side}_deg')} in its [switches]",
+            )
 
 
 def ahead(start_deg: Array, end_deg: Array, arm: Arm) -> float:

@@ -76,17 +76,23 @@ class MotionVariables:
 def angle_basis(degree: int, u: Array, orders: tuple[int, ...] = (1, 2, 3)) -> Array:
     """Weights of a segment's k + 1 control points in the derivatives at u (P,): (P, orders, k + 1)."""
     matrix = bspline.basis(degree)
-    rows = np.zeros((len(u), len(orders), degree + 1))
+    places, back = np.unique(u, return_inverse=True)  # those of a grid are the same in each segment
+    powers = [places[:, None] ** power for power in range(degree + 1)]
+    rows = np.zeros((len(places), len(orders), degree + 1))
     for number, order in enumerate(orders):
         for power in range(order, degree + 1):
-            rows[:, number] += perm(power, order) * u[:, None] ** (power - order) * matrix[power]
-    return rows
+            rows[:, number] += perm(power, order) * powers[power - order] * matrix[power]
+    return np.asarray(rows[back])
 
 
 def time_basis(degree: int, u: Array) -> Array:
-    """Weights of a segment's k differences in t', t'', t''' at u (P,): (P, 3, k)."""
-    rows = angle_basis(degree, u)
-    return np.asarray(rows[:, :, ::-1].cumsum(axis=2)[:, :, -2::-1])
+    """Weights of a segment's k differences in the first three derivatives of time at u (P,): (P, 3, k)."""
+    return by_differences(angle_basis(degree, u))
+
+
+def by_differences(basis: Array) -> Array:
+    """The weights (..., k + 1) of control points as those of their k differences, (..., k)."""
+    return np.asarray(basis[..., ::-1].cumsum(axis=-1)[..., -2::-1])
 
 
 def time_points(differences: Array, degree: int) -> Array:

@@ -72,6 +72,7 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
     if not pace.line:
         begin_deg = here_deg + point_to_point.ahead(here_deg, target, arm) * (target - here_deg)
         found = point_to_point.straight(_NAME, begin_deg, target, arm, pace.speed)
+        point_to_point.check_switches(here_deg, target, arm)
         workspace_check.tell_start(arm, here_deg)
         workspace_check.check(arm, found, outwards=True)
         return found

@@ -88,21 +88,23 @@ class Layout:
         return rows.equalities()
 
     def _add_angles(self, rows: _Rows, variables: MotionVariables, vias: Vias) -> None:
-        last = len(self.pieces)
-        for via, knot in enumerate(self.arrivals):
+        last, dwells = len(self.pieces), self.dwells
+        value, *rest = (_derivative(order) for order in range(3))
+        controls = [variables.angle_index(joint) for joint in range(variables.joints)]
+        for via, knot in enumerate(self.arrivals.tolist()):
             place = float(knot) + 0.5 * (DEGREE - 1)
             rests = via in (0, last) or via in self.stops
-            for joint in range(variables.joints):
-                control = variables.angle_index(joint)[knot:]
+            for joint, control in enumerate(controls):
                 angle = float(vias.angles[via, joint])
-                if int(knot) in self.dwells:
-                    for offset in range(DWELL_SEGMENTS + DEGREE):
-                        rows.add(control[offset : offset + 1], np.ones(1), angle, float(knot + offset))
+                if knot in dwells:
+                    for point in range(knot, knot + DWELL_SEGMENTS + DEGREE):
+                        rows.add(control[point : point + 1], np.ones(1), angle, float(point))
                     continue
+                own = control[knot : knot + DEGREE]
                 if via not in vias.loose:
-                    rows.add(control[:DEGREE], _derivative(0), angle, place)
-                for order in (1, 2) if rests else (1,) if vias.turning[via, joint] else ():
-                    rows.add(control[:DEGREE], _derivative(order), 0.0, place)
+                    rows.add(own, value, angle, place)
+                for weights in rest if rests else rest[:1] if vias.turning[via, joint] else []:
+                    rows.add(own, weights, 0.0, place)
 
 
 def uniform(vias: int, pieces: int, stops: Mapping[int, float]) -> Layout:

@@ -190,7 +190,7 @@ class ToolLine:
             return _short(found.reason)
         angles = np.array(found.angles_rad)
         if outside := self._outside(angles):
-            return f"{outside} is at the end of its range"
+            return outside
         most = MOST_GAIN * (math.radians(step) if self.about else step / self.reach_mm)
         moved = np.abs(angles - before) * self._parts_of_reach
         worst = int(np.argmax(moved))
@@ -206,13 +206,14 @@ class ToolLine:
         return np.array([SLIDE_MM / self.reach_mm if joint.slides else 1.0 for joint in self.arm.joints])
 
     def _outside(self, angles: Array) -> str:
-        """The first joint within the margin of its range, and nearer than at the start; "" if none."""
+        """Say which joint is within the margin of its travel's end, and nearer than at the start; "" if none is."""
         for index, joint in zip(self.arm.driven_indices, self.arm.driven, strict=True):
             margin = MARGIN_STEPS / joint.steps_per_deg
             angle, start = math.degrees(angles[index]), math.degrees(self._start[index])
-            low, high = (min(joint.range_deg[0] + margin, start), max(joint.range_deg[1] - margin, start))
+            least, most = joint.travel_deg
+            low, high = (min(least + margin, start), max(most - margin, start))
             if not low - 1e-9 <= angle <= high + 1e-9:
-                return joint.name
+                return f"{joint.name} is at {joint.end_of_travel('low' if angle < low else 'high')}"
         return ""
 
     def followed(self, length: float) -> FollowedLine:

@@ -204,23 +204,22 @@ def _joint(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tu
 
 
 def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
-    """The end of a joint's jog, degrees (a whole step, if the range ends it), and why it ends there.
+    """The end of a joint's jog, degrees (a whole step, if its travel ends it), and why it ends there.
 
     InputError if it cannot move that way.
     """
-    low, high = joint.range_deg
+    low, high = joint.travel_deg
     wanted = here + by
     if low <= wanted <= high:
         return wanted, ""
+    at_end = f"{joint.name} is at {joint.end_of_travel('high' if by > 0 else 'low')}"
     edge = min(high, wanted) if by > 0 else max(low, wanted)
     scale = joint.steps_per_deg
     inside = math.floor(edge * scale + 1e-9) / scale if by > 0 else math.ceil(edge * scale - 1e-9) / scale
     end = max(inside, here) if by > 0 else min(inside, here)
     if abs(end - here) * scale < _INSIDE_STEPS:
-        raise InputError(
-            f"{joint.name} is at the end of its range, {end:g} {joint.unit.word}", "jog it the other way"
-        )
-    return end, f"{joint.name} is at the end of its range, {edge:g} {joint.unit.word}"
+        raise InputError(f"{at_end}, {end:g} {joint.unit.word}", "jog it the other way")
+    return end, f"{at_end}, {edge:g} {joint.unit.word}"
 
 
 def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tuple[Trajectory, str]:
@@ -293,7 +292,7 @@ def _line_limits(followed: FollowedLine, length: float, speed: float) -> MoveLim
 def _within(trajectory: Trajectory, arm: Arm) -> bool:
     powers = np.vander(np.linspace(0.0, 1.0, 9), DEGREE + 1, increasing=True).T
     angles = np.stack([(joint.angle_polynomials @ powers).ravel() for joint in trajectory.joints], axis=1)
-    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    low, high = np.array([joint.travel_deg for joint in arm.driven]).T
     low, high = np.minimum(low, angles[0]), np.maximum(high, angles[0])  # a whole step may lie just beyond
     return bool(np.all(angles >= low - 1e-9) and np.all(angles <= high + 1e-9))
 

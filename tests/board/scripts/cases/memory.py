@@ -69,7 +69,7 @@ def case_parts_lie_one_behind_the_other_and_are_0():
     memory = Memory([100], address, 50)
     first, second = memory.take_for_processor(20), memory.take_for_processor(30)
     assert (begin_of(first), begin_of(second)) == (0, 20)
-    assert begin_of(memory.take_for_processor(1)) == -1, "what has no room there comes from the blocks"
+    assert begin_of(memory.take_for_processor(1)) == -1, "what has no space there comes from the blocks"
     for word in range(20):
         assert first[word] == 0
     first[19], second[0] = -(1 << 31), (1 << 31) - 1
