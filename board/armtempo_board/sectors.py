@@ -35,6 +35,11 @@ _ENTRY_BYTES = const(8)
 _SIZE_BIT = const(8)
 _MOST_FUNCTIONS = const(0xFF)
 _LENGTH_BYTES = const(2)
+_INDEX_AT = const(14)  # behind the head and its length
+_PIECE = const(128)  # bytes
+_LONGEST_LINE = const(64)
+_DIGITS = const(6)  # of an offset
+_WORDS = const(2)  # in a line about a module
 _MOST = const(0x40000)
 _RAM = const(0x10000000)  # no address of RAM is below
 _UNALIGNED = const(15)  # bits that no address of memory from the heap has
@@ -42,7 +47,6 @@ _POINT = "/armtempo"
 _PACKAGE = "armtempo_"
 _BEFORE = const(10)  # letters of "/armtempo_"
 _ENDING = ".mpy"
-_LATER = "later"
 _OF_PACKAGE = ".__init__"
 _FOLDER = const(0x4000)
 _REGULAR = const(0x8000)
@@ -98,22 +102,23 @@ def is_whole() -> bool:
     return not wrong & 0xFFFFFFFF
 
 
-def _index() -> bytes:
-    at = _AT + _HEAD_BYTES
-    size = int.from_bytes(bytearray_at(at, _LENGTH_BYTES), "little")
-    return bytes(bytearray_at(at + _LENGTH_BYTES, size))
-
-
 def _find(path: str) -> int:
-    """The address of what is said about a module, 0: a folder; OSError."""
+    """The address of what is said about a module, 0: a folder; OSError.
+
+    In small pieces: a copy of the whole index is 2 KB of garbage, which a word left on the stack by earlier calls may
+    keep in the heap as if it were in use, for as long as the program runs.
+    """
     is_module = path.endswith(_ENDING)
-    name = "\n" + (path[_BEFORE : -len(_ENDING)] + " " if is_module else path[_BEFORE:] + "/")
-    index = _index()
-    begin = index.find(name.encode())
-    if begin < 0:
-        raise OSError(_ENOENT)
-    begin += len(name)
-    return _AT + int(index[begin : index.find(b"\n", begin)]) if is_module else 0
+    text = "\n" + (path[_BEFORE : -len(_ENDING)] + " " if is_module else path[_BEFORE:] + "/")
+    name = text.encode()
+    at = _AT + _INDEX_AT
+    end = at + int.from_bytes(bytearray_at(at - _LENGTH_BYTES, _LENGTH_BYTES), "little")
+    while at < end:
+        found = bytes(bytearray_at(at, min(_PIECE + len(name), end - at))).find(name)
+        if found >= 0:
+            return _AT + int(bytes(bytearray_at(at + found + len(name), _DIGITS))) if is_module else 0
+        at += _PIECE
+    raise OSError(_ENOENT)
 
 
 def load() -> None:
@@ -123,15 +128,19 @@ def load() -> None:
     """
     # What functions of each kind begin with; on a virtual board of 64 bits they cannot be inspected
     kinds = [mem32[id(kind)] for kind in (_swap, _machine_code, _generator)] if not id(_swap) >> 32 else []
-    words = _index().decode().split()
-    for at in range(0, len(words), 2):
-        if words[at] == _LATER:
+    at = _AT + _INDEX_AT + 1
+    while True:
+        line = bytes(bytearray_at(at, _LONGEST_LINE))
+        line = line[: line.find(b"\n")]
+        at += len(line) + 1
+        words = line.decode().split()
+        if len(words) < _WORDS:  # "later", or the end
             break
-        name = _PACKAGE + words[at].replace("/", ".")
+        name = _PACKAGE + words[0].replace("/", ".")
         name = name[: -len(_OF_PACKAGE)] if name.endswith(_OF_PACKAGE) else name
         __import__(name)
         if kinds:
-            _settle(sys.modules[name].__dict__, kinds, _AT + int(words[at + 1]))
+            _settle(sys.modules[name].__dict__, kinds, _AT + int(words[1]))
         gc.collect()
     vfs.umount(_POINT)
     sys.path.remove(_POINT)

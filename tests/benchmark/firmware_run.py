@@ -43,7 +43,7 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.motion import Motion
 from numpy.typing import NDArray
 
-from tests.benchmark import firmware, loop
+from tests.benchmark import firmware, loop_board
 from tests.board import oracle
 from tests.system import commandline
 from tests.system.test_examples import README, command_lines
@@ -51,7 +51,7 @@ from tests.system.test_examples import README, command_lines
 PROBES = ("firmware_loop.py", "firmware_host.py")
 MANIFEST = 'include("$(PORT_DIR)/boards/manifest.py")\n' + "".join(f'module("{name}")\n' for name in PROBES)
 CYCLES = 1.3
-OWN = loop.OWN + 3_100
+OWN = loop_board.OWN + 3_100
 """Bytes of heap for what stands in for hardware, as in loop: what is received takes more."""
 PATIENCE_S = 300.0
 FIRST_COMPARE = 0x40000034
@@ -119,15 +119,17 @@ def flash(folder: Path, elf: Path, with_library: bool, edges: bool = True) -> Pa
     ``edges``: they tell of all edges, and collect the heap then.
     """
     places = firmware.symbols(elf)
-    scale = round(2 * loop._INSTRUCTION_NS / CYCLES)
+    scale = round(2 * loop_board._INSTRUCTION_NS / CYCLES)
     settings: dict[str, Any] = {
         name: places[name] for name in ("allocated", "at_compare", "at_feed", "feed_ticks", "looks_per_ms")
     }
-    settings |= loop.IN_FIRMWARE
+    settings |= loop_board.IN_FIRMWARE
     settings |= {
         "edges": edges,
         "prescaler": scale - 1,
-        "millisecond": round(loop.CORE_HZ / 1000 / CYCLES * loop._INSTRUCTION_NS * loop.CORE_HZ / 1e9),
+        "millisecond": round(
+            loop_board.CORE_HZ / 1000 / CYCLES * loop_board._INSTRUCTION_NS * loop_board.CORE_HZ / 1e9
+        ),
     }
     tree = folder / ("files" if with_library else "no-files")
     files = program_files.start_files()
@@ -157,7 +159,7 @@ def running(elf: Path, image: Path) -> Iterator[tuple[str, list[str]]]:
     with tempfile.NamedTemporaryFile() as cut:
         cut.write(struct.pack("<i", -OWN))
         cut.flush()
-        command = firmware.emulator(elf, image, Path(cut.name), "-icount", f"shift={loop._SHIFT}")
+        command = firmware.emulator(elf, image, Path(cut.name), "-icount", f"shift={loop_board._SHIFT}")
         command += ["-serial", serial]
         said: list[str] = []
         with subprocess.Popen(

@@ -143,6 +143,7 @@ def test_all_code_of_an_image_is_aligned() -> None:
     length = int.from_bytes(data[12:14], "little")
     lines = data[14 : 14 + length].decode().split("\n")[1:]
     needed = lines[: lines.index("later")]
+    assert max(map(len, lines)) < 64, "the board reads lines in pieces of this size"
     assert "board/app/program" in needed[-1]
     assert any(line.startswith("board/app/standalone ") for line in lines)
     found = 0
@@ -219,7 +220,7 @@ def test_program_in_the_firmware_leaves_no_library() -> None:
 @pytest.mark.slow
 def test_full_flash_is_refused() -> None:
     full = replace(BOARD, free_blocks=2)
-    with pytest.raises(LinkError, match="has room for 2; nothing of it is in use") as refused:
+    with pytest.raises(LinkError, match="has space for 2; nothing of it is in use") as refused:
         changes.choose(full, quiet)
     assert "remove" not in refused.value.hint
     mine = replace(full, others={"/flash/notes.txt": 700, "/flash/armtempo/a.atm": 60_000})

@@ -283,6 +283,7 @@ def test_bags_are_read(tmp_path: Path, kind: str, mcap: bool) -> None:
 
 
 # rosbags leaves a file open that it cannot read: closed, with a warning, when the garbage is collected.
+@pytest.mark.slow
 @pytest.mark.filterwarnings(r"ignore:[\s\S]*broken.mcap:pytest.PytestUnraisableExceptionWarning")
 def test_bags_that_will_not_do_are_refused(tmp_path: Path) -> None:
     two = bag(tmp_path / "two", "trajectory_msgs/msg/JointTrajectory", [trajectory(), trajectory()], True)

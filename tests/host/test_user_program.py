@@ -74,6 +74,8 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("cell.set('', 1)\n", 2, "no output ''"),
         ("cell.tool('')\n", 2, "the name of the tool is empty"),
         ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
+        ("\nname = input('which? ')\n", 3, "waits for a terminal"),
+        ("\nimport pick\n", 3, "the board gets this file alone, not pick.py beside it"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_line(text: str, line: int, problem: str, tmp_path: Path) -> None:
@@ -332,6 +334,7 @@ def test_places_and_postures_are_of_the_tool(tmp_path: Path) -> None:
     assert record.source() == found.marked
 
 
+@pytest.mark.slow
 def test_a_place_out_of_reach_is_named_with_its_line(tmp_path: Path) -> None:
     arm = six_joints(tmp_path)
     found = UserProgram.load(written("cell.tool('long')\ncell.pallet('tray')\n", tmp_path), arm)

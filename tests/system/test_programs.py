@@ -158,12 +158,12 @@ def test_commands_around_a_program(tmp_path: Path) -> None:
         assert (done.exit_code, "new" in done.output, "finished" in done.output) == (0, True, True), (
             done.errors
         )
-        (tmp_path / "pick.py").write_text(HEAD + "\n1 // 0\n")
+        (tmp_path / "pick.py").write_text(HEAD + "import asyncio\nasyncio.sleep(0)\n")
         assert commandline.run("program", "pick.py", "--arm", arm, folder=tmp_path, **port).exit_code == 1
         for _ in range(2):
             done = commandline.run("status", folder=tmp_path, **port)
             assert re.search(
-                r'^said +File "pick.py", line 3.*\n +ZeroDivisionError', done.output, re.MULTILINE
+                r'^said +File "pick.py", line 3.*\n +ImportError: asyncio', done.output, re.MULTILINE
             )
         assert commandline.run("clear", folder=tmp_path, **port).exit_code == 0
         assert "said" not in commandline.run("status", folder=tmp_path, **port).output

@@ -178,7 +178,7 @@ class Cell:
                 raise CellError("output %r has no state %r; it has %s" % (output, value, _names(states)))
             raw = states[value]
         else:
-            if not low <= value <= high:
+            if not _is_within(low, value, high):
                 raise CellError("output %r: %r is not within %r to %r" % (output, value, low, high))
             raw = int((value - low) / (high - low) * _FULL + 0.5)
         wait_ms = _ms(wait_s)
@@ -279,9 +279,13 @@ class Cell:
             found = posture.steps
             return found
         per_deg = self._table["per_deg"]
-        if len(posture) != len(per_deg):
-            raise CellError("a posture has %d angles, not %d" % (len(per_deg), len(posture)))
-        return [_rounded(angle * scale) for angle, scale in zip(posture, per_deg)]
+        try:
+            if len(posture) == len(per_deg):
+                return [_rounded(angle * scale) for angle, scale in zip(posture, per_deg)]
+            given = str(len(posture))
+        except (TypeError, ValueError, OverflowError):
+            given = repr(posture)
+        raise CellError("a posture has %d angles, not %s" % (len(per_deg), given))
 
     def _found(self, kind: str, word: str, name: str) -> "Any":
         found = self._table[kind]
@@ -299,14 +303,22 @@ def _rounded(value: float) -> int:
     return int(value + 0.5) if value >= 0 else -int(0.5 - value)
 
 
+def _is_within(low: float, value: "Any", high: float) -> bool:
+    """Whether a value is a number in a range."""
+    try:
+        return bool(low <= value <= high)
+    except TypeError:
+        return False
+
+
 def _percent(speed: float) -> int:
-    percent = int(speed * _PERCENT + 0.5)
+    percent = int(speed * _PERCENT + 0.5) if _is_within(0, speed, 2) else 0
     if not _LEAST_PERCENT <= percent <= _PERCENT:
         raise CellError("speed = %r is not within 0.01 to 1" % (speed,))
     return percent
 
 
 def _ms(time_s: float) -> int:
-    if not 0 <= time_s <= _LONGEST_S:
+    if not _is_within(0, time_s, _LONGEST_S):
         raise CellError("%r s is not within 0 to %d" % (time_s, _LONGEST_S))
     return int(time_s * 1000 + 0.5)

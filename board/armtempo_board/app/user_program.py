@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 _PERCENT = const(100)
 _MOST_SKIPPED = const(16)
 _SAY_MS = const(500)  # longest wait until a host has taken the text before,
+_LONGEST_ROW = const(120)
 _ALONE_MS = const(20)  # and if none was heard so long
 
 
@@ -332,5 +333,5 @@ def _traceback(error: "BaseException", file: str) -> "tuple[str, int]":
             line = int(number)
         elif row.startswith((" ", "Traceback")) or not row:
             continue
-        found.append(row)
+        found.append(row[:_LONGEST_ROW])  # what the host is told is cut at its begin
     return "\n".join(found), line

@@ -120,6 +120,8 @@ class _Reader:
         for node in ast.walk(tree):
             if isinstance(node, ast.Attribute) and _is_name(node.value, self.cell):
                 self._known(node)
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                self._check_import(node)
             if isinstance(node, ast.Call):
                 if isinstance(node.func, ast.Attribute) and _is_name(node.func.value, self.cell):
                     self._known(node.func)
@@ -197,8 +199,23 @@ class _Reader:
         found.pop("self")
         return found
 
+    def _check_import(self, node: ast.Import | ast.ImportFrom) -> None:
+        """The board gets this file alone."""
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
+        for name in names:
+            if (self.path.parent / f"{name.partition('.')[0]}.py").is_file():
+                raise InputError(
+                    f"{self._place(node)}the board gets this file alone, not {name}.py beside it",
+                    f"write what it needs of {name}.py into this file",
+                )
+
     def _check_sleep(self, node: ast.Call) -> None:
-        """The board does nothing else while MicroPython's sleep lasts: not even the steps of a motion."""
+        """The board does nothing else while MicroPython's sleep lasts, or ``input`` waits: no steps of a motion."""
+        if _is_name(node.func, "input"):
+            raise InputError(
+                f"{self._place(node)}input() waits for a terminal, which the board does not have",
+                f"wait for an input of the arm file: {self.cell}.wait(name)",
+            )
         if (
             isinstance(node.func, ast.Attribute)
             and node.func.attr in _SLEEPS

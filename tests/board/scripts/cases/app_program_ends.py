@@ -30,6 +30,13 @@ def case_an_exception_brakes_and_is_a_fault_with_its_line():
     assert world.host.ask("clear")[0] == "ok"
 
 
+def case_a_long_text_of_an_exception_hides_neither_its_name_nor_its_line():
+    world = World("\nraise ValueError('x' * 3000)\n")
+    assert world.run()[0] == "fault"
+    (text,) = world.said()
+    assert text.startswith('  File "pick.py", line 3') and "ValueError: xxx" in text, text
+
+
 def case_a_text_just_before_an_exception_does_not_hide_it():
     world = World("cell.sleep(0.2)\nprint('here')\n1 // 0\n")
     assert world.run()[0] == "fault"
@@ -136,7 +143,7 @@ def case_a_pass_without_memory_is_the_programs_fault():
 
 def case_what_a_lost_host_was_not_told_gives_way_to_the_traceback():
     def script(world):
-        world.app.link.room = lambda size: False
+        world.app.link.has_space = lambda size: False
 
     world = World("print('one')\nprint('two')\n1 // 0\n", script)
     assert world.start()[0] == "ok"

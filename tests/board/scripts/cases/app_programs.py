@@ -79,14 +79,14 @@ def case_a_program_acts_while_a_motion_runs():
 def case_without_a_host_texts_take_little_time():
     def script(world):
         if world.turns == 1:
-            world.host.port.room = 0
+            world.host.port.space = 0
 
     world = World("cell.sleep(1)\nfor i in range(20):\n    print(i)\n", script)
     assert world.start()[0] == "ok"
     try:
         world.execute()
     finally:
-        world.host.port.room = 1 << 30
+        world.host.port.space = 1 << 30
     assert world.stands()[0] == "finished"
     assert world.turns < 80, world.turns
 
@@ -134,6 +134,12 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("goto('nowhere')", "the arm has no posture 'nowhere'; it has away, home, there"),
         ("goto('away')", "goto: joint 2 would leave its range"),
         ("goto([1, 2, 3])", "a posture has 2 angles, not 3"),
+        ("goto(5)", "a posture has 2 angles, not 5"),
+        ("goto([1, 'a'])", "a posture has 2 angles, not [1, 'a']"),
+        ("goto([float('inf'), 0])", "a posture has 2 angles, not [inf, 0]"),
+        ("goto('there', speed='fast')", "speed = 'fast' is not within 0.01 to 1"),
+        ("set('gripper', None)", "output 'gripper': None is not within 0.0 to 1.0"),
+        ("sleep('1')", "'1' s is not within 0 to 3600"),
         ("goto('there', speed=2)", "speed = 2 is not within 0.01 to 1"),
         ("set('gripper', 'shut')", "output 'gripper' has no state 'shut'; it has closed, open"),
         ("set('gripper', 2)", "output 'gripper': 2 is not within 0.0 to 1.0"),

@@ -5,11 +5,13 @@ import sys
 
 def replace():
     """Later imports of ``os`` and so on get the board's; earlier ones keep the real modules."""
+    import board_asyncio
     import board_micropython
     import board_os
     import board_time
     import board_uctypes
 
+    sys.modules["asyncio"] = board_asyncio
     sys.modules["micropython"] = board_micropython
     sys.modules["os"] = board_os
     sys.modules["time"] = board_time
