@@ -186,10 +186,10 @@ class Pipe:
 
     def wait_away(self, seconds: float, buffer: int = _USB_BUFFER) -> None:
         """Let time pass while the host reads nothing: the port takes no more than its buffer's bytes."""
-        self.port.room = buffer
+        self.port.space = buffer
         for _ in range(round(seconds / _SAMPLE_S)):
             self.wait(_SAMPLE_S)
-        self.port.room = 1 << 30
+        self.port.space = 1 << 30
 
     def connected(self) -> bool:
         """Whether the cable is in."""

@@ -101,7 +101,7 @@ def fits(rates: "list[int]", free_bytes: int, with_backlash: int = 0) -> bool:
 
 
 def _find_place(rates: "list[int]", memory_words: int, lasts_ms: int) -> bool:
-    """Whether all parts of the engine fit, each in the first block with room."""
+    """Whether all parts of the engine fit, each in the first block with space."""
     free = blocks(memory_words)
     for part in _parts(rates, lasts_ms):
         for number, left in enumerate(free):

@@ -259,7 +259,7 @@ EVENTS: "dict[str, str]" = {
     "Tail as in `sample`.",
     "row": "A row of the sequence has begun, the `passed`-th since its start: `row`, `step` and `cycle` as in "
     "`sequence`, `run`: the number of the last run that it started, that of this row if it is a motion; `value` of "
-    "the counter if the row counts, else 0. It is dropped if the link has no room before the next row.",
+    "the counter if the row counts, else 0. It is dropped if the link has no space before the next row.",
     "notice": "Text, such as the traceback after an `internal` fault; it begins with `button:` if the board's "
     "button was pressed and could start nothing, as while an arm is guided by hand.",
     "ok": "The command was carried out; its number is followed by the answer's fields.",

@@ -26,7 +26,7 @@ from armtempo.planning.jog.jog_motion import JogMove
 from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
-from tests.benchmark import firmware, room
+from tests.benchmark import arm_heap, firmware
 from tests.benchmark.loop_board import CORE_HZ, CYCLES
 
 PROBE = "import probe\n\nprobe.replace()\n" + firmware.START
@@ -42,7 +42,7 @@ def image(folder: Path) -> Path:
     joints, whole = len(Arm.paper().driven), range(1, MAX_SEGMENTS + 1)
     largest = max(count for count in whole if motion.size(5, joints, True, count, 1) <= MAX_MOTION_BYTES)
     for name, segments in (("go", 40), ("large", largest)):
-        (tree / "armtempo" / f"{name}.atm").write_bytes(room.motion_record(arm, segments))
+        (tree / "armtempo" / f"{name}.atm").write_bytes(arm_heap.motion_record(arm, segments))
     here_deg = list(Arm.paper().home_deg)
     moved = jog_motion.plan("jog", Arm.paper(), here_deg, JogMove(math.inf, joint=0))
     target_deg = np.array(here_deg) + np.array([20.0, 10.0, -20.0])

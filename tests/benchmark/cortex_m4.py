@@ -110,8 +110,8 @@ class Count:
     def _emit(self, original: Any, rings: int, state: array[int], timer: array[int]) -> None:
         """``emit`` finds ring and queue by their addresses."""
         parts = [part[:] for part in self._parts] if self.verify else self._parts
-        room = state[isr.ROOM]
-        self.machine.run("emit", rings, ring_state(vars(isr), room, *parts), timer, beside=parts)
+        space = state[isr.SPACE]
+        self.machine.run("emit", rings, ring_state(vars(isr), space, *parts), timer, beside=parts)
         if self.verify:
             original(rings, state, timer)
             assert parts == self._parts

@@ -1,4 +1,4 @@
-"""What a turn of the program's loop costs on the chip, and up to which rates it keeps up: host/docs/measurements.md.
+"""What a pass of the program's loop costs on the chip, and up to which rates it keeps up: host/docs/measurements.md.
 
     python -m tests.benchmark.loop MICROPYTHON [files]
     python -m tests.benchmark.loop MICROPYTHON stops [COUNT [SEED [RATE]]]

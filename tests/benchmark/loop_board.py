@@ -1,4 +1,4 @@
-"""Motions on the program in an emulated chip, and what each turn of its loop costs: see tests/benchmark/loop.py."""
+"""Motions on the program in an emulated chip, and what each pass of its loop costs: see tests/benchmark/loop.py."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Turn:
-    """Instructions of one turn of the loop, and what was done in it."""
+    """Instructions of one pass of the loop, and what was done in it."""
 
     cost: float
     command: bool

@@ -1,4 +1,4 @@
-"""Motion time, floor and CPU time of plans: the shipped motion in many ways, and growth with via points and refine.
+"""Motion time, bound and CPU time of plans: the shipped motion in many ways, and growth with via points and refine.
 
     python -m tests.benchmark.plan_times [--large]
 
@@ -33,7 +33,7 @@ def main() -> None:
     paper = Job.paper(arm)
     planner.plan(arm, replace(paper, iterations=5, polish=True))  # so that everything is loaded
     planner.plan(arm, Job("first", paper.via, path="free", refine=4, starts=1))
-    print(f"{'job':<34}{'time s':>10}{'floor s':>10}{'over %':>8}{'CPU s':>8}{'segments':>10}{'record':>8}")
+    print(f"{'job':<34}{'time s':>10}{'bound s':>10}{'over %':>8}{'CPU s':>8}{'segments':>10}{'record':>8}")
     spline = Job("feed", paper.via, path="through")
     _print("paper: per-joint, refine 1, acs", arm, paper)
     for refine in (1, 8, 64):
@@ -65,12 +65,12 @@ def _print(label: str, arm: Arm, job: Job) -> None:
     start = time.process_time()
     plan = planner.plan(arm, job)
     seconds = time.process_time() - start
-    floor = max(search.floor_s for search in plan.searches)
+    bound = max(search.lower_bound_s for search in plan.searches)
     if not plan.trajectory.shared:
-        floor = max(plan.searches, key=lambda search: search.total_s).floor_s
+        bound = max(plan.searches, key=lambda search: search.total_s).lower_bound_s
     segments = len(plan.trajectory.joints[0].time_points_s) - job.degree
     print(
-        f"{label:<34}{plan.total_s:>10.4f}{floor:>10.4f}{100 * (plan.total_s / floor - 1):>8.2f}{seconds:>8.2f}"
+        f"{label:<34}{plan.total_s:>10.4f}{bound:>10.4f}{100 * (plan.total_s / bound - 1):>8.2f}{seconds:>8.2f}"
         f"{segments:>10}{text_summary.record_bytes(plan):>8}",
         flush=True,
     )

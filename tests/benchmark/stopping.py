@@ -80,7 +80,7 @@ def main() -> None:
         seconds.append(time.process_time() - start)
         ratios.append(plan.total_s / stopping_s(via, limits))
         wrong = problems.faults(plan)
-        if ratios[-1] > _SLOWER or plan.total_s < plan.searches[0].floor_s or wrong:
+        if ratios[-1] > _SLOWER or plan.total_s < plan.searches[0].lower_bound_s or wrong:
             faulty += 1
             print(
                 f"seed {seed}, {kind}: {plan.total_s:.4f} s, {ratios[-1]:.4f} of stopping {wrong}", flush=True

@@ -275,14 +275,14 @@ def _raw_code(reader: _Reader) -> _Code:
     return _Code(data if kind == 2 else None, children)
 
 
-def ring_state(isr: Mapping[str, int], room: int, ring: array[int], queue: array[int]) -> array[int]:
-    """The words by which ``emit`` finds a ring with room for that many entries, and its queue, ``beside`` it.
+def ring_state(isr: Mapping[str, int], space: int, ring: array[int], queue: array[int]) -> array[int]:
+    """The words by which ``emit`` finds a ring with space for that many entries, and its queue, ``beside`` it.
 
     ``isr``: what isr.py names. The ring has a word more than entries.
     """
     state = array("i", bytes(4 * isr["STATE_WORDS"]))
     state[isr["MASK"]] = len(ring) - 2
-    state[isr["ROOM"]] = room
+    state[isr["SPACE"]] = space
     for word, address in zip(("RING_AT", "QUEUE_AT"), Machine.places(ring, queue), strict=True):
         state[isr[word]] = address
     return state

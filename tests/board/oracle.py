@@ -188,19 +188,19 @@ class Steps:
 
 
 def walk(
-    interpreter: str, folder: Path, records: list[bytes], room: int = 2, brake: tuple[int, int] = (0, 0)
+    interpreter: str, folder: Path, records: list[bytes], space: int = 2, brake: tuple[int, int] = (0, 0)
 ) -> tuple[list[str], list[bytes]]:
     """What the board's check says of each record (a line each), and the bytes of the steps."""
     paths = [folder / f"{number}.atm" for number in range(len(records))]
     for path, record in zip(paths, records, strict=True):
         path.write_bytes(record)
-    words = [str(word) for word in (PULSE_TICKS, GAP_TICKS, room, *brake, BRAKE_SHAPE, *paths)]
+    words = [str(word) for word in (PULSE_TICKS, GAP_TICKS, space, *brake, BRAKE_SHAPE, *paths)]
     verdicts = interpreters.run(interpreter, SCRIPT, *words).splitlines()
     return verdicts, [Path(f"{path}.steps").read_bytes() for path in paths]
 
 
 def steps_of(data: bytes, joint: int) -> Steps:
-    """One joint's steps from a file written with room 2."""
+    """One joint's steps from a file written with space 2."""
     rows = np.frombuffer(data, dtype="<i4").reshape(-1, 5)
     rows = rows[rows[:, 0] == joint].astype(np.int64)
     near, rise, fall = rows[:, 2] << 10, rows[:, 3], rows[:, 4]

@@ -145,7 +145,7 @@ def test_turning_and_stopping(machine: Machine, joints: int) -> None:
 @pytest.mark.parametrize("joints", sorted(TAKE))
 def test_a_sample(machine: Machine, joints: int) -> None:
     """Without encoders: these come by way of objects."""
-    raw = _words(ISR_AT["RAW_ROOM"] * ISR_AT["RAW_WORDS"])
+    raw = _words(ISR_AT["RAW_SPACE"] * ISR_AT["RAW_WORDS"])
     hold(
         "a sample",
         _cost(machine, "take_sample", raw, _block(joints), _words(60), 0, _words(18)),

@@ -57,6 +57,6 @@ def test_what_fits() -> None:
 
 @pytest.mark.parametrize("joints", range(1, limits.MAX_JOINTS + 1))
 def test_the_largest_memory_holds_what_the_board_can_step(joints: int) -> None:
-    """The sum of the rates at its limit, with the little room that the host gives each joint."""
+    """The sum of the rates at its limit, with the little space that the host gives each joint."""
     rate = limits.MAX_STEP_RATE_SUM // joints
     assert engine_memory.fits([rate + rate // 100 + 1] * joints, engine_memory.LARGEST_BYTES)

@@ -84,7 +84,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[bytes], list[
         motions.NAMED["20 ms"](),
         *chance_records(8),
     ]
-    return records, oracle.walk(QUICK, tmp_path_factory.mktemp("shared"), records, room=2)[1]
+    return records, oracle.walk(QUICK, tmp_path_factory.mktemp("shared"), records, space=2)[1]
 
 
 @pytest.mark.long
@@ -93,7 +93,7 @@ def test_all_interpreters_give_the_same_edges(
     interpreter: str, shared: tuple[list[bytes], list[bytes]], tmp_path: Path
 ) -> None:
     records, expected = shared
-    assert oracle.walk(interpreter, tmp_path, records, room=2)[1] == expected
+    assert oracle.walk(interpreter, tmp_path, records, space=2)[1] == expected
 
 
 @pytest.mark.slow
@@ -101,8 +101,8 @@ def test_edges_do_not_depend_on_how_the_ring_is_filled(
     shared: tuple[list[bytes], list[bytes]], tmp_path: Path
 ) -> None:
     records, expected = shared
-    for room in (14, 512, 1016):
-        steps = oracle.walk(QUICK, tmp_path, records, room=room)[1]
+    for space in (14, 512, 1016):
+        steps = oracle.walk(QUICK, tmp_path, records, space=space)[1]
         for mine, other in zip(steps, expected, strict=True):
             edges, others = (np.frombuffer(data, dtype="<i4").reshape(-1, 5) for data in (mine, other))
             np.testing.assert_array_equal(edges[:, [0, 1, 3, 4]], others[:, [0, 1, 3, 4]])
@@ -129,14 +129,14 @@ def test_braking_stays_on_the_path(interpreter: str, start_s: float, length_s: f
 def test_nothing_is_written_beyond_the_time_at_which_braking_begins(
     start_s: float, length_s: float, tmp_path: Path
 ) -> None:
-    """However much room there is, the edges are those that are written one by one.
+    """However much space there is, the edges are those that are written one by one.
 
     A step in the Ki tick in which braking begins is one of a cubic, or solved by itself: within a cubic's error.
     """
     brake = _brake(start_s, length_s)
     records = [motions.feeding()] + [motions.cruise(90_000)] * (start_s < CRUISE_S)
     one_by_one, *others = (
-        oracle.walk(QUICK, tmp_path, records, room=room, brake=brake)[1] for room in (2, 14, 1016)
+        oracle.walk(QUICK, tmp_path, records, space=space, brake=brake)[1] for space in (2, 14, 1016)
     )
     for steps in others:
         for mine, other in zip(steps, one_by_one, strict=True):

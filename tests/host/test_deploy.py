@@ -220,7 +220,7 @@ def test_program_in_the_firmware_leaves_no_library() -> None:
 @pytest.mark.slow
 def test_full_flash_is_refused() -> None:
     full = replace(BOARD, free_blocks=2)
-    with pytest.raises(LinkError, match="has room for 2; nothing of it is in use") as refused:
+    with pytest.raises(LinkError, match="has space for 2; nothing of it is in use") as refused:
         changes.choose(full, quiet)
     assert "remove" not in refused.value.hint
     mine = replace(full, others={"/flash/notes.txt": 700, "/flash/armtempo/a.atm": 60_000})

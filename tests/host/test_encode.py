@@ -289,7 +289,7 @@ def test_rings_last_as_long_as_there_is_memory_for() -> None:
 
 
 def test_the_largest_rings_find_their_places_first() -> None:
-    """Else the small joint's would be in the only block that has room for the large one's."""
+    """Else the small joint's would be in the only block that has space for the large one's."""
     assert engine_memory.lasting_ms([5_000, 240_000], 1960) == 12
 
 

@@ -37,7 +37,7 @@ from tests.host.problems import FEEDING, LIMITS
 
 
 def test_joint_1_from_rest_to_rest() -> None:
-    assert rest_to_rest.floor_s(np.array([0.0, 180.0]), LIMITS[0]) == pytest.approx(
+    assert rest_to_rest.lower_bound_s(np.array([0.0, 180.0]), LIMITS[0]) == pytest.approx(
         4.0 + 0.6 + 1 / 3, rel=1e-12
     )
 
@@ -45,7 +45,7 @@ def test_joint_1_from_rest_to_rest() -> None:
 def test_short_way_reaches_neither_speed_nor_acceleration() -> None:
     """Four jerk phases: way 2 J t³, t each."""
     phase = 0.1
-    assert rest_to_rest.floor_s(np.array([0.0, 2 * 150 * phase**3]), LIMITS[0]) == pytest.approx(
+    assert rest_to_rest.lower_bound_s(np.array([0.0, 2 * 150 * phase**3]), LIMITS[0]) == pytest.approx(
         4 * phase, rel=1e-9
     )
 
@@ -53,9 +53,9 @@ def test_short_way_reaches_neither_speed_nor_acceleration() -> None:
 def test_a_turn_may_keep_its_acceleration() -> None:
     """Between two turns: hold a, swing to -a, hold it."""
     limits = Limits(1e9, 10.0, 20.0)
-    both_free = rest_to_rest.floor_s(np.array([0.0, 7.0, 0.0, 7.0]), limits) - rest_to_rest.floor_s(
-        np.array([0.0, 7.0, 0.0]), limits
-    )
+    both_free = rest_to_rest.lower_bound_s(
+        np.array([0.0, 7.0, 0.0, 7.0]), limits
+    ) - rest_to_rest.lower_bound_s(np.array([0.0, 7.0, 0.0]), limits)
     hold, swing = _between_turns(7.0, limits)
     assert both_free == pytest.approx(2 * hold + swing, rel=1e-6)
 
@@ -65,8 +65,8 @@ def test_ways_of_a_millionth_of_a_degree_at_1000_deg(seed: int) -> None:
     """The last digits of such angles are a part of the way; these plans are the fastest there are."""
     arm, job = problems.random_problem(seed)
     searches = planner.plan(arm, job).searches
-    assert all(0.0 < search.floor_s < search.total_s for search in searches)
-    assert any(search.floor_s > (1 - 1e-8) * search.total_s for search in searches)
+    assert all(0.0 < search.lower_bound_s < search.total_s for search in searches)
+    assert any(search.lower_bound_s > (1 - 1e-8) * search.total_s for search in searches)
 
 
 def _between_turns(way: float, limits: Limits) -> tuple[float, float]:
@@ -85,10 +85,10 @@ def _between_turns(way: float, limits: Limits) -> tuple[float, float]:
 
 def test_floor_falls_with_every_limit() -> None:
     turns = np.array([-60.0, -110.0, -38.0])
-    base = rest_to_rest.floor_s(turns, LIMITS[1])
+    base = rest_to_rest.lower_bound_s(turns, LIMITS[1])
     for factors in ((2, 1, 1), (1, 2, 1), (1, 1, 2)):
         looser = Limits(*(value * factor for value, factor in zip(LIMITS[1].values, factors, strict=True)))
-        assert rest_to_rest.floor_s(turns, looser) < 0.999 * base, factors
+        assert rest_to_rest.lower_bound_s(turns, looser) < 0.999 * base, factors
 
 
 def test_turns_of_the_paper_joints() -> None:
@@ -116,7 +116,7 @@ def test_path_floor_depends_little_on_the_time_it_is_told(about_s: float) -> Non
 @pytest.mark.parametrize("joint", range(3))
 def test_duality_comes_near_the_closed_form_of_one_joint(joint: int, degree: int) -> None:
     points = bspline.fit(FEEDING[:, [joint]], degree)
-    exact = rest_to_rest.floor_s(
+    exact = rest_to_rest.lower_bound_s(
         lower_bounds.turns(points[:, 0], degree), LIMITS[joint], from_rest=degree == 5
     )
     found = lower_bounds._path_s(points, degree, [LIMITS[joint]], exact)
@@ -129,7 +129,7 @@ def test_a_straight_path_takes_its_slowest_joint() -> None:
     both = [Limits(50, 50, 500), Limits(10, 5, 50)]
     found = lower_bounds.of_path(points, 5, both, 5.0)
     ways = zip((90.0, 30.0), both, strict=True)
-    alone = [rest_to_rest.floor_s(np.array([0.0, way]), limit) for way, limit in ways]
+    alone = [rest_to_rest.lower_bound_s(np.array([0.0, way]), limit) for way, limit in ways]
     assert found.time_s == pytest.approx(max(alone), rel=1e-8)
 
 
@@ -175,7 +175,7 @@ def test_no_plan_is_below_its_floor(seed: int) -> None:
     arm, job = random_motion(seed)
     plan = planner.plan(arm, job)
     (search,) = plan.searches
-    assert 0.0 < search.floor_s <= plan.total_s, f"seed {seed}"
+    assert 0.0 < search.lower_bound_s <= plan.total_s, f"seed {seed}"
 
 
 @pytest.mark.long
@@ -186,7 +186,7 @@ def test_many_via_points_and_jerk_that_hardly_matters() -> None:
     via = tuple(map(tuple, rng.normal(0, 40, (100, 3)).tolist()))
     arm = problems.make_arm([[50.0, 50.0, 1e5]] * 3)
     plan = planner.plan(arm, Job("many", via, refine=1, iterations=5, population=4, path="through"))
-    assert 0.85 * plan.total_s <= plan.searches[0].floor_s <= plan.total_s
+    assert 0.85 * plan.total_s <= plan.searches[0].lower_bound_s <= plan.total_s
 
 
 def test_floor_of_a_free_path_counts_turns_stops_and_dwells() -> None:
@@ -194,13 +194,15 @@ def test_floor_of_a_free_path_counts_turns_stops_and_dwells() -> None:
     limits = [Limits(50, 50, 150)] * 2
     through = lower_bounds.of_vias(via, limits, {})
     assert through.kind == "vias"
-    assert through.time_s == pytest.approx(rest_to_rest.floor_s(via[:, 0], limits[0]), rel=1e-8)
+    assert through.time_s == pytest.approx(rest_to_rest.lower_bound_s(via[:, 0], limits[0]), rel=1e-8)
     resting = lower_bounds.of_vias(via, limits, {1: 0.0})
-    alone = [rest_to_rest.floor_s(np.array([0.0, way]), limits[0]) for way in (40.0, 30.0)]
+    alone = [rest_to_rest.lower_bound_s(np.array([0.0, way]), limits[0]) for way in (40.0, 30.0)]
     assert resting.time_s == pytest.approx(sum(alone), rel=1e-8)
     assert lower_bounds.of_vias(via, limits, {1: 2.5}).time_s == pytest.approx(resting.time_s + 2.5, rel=1e-8)
     loose = lower_bounds.of_vias(via, limits, {}, {1})
-    assert loose.time_s == pytest.approx(rest_to_rest.floor_s(np.array([0.0, 10.0]), limits[0]), rel=1e-8)
+    assert loose.time_s == pytest.approx(
+        rest_to_rest.lower_bound_s(np.array([0.0, 10.0]), limits[0]), rel=1e-8
+    )
 
 
 @pytest.mark.slow
@@ -209,8 +211,8 @@ def test_floor_of_a_free_path_is_little_below_its_plan(name: str, kind: str) -> 
     problem = next(each for each in problems.load() if each.name == name)
     job = replace(problem.job, path="free", refine=6, starts=1)
     for search in planner.plan(problem.arm, job).searches:
-        assert search.floor_kind == kind
-        assert 0.97 * search.total_s <= search.floor_s <= search.total_s
+        assert search.lower_bound_kind == kind
+        assert 0.97 * search.total_s <= search.lower_bound_s <= search.total_s
 
 
 ABOUT_S = np.array([1.123, 1.597, 1.296, 0.8, 0.609, 1.397])
@@ -220,7 +222,7 @@ ABOUT_S = np.array([1.123, 1.597, 1.296, 0.8, 0.609, 1.397])
 @pytest.mark.parametrize("factors", [1.0, 0.8, 2.0, np.array([1, 3, 1, 1, 0.2, 1])])
 def test_free_floor_holds_for_any_expected_times(factors: float | np.ndarray) -> None:
     limits = np.array([limit.values for limit in LIMITS])
-    found = via_bound.floor_s(FEEDING, limits, ABOUT_S * factors)
+    found = via_bound.lower_bound_s(FEEDING, limits, ABOUT_S * factors)
     assert (0.98 if np.all(factors == 1.0) else 0.0) * 6.8222 <= found <= 6.8222
 
 
@@ -243,7 +245,7 @@ def test_free_floor_holds_for_any_multipliers(seed: int) -> None:
         cost = via_bound._Cost.of(ways[scan.leg[:-1]], limits, times)
         together = np.isfinite(low)
         assert np.all((cost.exact(x, cost.arguments(x)) + 1e-7 * (1 + np.abs(low)) >= low)[together])
-    assert scan.floor().sum() <= 6.8222
+    assert scan.lower_bounds().sum() <= 6.8222
 
 
 @pytest.mark.parametrize(("count", "joints"), [(1, 2), (2, 1), (5, 3), (9, 6)])

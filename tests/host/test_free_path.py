@@ -41,8 +41,8 @@ def test_the_shipped_motion_is_5_percent_faster_and_keeps_everything() -> None:
     plan = planner.plan(ARM, replace(FEED, refine="auto"))
     assert faults(plan) == []
     assert plan.total_s <= 6.83
-    assert 0.985 * plan.total_s <= plan.searches[0].floor_s <= plan.total_s
-    assert plan.searches[0].floor_kind == "together"
+    assert 0.985 * plan.total_s <= plan.searches[0].lower_bound_s <= plan.total_s
+    assert plan.searches[0].lower_bound_kind == "together"
 
 
 @pytest.mark.slow
@@ -58,7 +58,7 @@ def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> N
     plan = planner.plan(arm, job)
     assert faults(plan) == [], f"seed {seed}"
     for search in plan.searches:
-        assert search.floor_s <= search.total_s, f"seed {seed}"
+        assert search.lower_bound_s <= search.total_s, f"seed {seed}"
 
 
 @pytest.mark.slow
@@ -100,7 +100,7 @@ def test_the_motion_rests_at_stops_and_dwells() -> None:
     assert during == pytest.approx(np.tile(plan.via_deg[4], (50, 1)), abs=1e-9)
     assert np.abs(plan.trajectory(arrival[4] + 0.85) - plan.via_deg[4]).max() > 1e-4
     assert plan.total_s > 6.83 + 0.75  # longer than without stops, see above
-    assert 0.985 * plan.total_s <= plan.searches[0].floor_s <= plan.total_s
+    assert 0.985 * plan.total_s <= plan.searches[0].lower_bound_s <= plan.total_s
 
 
 def _away_deg(plan: Plan) -> float:
@@ -251,7 +251,7 @@ def test_a_pose_with_a_tolerance_is_passed_within_it_and_sooner() -> None:
     miss = Tool(ARM, [0, 1, 2], np.zeros(3)).miss(passed, pose)
     assert 0.2 < miss.position_mm <= 10.0 * (1 + 1e-6)
     assert miss.rotation_deg <= 8.0 * (1 + 1e-6)
-    assert loose.searches[0].floor_s <= loose.total_s
+    assert loose.searches[0].lower_bound_s <= loose.total_s
 
 
 @pytest.mark.slow
@@ -259,7 +259,7 @@ def test_per_joint_timing_takes_each_joint_through_its_own_angles() -> None:
     plan = planner.plan(ARM, replace(FEED, timing="per-joint", refine="auto"))
     assert faults(plan) == []
     for search in plan.searches:
-        assert search.total_s <= 1.002 * search.floor_s
+        assert search.total_s <= 1.002 * search.lower_bound_s
 
 
 @pytest.mark.slow
@@ -333,6 +333,7 @@ def test_where_the_spline_leaves_a_range_the_free_path_is_named_and_plans_it() -
     assert planner.plan(ARM, job).total_s > 0.0
 
 
+@pytest.mark.slow
 def test_a_plan_takes_few_and_small_matrices() -> None:
     """Counted, because seconds depend on the load: of six joints with 1378 variables on the final segments."""
     counted: list[int] = []
@@ -378,6 +379,7 @@ def test_a_solve_that_ends_far_beyond_the_limits_is_not_the_last() -> None:
     assert faults(plan) == []
 
 
+@pytest.mark.slow
 def test_what_ends_slower_than_stopping_starts_from_the_stops_too(monkeypatch: pytest.MonkeyPatch) -> None:
     finished = free_path._finished
     slow = iter([5.0])

@@ -170,7 +170,7 @@ def test_a_plan_on_the_spline_tells_what_is_faster_if_it_loses_much_to_it() -> N
     assert free_s < stopping_s < slow.total_s / 1.03
     legs = [
         max(
-            rest_to_rest.floor_s(np.array(ends), joint.limits)
+            rest_to_rest.lower_bound_s(np.array(ends), joint.limits)
             for ends, joint in zip(zip(here, there, strict=True), slow.arm.driven, strict=True)
         )
         for here, there in pairwise(np.array(via, dtype=float))

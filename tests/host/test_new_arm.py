@@ -128,6 +128,7 @@ def test_questions_at_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         "",
         "",
         "",
+        "",
         "-180",
         "180",
         "",
@@ -198,6 +199,8 @@ def test_each_answer_is_checked_where_it_is_given(tmp_path: Path, monkeypatch: p
             "<",
             "",
             "axis",
+            "rolls",
+            "",
             "x",
             "12",
             "",
@@ -235,6 +238,7 @@ def test_each_answer_is_checked_where_it_is_given(tmp_path: Path, monkeypatch: p
         "it must be one of paper",
         "a whole number from 1 to 6, such as 3",
         "modified (Craig)",
+        "it must be one of turns, slides",
         "'x' is not a number; write it as 120.5",
         "from -180 to 180, such as -90",
         "above the lowest angle, 120, such as 210; '<' goes back",
@@ -256,7 +260,7 @@ def test_what_was_answered_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert left.exit_code == 130
     assert f"continue with: armtempo new {folder} --resume" in left.output
     assert not folder.exists()
-    done = interview(folder, monkeypatch, ["", "44", *[""] * 12, ""], "--resume")
+    done = interview(folder, monkeypatch, ["", "", "44", *[""] * 12, ""], "--resume")
     assert done.exit_code == 0, done.output
     (joint,) = Arm.load(folder / "arm.toml").joints
     assert (joint.name, joint.a_mm) == ("axis", 44.0)
@@ -287,12 +291,36 @@ def test_modified_rows_bring_the_tool_where_craigs_do() -> None:
 
 
 def test_a_parallel_linkage_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    joint = ["", "", "100", "", "", "", "", "", "", "", "4000", ""]
-    answers = ["own", "2", "", *joint, *joint[:5], "yes", *joint[5:], "", "", "", ""]
+    joint = ["", "", "", "100", "", "", "", "", "", "", "", "4000", ""]
+    answers = ["own", "2", "", *joint, *joint[:6], "yes", *joint[6:], "", "", "", ""]
     done = interview(tmp_path / "x", monkeypatch, answers)
     assert done.exit_code == 0, done.output
     assert [found.parallel_linkage for found in Arm.load(tmp_path / "x" / "arm.toml").joints] == [False, True]
     assert Arm.load(tmp_path / "x" / "arm.toml").driven[1].encoder is not None
+
+
+def test_a_sliding_joint_is_asked_for_and_given_by_an_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slide = ["rail", "slides", "", "", "-90", "", "", "300", "", "", "2", "10", "", "50"]
+    arm_turns = ["", "", "", "100", "", "", "", "", "", "", "", "", ""]
+    done = interview(tmp_path / "x", monkeypatch, ["own", "2", "", *slide, *arm_turns, "", "", "", ""])
+    assert done.exit_code == 0, done.output
+    assert "does a parallelogram turn it" not in done.output
+    option = "name=rail,type=prismatic,alpha_deg=-90,high_mm=300,gear_ratio=2,mm_per_rev=10,speed_mm_s=50"
+    given = new(str(tmp_path / "y"), "--joint", option, "--joint", "a_mm=100", "--port", "sim:board")
+    assert given.exit_code == 0, given.output
+    for folder in ("x", "y"):
+        arm = Arm.load(tmp_path / folder / "arm.toml")
+        rail = arm.driven[0]
+        assert (rail.slides, rail.range_deg, rail.limits.speed_deg_s) == (True, (0.0, 300.0), 50.0)
+        assert rail.steps_per_deg == pytest.approx(200 * 16 * 2 / 10)
+        assert not arm.driven[1].slides
+        Job.load(tmp_path / folder / "first.toml", arm)
+    wrong = new(str(tmp_path / "z"), "--joint", "type=prismatic,high_deg=3")
+    assert wrong.exit_code == 2
+    assert "'high_deg=3' is not one of the keys" in wrong.output
+    assert "high_mm" in wrong.output
 
 
 def turned(axis: int, angle_deg: float) -> NDArray[np.float64]:

@@ -155,5 +155,5 @@ def test_what_the_system_refuses_is_said_without_a_traceback(monkeypatch: pytest
     assert (result.exit_code, result.output.split("shipped feeding job and arm\n")[1]) == (
         1,
         "armtempo: somewhere: No space left on device\n"
-        "hint: check the path, its permissions and the room on the disk\n",
+        "hint: check the path, its permissions and the space on the disk\n",
     )

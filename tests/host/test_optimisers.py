@@ -125,7 +125,7 @@ def test_bears_with_nothing_but_infinity(algorithm: str) -> None:
 
 
 @pytest.mark.parametrize("algorithm", EVERY)
-def test_a_variable_without_room_stays(algorithm: str) -> None:
+def test_a_variable_without_space_stays(algorithm: str) -> None:
     bounds = np.array([[0.0, 1.0], [0.7, 0.7]])
     found = optimise.minimise(
         lambda points: points.sum(axis=1),

@@ -215,7 +215,7 @@ def test_pins_that_cannot_be_had(tmp_path: Path, tables: str, words: list[str]) 
         (GRIPPER.replace("gripper", '"my gripper"'), ["output.my gripper", "letters, digits"]),
         (PART + "debounce_ms = -1\n", ["input.part.debounce_ms = -1"]),
         (PART + 'active = "up"\n', ["input.part.active = 'up'"]),
-        ("".join(PART.replace("part", f"p{n}") for n in range(9)), ["9 tables [input.NAME]", "room for 8"]),
+        ("".join(PART.replace("part", f"p{n}") for n in range(9)), ["9 tables [input.NAME]", "space for 8"]),
         ("\n[output]\npump = 3\n", ["output.pump = 3", "a table"]),
     ],
 )

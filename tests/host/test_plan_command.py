@@ -77,7 +77,7 @@ def test_json_is_one_document_and_quiet_leaves_it_alone() -> None:
     assert (found["file"], found["duration_s"]) == ("feed.json", saved.trajectory.duration_s)
     assert [joint["name"] for joint in found["joints"]] == ["joint 1", "joint 2", "joint 3"]
     for joint in found["joints"]:
-        assert joint["floor_s"] <= joint["duration_s"] <= found["duration_s"]
+        assert joint["lower_bound_s"] <= joint["duration_s"] <= found["duration_s"]
         assert all(value <= joint["limits"][name] * (1 + 1e-9) for name, value in joint["extremes"].items())
     assert "no arm and no job given" in run("--iterations", "5").stderr
 

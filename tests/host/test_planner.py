@@ -17,7 +17,7 @@ from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.model.tool_segment import ToolSegment
 from armtempo.planning import checks, lower_bounds, planner
-from armtempo.planning.lower_bounds import Floor
+from armtempo.planning.lower_bounds import LowerBound
 
 from tests.host import problems
 from tests.host.problems import dense
@@ -35,7 +35,7 @@ def check(plan: Plan, label: str) -> None:
         assert np.all(np.diff(spline.time_points_s) > 0), label
         assert spline.time_polynomials[0, 0] == pytest.approx(0, abs=1e-12 * spline.duration_s), label
     for search in plan.searches:
-        assert search.floor_s <= search.total_s * 1.001, label
+        assert search.lower_bound_s <= search.total_s * 1.001, label
 
 
 def check_thoroughly(plan: Plan, label: str) -> None:
@@ -87,8 +87,8 @@ def test_problem(problem: problems.Problem) -> None:
 @pytest.mark.slow
 @pytest.mark.seeds(2)
 def test_random_jobs_keep_their_limits_or_say_why_not(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """200 jobs each; floors have their own test."""
-    monkeypatch.setattr(lower_bounds, "of_path", lambda *_: Floor(math.ulp(0.0), "rests"))
+    """200 jobs each; bounds have their own test."""
+    monkeypatch.setattr(lower_bounds, "of_path", lambda *_: LowerBound(math.ulp(0.0), "rests"))
     planned = 0
     for number in range(200 * seed, 200 * seed + 200):
         arm, job = problems.random_problem(number)

@@ -69,7 +69,7 @@ def test_summary_says_times_floors_limits_and_strays(apart: Plan, together: Plan
     for joint, search, line in zip(ARM.driven, apart.searches, text[3:6], strict=True):
         assert line.startswith(joint.name)
         assert f"{search.total_s:.4f}" in line
-        assert f"{search.floor_s:.4f}" in line
+        assert f"{search.lower_bound_s:.4f}" in line
         assert joint.limits is not None
         assert f"/ {joint.limits.speed_deg_s:g}" in line
     assert any("strays up to" in line for line in text)

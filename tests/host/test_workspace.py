@@ -148,7 +148,7 @@ def test_a_free_path_goes_around_what_is_between_its_via_points(monkeypatch: pyt
     assert dense_least(arm, plan.trajectory, 2000) > 0.0
     assert calls.count("of_vias") == 2, "of the first motion and of the last"
     assert calls.count("_starts") <= 4, "the tool may pass nearby: no plan from new starts"
-    assert plan.searches[0].floor_s <= plan.total_s < 10.0
+    assert plan.searches[0].lower_bound_s <= plan.total_s < 10.0
     spline = plan.trajectory.joints[0]
     assert spline.via_segments is not None
     assert len(spline.via_segments) == 3

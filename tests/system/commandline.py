@@ -28,7 +28,7 @@ SLOW_S = 600.0
 """Nothing here takes longer, on however loaded a machine."""
 ARM = Arm.paper()
 SOURCES_BLOCKS = 1200
-"""A flash in which the sources have room; the chip takes compiled files."""
+"""A flash in which the sources have space; the chip takes compiled files."""
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ def test_on_a_stock_flash_as_it_comes(tmp_path: Path) -> None:
             data = (flash / "armtempo" / "small.atm").read_bytes()
             more = fill(link, data)
             assert len(more) > 3
-            with pytest.raises(BoardError, match=r"room|flash is full"):
+            with pytest.raises(BoardError, match=r"space|flash is full"):
                 link.upload("small", data)
             assert link.fetch("small") == data
             for name in more:

@@ -223,7 +223,7 @@ STATES: dict[str, dict[str, Callable[[Bench], None]]] = {
     "Another file is in the way": {"module": lambda bench: file(bench, "armtempo_board.py", "")},
     "The program is whole and does not start": {"module": lambda bench: file(bench, "armtempo_board.py", "")},
     "The flash is full": {"data": full_flash},
-    "An upload finds no room": {"motion": full_of_motions},
+    "An upload finds no space": {"motion": full_of_motions},
     "The flash is empty": {"": damaged("no file system")},
     "The file system is damaged": {"": damaged("unreadable")},
     "Nothing else helps": {"hanging": lambda bench: file(bench, "main.py", HANG)},

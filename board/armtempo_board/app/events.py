@@ -17,7 +17,7 @@ _BYTES_PER_JOINT = const(8)
 
 
 class Events:
-    """Gives pending events to the link when it has room."""
+    """Gives pending events to the link when it has space."""
 
     def __init__(self, controller: "Controller", link: "SerialLink") -> None:
         self._controller = controller
@@ -78,7 +78,7 @@ class Events:
         index = samples.waiting()
         size = self._slot_at + samples.size
         link = self._link
-        if index < 0 or not link.room(size):
+        if index < 0 or not link.has_space(size):
             return False
         at = link.payload()
         run = samples.take(index, link.out, at + self._slot_at, self._controller.run_number)
@@ -88,19 +88,19 @@ class Events:
 
     def _push_end(self) -> None:
         controller = self._controller
-        if controller.done and self._room(self._done):
+        if controller.done and self._has_space(self._done):
             controller.done = False
             samples = self._board.samples
             self._put(self._done, controller.run_number, 0, 0, samples.next, samples.lost)
-        if self._fault_waits and self._room(self._fault):
+        if self._fault_waits and self._has_space(self._fault):
             self._fault_waits = False
             self._put(
                 self._fault, controller.run_number, self._board.fault(), self._board.fault_joint(), 0, 0
             )
 
-    def _room(self, event: "tuple[int, str, int]") -> int:
+    def _has_space(self, event: "tuple[int, str, int]") -> int:
         _, layout, _ = event
-        return self._link.room(calcsize(layout) + _BYTES_PER_JOINT * self._board.joints)
+        return self._link.has_space(calcsize(layout) + _BYTES_PER_JOINT * self._board.joints)
 
     def _put(self, event: "tuple[int, str, int]", *values: int) -> None:
         """Put an event; ``values``: its fields, with 0 for the two times, which are filled in here, as the
@@ -117,7 +117,7 @@ class Events:
         link = self._link
         if features.SEQUENCES:
             self.take_failure()
-        if self.notice and link.room(len(self.notice)):
+        if self.notice and link.has_space(len(self.notice)):
             at = link.payload()
             link.out[at : at + len(self.notice)] = self.notice
             link.event(self._notice_number, len(self.notice))

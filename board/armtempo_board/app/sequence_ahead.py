@@ -1,7 +1,7 @@
 """A sequence that prepares its next motion during the running one, to start it without delay.
 
-Used if the heap has room when the sequence begins; otherwise the next motion is opened and loaded between two
-motions. Not part of the program in files, which has no room for sequences.
+Used if the heap has space when the sequence begins; otherwise the next motion is opened and loaded between two
+motions. Not part of the program in files, which has no space for sequences.
 """
 
 import gc
@@ -35,8 +35,8 @@ _BESIDE_BYTES = const(10_000)
 class AheadSequencer(Sequencer):
     """See ``Sequencer`` for its arguments."""
 
-    _prepared: "NextMotion | None" = None  # None: the heap has no room
-    _is_full = False  # the heap has no more room
+    _prepared: "NextMotion | None" = None  # None: the heap has no space
+    _is_full = False  # the heap has no more space
     _work: "Iterator[None] | None" = None  # remaining work for the next motion
     _prepared_index = _running_index = _NONE  # the prepared motion, and the motion that was begun last
     _at_rate = 0  # rate for which it is prepared

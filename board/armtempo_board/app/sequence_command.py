@@ -94,10 +94,10 @@ class SequenceCommand:
         return size + len(name)
 
     def tell(self, link: "Any") -> None:
-        """Send the event of the row that has begun, once, when there is room."""
+        """Send the event of the row that has begun, once, when there is space."""
         status = self._status
         passed = status[PASSED]
-        if passed == self._sent or not link.room(self._size):
+        if passed == self._sent or not link.has_space(self._size):
             return
         self._sent = passed
         pack_into(

@@ -117,7 +117,7 @@ class Sequencer:
         self.tell = self._command.tell
 
     def begin(self) -> None:
-        """Begin with the next pass; raises Refused if the heap has no room for a motion."""
+        """Begin with the next pass; raises Refused if the heap has no space for a motion."""
         controller = self._controller
         controller.release_memory()
         free = gc.mem_free() if hasattr(gc, "mem_free") else self.start_bytes

@@ -50,7 +50,7 @@ LAST_SAMPLE = const(2)  # time of the last sample
 SAMPLES_DONE = const(3)  # the last sample has been taken
 RAW_IN = const(4)  # raw samples taken
 RAW_OUT = const(5)  # raw samples converted
-RAW_LOST = const(6)  # raw samples that found no room
+RAW_LOST = const(6)  # raw samples that found no space
 FROZEN = const(8)  # outputs are frozen; why, as bits as in LINE_MASK
 FAULT = const(9)
 FAULT_JOINT = const(10)
@@ -97,7 +97,7 @@ FAR_TIME = const(4)  # of the entry after it, half a round of the counter away
 MASK = const(5)  # entries of the ring, a power of two, less 1
 NDTR_AT = const(6)  # word offset of its stream's NDTR in DMA1
 FED = const(7)  # the interrupt writes to the ring; it stops that when the ring has run out of entries
-ROOM = const(8)  # entries that may be written now
+SPACE = const(8)  # entries that may be written now
 RING_AT = const(9)  # where its words are: the low 30 bits of the address, and in the next word the rest
 QUEUE_AT = const(11)  # and those of the queue that it is filled from
 STATE_WORDS = const(13)
@@ -107,7 +107,7 @@ RAW_COUNTER = const(0)
 RAW_MATCHES = const(1)  # six, one a joint
 RAW_ENCODERS = const(7)  # four counters
 RAW_WORDS = const(11)
-RAW_ROOM = const(4)  # raw samples: 0.4 s; the main loop comes every few milliseconds
+RAW_SPACE = const(4)  # raw samples: 0.4 s; the main loop comes every few milliseconds
 
 # SAMPLE_TICKS of limits.py
 _SAMPLE_TICKS = const(8400000)
@@ -191,7 +191,7 @@ def matches(state: ptr32, dma: ptr32) -> int:
 
 @micropython.viper
 def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
-    """One bit per joint: three eighths of its ring are free, so up to ROOM entries are to be added. -1: no ring is fed.
+    """One bit per joint: three eighths of its ring are free, so up to SPACE entries are added. -1: no ring is fed.
 
     130 instructions and 79 a joint, 126 if entries are to be added.
     """
@@ -208,18 +208,18 @@ def rings_to_refill(block: ptr32, dma: ptr32, timer: ptr32) -> int:
             block[MATCHED] = (
                 (block[NDTR_AT_START] - dma[block[NDTR_AT]] - block[MATCHED]) & block[MASK]
             ) + block[MATCHED]
-            room = block[MATCHED] - block[WRITTEN]
-            if room:
-                room += block[MASK] + 1
+            space = block[MATCHED] - block[WRITTEN]
+            if space:
+                space += block[MASK] + 1
                 if (
-                    8 * room > 3 * block[MASK]
+                    8 * space > 3 * block[MASK]
                     and ((block[LAST_TIME] - now) & 0x3FFFFFFF) < _FAR_AHEAD_TICKS - _GUARD_TICKS
                 ):
                     found |= 1 << joint
-                    room -= SPARE_ENTRIES
-                    block[ROOM] = room
-                    if room > _MOST_ENTRIES:
-                        block[ROOM] = _MOST_ENTRIES
+                    space -= SPARE_ENTRIES
+                    block[SPACE] = space
+                    if space > _MOST_ENTRIES:
+                        block[SPACE] = _MOST_ENTRIES
             else:
                 block[FED] = 0
     return found if fed else -1
@@ -352,11 +352,11 @@ def take_sample(raw: ptr32, block: ptr32, dma: ptr32, encoders: object, timer: p
     180 instructions, 40 a joint, 100 an encoder.
     """
     n = block[RAW_IN]
-    if ((n - block[RAW_OUT]) & 0xFF) >= RAW_ROOM:
+    if ((n - block[RAW_OUT]) & 0xFF) >= RAW_SPACE:
         block[RAW_LOST] = block[RAW_LOST] + 1
     else:
         block[RAW_IN] = (n + 1) & 0xFF
-        raw = ptr32(int(raw) + (n & (RAW_ROOM - 1)) * (4 * RAW_WORDS))
+        raw = ptr32(int(raw) + (n & (RAW_SPACE - 1)) * (4 * RAW_WORDS))
         raw[RAW_COUNTER] = timer[CNT]
         head = block
         n = block[JOINTS]

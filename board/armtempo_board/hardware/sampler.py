@@ -25,7 +25,7 @@ class Sampler:
 
     def __init__(self) -> None:
         self.block = array("I", bytearray(4 * isr.BLOCK_WORDS))
-        self.raw = array("I", bytearray(4 * isr.RAW_WORDS * isr.RAW_ROOM))
+        self.raw = array("I", bytearray(4 * isr.RAW_WORDS * isr.RAW_SPACE))
         self._counters: "tuple[int, ...]" = ()
         self._timer2 = stm.TIM2
         self._directions = stm.GPIOE
@@ -124,7 +124,7 @@ class Sampler:
         read = self.block[isr.RAW_OUT]
         if read == self.block[isr.RAW_IN]:
             return -1
-        return (read & (isr.RAW_ROOM - 1)) * isr.RAW_WORDS
+        return (read & (isr.RAW_SPACE - 1)) * isr.RAW_WORDS
 
     def drop(self) -> None:
         """The oldest raw sample has been converted."""

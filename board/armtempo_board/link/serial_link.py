@@ -54,7 +54,7 @@ class SerialLink:
         if self._repeated():
             self._reply_waits = True
             return False
-        return not self._reply_waits  # an answer is still waiting for room: the host repeats its command
+        return not self._reply_waits  # an answer is still waiting for space: the host repeats its command
 
     def answer(self, number: int, size: int) -> None:
         """Send the reply whose payload of ``size`` bytes is in ``reply``."""
@@ -64,7 +64,7 @@ class SerialLink:
         self._reply_size = self._finish(self.reply, 0, sequence, number, size)
         self._reply_waits = True
 
-    def room(self, size: int) -> bool:
+    def has_space(self, size: int) -> bool:
         """Whether an event with that many bytes of payload fits into ``out`` now; replies go first."""
         self._queue_reply()
         return not self._reply_waits and self._fits(size + OVERHEAD)
@@ -74,7 +74,7 @@ class SerialLink:
         return self._end + PAYLOAD_AT
 
     def event(self, number: int, size: int) -> None:
-        """Send the event whose payload was put at ``payload()``; ask ``room()`` before."""
+        """Send the event whose payload was put at ``payload()``; ask ``has_space()`` before."""
         self._end += self._finish(self.out, self._end, self._events, number, size)
         self._events = (self._events + 1) & 0xFF
 

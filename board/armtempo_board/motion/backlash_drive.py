@@ -26,8 +26,8 @@ from armtempo_board.stepgen import step_queue
 from armtempo_board.stepgen.step_queue import emit
 
 _TAP_ENTRIES = const(64)
-_TAP_ROOM = const(56)  # of them: ``emit`` writes one entry more
-_TAP_STEPS = const(28)  # in that room
+_TAP_SPACE = const(56)  # of them: ``emit`` writes one entry more
+_TAP_STEPS = const(28)  # in that space
 _PAST_KITICKS = const(8192)  # 100 ms, more than is computed ahead
 _MERGED_KITICKS = const(256)  # 3 ms between two calls of ``merge``: an item then has more than one step
 _THIS_RING = const(1)
@@ -48,7 +48,7 @@ _LATEST_KITICKS = const(22)
 _FULL = const(15)
 _COUNT_MASK = const(0xFFFF)
 # as in isr.py: words of a ring's state
-_ROOM = const(8)
+_SPACE = const(8)
 _QUEUE_AT = const(11)
 
 
@@ -278,7 +278,7 @@ class BacklashDrive(JointDrive):
         while True:
             if words[crossing.NEXT] == words[crossing.COUNT]:
                 words[crossing.NEXT] = 0
-                words[crossing.COUNT] = generator.write(self._tap, 0, _TAP_ROOM, self.ring.timer) >> 1
+                words[crossing.COUNT] = generator.write(self._tap, 0, _TAP_SPACE, self.ring.timer) >> 1
                 is_all = words[crossing.COUNT] < _TAP_STEPS
             # more of the generator's may wait, and come before steps of the play that are after those tapped
             crossing.merge(
@@ -303,7 +303,7 @@ class BacklashDrive(JointDrive):
         if ring.written():
             self.empty()
         self._queue[_HEAD] = 0
-        ring.state[_ROOM] = ring.entries - isr.SPARE_ENTRIES
+        ring.state[_SPACE] = ring.entries - isr.SPARE_ENTRIES
         emit(_THIS_RING, ring.state, ring.timer)
         return codes.UNDERRUN if ring.run() else 0
 

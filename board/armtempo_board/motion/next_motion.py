@@ -1,7 +1,7 @@
 """Prepares the next motion, with its first steps, while another one runs.
 
 It has its own step generators. The running motion, pins, rings and clock are not touched before
-``hand_over``, when nothing moves. Imported for sequences, if the heap has room
+``hand_over``, when nothing moves. Imported for sequences, if the heap has space
 (``armtempo_shared.engine_memory.ahead_bytes``).
 """
 
@@ -43,7 +43,7 @@ _PERMILLE = const(1000)
 class NextMotion:
     """The next motion of an engine. ``is_ready``: it is loaded, to start at ``expected``.
 
-    Raises MemoryError if the heap has no room.
+    Raises MemoryError if the heap has no space.
     """
 
     def __init__(self, engine: "Engine") -> None:

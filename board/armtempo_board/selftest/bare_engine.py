@@ -105,7 +105,7 @@ def pull_inactive(engine: "Any") -> None:
 
 
 def serve(engine: "Engine", idle_us: int) -> None:
-    """A turn of the loop. ``idle_us``: its duration in simulated time."""
+    """A pass of the loop. ``idle_us``: its duration in simulated time."""
     engine.service()
     if idle_us:
         time.sleep_us(idle_us)

@@ -9,7 +9,7 @@ from armtempo_shared import armrecord
 from machine import mem32
 from micropython import const
 
-_SAMPLES = 4096  # 4 ms, more than a turn of the loop
+_SAMPLES = 4096  # 4 ms, more than a pass of the loop
 _PERIOD = 167  # of TIM1 at 168 MHz: 1 us
 _DMA2EN, _TIM1EN = 1 << 22, 1
 _TIM1 = stm.TIM1

@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
 
 @micropython.viper
-def counting(turns: int) -> int:
+def counting(passes: int) -> int:
     """A loop in machine code."""
     total = 0
-    for turn in range(turns):
-        total += turn
+    for number in range(passes):
+        total += number
     return total
 
 
-def plain(turns: int) -> int:
+def plain(passes: int) -> int:
     """The same in byte code."""
     total = 0
-    for turn in range(turns):
-        total += turn
+    for number in range(passes):
+        total += number
     return total
 
 
@@ -42,7 +42,7 @@ def emitted(entries: int) -> int:
     queue[step_queue.STEPS], queue[step_queue.UNTIL_KITICKS], queue[step_queue.PULSE] = 512, 1 << 28, 168
     ring = array("i", [0] * 1025)
     state = array("i", [0] * isr.STATE_WORDS)
-    state[isr.MASK], state[isr.ROOM] = 1023, entries
+    state[isr.MASK], state[isr.SPACE] = 1023, entries
     isr.set_places(state, ring, queue)
     return cost(step_queue.emit, 1, state, array("i", [0] * 18), times=1)
 

@@ -99,7 +99,7 @@ def flash() -> "dict[str, Any] | None":
 
 
 def write_file() -> "dict[str, Any] | None":
-    """Milliseconds to write and read a file of 4 KB, None if there is no room; nothing is left of it."""
+    """Milliseconds to write and read a file of 4 KB, None if there is no space; nothing is left of it."""
     import os
 
     space = os.statvfs("/flash")

@@ -37,7 +37,7 @@ def measure(
     captures, steps = captured(record, len(start_steps), most)
     engine, joints = make_engine(record, rates=rates)
     stages = {"engine": free()}
-    longest = turns = 0
+    longest = passes = 0
     try:
         load(engine, unhexlify(motion), start_steps)
         stages["loaded"] = free()
@@ -51,7 +51,7 @@ def measure(
             now = cycles()
             longest = max(longest, (now - then) & 0xFFFFFFFF)
             then = now
-            turns += 1
+            passes += 1
         passed = (cycles() - begun) & 0xFFFFFFFF
         turned = directions(joints)
         for capture in captures:
@@ -72,9 +72,9 @@ def measure(
         "counts": [capture.count() for capture in captures],
         "steps": steps,
         "directions": turned,
-        "turns": turns,
-        "turn_cycles": passed // max(turns, 1),
-        "longest_turn_cycles": longest,
+        "passes": passes,
+        "pass_cycles": passed // max(passes, 1),
+        "longest_pass_cycles": longest,
         "free": stages,
         "enable": off,
     }

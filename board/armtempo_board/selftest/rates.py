@@ -53,7 +53,7 @@ def measure(
     idle_us: int,
     watch: "tuple[str, int] | None" = None,
 ) -> "dict[str, Any]":
-    """The first joints of the arm, one for each of ``rates``, from step 0 on: fault, turns of the loop, the longest.
+    """The first joints of the arm, one for each of ``rates``, from step 0 on: fault, passes of the loop, the longest.
 
     ``frames``: hello, then two commands that take turns. ``watch``: a port, and the microsecond at which its capture
     ends: the steps on its pins in the 4 ms before are measured.
@@ -96,8 +96,8 @@ def measure(
         raise ValueError("the E-stop was pressed")
     return {
         "fault": fault,
-        "turns": app.passes,
-        "longest_turn_cycles": longest,
+        "passes": app.passes,
+        "longest_pass_cycles": longest,
         "commands": host.sent,
         "steps": captures[0].window() if captures else {},
         "enable": off,

@@ -14,7 +14,7 @@ _RAMP_SLACK = const(2)  # log2 of how much wider the error bound is within a ram
 _MOST_SLACK = const(8)
 _SLACK_SHIFT = const(8)  # 2**slack / 8 ticks are 1/1024 of a step's interval
 # results of ``queue_steps``
-NO_ROOM = const(0)  # the queue is full, or reaches UNTIL_KITICKS
+NO_SPACE = const(0)  # the queue is full, or reaches UNTIL_KITICKS
 GOES_ON = const(1)
 STOPPED = const(2)  # HELD_BACK or HALTED is set
 
@@ -151,7 +151,7 @@ def queue_steps(solver: object, queue: object, law: object) -> int:
         if (words[_IN] - words[_OUT]) & _COUNT_MASK >= _FULL or words[_LATEST_KITICKS] > words[
             _UNTIL_KITICKS
         ]:
-            result = NO_ROOM
+            result = NO_SPACE
             break
         length = (last - reached) >> 1
         if length > 1 and mode < _AT_START and not words[_SINGLE_STEPS]:

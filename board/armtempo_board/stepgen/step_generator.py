@@ -28,7 +28,7 @@ from armtempo_board.memory import Memory
 from armtempo_board.stepgen import newton, step_queue
 from armtempo_board.stepgen.newton import solve
 from armtempo_board.stepgen.override import JointLaw
-from armtempo_board.stepgen.step_queue import emit, has_room, put_single
+from armtempo_board.stepgen.step_queue import emit, has_space, put_single
 from armtempo_board.stepgen.subintervals import Subintervals
 
 TYPE_CHECKING = False
@@ -76,11 +76,11 @@ _MOTION_HIGH = const(22)
 _NOT_YET = const(0)
 _FOUND_AT_START = const(2)
 _END = const(3)
-# as in interval_steps.py: results, 0 if the queue has no room
+# as in interval_steps.py: results, 0 if the queue has no space
 _STOPPED = const(2)
 
 # as in isr.py: word of a ring's state
-_ROOM = const(8)
+_SPACE = const(8)
 _NO_RING = array("i", bytes(4 * 9))  # the state of one that no interrupt writes to
 
 # of ``_pending``
@@ -185,7 +185,7 @@ class StepGenerator:
         """
         queue = self.queue
         for _ in range(_PARTS_PER_CALL):
-            if not has_room(queue, until_kiticks) or self.at_reversal or self.halted or self.ended:
+            if not has_space(queue, until_kiticks) or self.at_reversal or self.halted or self.ended:
                 return False
             if self._pending & _FIRST:
                 self._queue_first()
@@ -199,15 +199,15 @@ class StepGenerator:
                 self._next_interval()
         return True
 
-    def write(self, ring: "array[int] | memoryview[int]", head: int, room: int, timer: "Any") -> int:
-        """Write up to ``room`` edge times (rise, fall, ...; ticks modulo 2**32) to a ring, from the entry ``head`` on.
+    def write(self, ring: "array[int] | memoryview[int]", head: int, space: int, timer: "Any") -> int:
+        """Write up to ``space`` edge times (rise, fall, ...; ticks modulo 2**32) to a ring, from the entry ``head`` on.
 
         ``ring``: the ring's state (isr.py), which says where it and the queue are. ``head`` is even. ``timer``: see
         ``emit``. Returns how many were written.
         """
         queue = self.queue
         queue[_HEAD] = head
-        ring[_ROOM] = room
+        ring[_SPACE] = space
         emit(_THIS_RING, ring, timer)
         return int(queue[_HEAD] - head)
 

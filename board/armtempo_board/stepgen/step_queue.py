@@ -56,7 +56,7 @@ QUEUE_SIZE = const(224)
 
 SQUARE = const(8)
 _GROUP_MASK = const(7)
-_FULL = const(15)  # items: there is no room for two more
+_FULL = const(15)  # items: there is no space for two more
 # bits of MODE
 BY_LAW = const(1)  # real time is not the motion's own, see time_law.py
 AT_START = const(2)  # all steps come at the start of the subinterval
@@ -80,7 +80,7 @@ _LAST_TIME = const(3)
 _FAR_TIME = const(4)
 _MASK = const(5)
 _FED = const(7)
-_ROOM = const(8)
+_SPACE = const(8)
 _RING_AT = const(9)
 _QUEUE_AT = const(11)
 _JOINT_WORDS = const(29)
@@ -93,7 +93,7 @@ _LONG_KITICKS = const(1 << 19)  # longer than any cubic
 
 @micropython.viper
 def emit(now: int, ring: ptr32, timer: ptr32) -> int:
-    """Write edges of queued items to rings: of each joint up to UNTIL_KITICKS, and as many as its ROOM says.
+    """Write edges of queued items to rings: of each joint up to UNTIL_KITICKS, and as many as its SPACE says.
 
     ``now``: one bit per joint; ``ring``: the state of the first joint's ring in the block of isr.py, followed by the
     others'. Returns a bit for each joint whose last edge had passed by ``timer`` before all was written.
@@ -114,7 +114,7 @@ def emit(now: int, ring: ptr32, timer: ptr32) -> int:
             queue = ptr32((state[_QUEUE_AT + 1] << 30) + state[_QUEUE_AT])
             mask = state[_MASK]
             pulse = queue[PULSE]
-            queue[_ENTRIES_LEFT] = state[_ROOM]
+            queue[_ENTRIES_LEFT] = state[_SPACE]
             while True:
                 if queue[_ENTRIES_LEFT] < 2:
                     break
@@ -152,7 +152,7 @@ def emit(now: int, ring: ptr32, timer: ptr32) -> int:
                     queue[HEAD] = queue[HEAD] + 2
                     queue[_ENTRIES_LEFT] = queue[_ENTRIES_LEFT] - 2
                     continue
-                # A cubic: how many of its steps fit in front of the ring's end, into the room and before UNTIL_KITICKS
+                # A cubic: how many of its steps fit in front of the ring's end, into the space and before UNTIL_KITICKS
                 now = queue[_TIME]
                 shift = queue[SHIFT]
                 count = (mask + 1 - at) >> 1
@@ -257,7 +257,7 @@ def emit(now: int, ring: ptr32, timer: ptr32) -> int:
                                 ring = ptr32(int(ring) + 16)
                                 left -= 2
                             continue
-                    # or those that have room, singly
+                    # or those that have space, singly
                     while left and count:
                         now = now + step
                         ring[_RISE] = (now >> shift) + base
@@ -311,8 +311,8 @@ def put_single(queue: ptr32, high: int, ticks: int) -> object:
 
 
 @micropython.viper
-def has_room(queue: ptr32, until_kiticks: int) -> int:
-    """1 if the queue has room for two items and does not continue beyond a time, the new UNTIL_KITICKS; else 0."""
+def has_space(queue: ptr32, until_kiticks: int) -> int:
+    """1 if the queue has space for two items and does not continue beyond a time, the new UNTIL_KITICKS; else 0."""
     queue[UNTIL_KITICKS] = until_kiticks
     if (queue[IN] - queue[OUT]) & _COUNT_MASK >= _FULL:
         return 0

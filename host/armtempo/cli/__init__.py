@@ -173,7 +173,7 @@ def _of_file(error: OSError) -> ArmtempoError:
     """The operating system's reason for an error with a file, and what to check."""
     where = f"{error.filename}: " if error.filename else ""
     return ArmtempoError(
-        f"{where}{error.strerror or error}", "check the path, its permissions and the room on the disk"
+        f"{where}{error.strerror or error}", "check the path, its permissions and the space on the disk"
     )
 
 

@@ -242,14 +242,7 @@ def import_urdf(
         "links' shapes",
         f"wrote {out}; add the motors, then: armtempo check --arm {out}",
     ]
-    lines += [
-        f"note: {doubt} A URDF has radians; correct it, or the joint in {out}" for doubt in chain.doubts
-    ]
-    lines += [f"note: {said}" for said in (*chain.narrowed, *chain.unclear)]
-    if chain.couplings:
-        lines.append(
-            f"the URDF's transmissions couple joints: [coupling] in {out} is to be used with the motors"
-        )
+    lines += [f"note: {text}" for text in arm_text.notes(chain, out)]
     if meshes:
         lines.append(f"wrote {len(written)} meshes into {mesh_files.folder_of(out)}")
     if len(chain.joints) > MAX_JOINTS:

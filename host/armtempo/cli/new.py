@@ -34,7 +34,8 @@ from armtempo.new_arm.questions import Answers
     multiple=True,
     metavar="KEY=VALUE,…",
     help="One joint, base first; repeat for each: name, d_mm, a_mm, alpha_deg, theta_offset_deg, "
-    "low_deg, high_deg, steps_per_rev, microsteps, gear_ratio, speed_deg_s, encoder_counts, parallel_linkage (1).",
+    "low_deg, high_deg, steps_per_rev, microsteps, gear_ratio, speed_deg_s, encoder_counts, parallel_linkage (1); of a "
+    "sliding one: type=prismatic, low_mm, high_mm, mm_per_rev, speed_mm_s.",
 )
 @click.option("--modified", is_flag=True, help="The joints' rows are in the modified (Craig) convention.")
 @click.option("--resume", is_flag=True, help="Continue with the questions that Ctrl-C interrupted.")
@@ -74,9 +75,14 @@ def new(
     written = project_folder.write(folder, arm, port)
     draft_path(folder).unlink(missing_ok=True)
     joint_figures = figures.of(arm.arm)
-    values = {"files": [str(path) for path in written], "joints": [joint.values for joint in joint_figures]}
+    values = {
+        "files": [str(path) for path in written],
+        "joints": [joint.values for joint in joint_figures],
+        "notes": list(arm.notes),
+    }
     next_step = f"next: cd {folder}; armtempo check; the other commands are in README.md"
-    lines = [*(f"wrote {path}" for path in written), *figures.table(joint_figures), next_step]
+    lines = [*(f"wrote {path}" for path in written), *figures.table(joint_figures)]
+    lines += [*(f"note: {text}" for text in arm.notes), next_step]
     results.show(as_json, values, lines)
 
 

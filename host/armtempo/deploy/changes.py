@@ -115,7 +115,7 @@ def choose(found: Survey, tell: Tell) -> Wanted:
         )
     if not _fits(found, program.files):
         raise LinkError(
-            f"the program needs {_needed(found, program.files)} blocks of flash, the board has room for "
+            f"the program needs {_needed(found, program.files)} blocks of flash, the board has space for "
             f"{_free_blocks(found)}; {_taken(found)}",
             _way_out(found),
         )

@@ -71,9 +71,7 @@ def image(needed: Mapping[str, bytes], later: Mapping[str, bytes]) -> bytes:
     text = len(index).to_bytes(2, "little") + index
     text += bytes(-(HEAD_BYTES + len(text)) % 4) + body
     if HEAD_BYTES + len(text) > SIZE:
-        raise UnknownFormatError(
-            f"{HEAD_BYTES + len(text)} bytes of program, in the flash is room for {SIZE}"
-        )
+        raise UnknownFormatError(f"{HEAD_BYTES + len(text)} bytes of program, the flash has space for {SIZE}")
     return MAGIC + struct.pack("<II", HEAD_BYTES + len(text), zlib.crc32(text)) + text
 
 

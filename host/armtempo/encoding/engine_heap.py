@@ -53,7 +53,7 @@ CORE = EngineHeap(10_900)
 IN_FIRMWARE = EngineHeap(engine_memory.LARGEST_BYTES)
 """Memory with the program's core on stock MicroPython for the STM32F4DISC, and built into the firmware.
 
-Measured: ``python -m tests.benchmark.room MICROPYTHON``.
+Measured: ``python -m tests.benchmark.arm_heap MICROPYTHON``.
 """
 _BUILD = "'armtempo flash'"
 

@@ -36,7 +36,7 @@ def named(top: Table, key: str, most: int | None = None) -> list[tuple[str, Tabl
     """The tables [key.NAME] of a file, of which the board takes ``most``; raises as ``outputs``."""
     found = top.named_tables(key)
     if most is not None and len(found) > most:
-        raise InputError(f"{top.file}: {len(found)} tables [{key}.NAME]", f"the board has room for {most}")
+        raise InputError(f"{top.file}: {len(found)} tables [{key}.NAME]", f"the board has space for {most}")
     for name, _ in found:
         check_name(f"{top.file}: {key}.{name}", name)
     return found

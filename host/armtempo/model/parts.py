@@ -423,7 +423,8 @@ class Safety:
     )
     at_power_up: str = field(
         default="nothing",
-        metadata=key(
-            "what starts by itself at power-up: the default, if it is a program", choices=AT_POWER_UP
-        ),
+        metadata={
+            **key("what starts by itself at power-up: the default, if it is a program", choices=AT_POWER_UP),
+            **json_codec.ADDED,
+        },
     )

@@ -54,11 +54,11 @@ class Search:
     motion time after each start."""
     optimum_s: float
     """After polish: lower bound of the local optimum with the same number of intervals; else 0."""
-    floor_s: float
+    lower_bound_s: float = field(metadata={json_codec.KEY: "floor_s"})
     """Proven lower bound of the motion time over all time laws along this path; for a free path, over all
     paths through the via points."""
-    floor_kind: str
-    """How the lower bound was found, see ``lower_bounds.Floor``."""
+    lower_bound_kind: str = field(metadata={json_codec.KEY: "floor_kind"})
+    """How the lower bound was found, see ``lower_bounds.LowerBound``."""
     starts_s: Array = field(default_factory=lambda: np.empty(0), metadata=json_codec.ADDED)
     """For a gradient search, the motion time of each start on few segments; else empty."""
 

@@ -74,6 +74,17 @@ def arm_text(chain: Chain, fit: Fit, urdf: Path) -> str:
     return "\n".join([unread + head, *rows, *_couplings(chain)])
 
 
+def notes(chain: Chain, file: Path | str) -> list[str]:
+    """What is doubtful or changed in the arm of a URDF that is written into an arm file."""
+    found = [f"{doubt} A URDF has radians; correct it, or the joint in {file}" for doubt in chain.doubts]
+    found += [*chain.narrowed, *chain.unclear]
+    if chain.couplings:
+        found.append(
+            f"the URDF's transmissions couple joints: [coupling] in {file} is to be used with the motors"
+        )
+    return found
+
+
 def _couplings(chain: Chain) -> list[str]:
     """The table [coupling], to be used with the motors; no text without couplings."""
     if not chain.couplings:

@@ -17,6 +17,7 @@ from armtempo.model.arm import Arm
 from armtempo.new_arm import joint_entry
 from armtempo.new_arm.joint_entry import JointEntry
 
+ARM_FILE = "arm.toml"
 _SETTINGS = """\
 # What commands in this folder use if an option does not say otherwise; 'armtempo config' shows it.
 arm = "arm.toml"
@@ -76,6 +77,8 @@ class ArmText:
     text: str
     arm: Arm
     """The arm read from the text."""
+    notes: tuple[str, ...] = ()
+    """On what it was made from."""
 
 
 def from_shipped(name: str) -> ArmText:
@@ -98,7 +101,8 @@ def from_urdf(urdf: Path) -> ArmText:
     from armtempo.new_arm import urdf_reader as reader
 
     chain = reader.read(urdf, None, None)
-    return _checked(arm_text.arm_text(chain, fitting.fit(chain), urdf))
+    made = _checked(arm_text.arm_text(chain, fitting.fit(chain), urdf))
+    return replace(made, notes=tuple(arm_text.notes(chain, ARM_FILE)))
 
 
 def from_joints(name: str, joints: Sequence[JointEntry], modified: bool = False) -> ArmText:
@@ -126,12 +130,12 @@ def within(arm: ArmText, workspace: Mapping[str, Sequence[float]]) -> ArmText:
     if not workspace:
         return arm
     rows = [f"{key} = {values[0] if len(values) == 1 else list(values)}" for key, values in workspace.items()]
-    return _checked("\n".join([arm.text, "[workspace]", *rows, ""]))
+    return replace(_checked("\n".join([arm.text, "[workspace]", *rows, ""])), notes=arm.notes)
 
 
 def _checked(text: str) -> ArmText:
     """Raise InputError for a text that could not be read again."""
-    return ArmText(text, Arm.of_table(toml_table.parse(text, "arm.toml")))
+    return ArmText(text, Arm.of_table(toml_table.parse(text, ARM_FILE)))
 
 
 def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
@@ -140,7 +144,7 @@ def write(folder: Path, arm: ArmText, port: str) -> list[Path]:
     Raises InputError, leaving nothing, if the folder exists and is not empty, or cannot be written.
     """
     check_free(folder)
-    files = {"arm.toml": arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
+    files = {ARM_FILE: arm.text, "armtempo.toml": _SETTINGS.format(port=_quoted(port))}
     if arm.arm.driven_indices:
         files["first.toml"] = _JOB.format(
             what=arm.arm.texts.position,

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS, MAX_STEP_RATE
 
 from armtempo.basics.text import visible
-from armtempo.model import shipped
+from armtempo.model import joint_unit, shipped
+from armtempo.model.joint_unit import PRISMATIC, REVOLUTE
 from armtempo.model.parts_file import MAX_ANGLE_DEG, MAX_LENGTH_MM
 from armtempo.model.workspace import FAR_MM
 from armtempo.new_arm.joint_entry import INTEGERS, JointEntry
 
 STANDARD, MODIFIED = "standard", "modified"
+TURNS, SLIDES = "turns", "slides"
 NO = "none"
 FLOOR, WALLS = "floor_mm", ("x_mm", "y_mm")
 """Keys of the workspace in an arm file."""
@@ -73,8 +75,9 @@ def joints(answers: Mapping[str, str]) -> list[JointEntry]:
         }
         name = of_joint.pop("name")
         has_linkage = of_joint.pop("parallel_linkage", "") in _YES
+        kind = PRISMATIC if of_joint.pop("type", TURNS) == SLIDES else REVOLUTE
         values = {key: int(text) if key in INTEGERS else float(text) for key, text in of_joint.items()}
-        found.append(JointEntry(name, **values, parallel_linkage=has_linkage))  # type: ignore[arg-type]
+        found.append(JointEntry(name, **values, parallel_linkage=has_linkage, type=kind))  # type: ignore[arg-type]
     return found
 
 
@@ -152,7 +155,7 @@ def _own(answers: Mapping[str, str]) -> list[Question]:
     found = [
         Question(
             *("count", "how many joints", "3"),
-            f"Those that a motor turns, 1 to {MAX_JOINTS}; a gripper is an output, not a joint.",
+            f"Those that a motor moves, 1 to {MAX_JOINTS}; a gripper is an output, not a joint.",
             _whole(1, MAX_JOINTS),
         ),
         Question(
@@ -181,28 +184,40 @@ class _Joint:
         self._number = number
         self._answers = answers
         self._name = f"joint {number} of {answers['count']}"
+        self._slides = self._is_sliding(number)
+        self._unit = joint_unit.of_type(PRISMATIC if self._slides else REVOLUTE)
+        self._shaft = "its screw or pulley" if self._slides else "the joint"
+
+    def _is_sliding(self, number: int) -> bool:
+        return self._answers.get(f"{number}.type") == SLIDES
 
     def row(self) -> list[Question]:
         names = [self._answers[f"{other}.name"] for other in range(1, self._number)]
         modified = self._answers["convention"] == MODIFIED
         link = "the axis before to this one" if modified else "this axis to the next one"
         length = _number(-MAX_LENGTH_MM, MAX_LENGTH_MM, "120.5")
-        offset = "theta where the joint is at 0, degrees"
+        offset = "theta, degrees" if self._slides else "theta where the joint is at 0, degrees"
+        added = "The fixed angle about its axis." if self._slides else "Added to the joint's angle."
+        d = "d where the joint is at 0, mm" if self._slides else "d, mm"
         return [
             self._ask("name", "name", "Any words; reports and messages use them.", _new_name(names)),
             self._ask(
-                "d_mm", "d, mm", "Along this joint's axis, from one common normal to the next.", length
+                *("type", f"how it moves ({TURNS}, {SLIDES})"),
+                "About its axis, or along it, as on a rail or a spindle.",
+                _one_of([TURNS, SLIDES]),
+                TURNS,
             ),
+            self._ask("d_mm", d, "Along this joint's axis, from one common normal to the next.", length),
             self._ask("a_mm", "a, mm", f"Length of the common normal from {link}.", length),
             self._ask(
                 *("alpha_deg", "alpha, degrees", f"Turn about the common normal from {link}."),
                 _number(-180, 180, "-90"),
             ),
-            self._ask("theta_offset_deg", offset, "Added to the joint's angle.", _number(-360, 360, "-90")),
+            self._ask("theta_offset_deg", offset, added, _number(-360, 360, "-90")),
         ]
 
     def linkage(self) -> list[Question]:
-        if self._number == 1:
+        if self._number == 1 or self._slides or self._is_sliding(self._number - 1):
             return []
         text = "does a parallelogram turn it, with the motor one link further down (yes, no)"
         explanation = (
@@ -212,21 +227,29 @@ class _Joint:
         return [self._ask("parallel_linkage", text, explanation, _one_of([*_YES, *_NO]), "no")]
 
     def travel(self) -> list[Question]:
-        low = float(self._answers.get(f"{self._number}.low_deg", "-90"))
+        least = 0.0 if self._slides else -90.0
+        low = float(self._answers.get(f"{self._number}.low_deg", least))
+        what, unit = self._unit.what, self._unit.word
         return [
             self._ask(
-                *("low_deg", "lowest angle, degrees", "The lower end of the joint's range."),
+                *("low_deg", f"lowest {what}, {unit}", "The lower end of the joint's range."),
                 _number(-MAX_ANGLE_DEG, MAX_ANGLE_DEG, "-90"),
+                str(least),
             ),
             self._ask(
-                *("high_deg", "highest angle, degrees", "The upper end of its range."),
-                _above(low),
+                *("high_deg", f"highest {what}, {unit}", "The upper end of its range."),
+                _above(low, what),
                 str(max(90.0, low + 90.0)),
             ),
         ]
 
     def drive(self) -> list[Question]:
-        steps, gear = "full steps for a turn of the motor", "motor turns for a turn of the joint"
+        steps, gear = "full steps for a turn of the motor", f"motor turns for a turn of {self._shaft}"
+        travel = self._ask(
+            *("mm_per_rev", "travel for a turn of its screw or pulley, mm"),
+            "The lead of the screw, or the pulley's number of teeth times the pitch of its belt.",
+            _number(0.01, 10_000, "8"),
+        )
         return [
             self._ask("steps_per_rev", steps, "200 for 1.8 degrees a step.", _whole(4, 10_000)),
             self._ask(
@@ -237,26 +260,32 @@ class _Joint:
                 *("gear_ratio", gear, "Of gear and belt together; 1 without any."),
                 _number(0.1, 10_000, "4.5"),
             ),
+            *([travel] if self._slides else []),
         ]
 
     def encoder(self) -> list[Question]:
         if self._number > MAX_ENCODERS:
             return []
-        text = "encoder counts for a turn of the joint, all edges (0: none)"
+        text = f"encoder counts for a turn of {self._shaft}, all edges (0: none)"
         return [self._ask("encoder_counts", text, "Four times the lines of its disc.", _counts)]
 
     def speed(self) -> list[Question]:
         """The question about the speed, once steps and gear are known."""
-        keys = [f"{self._number}.{key}" for key in ("steps_per_rev", "microsteps", "gear_ratio")]
+        wanted = ("steps_per_rev", "microsteps", "gear_ratio", *(["mm_per_rev"] if self._slides else []))
+        keys = [f"{self._number}.{key}" for key in wanted]
         if not all(key in self._answers for key in keys):
             return []
-        steps, micro, gear = (self._answers[key] for key in keys)
+        steps, micro, gear, *travel = (self._answers[key] for key in keys)
         entry = JointEntry("", steps_per_rev=int(steps), microsteps=int(micro), gear_ratio=float(gear))
+        if travel:
+            entry = replace(entry, mm_per_rev=float(travel[0]), type=PRISMATIC)
+        unit = self._unit
         most = entry.most_speed_deg_s(int(self._answers["count"]))
         return [
             self._ask(
                 "speed_deg_s",
-                f"speed limit, degrees/s ({entry.steps_per_deg:.5g} steps/deg; {most:.4g} is easy for the motor)",
+                f"speed limit, {unit.word}/s ({entry.steps_per_deg:.5g} steps/{unit.name}; {most:.4g} is easy for the "
+                "motor)",
                 "Acceleration and jerk begin at 1 and 4 times of it; change all three in the file.",
                 _number(0.001, MAX_STEP_RATE / entry.steps_per_deg, "30"),
                 f"{min(60.0, float(f'{0.9 * most:.2g}')):g}",
@@ -323,12 +352,12 @@ def _counts(text: str) -> int:
     return 0 if text == "0" else int(str(_whole(4, 10_000_000)(text)))
 
 
-def _above(low: float) -> Reader:
+def _above(low: float, what: str) -> Reader:
     def read(text: str) -> float:
         value = float(str(_number(-MAX_ANGLE_DEG, MAX_ANGLE_DEG, "90")(text)))
         if value <= low:
             raise WrongAnswerError(
-                f"it must be above the lowest angle, {low:g}, such as {low + 90:g}; '<' goes back to that"
+                f"it must be above the lowest {what}, {low:g}, such as {low + 90:g}; '<' goes back to that"
             )
         return value
 

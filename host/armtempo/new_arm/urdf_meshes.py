@@ -37,14 +37,14 @@ def of_rows(chain: Chain, fit: Fit, urdf: Path) -> dict[int, Array]:
 def radii_mm(chain: Chain, fit: Fit, urdf: Path) -> dict[int, float]:
     """Radii of rows, from 1, about whose d and a the links' shapes for collision are, or those that are seen.
 
-    A triangle is within a capsule if its corners are; constant rows carry what the one before them does. Rows
-    without shapes are left out, and those of sliding joints. InputError for a mesh that cannot be read.
+    A triangle is within a capsule if its corners are; constant rows carry what the one before them does. A sliding
+    joint's d is taken where it is shortest. Rows without shapes are left out. Raises InputError for a mesh that
+    cannot be read.
     """
     frames = all_frames(geometry(fit.rows), [0.0] * len(fit.rows))
     found: dict[int, float] = {}
     for joint, links in enumerate(_links(chain)[1:]):
-        if chain.joints[joint].slides:
-            continue  # how far its shapes are from its d changes as it slides
+        moved = chain.joints[joint]
         first = next(number for number, row in enumerate(fit.rows) if row.joint == joint)
         rows = [
             first,
@@ -54,7 +54,11 @@ def radii_mm(chain: Chain, fit: Fit, urdf: Path) -> dict[int, float]:
             away = []
             for row in rows:
                 begin, end = frames[row][:3, 3], frames[row + 1][:3, 3]
-                turn = begin + fit.rows[row].d_mm * frames[row][:3, 2]
+                axis, d_mm = frames[row][:3, 2], fit.rows[row].d_mm
+                turn = begin + d_mm * axis
+                if row == first and moved.slides:  # the shapes go with the end of its d
+                    low, high = moved.range_deg
+                    begin = turn - np.clip(0.0, d_mm + low, d_mm + high) * axis
                 away += [_farthest(corners_mm, *each) for each in ((begin, turn), (turn, end))]
             nearest = np.argmin(away, axis=0)
             for number, corners in enumerate(away):

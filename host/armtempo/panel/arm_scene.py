@@ -233,9 +233,9 @@ class ArmScene:
     def __init__(self, shape: ArmShape) -> None:
         self._shape = shape
         self.picked: Callable[[int], object] = lambda number: None
-        """Called with the number of a via point that was clicked."""
+        """Called with the number of a via point that was clicked; what it returns is awaited, if it can be."""
         self.dragged: Callable[[int, Array], object] = lambda number, position_mm: None
-        """Called with the number of a via point that was dragged, and where to, (3,)."""
+        """The same of one that was dragged, and where to, (3,)."""
         with ui.scene(
             width=800,
             height=500,
@@ -339,15 +339,13 @@ class ArmScene:
             name.move(x, y, z + 2 * _DOT)
         ui.run_javascript("armtempo.changes += 1")
 
-    def _clicked(self, event: SceneClickEventArguments) -> None:
-        for hit in event.hits:
-            if (number := _via_number(hit.object_name)) is not None:
-                self.picked(number)
-                return
+    def _clicked(self, event: SceneClickEventArguments) -> object:
+        numbers = [_via_number(hit.object_name) for hit in event.hits]
+        return next((self.picked(number) for number in numbers if number is not None), None)
 
-    def _moved(self, name: str, position: list[float]) -> None:
-        if (number := _via_number(name)) is not None:
-            self.dragged(number, np.array(position) * self._shape.reach_mm)
+    def _moved(self, name: str, position: list[float]) -> object:
+        number = _via_number(name)
+        return None if number is None else self.dragged(number, np.array(position) * self._shape.reach_mm)
 
 
 def _via_number(name: str | None) -> int | None:

@@ -57,7 +57,8 @@ class CurveChart:
         if reference is not None:
             series += [self._curve(number, times_s, reference[:, number], of_plan=True) for number in joints]
         self._place.set_visibility(True)
-        self.chart.options["series"] = series
+        # Not as an item of NiceGUI's dictionary, which would watch each of thousands of points, in 20 ms
+        dict.__setitem__(self.chart.options, "series", series)
         self.chart.update()
 
     def mark(self, time_s: float) -> None:

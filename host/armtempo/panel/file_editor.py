@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,8 @@ class FileEditor(ABC):
         self._values: dict[str, Any] = {}
         self._saved = ""
         self._undo: list[str] = []
+        self._kinds: dict[Path, tuple[int, bool]] = {}
+        """Whether each file of the folder is one of this kind, with the time of what was read."""
 
     @abstractmethod
     def new_text(self, name: str) -> str:
@@ -51,22 +54,43 @@ class FileEditor(ABC):
         """Take another version of the arm."""
         self.arm = arm
 
+    def check_to_open(self, text: str, file: Path) -> None:
+        """As ``check``, for a file that is opened."""
+        self.check(text, file)
+
     # files
 
     def files(self) -> list[str]:
-        """Names of the files of this kind in the folder."""
-        return [path.name for path in sorted(self.folder.glob("*.toml")) if self.is_one(path)]
+        """Names of the files of this kind in the folder; only those that have changed are read."""
+        known, self._kinds = self._kinds, {}
+        for path in sorted(self.folder.glob("*.toml")):
+            with suppress(OSError):  # it is gone
+                changed_ns = path.stat().st_mtime_ns
+                before = known.get(path)
+                is_one = before[1] if before and before[0] == changed_ns else self.is_one(path)
+                self._kinds[path] = changed_ns, is_one
+        return [path.name for path, (_, is_one) in self._kinds.items() if is_one]
 
     def open(self, name: str) -> None:
         """Edit a file of the folder; raises InputError if it is none of this kind."""
-        if name not in self.files():
-            raise InputError(f"{name}: there is no such {self.kind} in the project folder", "choose another")
-        self.load(self.folder / name)
+        self.take(*self.to_open(name))
 
     def load(self, file: Path) -> None:
         """Edit a file; raises InputError if it is not valid."""
-        text = _read(file)
-        self.check(text, file)
+        self.take(file, self._checked(file))
+
+    def to_open(self, name: str) -> tuple[Path, str]:
+        """A file of the folder and its text, checked in any thread; raises InputError if it is none of this kind."""
+        if name not in self.files():
+            raise InputError(f"{name}: there is no such {self.kind} in the project folder", "choose another")
+        return (file := self.folder / name), self._checked(file)
+
+    def _checked(self, file: Path) -> str:
+        self.check_to_open(text := _read(file), file)
+        return text
+
+    def take(self, file: Path, text: str) -> None:
+        """Edit the text of a file that was checked."""
         self._set(text)
         self.file, self._saved = file, text
 

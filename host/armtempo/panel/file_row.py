@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from nicegui import ui
 
@@ -17,6 +17,8 @@ from armtempo.panel.panel_page import named
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
     from armtempo.panel.press import Press
+
+T = TypeVar("T")
 
 
 class FileRow:
@@ -46,9 +48,9 @@ class FileRow:
         self._page.operator.check(self._page.client, press, Needs.CONTROL)
         self._call(call, *given)
 
-    def _call(self, call: Callable[..., object], *arguments: Any) -> None:
+    def _call(self, call: Callable[..., T], *arguments: Any) -> T:
         with in_words(self._of):
-            call(*arguments)
+            return call(*arguments)
 
     def _why_nothing(self) -> str:
         return "" if self._editor.text else words.NOTHING_OPEN
@@ -56,11 +58,16 @@ class FileRow:
     def _why_no_undo(self) -> str:
         return "" if self._editor.can_undo else words.NOTHING_TO_UNDO
 
-    def _open(self, event: Any) -> None:
-        if event.value not in (None, self._opened):
-            if not self._page.operator.why_not(self._page.client, Needs.CONTROL):
-                self._page.attempt(lambda: self._call(self._editor.open, str(event.value)))
-            self._files.set_value(self._opened)  # the previous one, if it was refused
+    async def _open(self, event: Any) -> None:
+        """Open a file, which is checked in a thread: a pose that nothing reaches takes half a second."""
+        if event.value in (None, self._opened):
+            return
+        editor, name = self._editor, str(event.value)
+        if not self._page.operator.why_not(self._page.client, Needs.CONTROL):
+            found = await self._page.threaded(lambda: self._call(editor.to_open, name))
+            if found is not None:
+                editor.take(*found)
+        self._files.set_value(self._opened)  # the previous one, if it was refused
 
     @property
     def _opened(self) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,8 @@ class JobEditor(FileEditor):
         self.plan: Plan | None = None
         """The last plan."""
         self._planned = -1
-        self._solved: tuple[int, list[Via]] = (-1, [])
+        self._solved: tuple[int, list[Via], bool] = (-1, [], False)
+        """A version, its via points with the angles that are known, and whether they were searched for."""
         if job_file is None:
             self._set(self.new_text(_NEW))
         else:
@@ -101,10 +103,14 @@ class JobEditor(FileEditor):
         """Raise InputError if the text is no job."""
         Job.of_table(toml_table.parse(text, str(file)), self.arm)
 
-    def load(self, file: Path) -> None:
-        """Edit a file; raises InputError if it is no job, PlanError if no posture reaches a pose in it."""
-        planner.via_angles(self.arm, Job.load(file, self.arm))  # told now instead of in the table
-        super().load(file)
+    def check_to_open(self, text: str, file: Path) -> None:
+        """Raise InputError if the text is no job, PlanError if no posture reaches a pose in it, which takes some time:
+        told now instead of in the table."""
+        planner.via_angles(self.arm, Job.of_table(toml_table.parse(text, str(file)), self.arm))
+
+    def take(self, file: Path, text: str) -> None:
+        """Edit the text of a file that was checked."""
+        super().take(file, text)
         self.plan = None
 
     def new(self, name: str) -> None:
@@ -120,22 +126,36 @@ class JobEditor(FileEditor):
 
     @property
     def vias(self) -> list[Via]:
-        """The via points; poses with the angles that reach them, if the job is valid."""
-        if self._solved[0] != self.version:
-            self._solved = self.version, self._solve()
-        return self._solved[1]
+        """The via points; poses have angles once ``solve`` has found them."""
+        return self._present[1]
 
-    def _solve(self) -> list[Via]:
-        found = [_via(values) for values in self._rows()]
-        if all(via.angles_deg is not None for via in found):
-            return found
-        try:
+    @property
+    def is_solved(self) -> bool:
+        """Whether the angles of all poses were searched for."""
+        return self._present[2]
+
+    @property
+    def _present(self) -> tuple[int, list[Via], bool]:
+        if (found := self._solved)[0] != self.version:
+            given = [_via(values) for values in self._rows()]
+            found = self.version, given, all(via.angles_deg is not None for via in given)
+            self._solved = found
+        return found
+
+    def solve(self) -> None:
+        """Find the angles of all poses, in any thread: where none reaches one, that takes half a second.
+
+        A job that is not valid, or has a pose that nothing reaches, stays without them.
+        """
+        version, found, solved = self._present
+        if solved:
+            return
+        with suppress(ArmtempoError, ValueError):  # ValueError: it was changed meanwhile
             angles = planner.via_angles(self.arm, self.job())[0]
-        except ArmtempoError:
-            return found
-        return [
-            Via(via.form, via.values, tuple(map(float, row))) for via, row in zip(found, angles, strict=True)
-        ]
+            pairs = zip(found, angles, strict=True)
+            found = [Via(via.form, via.values, tuple(map(float, row))) for via, row in pairs]
+        if version == self.version:
+            self._solved = version, found, True
 
     def _rows(self) -> list[dict[str, Any]]:
         """The via points' keys; a list of positions is called ANGLES, however the file calls it."""
@@ -159,11 +179,16 @@ class JobEditor(FileEditor):
 
     def take_arm(self, arm: Arm) -> None:
         """Take another version of the arm; a plan that it makes old is old."""
-        before = [via.angles_deg for via in self.vias]
+        before = self._understood()
         super().take_arm(arm)
-        self._solved = -1, []
-        if before != [via.angles_deg for via in self.vias] or self._moved_since(arm):
+        if before != self._understood() or self._moved_since(arm):
             self.version += 1
+
+    def _understood(self) -> object:
+        """What the text means with the arm as it is; None if it is not valid."""
+        with suppress(ArmtempoError):
+            return self.job(), self.tooled_arm.tool
+        return None
 
     def _moved_since(self, arm: Arm) -> bool:
         """Whether a frame or the tool of the plan has changed."""
@@ -227,18 +252,31 @@ class JobEditor(FileEditor):
         values = [round(float(value), 3) for value in own]
         self._change_table(number, lambda table: table.update({POSE: values}))
 
+    def _angles(self, number: int) -> tuple[float, ...]:
+        """The angles of a via point; raises InputError if it has none, or they were not searched for."""
+        angles = self.vias[number].angles_deg
+        if angles is None and not self.is_solved:
+            raise InputError(f"P{number}: the angles of its pose are being searched for", "try again soon")
+        if angles is None:
+            raise InputError(
+                f"P{number} has no angles: no posture reaches it", "correct it, or the job, first"
+            )
+        return angles
+
     def set_pose(self, number: int) -> None:
         """Give a via point by the pose of the tool there; raises InputError for an arm that has no form of a pose."""
-        angles = self.vias[number].angles_deg
-        if angles is None:
-            raise InputError(f"P{number} has no angles", "correct the job first")
-        pose = pose_values(self.tooled_arm, angles, self._frame(number))
+        pose = pose_values(self.tooled_arm, self._angles(number), self._frame(number))
         self._change_table(number, lambda table: _place(table, pose))
+
+    def set_own_angles(self, number: int) -> None:
+        """Give a via point by its angles; raises InputError if it has none."""
+        self.set_angles(number, self._angles(number))
 
     def insert(self, number: int, values: dict[str, Any] | Sequence[float] | None = None) -> None:
         """Insert a via point before ``number``: angles (J,), or keys; default: where the one before it is."""
         if values is None:
-            before = self.vias[max(0, number - 1)].values if self.vias else {ANGLES: list(self.arm.home_deg)}
+            given = self.vias
+            before = given[max(0, number - 1)].values if given else {ANGLES: list(self.arm.home_deg)}
             pose = {"frame"} if POSE in before or "matrix" in before else set()
             values = {key: value for key, value in before.items() if key in {*_WHERE, *pose}}
         found = values if isinstance(values, dict) else {ANGLES: _rounded(values)}
@@ -260,7 +298,7 @@ class JobEditor(FileEditor):
 
     def move(self, number: int, by: int) -> None:
         """Move a via point ``by`` places, with its keys and comments; not beyond the first or last."""
-        if not 0 <= number + by < len(self.vias):
+        if not 0 <= number + by < len(self._rows()):
             return
         if self._is_list:
             rows = [via.values[ANGLES] for via in self.vias]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Awaitable
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,10 @@ if TYPE_CHECKING:
     from armtempo.panel.press import Press
 
 _POINTS = 200
-_PLAY_S = 0.05
+_SLIDER = 1000
+"""The slider's end."""
+_MARK_S = 0.2
+"""Interval at which the curves' cursors move: a browser draws each chart anew for it."""
 
 
 class JobPlan:
@@ -36,6 +40,7 @@ class JobPlan:
         self._jobs = page.operator.jobs
         self._planning = self._cancelled = False
         self._played: Plan | None = None
+        self._marked_s = 0.0
         self._plan_row()
         self._play_row()
         self._charts = [
@@ -96,7 +101,8 @@ class JobPlan:
             play = ui.button(icon="play_arrow", on_click=self._play).props("outline dense")
             named(play, words.PLAY)
             self._page.control(play, None, self._why_no_play)
-            self._slider = ui.slider(min=0, max=1000, value=0, on_change=self._show_time)
+            self._play_button = play
+            self._slider = ui.slider(min=0, max=_SLIDER, value=0, on_change=self._show_time)
             named(self._slider, words.PLAY_TIME)
             self._page.control(self._slider, None, self._why_no_play)
             self._time = ui.label("").classes("armtempo-percent")
@@ -106,23 +112,29 @@ class JobPlan:
 
     def _show_time(self) -> None:
         if (plan := self._played) is not None:
-            time_s = plan.total_s * self._slider.value / 1000
+            time_s = plan.total_s * self._slider.value / _SLIDER
             self._time.set_text(f"{time_s:.2f} s")
             self._page.show_ghost(plan.trajectory(time_s))
-            for chart in self._charts:
-                chart.mark(time_s)
+            now_s = time.monotonic()
+            if now_s - self._marked_s > _MARK_S or self._slider.value == _SLIDER:
+                self._marked_s = now_s
+                for chart in self._charts:
+                    chart.mark(time_s)
 
     async def _play(self) -> None:
-        if (plan := self._played) is None:
+        """Play the motion; pressed again, stop it."""
+        page = self._page
+        if (plan := self._played) is None or page.is_playing:
+            page.stop_playing()
             return
-        for time_s in np.arange(0.0, plan.total_s, _PLAY_S):
-            self._slider.set_value(round(1000 * float(time_s) / plan.total_s))
-            await asyncio.sleep(_PLAY_S)
-        self._slider.set_value(1000)
+        await page.play(
+            plan.total_s, lambda time_s: self._slider.set_value(round(_SLIDER * time_s / plan.total_s))
+        )
 
     def look(self) -> None:
         """Show a plan that is new, also by another page."""
         self._result.set_text(self._describe_plan())
+        self._play_button.set_icon("stop" if self._page.is_playing else "play_arrow")
         plan = self._jobs.plan
         if plan is None or plan is self._played:
             return
@@ -137,5 +149,5 @@ class JobPlan:
             return words.NO_PLAN
         if self._jobs.plan_is_old:
             return words.PLAN_IS_OLD
-        bound = max(search.floor_s for search in plan.searches)
+        bound = max(search.lower_bound_s for search in plan.searches)
         return words.MOTION_TIME.format(total=plan.total_s, bound=bound)

@@ -7,10 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from nicegui import ui
+from nicegui import background_tasks, run, ui
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.solver import moved_tool_deg
 from armtempo.model import via_table
@@ -39,13 +38,15 @@ class JobTab:
         self._jobs = page.operator.jobs
         self._open: set[int] = set()
         """Via points whose keys are shown."""
-        self._shown = self._jobs.version
+        self._shown = self._jobs.version, self._jobs.is_solved
+        self._solving = False
         self._cells, self._choices = Fields(), Fields()
         self._built: object = None
         """What the table and the options were built for."""
         page.scene.picked, page.scene.dragged = self._pick, self._drag
         self._file = FileRow(page, self._jobs, words.JOB_FILE, words.of_job)
-        self._table()
+        with ui.column().classes("full-width") as self._place:
+            self._table()
         ui.label(words.DRAG_HINT).classes("armtempo-note")
         self._offered = ui.column()
         self._options()
@@ -57,7 +58,7 @@ class JobTab:
         ui.context.client.on_connect(self._connected)
 
     def _connected(self) -> None:
-        self._built, self._shown = None, -1
+        self._built, self._shown = None, (-1, False)
 
     # the table
 
@@ -108,21 +109,29 @@ class JobTab:
         with ui.row().classes("no-wrap armtempo-actions"):
             more = ui.button(icon="tune", on_click=lambda: self._toggle(number)).props("flat dense")
             named(more, f"{words.MORE} P{number}")
-            with ui.button(icon="more_vert").props("flat dense") as menu:
-                named(menu, f"{words.CHANGES} P{number}")
-                with ui.menu():
-                    for text, call in (
-                        (words.INSERT, partial(self._jobs.insert, number)),
-                        (words.COPY, partial(self._jobs.copy, number)),
-                        (words.UP, partial(self._jobs.move, number, -1)),
-                        (words.DOWN, partial(self._jobs.move, number, 1)),
-                        (words.AS_POSE, partial(self._jobs.set_pose, number)),
-                        (words.AS_ANGLES, partial(self._as_angles, number)),
-                        (words.DELETE, partial(self._jobs.delete, number)),
-                    ):
-                        ui.menu_item(text, on_click=partial(self._edit, call))
+            with ui.button(icon="more_vert").props("flat dense") as change:
+                named(change, f"{words.CHANGES} P{number}")
+                menu = ui.menu()
+            change.on_click(lambda: self._fill(menu, number))
         if number in self._open:
             self._keys(number, via)
+
+    def _fill(self, menu: ui.menu, number: int) -> None:
+        """The changes of a via point, which forty rows need not have before they are asked for."""
+        if menu.default_slot.children:
+            return
+        jobs = self._jobs
+        with menu:
+            for text, call in (
+                (words.INSERT, partial(jobs.insert, number)),
+                (words.COPY, partial(jobs.copy, number)),
+                (words.UP, partial(jobs.move, number, -1)),
+                (words.DOWN, partial(jobs.move, number, 1)),
+                (words.AS_POSE, partial(jobs.set_pose, number)),
+                (words.AS_ANGLES, partial(jobs.set_own_angles, number)),
+                (words.DELETE, partial(jobs.delete, number)),
+            ):
+                ui.menu_item(text, on_click=partial(self._edit, call))
 
     def _keys(self, number: int, via: Via) -> None:
         """The keys of a via point: of its pose, and of the way to it."""
@@ -163,12 +172,6 @@ class JobTab:
         self._page.attempt(lambda: call(*arguments))
         self._look()
 
-    def _as_angles(self, number: int) -> None:
-        angles = self._jobs.vias[number].angles_deg
-        if angles is None:
-            raise InputError(f"P{number}: no posture reaches this pose", "correct the pose first")
-        self._jobs.set_angles(number, angles)
-
     def _take_posture(self) -> None:
         angles = [float(angle) for angle in self._operator.live.angles_deg]
         self._edit(self._jobs.insert, len(self._jobs.vias), angles)
@@ -195,28 +198,30 @@ class JobTab:
         if len(rows) == len(angles) and len(rows) and np.isfinite(rows).all():
             self._page.scene.dots(chains_mm(self._jobs.tooled_arm, rows)[:, -1])
 
-    def _pick(self, number: int) -> None:
+    async def _pick(self, number: int) -> None:
         """Show a via point and the other postures that reach it."""
         vias = self._jobs.vias
         if number < len(vias) and (angles := vias[number].angles_deg) is not None:
-            tool_mm = chains_mm(self._jobs.tooled_arm, np.array(angles))[-1]
-            self._page.attempt(lambda: self._offer(number, tool_mm))
+            await self._offer(number, chains_mm(self._jobs.tooled_arm, np.array(angles))[-1])
 
-    def _drag(self, number: int, position_mm: Array) -> None:
+    async def _drag(self, number: int, position_mm: Array) -> None:
         """Move a via point to where it was dragged; back if no posture reaches that."""
         vias = self._jobs.vias
         if number < len(vias):
             if vias[number].form == POSE:
                 self._edit(self._jobs.set_position, number, position_mm.tolist())
             elif vias[number].form == ANGLES:
-                self._page.attempt(lambda: self._offer(number, position_mm))
+                await self._offer(number, position_mm)
             self._draw_vias()
 
-    def _offer(self, number: int, position_mm: Array) -> None:
-        """Take the posture that is nearest to the via point's, and offer the others."""
-        angles = self._jobs.vias[number].angles_deg
-        postures = moved_tool_deg(self._jobs.tooled_arm, np.array(angles), position_mm.tolist())
-        texts = [self._operator.arm.texts.listed(f"{angle:.1f}" for angle in posture) for posture in postures]
+    async def _offer(self, number: int, position_mm: Array) -> None:
+        """Take the posture that is nearest to the via point's, and offer the others, which takes some time."""
+        jobs, version = self._jobs, self._jobs.version
+        arm, angles = jobs.tooled_arm, np.array(jobs.vias[number].angles_deg)
+        postures = await self._page.threaded(lambda: moved_tool_deg(arm, angles, position_mm.tolist()))
+        if postures is None or jobs.version != version:  # nothing reaches it, or it is another one by now
+            return
+        texts = [arm.texts.listed(f"{angle:.1f}" for angle in posture) for posture in postures]
         self._offered.clear()
         with self._offered:
             ui.label(words.POSTURES_OF.format(number=number, count=len(postures)))
@@ -268,10 +273,10 @@ class JobTab:
         self._choices.add(chosen.set_value, partial(self._jobs.option, key))
 
     def _look(self) -> None:
-        """Show what has changed, also on another page."""
+        """Show what has changed, also on another page; the angles of poses come a little later."""
         jobs = self._jobs
-        if jobs.version != self._shown:
-            self._shown = jobs.version
+        if self._shown != (jobs.version, jobs.is_solved):
+            self._shown = jobs.version, jobs.is_solved
             if self._form() != self._built:
                 self._table.refresh()  # later
                 self._options.refresh()
@@ -279,8 +284,20 @@ class JobTab:
                 self._cells.look()
                 self._choices.look()
             self._draw_vias()
+        if not jobs.is_solved and not self._solving:
+            self._solving = True
+            background_tasks.create(self._solve())
         self._file.look()
         self._plan.look()
+
+    async def _solve(self) -> None:
+        try:
+            await run.io_bound(self._jobs.solve)
+        finally:
+            self._solving = False
+        if not self._place.is_deleted:
+            with self._place:
+                self._look()
 
 
 def _shown_keys(via: Via) -> list[str]:

@@ -111,8 +111,9 @@ class LiveArm:
         self.sequence: SequenceState | None = None
         """State of the sequence that was started last."""
         self._seen = (-1, 0)
-        self._jogs: tuple[Arm, Array, dict[JogMove, str]] = (arm, np.empty(0), {})
-        """The arm, its angles, (J,), and the answers of ``why_no_jog`` for them."""
+        self._jogs: tuple[tuple[Arm, Array], dict[JogMove, str]] = (arm, np.empty(0)), {}
+        """The arm, its angles, (J,), and why jogs along axes of frames are not possible from there."""
+        self._asked_jogs: set[JogMove] = set()
 
     @property
     def age_s(self) -> float:
@@ -130,14 +131,26 @@ class LiveArm:
         return describe_fault(self.state.fault) if self.state is not None and self.state.fault else ""
 
     def why_no_jog(self, move: JogMove) -> str:
-        """Why this jog is not possible now; "" if it is."""
-        arm, here = self.arm, self.angles_deg
-        if arm is not self._jogs[0] or not np.array_equal(here, self._jogs[1]):
-            self._jogs = arm, here, {}
-        known = self._jogs[2]
-        if move not in known:
-            known[move] = jog_motion.problem(arm, tuple(map(float, here)), move)
-        return known[move]
+        """Why this jog is not possible now; "" if it is.
+
+        Along the axes of a frame it is as it was until ``draw`` has found it: that takes up to 10 ms for each.
+        """
+        if move.joint is None:
+            self._asked_jogs.add(move)
+            return self._jogs[1].get(move, "")
+        return jog_motion.problem(self.arm, tuple(map(float, self.angles_deg)), move)
+
+    def _look_at_jogs(self) -> None:
+        """Find why the jogs that were asked for are not possible, if the arm has moved or others are asked for."""
+        arm, here, asked = self.arm, self.angles_deg, self._asked_jogs
+        self._asked_jogs = set()
+        seen, known = self._jogs
+        if arm is not seen[0] or not np.array_equal(here, seen[1]):
+            known = {}
+        if asked := asked - known.keys():
+            angles = tuple(map(float, here))
+            found = {move: jog_motion.problem(arm, angles, move) for move in asked}
+            self._jogs = (arm, here), known | found
 
     def take_event(self, event: Event) -> None:
         """Handle an event of the board."""
@@ -157,12 +170,14 @@ class LiveArm:
         self.sequence = state
 
     def draw(self) -> None:
-        """The tool's path by the samples, if there are new ones."""
+        """The tool's path by the samples, if there are new ones, and why jogs are not possible where it rests."""
         curves = self.curves
         if self._seen != (seen := (curves.run, len(curves.time_s))) and seen[1] > 1:
             arm = self.plan.arm if self.plan is not None else self.arm  # a job's tool is its own
             self.run_path_mm = chains_mm(arm, curves.thinned(_MOST_POINTS).angle_deg)[:, -1]
         self._seen = seen
+        if self.state is None or not self.state.moving:
+            self._look_at_jogs()
 
     def ask(self, board: Board) -> None:
         """Read the board's state and inputs; raises LinkError if it does not answer."""

@@ -41,10 +41,10 @@ class MoveTab:
         """Of the jogs that were built: of the joints, then of frames."""
         self._jogs()
         floor.build(page)
+        self._home_and_teach()
         targets.build(page)
         teach_points.build(page)
         names.build(page)
-        self._home_and_teach()
         _outputs(page)
         _inputs(page)
         page.on_arm(self._changed)

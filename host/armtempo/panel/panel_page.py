@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -25,6 +27,7 @@ from armtempo.robot.board import Board
 
 T = TypeVar("T")
 _WAY_POINTS = 40
+_PLAY_S = 0.05
 LOOK_S = 0.25
 """Interval at which a page updates, except for moving parts."""
 
@@ -88,6 +91,9 @@ class PanelPage:
     _arm: Arm = field(init=False)
     speeds: ui.label = field(init=False)
     """What the colours of the planned path mean."""
+
+    _playing: object = None
+    """What is played on the model; another object for each time."""
 
     def __post_init__(self) -> None:
         """The controls are built for the arm as it is now."""
@@ -271,6 +277,28 @@ class PanelPage:
         """Show a ghost of the arm at these angles, (J,), on this page only; None: none."""
         poses = json.dumps(None if angles_deg is None else self.shape.poses(angles_deg))
         ui.run_javascript(f"armtempo.ghost = {poses}")
+
+    async def play(self, total_s: float, show: Callable[[float], object]) -> bool:
+        """Show the times of a motion as they pass; whether that was to its end."""
+        self._playing = mine = object()
+        begin_s = time.monotonic()
+        while self._playing is mine and (time_s := time.monotonic() - begin_s) < total_s:
+            show(time_s)
+            await asyncio.sleep(_PLAY_S)
+        if self._playing is not mine:
+            return False
+        self._playing = None
+        show(total_s)
+        return True
+
+    @property
+    def is_playing(self) -> bool:
+        """Whether a motion is played on the model."""
+        return self._playing is not None
+
+    def stop_playing(self) -> None:
+        """End the playing."""
+        self._playing = None
 
     def show_way(self, target_deg: Array) -> None:
         """Draw the way of the tool from where the arm is to these angles, (J,), on this page only."""

@@ -32,9 +32,9 @@ class PastRun:
     ending: str
 
 
-def listed(folder: Path) -> list[PastRun]:
-    """The runs in a folder, the newest first."""
-    return [_read(found / META) for found in run_reader.folders(folder)]
+def listed(folder: Path, most: int) -> list[PastRun]:
+    """The newest runs in a folder, at most so many, the newest first."""
+    return [_read(found / META) for found in run_reader.folders(folder)[:most]]
 
 
 def _read(file: Path) -> PastRun:

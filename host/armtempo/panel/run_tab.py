@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlencode
 
 import numpy as np
-from nicegui import ui
+from nicegui import background_tasks, run, ui
 
 from armtempo.basics.errors import InputError
 from armtempo.panel import past_runs, words
@@ -41,6 +41,7 @@ class RunTab:
         self._shown = (-1, 0)
         self._drawn_s = 0.0
         self._known: list[PastRun] = []
+        self._listing = False
         self._chosen: set[str] = set()
         """Names of the runs to compare; they stay chosen when another run is added to the list."""
         self._compare: ui.button | None = None
@@ -82,11 +83,20 @@ class RunTab:
 
     def _look(self) -> None:
         self._look_at_plan()
-        found = past_runs.listed(self._operator.runs)[:_MOST_RUNS]
-        if found != self._known:  # also those of the command line
+        if not self._listing:
+            self._listing = True
+            background_tasks.create(self._look_at_runs())
+        self._look_at_curves()
+
+    async def _look_at_runs(self) -> None:
+        """List what was recorded, also by the command line; the first time, hundreds of files may be read."""
+        try:
+            found = await run.io_bound(past_runs.listed, self._operator.runs, _MOST_RUNS)
+        finally:
+            self._listing = False
+        if found is not None and found != self._known and not self._left.is_deleted:
             self._known = found
             self._past.refresh()
-        self._look_at_curves()
 
     def _look_at_plan(self) -> None:
         operator, jobs = self._operator, self._operator.jobs
@@ -123,7 +133,7 @@ class RunTab:
 
     @ui.refreshable_method
     def _past(self) -> None:
-        names = [run.folder.name for run in self._known]
+        names = [one.folder.name for one in self._known]
         self._chosen &= set(names)
         if not names:
             ui.label(words.NO_RUNS).classes("armtempo-note")
@@ -131,10 +141,10 @@ class RunTab:
         with ui.element("div").classes("armtempo-runs"):
             for text in ("", *words.RUN_COLUMNS):
                 ui.label(text).classes("text-caption")
-            for run, name in zip(self._known, names, strict=True):
+            for one, name in zip(self._known, names, strict=True):
                 box = ui.checkbox(value=name in self._chosen, on_change=partial(self._choose, name))
                 named(box.props("dense"), f"{words.COMPARE}: {name}")
-                for text in (name, run.date, run.duration, run.ending):
+                for text in (name, one.date, one.duration, one.ending):
                     ui.label(words.plain(text))
                 report = _link(ui.button(words.REPORT), f"{_ADDRESS}/{quote(name)}/{REPORT_PAGE}")
                 named(report.props("flat dense no-caps"), f"{words.REPORT}: {name}")

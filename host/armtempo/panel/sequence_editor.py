@@ -72,15 +72,14 @@ class SequenceEditor(FileEditor):
         """Raise InputError, with step and key, if the text is no sequence."""
         Sequence.of_table(toml_table.parse(text, str(file)), self.arm)
 
-    def load(self, file: Path) -> None:
-        """Edit a file; raises InputError if it is no sequence, or its steps cannot be edited here."""
-        table = toml_table.read(file)
-        blocks = TomlBlocks(file.read_text(encoding="utf-8"), _STEP)
-        if len(blocks.tables) != len(table.peek(_STEP) or ()):
+    def check_to_open(self, text: str, file: Path) -> None:
+        """Raise InputError if the text is no sequence, or its steps cannot be edited here."""
+        table = toml_table.parse(text, str(file))
+        if len(TomlBlocks(text, _STEP).tables) != len(table.peek(_STEP) or ()):
             raise InputError(
                 f"{file.name}: its steps are not written as [[step]]", "write them so, or edit it as text"
             )
-        super().load(file)
+        self.check(text, file)
 
     @property
     def is_open(self) -> bool:

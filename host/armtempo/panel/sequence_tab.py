@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from armtempo_shared.sequence import ENDINGS, FINISHED, MOVE, WAIT
 from nicegui import run, ui
 
@@ -22,13 +20,13 @@ from armtempo.panel.panel_page import named
 from armtempo.panel.sequence_editor import KINDS, kind_of
 
 if TYPE_CHECKING:
+    from armtempo.basics.arrays import Array
     from armtempo.link.board_messages import SequenceState
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.panel.panel_page import PanelPage
     from armtempo.panel.press import Press
 
 _LIT = "armtempo-lit"
-_PLAY_S = 0.05
 
 
 class SequenceTab:
@@ -205,15 +203,16 @@ class SequenceTab:
         self._page.refresh()
 
     async def _play(self) -> None:
-        """Play every motion on the model, each once."""
-        if (plan := self._editor.plan) is None:
+        """Play every motion on the model, each once; pressed again, stop it."""
+        page = self._page
+        if (plan := self._editor.plan) is None or page.is_playing:
+            page.stop_playing()
             return
         for row in [row for row in plan.rows if row.op == MOVE]:
             leg = plan.legs[row.number]
-            for time_s in np.arange(0.0, leg.duration_s, _PLAY_S):
-                self._page.show_ghost(leg(float(time_s)))
-                await asyncio.sleep(_PLAY_S)
-        self._page.show_ghost(None)
+            if not await page.play(leg.duration_s, partial(_show, page, leg)):
+                break
+        page.show_ghost(None)
 
     def _to_start(self, press: Press) -> None:
         self._page.do(press, words.TO_START, lambda: self._operator.go(self._planned()))
@@ -229,6 +228,10 @@ class SequenceTab:
             )
 
         self._page.do(press, words.RUN, run_it)
+
+
+def _show(page: PanelPage, leg: Callable[[float], Array], time_s: float) -> None:
+    page.show_ghost(leg(time_s))
 
 
 def _where(state: SequenceState) -> str:

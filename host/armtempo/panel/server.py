@@ -48,6 +48,8 @@ class Panel:
         self._operator = operator
         self._shape = ArmShape(operator.arm)
         self._hold = ButtonHold(operator)
+        self._new: set[str] = set()
+        """Pages that have not connected yet."""
         self._api = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         self._api.get("/runs/{name}/{file}")(self._run_file)
         self._api.get(f"/runs/{COMPARISON}")(self._comparison)
@@ -80,16 +82,29 @@ class Panel:
 
     def _page(self) -> None:
         client = ui.context.client
-        holder = Client.instances.get(self._operator.holder)
-        if holder is None or not holder.has_socket_connection:
-            self._operator.take_control(client.id)
+        self._new.add(client.id)
+        self._offer_control(client.id)
         layout.build(self._operator, self._hold, self._shape)
-        client.on_connect(lambda: self._hold.lost(client.id))
+        client.on_connect(lambda: self._connected(client.id))
         client.on_disconnect(lambda: self._hold.lost(client.id))
         client.on_delete(lambda: self._gone(client.id))
 
+    def _connected(self, client: str) -> None:
+        """A page has connected; one that was loaded again has lost its connection as the page before only now."""
+        self._hold.lost(client)
+        if client in self._new:
+            self._new.discard(client)
+            self._offer_control(client)
+
+    def _offer_control(self, client: str) -> None:
+        """Give control to a page that comes while no connected page has it."""
+        holder = Client.instances.get(self._operator.holder)
+        if holder is None or not holder.has_socket_connection:
+            self._operator.take_control(client)
+
     def _gone(self, client: str) -> None:
         """A page was closed, or did not reconnect."""
+        self._new.discard(client)
         self._operator.release(client)
         self._operator.monitors.discard(client)
         self._operator.presses.gone(client)

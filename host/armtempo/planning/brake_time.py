@@ -59,7 +59,7 @@ rises from rest, as the best shape changes most there."""
 _ABOUT, _NEARLY = 1.2, 0.9  # of the estimated time to rest, and of that to the end: where shapes are compared
 _LEAST_FIRST, _POWERS = 0.01, (-3.0, -0.5)  # where lengths of shapes are estimated
 _SPARE = 1.01  # so that few of them have to be lengthened
-_ROOM = 1.1  # for entries to be lengthened
+_MARGIN = 1.1  # for entries to be lengthened
 _FEW_STARTS = 64  # for which one call with all rates is quicker than two
 _NEGLIGIBLE = 1e-6  # of the unit of lengths
 
@@ -125,7 +125,7 @@ def of_motion(trajectory: Trajectory, limits: Sequence[Limits]) -> BrakeTimes:
     shapes, about_s = _best_shapes(ramps, rests.starts_s)
     rests.search(shapes, about_s)
     others.search(np.full(OTHER_ENTRIES - 1, EVEN_RAMP), ramps.estimated_s(others.starts_s.ravel()))
-    longest = _ROOM * TICK_HZ * max(float(kind.needed_s.max()) for kind in (rests, others))
+    longest = _MARGIN * TICK_HZ * max(float(kind.needed_s.max()) for kind in (rests, others))
     bits = LEAST_RAMP_BITS
     while True:
         while bits < MOST_RAMP_BITS and longest > RAMP_LENGTH << bits:

@@ -26,7 +26,7 @@ _WORK = 10_000
 
 
 @dataclass(frozen=True)
-class Floor:
+class LowerBound:
     """A proven lower bound of a motion time under speed, acceleration and jerk limits.
 
     ``kind``: ``"rests"``: of one joint between its reversals; ``"path"``: along the common path; through the via
@@ -37,7 +37,7 @@ class Floor:
     kind: str
 
 
-def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> Floor:
+def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> LowerBound:
     """The highest lower bound for joints that move together on a path; ``about_s``: approximate motion time.
 
     ``angle_points_deg``: (n + degree, J). Bounds: each joint between its reversals, where it stands still; for
@@ -48,15 +48,17 @@ def of_path(angle_points_deg: Array, degree: int, limits: Sequence[Limits], abou
     angle_points_deg = angle_points_deg - angle_points_deg[0]
     for joint, limit in enumerate(limits):
         reached = turns(angle_points_deg[:, joint], degree)
-        found.append(Floor(_ROUNDED * rest_to_rest.floor_s(reached, limit, from_rest=degree == 5), "rests"))
+        found.append(
+            LowerBound(_ROUNDED * rest_to_rest.lower_bound_s(reached, limit, from_rest=degree == 5), "rests")
+        )
     if len(limits) > 1:
-        found.append(Floor(_path_s(angle_points_deg, degree, limits, about_s), "path"))
-    return max(found, key=lambda floor: floor.time_s)
+        found.append(LowerBound(_path_s(angle_points_deg, degree, limits, about_s), "path"))
+    return max(found, key=lambda bound: bound.time_s)
 
 
 def _path_s(angle_points_deg: Array, degree: int, limits: Sequence[Limits], about_s: float) -> float:
     """The dual bound, on more cells if few prove nothing; 0 if that does not help."""
-    stage("proving the floor")
+    stage("proving the lower bound")
     segments = len(angle_points_deg) - degree
     parts = min(max(_WORK // (segments * len(limits) ** 2), _LEAST_CELLS), _MOST_CELLS)
     found = _by_cells(angle_points_deg, degree, limits, about_s, parts)
@@ -97,7 +99,7 @@ def of_vias(
     stops: Mapping[int, float],
     loose: Collection[int] = (),
     times_s: Array | None = None,
-) -> Floor:
+) -> LowerBound:
     """A lower bound for all motions through via angles (n + 1, J), on any path.
 
     The sum over legs between stops (dwells in seconds by via point) of the largest, over joints, of the
@@ -114,20 +116,20 @@ def of_vias(
         exact = [via for via in range(first, end + 1) if via not in loose]
         rests = end not in loose
         alone = max(
-            rest_to_rest.floor_s(_stood_at(via_deg[exact, joint], rests), limit, to_rest=rests)
+            rest_to_rest.lower_bound_s(_stood_at(via_deg[exact, joint], rests), limit, to_rest=rests)
             for joint, limit in enumerate(limits)
         )
         together = 0.0
         if times_s is not None and len(limits) > 1 and len(exact) > 1:
-            stage("proving the floor")
+            stage("proving the lower bound")
             lasts_s = np.diff(times_s[exact]) - [
                 sum(dwell for via, dwell in stops.items() if here <= via < there)
                 for here, there in pairwise(exact)
             ]
-            together = via_bound.floor_s(via_deg[exact], values, lasts_s, rests)
+            together = via_bound.lower_bound_s(via_deg[exact], values, lasts_s, rests)
         kind = "together" if together > alone else kind
         total += _ROUNDED * max(alone, together)
-    return Floor(total, kind)
+    return LowerBound(total, kind)
 
 
 def _turning(angles: Array, wiggle: float = 0.0) -> list[float]:

@@ -65,7 +65,7 @@ def plan(
     via_deg = np.einsum("c,scj->sj", bspline.basis(DEGREE)[0, :-1], via)
     job = Job(name, via_deg=via_deg.tolist(), path="through", timing="shared", refine=1, optimiser=GRADIENT)
     moving = np.flatnonzero(np.ptp(points, axis=0) > checks.TOLERANCE)
-    floor = lower_bounds.of_path(
+    bound = lower_bounds.of_path(
         points[:, moving], DEGREE, [limits[joint] for joint in moving], trajectory.duration_s
     )
     search = Search(
@@ -76,8 +76,8 @@ def plan(
         evaluations=1,
         history_s=np.array([trajectory.duration_s]),
         optimum_s=0.0,
-        floor_s=floor.time_s,
-        floor_kind=floor.kind,
+        lower_bound_s=bound.time_s,
+        lower_bound_kind=bound.kind,
     )
     kept = f"follows the recording on its own times, within {off_deg:.2g} {arm.texts.units} at its points"
     long = checks.long_ways(arm, angles_deg, [f"{time:g} s" for time in times_s])

@@ -20,7 +20,9 @@ _LEAST_SHARE = 0.05
 """Least time of a leg in which the joints hardly move, as a fraction of the mean."""
 
 
-def floor_s(angles_deg: Array, limits: Limits, from_rest: bool = True, to_rest: bool | None = None) -> float:
+def lower_bound_s(
+    angles_deg: Array, limits: Limits, from_rest: bool = True, to_rest: bool | None = None
+) -> float:
     """Least time to pass ``angles_deg`` (turning points with both ends) in order.
 
     The acceleration is also zero at the first if ``from_rest``, at the last if ``to_rest`` (None: as at the
@@ -71,7 +73,7 @@ def stopping_s(via_deg: Array, limits: Sequence[Limits], together: bool = True) 
     """Least time through via angles (n + 1, J) with a rest at each; ``together``: all joints leave each together."""
     each = np.array(
         [
-            [floor_s(np.array(ends), limit) for ends in pairwise(angles)]
+            [lower_bound_s(np.array(ends), limit) for ends in pairwise(angles)]
             for angles, limit in zip(via_deg.T.tolist(), limits, strict=True)
         ]
     )

@@ -15,7 +15,7 @@ from armtempo.splines.trajectory import Trajectory
 
 LONGEST_S = LONGEST_TICKS / TICK_HZ
 """Longest motion of the board."""
-_ROOM = 0.98
+_MARGIN = 0.98
 """Used fraction of it: a part planned separately may take a little longer."""
 
 
@@ -37,7 +37,7 @@ def at_few_stops(job: Job, via_deg: Array, whole: Trajectory) -> list[Job]:
     begin = 0
     marks = [*(stop.via for stop in _stops(job)), len(via_deg) - 1]
     for here, after in pairwise([0, *marks]):
-        if times[after] - times[begin] > _ROOM * LONGEST_S and here > begin:
+        if times[after] - times[begin] > _MARGIN * LONGEST_S and here > begin:
             cuts.append(here)
             begin = here
         takes_s = times[after] - times[begin]

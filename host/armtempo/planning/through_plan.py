@@ -68,7 +68,7 @@ def _trajectory(job: Job, points: Array, groups: list[Group], timed: list[Timed]
 
 
 def _search(group: Group, job: Job, timed: Timed) -> Search:
-    floor = lower_bounds.of_path(group.angle_points_deg, job.degree, group.limits, timed.total_s)
+    bound = lower_bounds.of_path(group.angle_points_deg, job.degree, group.limits, timed.total_s)
     return Search(
         joints=group.joints,
         intervals_s=timed.intervals_s,
@@ -78,6 +78,6 @@ def _search(group: Group, job: Job, timed: Timed) -> Search:
         history_s=timed.found.history,
         starts_s=timed.starts_s,
         optimum_s=timed.optimum_s,
-        floor_s=floor.time_s,
-        floor_kind=floor.kind,
+        lower_bound_s=bound.time_s,
+        lower_bound_kind=bound.kind,
     )

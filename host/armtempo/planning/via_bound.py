@@ -88,7 +88,7 @@ _PATTERNS = _patterns()
 
 
 @np.errstate(all="ignore")  # numbers too far apart in size prove nothing
-def floor_s(via_deg: Array, limits: Array, times_s: Array, rests: bool = True) -> float:
+def lower_bound_s(via_deg: Array, limits: Array, times_s: Array, rests: bool = True) -> float:
     """Lower bound of the time of motions from rest through via angles (n + 1, J), to rest if ``rests``; 0: none.
 
     ``limits``: (J, 3). ``times_s``: (n,), expected durations of the legs; they decide how tight the bound is.
@@ -104,7 +104,9 @@ def floor_s(via_deg: Array, limits: Array, times_s: Array, rests: bool = True) -
     expected = np.maximum(times_s / unit_s, _LEAST_TIME)
     times = expected[:, None] * _TRIAL_TIMES
     try:
-        found = float(np.sum(_Scan(distances, scaled, times, _best(distances, scaled, times, rests)).floor()))
+        found = float(
+            np.sum(_Scan(distances, scaled, times, _best(distances, scaled, times, rests)).lower_bounds())
+        )
     except np.linalg.LinAlgError:  # numbers too far apart in size, or durations too short
         return 0.0
     return max(found, 0.0) * unit_s if np.isfinite(found) else 0.0
@@ -294,7 +296,7 @@ class _Scan:
             np.arange(len(distances)), shortest, self.x[first], self._least + _TOLERANCE * self._expected
         )
 
-    def floor(self) -> Array:
+    def lower_bounds(self) -> Array:
         """Proven minimum of E over all durations, by leg: (n,)."""
         low, last = self._between(), self._after()
         for _ in range(_MOST_REFINEMENTS):

@@ -256,11 +256,11 @@ def plan_origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, o
 
 def _extremes_row(plan: Plan, joint: int) -> list[str]:
     limits = plan.arm.driven[joint].limits
-    floors = [search.floor_s for search in plan.searches if joint in search.joints]
+    bounds = [search.lower_bound_s for search in plan.searches if joint in search.joints]
     largest = zip(plan.extremes[joint].values, limits.values, strict=True)
     return [
         plan.arm.driven[joint].labelled,
         f"{plan.trajectory.joints[joint].duration_s:.4f}",
-        f"{floors[0]:.4f}" if floors else "–",
+        f"{bounds[0]:.4f}" if bounds else "–",
         *(f"{value:.3f} of {most:g}" for value, most in largest),
     ]

@@ -34,7 +34,7 @@ _BOUNDS = {
     "together": "through the via points under the speed, acceleration and jerk limits of all joints, whatever the path",
     "vias": "through the via angles of a joint under its speed, acceleration and jerk limits, whatever the path",
 }
-"""Meaning of ``Search.floor_kind``."""
+"""Meaning of ``Search.lower_bound_kind``."""
 _WORTH_SAYING = 0.03
 """What is faster than the spline through the via points is told if the spline takes longer by this fraction."""
 
@@ -62,7 +62,7 @@ def lines(plan: Plan, verbose: bool = False) -> list[str]:
 
 def _details(plan: Plan) -> list[str]:
     """Lines on the search, its bounds and the board."""
-    kinds = sorted({search.floor_kind for search in plan.searches})
+    kinds = sorted({search.lower_bound_kind for search in plan.searches})
     return [
         *(f"lower bound: least time {_BOUNDS[kind]}" for kind in kinds),
         *(_polished(search) for search in plan.searches if search.optimum_s),
@@ -113,7 +113,9 @@ def _widths(plan: Plan) -> tuple[int, ...]:
 
 def _at_least(plan: Plan) -> str:
     """The proven lower bound of the motion time, for the first line."""
-    return f", at least {max(search.floor_s for search in plan.searches):.4f} s" if plan.searches else ""
+    return (
+        f", at least {max(search.lower_bound_s for search in plan.searches):.4f} s" if plan.searches else ""
+    )
 
 
 def _settings(plan: Plan, verbose: bool) -> list[str]:
@@ -149,7 +151,7 @@ def _started(search: Search) -> str:
 def _row(plan: Plan, joint: int) -> tuple[str, ...]:
     limits = plan.arm.driven[joint].limits
     time = f"{plan.trajectory.joints[joint].duration_s:.4f}"
-    bounds = [f"{search.floor_s:.4f}" for search in plan.searches if joint in search.joints]
+    bounds = [f"{search.lower_bound_s:.4f}" for search in plan.searches if joint in search.joints]
     pairs = zip(plan.extremes[joint].values, limits.values, strict=True)
     reached = [f"{value:.2f} / {limit:g}" for value, limit in pairs]
     return plan.arm.driven[joint].labelled, time, (bounds or ["-"])[0], *reached
@@ -185,7 +187,7 @@ def _loses(total_s: float, other_s: float) -> bool:
 def _free_s(plan: Plan) -> float:
     """Motion time of a free path, from one start; infinite if it cannot save much, or there is none."""
     every = [*range(len(plan.arm.driven))]
-    if not _loses(plan.total_s, free_plan.floor_of(plan.arm, plan.job, plan.via_deg, every).time_s):
+    if not _loses(plan.total_s, free_plan.lower_bound_of(plan.arm, plan.job, plan.via_deg, every).time_s):
         return math.inf
     job = replace(plan.job, path="free", degree=5, refine=AUTO, starts=1)
     try:
@@ -225,12 +227,12 @@ def values(plan: Plan) -> dict[str, Any]:
 
 def _joint_values(plan: Plan, joint: int) -> dict[str, Any]:
     driven = plan.arm.driven[joint]
-    floors = [search.floor_s for search in plan.searches if joint in search.joints]
+    bounds = [search.lower_bound_s for search in plan.searches if joint in search.joints]
     keys = [driven.unit.key(name) for name in _QUANTITIES]
     return {
         "name": driven.name,
         "duration_s": plan.trajectory.joints[joint].duration_s,
-        "floor_s": floors[0] if floors else None,
+        "lower_bound_s": bounds[0] if bounds else None,
         "extremes": dict(zip(keys, map(float, plan.extremes[joint].values), strict=True)),
         "limits": dict(zip(keys, driven.limits.values, strict=True)),
     }

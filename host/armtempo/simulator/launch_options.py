@@ -121,7 +121,7 @@ class ProcessOptions:
     """A kind of damage of ``chip/flash.py``."""
     machine: str
     turn_us: int = 1000
-    """Time of a turn of the program's main loop on the chip in addition to its simulated calls."""
+    """Time of a pass of the program's main loop on the chip in addition to its simulated calls."""
     arm: dict[str, Any] | None
     """The arm from ``describe``; None: ideal motors for the arm record in the flash."""
     up: str

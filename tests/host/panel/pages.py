@@ -32,19 +32,20 @@ class Page:
     def show(self, tab: str) -> None:
         """Go to a tab."""
         panels = next(one for one in self.elements(ui.tab_panels))
-        self._call(lambda: panels.set_value(tab))
+        self.act(lambda: panels.set_value(tab))
 
     def look(self) -> None:
         """What the page does every quarter of a second."""
-        self._call(self.of.refresh)
+        self.act(self.of.refresh)
 
-    def _call(self, call: Callable[[], object]) -> None:
+    def act(self, call: Callable[[], object]) -> None:
         """Call something, and wait for what it begins."""
 
         async def ended() -> None:
             before = set(background_tasks.running_tasks)
             with self.client:
-                call()
+                if asyncio.iscoroutine(begun := call()):
+                    await begun
             for _ in range(3):  # a table that is built anew begins a little later
                 await asyncio.sleep(0)
             await asyncio.wait_for(asyncio.gather(*(background_tasks.running_tasks - before)), 60)
@@ -69,7 +70,7 @@ class Page:
 
     def unfold(self, text: str) -> None:
         """Open a folded part."""
-        self._call(lambda: next(one for one in self.elements(ui.expansion) if one.text == text).open())
+        self.act(lambda: next(one for one in self.elements(ui.expansion) if one.text == text).open())
 
     def texts(self) -> list[str]:
         """All texts that are in view."""
@@ -89,7 +90,7 @@ class Page:
                     sent = GenericEventArguments(sender=element, client=self.client, args=given)
                     handle_event(listener.handler, sent)
 
-        self._call(send)
+        self.act(send)
 
     def answer(self, name: str) -> None:
         """Press the button of that name in the dialog that is open."""

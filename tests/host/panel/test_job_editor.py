@@ -11,7 +11,7 @@ from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.panel.job_editor import ANGLES, POSE, JobEditor
+from armtempo.panel.job_editor import ANGLES, POSE, JobEditor, Via
 from armtempo.panel.toml_blocks import TomlBlocks
 
 from tests.host import test_frames, test_tools
@@ -123,8 +123,16 @@ def test_keys_and_comments_go_with_their_via_point(editor: JobEditor) -> None:
     assert not editor.can_undo
 
 
+def solved(editor: JobEditor) -> list[Via]:
+    editor.solve()
+    return editor.vias
+
+
 def test_a_pose_stays_a_pose_and_is_kept_when_others_change(editor: JobEditor) -> None:
-    angles = editor.vias[2].angles_deg
+    assert editor.vias[2].angles_deg is None
+    with pytest.raises(InputError, match="being searched for"):
+        editor.set_own_angles(2)
+    angles = solved(editor)[2].angles_deg
     assert angles == pytest.approx((12, -70, 50), abs=0.2)
     editor.set_angle(0, 0, "1.5")
     editor.set_key(1, "speed_mm_s", "20")
@@ -142,11 +150,11 @@ def test_a_pose_stays_a_pose_and_is_kept_when_others_change(editor: JobEditor) -
 def test_angles_become_a_pose_and_back(editor: JobEditor) -> None:
     editor.set_pose(0)
     assert editor.vias[0].form == POSE
-    assert editor.vias[0].angles_deg == pytest.approx((0, -60, 40), abs=0.2)
+    assert solved(editor)[0].angles_deg == pytest.approx((0, -60, 40), abs=0.2)
     editor.set_angles(0, (0, -60, 40))
     assert editor.vias[0].values == {ANGLES: [0, -60, 40]}
     editor.set_position(2, [100.0, 100.0, 9999.0])
-    assert editor.vias[2].angles_deg is None  # nothing reaches that
+    assert solved(editor)[2].angles_deg is None  # nothing reaches that
     with pytest.raises(ArmtempoError, match="P2"):
         editor.set_pose(2)
 
@@ -295,7 +303,7 @@ def test_poses_stay_in_their_frame(tmp_path: Path) -> None:
     there += (3.0, -2.0, 4.0)
     for number, place in enumerate(there.tolist(), 1):
         editor.set_position(number, place)
-    for via, place in zip(editor.vias[1:], there, strict=True):
+    for via, place in zip(solved(editor)[1:], there, strict=True):
         np.testing.assert_allclose(forward(arm, via.angles_deg)[:3, 3], place, atol=0.1)
     editor.set_angles(2, [25.0, -45.0, 30.0])
     assert "frame" not in editor.vias[2].values
@@ -314,10 +322,11 @@ def test_poses_are_of_the_jobs_tool(tmp_path: Path) -> None:
     arm = Arm.load(test_tools.arm_file(tmp_path))
     (tmp_path / "job.toml").write_text(f'tool = "gripper"\n{test_tools.JOB}', encoding="utf-8")
     editor = JobEditor(arm, tmp_path, tmp_path / "job.toml")
+    editor.solve()
     editor.set_pose(1)
     place = forward(arm.with_tool("gripper"), [20, 10, -10, 5, 40, 8])[:3, 3]
     assert editor.vias[1].values["position_mm"] == pytest.approx(place.tolist(), abs=1e-3)
-    assert editor.vias[1].angles_deg == pytest.approx([20, 10, -10, 5, 40, 8], abs=0.02)
+    assert solved(editor)[1].angles_deg == pytest.approx([20, 10, -10, 5, 40, 8], abs=0.02)
     editor.set_option("tool", "")
     assert editor.tooled_arm.tool is None
     assert editor.tooled_arm == arm

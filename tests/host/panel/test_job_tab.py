@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from typing import Any
 
 import pytest
-from armtempo.panel import words
+from armtempo.panel import job_editor, job_tab, words
 from armtempo.panel.panel_board import PanelBoard
 from nicegui import ui
 
@@ -63,6 +65,39 @@ def test_what_is_being_typed_stays_when_another_field_changes(operator: PanelBoa
         page.fire(typed, "change", "12")
         wanted = (12.0, -61.0 if elsewhere == "field" else -60.0, 40.0)
         assert operator.jobs.vias[2].angles_deg == pytest.approx(wanted)
+
+
+def test_no_page_waits_while_poses_are_searched_for(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that is opened, a pose that is typed, another posture in the picture."""
+    asked: list[str] = []
+
+    def watched(call: Callable[..., Any], name: str) -> Callable[..., Any]:
+        def seen(*given: Any) -> Any:
+            assert threading.current_thread() is not threading.main_thread()
+            asked.append(name)
+            return call(*given)
+
+        return seen
+
+    for module, name in ((job_editor.planner, "via_angles"), (job_tab, "moved_tool_deg")):
+        monkeypatch.setattr(module, name, watched(getattr(module, name), name))
+    with pages(operator) as page:
+        (operator.jobs.folder / "poses.toml").write_text(POSES)
+        page.show(words.TAB_JOB)
+        page.act(lambda: page.named(words.JOB_FILE).set_value("poses.toml"))
+        assert asked
+        page.look()
+        cell = page.named("P1 joint 1")
+        assert cell.value
+        page.fire(page.named(f"{words.MORE} P1"), "click", {})
+        before = cell.value
+        type_into(page, f"P1: {words.VIA_KEYS['position_mm']}", "[310, 10, 210]")
+        assert page.named("P1 joint 1").value not in ("", before)
+        page.act(lambda: page.of.scene.picked(1))
+        assert any("postures that reach it" in text for text in page.texts())
+        assert {*asked} == {"via_angles", "moved_tool_deg"}
 
 
 def test_a_switch_that_shows_the_file_again_does_not_change_it(operator: PanelBoard) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from types import SimpleNamespace
 from typing import Any
@@ -98,3 +99,20 @@ def test_freeze_is_offered_where_the_arm_does_not_rest_after_a_stop(
     operator.board.moves = False  # type: ignore[attr-defined]
     operator.stop()
     assert offered() is False
+
+
+def test_a_motion_that_is_played_ends_in_time_or_when_it_is_stopped(operator: PanelBoard) -> None:
+    with pages(operator) as page:
+        shown: list[float] = []
+
+        async def stopped() -> bool:
+            task = asyncio.ensure_future(page.of.play(1e9, shown.append))
+            await asyncio.sleep(0)
+            assert page.of.is_playing
+            page.of.stop_playing()
+            return await task
+
+        assert not page.loop.run_until_complete(stopped())
+        assert not page.of.is_playing
+        assert page.loop.run_until_complete(page.of.play(1e-3, shown.append))
+        assert shown[0] < shown[-1] == 1e-3

@@ -23,7 +23,7 @@ from armtempo.panel.panel_board import PanelBoard
 
 from tests.host import arms
 from tests.host.panel.fakes import ARM, board_state, press, unhomed
-from tests.host.panel.pages import pages
+from tests.host.panel.pages import Page, pages
 
 
 def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
@@ -100,7 +100,7 @@ def test_a_jog_that_is_not_possible_is_grey_with_the_reason(operator: PanelBoard
         page.look()
         assert plus.enabled
         page.named(words.FRAME).value = BASE
-        page.look()
+        _found(page)
         assert not page.named("⟳ x +").enabled
         reasons = [control.reason for control in page.of.controls if control.element is page.named("⟳ x +")]
         assert "the arm cannot turn the tool about x from here" in reasons[0]
@@ -120,10 +120,17 @@ def test_the_tool_is_jogged_along_the_axes_of_a_frame(operator_of: Callable[[Arm
         assert _in_view(page.named("joints z +"))
         assert not _in_view(page.named("joint 1 +"))
         page.named(words.FRAME).value = "tray"
-        page.look()
+        _found(page)
         turn = page.named("⟳ tray y +")  # about the base's x
         (reason,) = [control.reason for control in page.of.controls if control.element is turn]
         assert "the arm cannot turn the tool about tray-y from here" in reason
+
+
+def _found(page: Page) -> None:
+    """Show why jogs are not possible, which a thread finds out."""
+    page.look()
+    page.operator.live.draw()
+    page.look()
 
 
 def _in_view(element: Any) -> bool:

@@ -39,7 +39,8 @@ def test_runs_of_the_command_line_are_listed_the_newest_first(tmp_path: Path) ->
         (tmp_path / name).mkdir()
         (tmp_path / name / "run.json").write_text(text)
         os.utime(tmp_path / name / "run.json", (1, 1))
-    rows = past_runs.listed(tmp_path)
+    rows = past_runs.listed(tmp_path, 9)
+    assert past_runs.listed(tmp_path, 2) == rows[:2]
     assert [(row.folder.name, row.duration, row.ending) for row in rows[:2]] == [
         ("feed-002", "13.6 s", "estop"),
         ("feed-001", "13.6 s", "complete"),

@@ -172,6 +172,7 @@ def test_a_new_tool_is_taught_from_four_postures_and_can_be_chosen(operator: Pan
         np.testing.assert_allclose(np.array(operator.arm.tool.matrix)[:3, 3], TIP, atol=0.05)
 
 
+@pytest.mark.slow
 def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
     operator: PanelBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -186,6 +187,9 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
                 "name": "feed",
                 "arm": operator.arm,
                 "frames": ("tray",),
+                "loaded_legs": (),
+                "loads": (),
+                "pallets": (),
                 "job": type("Job", (), {"name": "feed", "holds": ""}),
                 "total_s": 1.0,
                 "trajectory": None,
@@ -196,6 +200,7 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
     with pages(operator) as page:
         page.unfold(words.TYPED_TARGET)
         page.named(words.FRAME).value = "tray"
+        operator.jobs.solve()
         before = operator.jobs.vias[0].angles_deg
         text = (tmp_path / "arm.toml").read_text() + "\n[posture.away]\nangles_deg = [0, 0, 0, 0, 10, 0]\n"
         operator.arm_changed(arm_of(tmp_path, text))
@@ -212,6 +217,7 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
         page.named("bin x +")
         page.named(words.FRAME).value = "tray"
         assert operator.jobs.plan_is_old
+        operator.jobs.solve()
         assert operator.jobs.vias[0].angles_deg != before
         operator.arm_changed(
             arm_of(tmp_path, text.replace("[frame.tray]", "[frame.table]").replace('"tray"', '"table"'))

@@ -210,6 +210,43 @@ def test_whole_radians_beyond_a_turn_are_doubtful(limits: tuple[float, float], i
         assert is_range_doubtful((round(low, decimals), round(high, decimals))) == is_doubtful
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.1, 0.4), (-0.3, 0.2)])
+def test_capsules_of_a_slide_contain_its_shapes_wherever_it_is(
+    tmp_path: Path, low: float, high: float
+) -> None:
+    urdf, out = tmp_path / "slide.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text().replace('name="j2" type="rev', 'name="j2" type="pris')
+    text = text.replace('type="prisolute"', 'type="prismatic"')
+    text = text.replace(J2_LIMIT, J2_LIMIT.replace("-2.0", str(low)).replace('"2.0"', f'"{high}"'))
+    box = '<visual><origin xyz="0.05 0 0.02" rpy="0 0 0"/><geometry><box size="0.1 0.04 0.2"/></geometry></visual>'
+    urdf.write_text(text.replace('<link name="l2"/>', f'<link name="l2">{box}</link>'))
+    done = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)])
+    assert done.exit_code == 0, done.output
+    arm = Arm.read(out)
+    row = [joint.name for joint in arm.joints].index("j2")
+    assert arm.joints[row].radius_mm > 0.0
+    corners = 1e3 * trimesh.creation.box((0.1, 0.04, 0.2)).vertices + (50, 0, 20)
+    for at in np.linspace(low, high, 5):
+        pose = tool_pose(urdf, {"j1": 0.0, "j2": float(at), "j3": 0.0}, "l2")
+        seen = corners @ pose[:3, :3].T + pose[:3, 3]
+        points = outline_mm(arm, [1e3 * at if joint.slides else 0.0 for joint in arm.joints])
+        away = [
+            point_distance(seen, points[None, part], (points[part + 1] - points[part])[None])
+            for part in (2 * row, 2 * row + 1)
+        ]
+        assert np.min(away, axis=0).max() <= arm.joints[row].radius_mm + 1e-6
+
+
+def test_a_new_project_says_what_is_doubtful_in_a_urdf(tmp_path: Path) -> None:
+    urdf = tmp_path / "robot.urdf"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    urdf.write_text(text.replace(J2_LIMIT, J2_LIMIT.replace("2.0", "90")))
+    done = CliRunner().invoke(main, ["new", str(tmp_path / "x"), "--urdf", str(urdf)])
+    assert done.exit_code == 0, done.output
+    assert "note: joint 'j2': its limits, -90 to 90 rad" in done.output
+    assert "correct it, or the joint in arm.toml" in done.output
+
+
 def test_names_of_any_kind_are_written_safely_and_blank_ones_replaced(tmp_path: Path) -> None:
     path, out = tmp_path / "robot.urdf", tmp_path / "arm.toml"
     text = (FOLDER / "three_planar.urdf").read_text().replace('"three planar"', '" "')

@@ -146,3 +146,5 @@ def test_a_target_is_shown_then_approached_while_held_and_postures_are_stored(
     panels.answer(page, "The current on")
     wait_for(page, "Guide by hand…: done", place="armtempo-said")
     wait_for(page, "idle")
+    page.reload()
+    page.wait_for_selector("text=In control")  # as before

@@ -112,7 +112,7 @@ def _backup_sram(access: float | None) -> Measurement:
 def _flash(found: dict[str, Any] | None) -> Iterator[Measurement]:
     if found is None:
         yield Measurement(
-            BOARD, "flash speed", "left out: no room for a file of 4 KB", "", Level.NOTE,
+            BOARD, "flash speed", "left out: no space for a file of 4 KB", "", Level.NOTE,
             "remove motions: 'armtempo remove'",
         )  # fmt: skip
         return
@@ -130,7 +130,7 @@ def _flash(found: dict[str, Any] | None) -> Iterator[Measurement]:
 def judge_cycles(found: dict[str, float]) -> Iterator[Measurement]:
     """Lines about ``found`` of ``board: selftest/cycles.py``: figures, without a verdict."""
     for name, words in (
-        ("byte_code", "a turn of a small loop in byte code"),
+        ("byte_code", "a pass of a small loop in byte code"),
         ("machine_code", "the same in machine code"),
         ("collection", "a collection of the heap"),
     ):

@@ -18,8 +18,8 @@ from armtempo.diagnosis.selftest.result import Measurement, judged, left_out
 PULSES, SAFETY, TURNS = "pulses", "safety", "cycles"
 _RESOLUTION_US = 2.0
 """One sample per microsecond, half a sample between the two ports, and the rounding of a step time."""
-_LONGEST_TURN_US = 4000
-"""The capture keeps 4096 samples; after a longer turn some are lost."""
+_LONGEST_PASS_US = 4000
+"""The capture keeps 4096 samples; after a longer pass some are lost."""
 _SLOWEST_STOP_US = 30.0
 STOPS = tuple(f"{pin} by {how}" for pin in ("E-stop", "limit switch") for how in ("software", "an edge"))
 """The stops of ``board: selftest/estop.py``."""
@@ -62,11 +62,11 @@ def judge(
     if values["fault"]:
         name, meaning, cure = ERRORS[values["fault"]]
         yield judged(PULSES, f"motion {how}", f"fault {name}: {meaning}", "no fault", False, cure)
-    longest_us = values["longest_turn_cycles"] / CYCLES_PER_US
-    if longest_us > _LONGEST_TURN_US:
-        measured_words = f"a turn of the loop took {longest_us:.0f} us"
+    longest_us = values["longest_pass_cycles"] / CYCLES_PER_US
+    if longest_us > _LONGEST_PASS_US:
+        measured_words = f"a pass of the loop took {longest_us:.0f} us"
         yield judged(
-            PULSES, f"capture {how}", measured_words, f"below {_LONGEST_TURN_US}", False, "run it again"
+            PULSES, f"capture {how}", measured_words, f"below {_LONGEST_PASS_US}", False, "run it again"
         )
         return
     found = rises_us(measured)
@@ -132,8 +132,8 @@ def _channel(
 def judge_long(values: dict[str, Any], steps: int, duration_s: float) -> Measurement:
     """The line about a motion of ``steps`` of each joint: counted edges by port."""
     what = f"steps of a longer motion, {duration_s:g} s"
-    if values["longest_turn_cycles"] / CYCLES_PER_US > _LONGEST_TURN_US:
-        return left_out(PULSES, f"{what}: a turn of the loop took too long to capture all", "run it again")
+    if values["longest_pass_cycles"] / CYCLES_PER_US > _LONGEST_PASS_US:
+        return left_out(PULSES, f"{what}: a pass of the loop took too long to capture all", "run it again")
     counted = {port: count / 2 for port, count in zip(values["ports"], values["counts"], strict=True)}
     due = {port: steps * sum(pin[0] == port for pin in values["steps"]) for port in values["ports"]}
     return judged(
@@ -148,10 +148,10 @@ def judge_long(values: dict[str, Any], steps: int, duration_s: float) -> Measure
 
 def judge_turns(values: dict[str, Any]) -> Iterator[Measurement]:
     """Lines on the loop while all joints move, and on the heap."""
-    mean, longest = (values[name] / CYCLES_PER_US for name in ("turn_cycles", "longest_turn_cycles"))
+    mean, longest = (values[name] / CYCLES_PER_US for name in ("pass_cycles", "longest_pass_cycles"))
     yield Measurement(
         TURNS,
-        "a turn of the engine's loop with its capture, all joints moving",
+        "a pass of the engine's loop with its capture, all joints moving",
         f"{mean:.0f} us, the longest {longest:.0f}",
     )
     stages = ", ".join(f"{name} {values['free'][name]}" for name in ("engine", "loaded", "moved"))

@@ -21,7 +21,7 @@ _LEAD_US, WATCHED_US = 20_000, 4096
 """Time from start to the motion's time 0 (``engine.LEAD_TICKS``); length of a capture."""
 _RESOLUTION_US = 1.5
 _SLOWER = 0.03
-"""Tolerance of the time between steps: a capture ends with a turn of the loop."""
+"""Tolerance of the time between steps: a capture ends with a pass of the loop."""
 KEPT = 0.8
 """Fraction of the measured rate that the board states, at most the default rate."""
 _ROUNDS = 5
@@ -130,9 +130,9 @@ def judge_steps(values: Mapping[str, Any], port: str, rate: int, count: int) -> 
 
 
 def judge_load(longest_cycles: int) -> Measurement:
-    """The line about the longest turn of the loop in all successful motions."""
+    """The line about the longest pass of the loop in all successful motions."""
     took = f"{longest_cycles / CYCLES_PER_US:.0f} us"
-    return Measurement(PART, "worst turn of the program's loop under load, with commands and samples", took)
+    return Measurement(PART, "worst pass of the program's loop under load, with commands and samples", took)
 
 
 def _joints(count: int) -> str:

@@ -39,7 +39,7 @@ _ROOT = "/flash/armtempo"
 _ARM_RECORD = f"{_ROOT}/arm.ata"
 _BACK_S = 60.0
 _SIMULATED_TURN_US = 1000
-"""Duration of a turn of the loop on a virtual board, about that of the chip."""
+"""Duration of a pass of the loop on a virtual board, about that of the chip."""
 _SEED = 5
 _STOPS, _BATCH, _SIMULATED_STOPS = 1000, 50, 4
 """Numbers of stops, by E-stop and limit switch, software and edge, in turn. A batch is one call of the part."""
@@ -329,11 +329,11 @@ class _Trials:
         values = self._tried(rates, duration_s or self._duration_s, "")
         if values is None or values["fault"]:
             return None if values is None else False
-        self.longest_cycles = max(self.longest_cycles, values["longest_turn_cycles"])
+        self.longest_cycles = max(self.longest_cycles, values["longest_pass_cycles"])
         return True
 
     def watched(self, joints: Sequence[dict[str, Any]], rate: int) -> Iterator[Measurement]:
-        """The steps on the pins in the middle of a motion, by port, as the heap has room for one capture."""
+        """The steps on the pins in the middle of a motion, by port, as the heap has space for one capture."""
         for port in sorted({engine_pins.table()["STEP"][joint["channel"]][0][0] for joint in joints}):
             values = self._tried([rate] * len(joints), self._duration_s, port)
             if values is not None:

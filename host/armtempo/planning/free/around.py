@@ -148,8 +148,8 @@ def _without_help(
         joints.append(replace(joint, via_segments=tuple(joint.via_segments[place] for place in places)))
     searches = []
     for search in planned.searches:
-        floor = free_plan.floor_of(arm, job, via_deg, list(search.joints))
-        searches.append(replace(search, floor_s=floor.time_s, floor_kind=floor.kind))
+        bound = free_plan.lower_bound_of(arm, job, via_deg, list(search.joints))
+        searches.append(replace(search, lower_bound_s=bound.time_s, lower_bound_kind=bound.kind))
     note = f"the path goes around {', '.join(sorted(names))}"
     trajectory = replace(planned.trajectory, joints=tuple(joints))
     return Planned(trajectory, tuple(searches), (*planned.notes, note))

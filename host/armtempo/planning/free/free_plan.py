@@ -21,7 +21,7 @@ from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Tolerance, through
 from armtempo.planning.free.free_path import Effort, Shortest
 from armtempo.planning.free.layout import DEGREE, DWELL_SEGMENTS, LEAST_PIECES, Layout, uniform
-from armtempo.planning.lower_bounds import Floor
+from armtempo.planning.lower_bounds import LowerBound
 from armtempo.planning.through_plan import Planned
 from armtempo.planning.time_parameterization import MIN_DURATION_S
 from armtempo.planning.tool import Tool
@@ -115,10 +115,10 @@ def _on_spline(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planne
     except PlanError:
         return None
     searches = (
-        replace(search, floor_s=floor.time_s, floor_kind=floor.kind)
+        replace(search, lower_bound_s=bound.time_s, lower_bound_kind=bound.kind)
         for search in planned.searches
-        for floor in (
-            floor_of(arm, job, via_deg, list(search.joints), planned.trajectory.joints[0].via_times_s),
+        for bound in (
+            lower_bound_of(arm, job, via_deg, list(search.joints), planned.trajectory.joints[0].via_times_s),
         )
     )
     note = "no faster path was found in the corridor than the spline through the via points itself"
@@ -239,7 +239,11 @@ def _spline(motion: FreeMotion, angle_points_deg: Array) -> JointSpline:
 
 
 def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shortest, trial: bool) -> Search:
-    floor = Floor(0.0, "vias") if trial else floor_of(arm, job, via_deg, joints, found.motion.via_times_s)
+    bound = (
+        LowerBound(0.0, "vias")
+        if trial
+        else lower_bound_of(arm, job, via_deg, joints, found.motion.via_times_s)
+    )
     return Search(
         joints=tuple(joints),
         intervals_s=found.motion.differences_s,
@@ -249,12 +253,14 @@ def _search(arm: Arm, job: Job, via_deg: Array, joints: list[int], found: Shorte
         history_s=np.minimum.accumulate(found.starts_s),
         starts_s=found.starts_s,
         optimum_s=0.0,
-        floor_s=floor.time_s,
-        floor_kind=floor.kind,
+        lower_bound_s=bound.time_s,
+        lower_bound_kind=bound.kind,
     )
 
 
-def floor_of(arm: Arm, job: Job, via_deg: Array, joints: list[int], times_s: Array | None = None) -> Floor:
+def lower_bound_of(
+    arm: Arm, job: Job, via_deg: Array, joints: list[int], times_s: Array | None = None
+) -> LowerBound:
     """Lower bound of the time of any path of some driven joints through via angles (n + 1, J).
 
     ``times_s``: see ``lower_bounds.of_vias``.

@@ -13,7 +13,7 @@ from armtempo.model.job import Job
 from armtempo.planning import checks
 from armtempo.planning.free import around
 from armtempo.planning.line.legs import Leg
-from armtempo.planning.lower_bounds import Floor
+from armtempo.planning.lower_bounds import LowerBound
 from armtempo.splines import bspline
 from armtempo.splines.bspline import REST_PIECES
 
@@ -28,7 +28,7 @@ class Between:
     """(S + 5, J)."""
     arrivals: tuple[int, ...]
     """Segments before each of its via points."""
-    floor: Floor | None = None
+    bound: LowerBound | None = None
     """Lower bound for any motion through them; None for a fixed path."""
 
     @property
@@ -71,4 +71,4 @@ def _free(arm: Arm, job: Job, leg: Leg, via_deg: Array, progress: Progress) -> B
     search = planned.searches[0]
     arrivals = joints[0].via_segments
     assert arrivals is not None
-    return Between(points, arrivals, Floor(search.floor_s, search.floor_kind))
+    return Between(points, arrivals, LowerBound(search.lower_bound_s, search.lower_bound_kind))

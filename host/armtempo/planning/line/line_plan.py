@@ -26,7 +26,7 @@ from armtempo.planning.line.dwell import DWELL_SEGMENTS, TimedPath
 from armtempo.planning.line.follow import passed
 from armtempo.planning.line.line_path import DEGREE, Led, LinePath, Proven, led_legs, proven_paths
 from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
-from armtempo.planning.lower_bounds import Floor
+from armtempo.planning.lower_bounds import LowerBound
 from armtempo.planning.through_plan import Planned
 from armtempo.planning.tool import Tool
 from armtempo.planning.variables import Index, time_points
@@ -61,7 +61,7 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress) -> Planned:
     checks.check_ranges(arm, path.angle_points_deg, DEGREE)
     notes = [_away(led[number], found) for number, found in away.items()]
     notes += [words for one in led.values() for words in passed(one.followed)]
-    return _timed(arm, job, path, {number: one.floor for number, one in others.items()}, notes, best)
+    return _timed(arm, job, path, {number: one.bound for number, one in others.items()}, notes, best)
 
 
 def _fastest(arm: Arm, job: Job, paths: Sequence[Proven], progress: Progress) -> tuple[Proven, _Axis]:
@@ -102,7 +102,7 @@ def _timed(
     arm: Arm,
     job: Job,
     path: LinePath,
-    floors: Mapping[int, Floor | None],
+    bounds: Mapping[int, LowerBound | None],
     notes: list[str],
     best: _Axis,
 ) -> Planned:
@@ -129,7 +129,7 @@ def _timed(
         for column in timed.angle_points_deg.T
     )
     waits_s = joints[0].duration_s - found.total_s * scale
-    floor = _floor(points, path.knots, own, found.total_s, floors)
+    bound = _lower_bound(points, path.knots, own, found.total_s, bounds)
     search = Search(
         joints=tuple(map(int, moving)),
         intervals_s=timed.differences_s,
@@ -138,8 +138,8 @@ def _timed(
         evaluations=len(best.history_s),
         history_s=np.minimum.accumulate(best.history_s) + waits_s,
         optimum_s=found.bound_s + waits_s,
-        floor_s=floor.time_s + sum(dwells_s.values()),
-        floor_kind=floor.kind,
+        lower_bound_s=bound.time_s + sum(dwells_s.values()),
+        lower_bound_kind=bound.kind,
     )
     return Planned(Trajectory(job.name, joints, True), (search,), tuple(notes))
 
@@ -186,14 +186,14 @@ def _levels(most: int) -> list[int]:
     return [1, min(_REFINE_FACTOR, most)][: min(most, 2)]
 
 
-def _floor(
+def _lower_bound(
     points: Array,
     knots: Sequence[int],
     limits: Sequence[Limits],
     about_s: float,
-    floors: Mapping[int, Floor | None],
-) -> Floor:
-    """Lower bound for all time laws on the path with rests between legs; ``floors``: known bounds of
+    bounds: Mapping[int, LowerBound | None],
+) -> LowerBound:
+    """Lower bound for all time laws on the path with rests between legs; ``bounds``: known bounds of
     legs."""
     parts = []
     for number, (first, last) in enumerate(pairwise(knots)):
@@ -201,8 +201,8 @@ def _floor(
         moving = np.ptp(leg, axis=0) > checks.TOLERANCE
         own = [limit for limit, moves in zip(limits, moving, strict=True) if moves]
         share = about_s * (last - first) / knots[-1]
-        parts.append(floors.get(number) or lower_bounds.of_path(leg[:, moving], DEGREE, own, share))
-    return Floor(sum(part.time_s for part in parts), parts[0].kind)
+        parts.append(bounds.get(number) or lower_bounds.of_path(leg[:, moving], DEGREE, own, share))
+    return LowerBound(sum(part.time_s for part in parts), parts[0].kind)
 
 
 def _asked(job: Job, via: int) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from micropython import mem_info
 FRAMES = "/flash/frames"
 ROUNDS = "/flash/rounds"
 TURNS = 20
-"""Turns of the program's loop between two frames, and at the end."""
+"""Passes of the program's loop between two frames, and at the end."""
 BACKUP_SRAM = 0x2002F000
 """Memory of the emulator's that the chip has not, in the place of the backup SRAM that the emulator has not."""
 STARTS_US = 50

@@ -1,4 +1,4 @@
-"""Stands around the program in an emulated board, and stamps each turn of its loop (see tests/benchmark/loop_board.py).
+"""Stands around the program in an emulated board, and stamps each pass of its loop (see tests/benchmark/loop_board.py).
 
 TIM2 counts instructions there, scaled to ticks. It stands while something happens here, so only the program's work
 takes time. DMA1 is memory: its streams catch up with the clock whenever the program looks at one.

@@ -58,14 +58,14 @@ def case_commands_before_hello_are_refused():
 def case_a_new_session_hears_nothing_that_was_meant_for_the_old_one():
     app, host = connected()
     start(host)
-    host.port.room = 0
+    host.port.space = 0
     app.controller.board.engine.advance(3)
     host.turn()
     assert not app.link.idle()  # samples wait for a host that does not read
     host.events.clear()
     host.send("hello", (wire.PROTOCOL_VERSION, 2))
     host.turn()
-    host.port.room = 1 << 30
+    host.port.space = 1 << 30
     frames = [wire.EVENT_BY_ID[number][0] for _, number, _ in host.turn()]
     assert frames == ["ok"], frames
 
@@ -113,20 +113,20 @@ def case_a_frame_may_come_in_pieces():
     assert host.ask("status")[1][10] == 0
 
 
-def case_what_the_port_took_makes_room():
+def case_what_the_port_took_makes_space():
     """A piece of an event is enough; what stays after it comes whole."""
     port = stand_in.Port()
     link = SerialLink(port)
     size = 250
-    port.room = 200
+    port.space = 200
     for number in range(3):
-        while not link.room(size):
+        while not link.has_space(size):
             assert number == 2
-            assert port.room, "no room for the third, though there are bytes free"
+            assert port.space, "no space for the third, though there are bytes free"
             link.flush()
         link.out[link.payload()] = number
         link.event(0x40, size)
-    port.room = 1000
+    port.space = 1000
     while not link.idle():
         link.flush()
     parser = wire.Parser()

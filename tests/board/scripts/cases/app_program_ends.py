@@ -143,7 +143,7 @@ def case_a_pass_without_memory_is_the_programs_fault():
 
 def case_what_a_lost_host_was_not_told_gives_way_to_the_traceback():
     def script(world):
-        world.app.link.room = lambda size: False
+        world.app.link.has_space = lambda size: False
 
     world = World("print('one')\nprint('two')\n1 // 0\n", script)
     assert world.start()[0] == "ok"

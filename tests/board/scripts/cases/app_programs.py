@@ -79,14 +79,14 @@ def case_a_program_acts_while_a_motion_runs():
 def case_without_a_host_texts_take_little_time():
     def script(world):
         if world.turns == 1:
-            world.host.port.room = 0
+            world.host.port.space = 0
 
     world = World("cell.sleep(1)\nfor i in range(20):\n    print(i)\n", script)
     assert world.start()[0] == "ok"
     try:
         world.execute()
     finally:
-        world.host.port.room = 1 << 30
+        world.host.port.space = 1 << 30
     assert world.stands()[0] == "finished"
     assert world.turns < 80, world.turns
 

@@ -95,10 +95,10 @@ def case_oldest_sample_gives_way_and_is_counted():
     app, host = connected()
     start(host)
     places = app.controller.board.samples._capacity
-    host.port.room = 0
+    host.port.space = 0
     app.controller.board.engine.advance(places + 20)
     host.turn()
-    host.port.room = 1 << 30
+    host.port.space = 1 << 30
     assert host.ask("samples", (0, 0)) == ("ok", (21, places), b"")
     app.controller.board.engine.finish()
     for _ in range(10):
@@ -150,7 +150,7 @@ def case_samples_of_a_run_without_host_are_kept():
 def case_stalled_host_does_not_stall_the_loop():
     app, host = connected()
     start(host)
-    host.port.room = 0
+    host.port.space = 0
     for _ in range(300):
         host.send("status")
         app.controller.board.engine.advance(1)
@@ -158,7 +158,7 @@ def case_stalled_host_does_not_stall_the_loop():
     assert app.controller.board.samples.next == 301
     assert app.controller.board.fault() == 0
     host.port.inbox = bytearray()
-    host.port.room = 1 << 30
+    host.port.space = 1 << 30
     host.turn()
     assert state(host) == "moving"
 

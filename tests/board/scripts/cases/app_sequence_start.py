@@ -84,7 +84,7 @@ def case_unhomed_it_is_refused():
     assert host.ask("start", (1, wire.record_crc(host.seq)), "seq")[:2] == ("error", "is_sequence")
 
 
-def case_without_room_it_is_refused():
+def case_without_space_it_is_refused():
     app, host = ready([(WAIT, 0, 0, 1)])
     import armtempo_board.app.sequencer as module
 

@@ -38,7 +38,7 @@ def begin_of(part):
 def parts_of(generator):
     """All words of a step generator."""
     now = generator.subintervals
-    windows = [points.words for points in (now._angle_points, now._time_points)]
+    windows = [points.words for points in (now.points, now._time_points)]
     own = [generator._solver, generator._law_words, generator.queue]
     return [now.angle, now.time] + windows + [now.angle_measures, now.time_measures] + own
 
@@ -69,7 +69,7 @@ def case_parts_lie_one_behind_the_other_and_are_0():
     memory = Memory([100], address, 50)
     first, second = memory.take_for_processor(20), memory.take_for_processor(30)
     assert (begin_of(first), begin_of(second)) == (0, 20)
-    assert begin_of(memory.take_for_processor(1)) == -1, "what has no room there comes from the blocks"
+    assert begin_of(memory.take_for_processor(1)) == -1, "what has no space there comes from the blocks"
     for word in range(20):
         assert first[word] == 0
     first[19], second[0] = -(1 << 31), (1 << 31) - 1

@@ -89,7 +89,7 @@ def case_when_to_write():
         assert state[isr.FED] == fed
         assert state[isr.MATCHED] == matched
         if hungry:
-            assert state[isr.ROOM] == min(entries - 8 - (made - matched), 512)
+            assert state[isr.SPACE] == min(entries - 8 - (made - matched), 512)
         if not fed:
             assert isr.rings_to_refill(block, dma, timer) == -1
         block[isr.FROZEN] = 1
@@ -113,7 +113,7 @@ def case_written_and_wrapped():
             queue[ITEM_TIME] = 0
             queue[ITEM_BASE] = made // 2 * APART & 0xFFFFFFFF
             queue[step_queue.STEPS] = count // 2
-            state[isr.ROOM] = count
+            state[isr.SPACE] = count
             timer[isr.CNT] = (before - 100 + (count == 20)) & 0xFFFFFFFF
             assert step_queue.emit(2, states(block), timer) == 2 * (count == 20)
             made += count
@@ -205,8 +205,8 @@ def case_turn_queue():
 
 
 def case_sample_times():
-    """From 0 in steps of a tenth of a second to the end; raw samples that find no room are counted."""
-    block, raw, dma, encoder = words(BLOCK), words(isr.RAW_ROOM * isr.RAW_WORDS), words(60), words(18)
+    """From 0 in steps of a tenth of a second to the end; raw samples that find no space are counted."""
+    block, raw, dma, encoder = words(BLOCK), words(isr.RAW_SPACE * isr.RAW_WORDS), words(60), words(18)
     timer = words(18)
     at = isr.BLOCK_HEAD + isr.RING
     block[at + isr.MASK] = 63
@@ -230,7 +230,7 @@ def case_sample_times():
     assert list(raw[11:13]) == [1001, 77] and raw[18] == 65535
     for _ in range(20):
         isr.take_sample(raw, block, dma, (uctypes.addressof(encoder),), timer)
-    assert (block[isr.RAW_IN], block[isr.RAW_LOST]) == (isr.RAW_ROOM, 24 - isr.RAW_ROOM)
+    assert (block[isr.RAW_IN], block[isr.RAW_LOST]) == (isr.RAW_SPACE, 24 - isr.RAW_SPACE)
     assert raw[0] == 1000
 
 

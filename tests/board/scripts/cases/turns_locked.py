@@ -1,4 +1,4 @@
-"""Turns of the loop while moving with the heap locked: MicroPython raises MemoryError if anything allocates.
+"""Passes of the loop while moving with the heap locked: MicroPython raises MemoryError if anything allocates.
 
 Samples come and go, the host asks for status and samples, sets outputs and reads inputs; prints what was done that way.
 """

@@ -1,8 +1,8 @@
 """Check motion records and walk every joint of them; runs on all interpreters.
 
-Arguments: pulse ticks, gap ticks, room, start and length of braking in ticks (0 0: none; the length whole in a unit for
-it) and its shape, then records. Prints what the check says of each, and writes its steps next to it (.steps), little
-endian int32 each: joint, direction, time of it or of the one before in 1024 ticks, rising edge, falling edge.
+Arguments: pulse ticks, gap ticks, space, start and length of braking in ticks (0 0: none; the length whole in a unit
+for it) and its shape, then records. Prints what the check says of each, and writes its steps next to it (.steps),
+little endian int32 each: joint, direction, time of it or of the one before in 1024 ticks, rising edge, falling edge.
 """
 
 import struct
@@ -43,7 +43,7 @@ class SameRamps:
 FREE = {"min_steps": -50000000, "max_steps": 50000000, "max_rate": 336330}
 
 
-def walk(motion, joint, generator, out, pulse, gap, room, start, length, shape):
+def walk(motion, joint, generator, out, pulse, gap, space, start, length, shape):
     """All steps of one joint; nothing may be allocated on the way."""
     ring, state = array("I", bytes(4 * (MASK + 2))), array("i", bytes(4 * isr.STATE_WORDS))
     state[isr.MASK] = MASK
@@ -61,7 +61,7 @@ def walk(motion, joint, generator, out, pulse, gap, room, start, length, shape):
         generator.prepare(NEVER if braked else start_kiticks)
         near = generator.next_kiticks()
         brake_now = not braked and near >= start_kiticks
-        count = 0 if brake_now else generator.write(state, head, room, state)
+        count = 0 if brake_now else generator.write(state, head, space, state)
         unlock()
         if brake_now:
             OVERRIDE.ramp(start, 0)
@@ -82,7 +82,7 @@ def first_position(motion, joint):
     return (total // 60 + (1 << 28)) >> 29
 
 
-def main(pulse, gap, room, start, length, shape, *records):
+def main(pulse, gap, space, start, length, shape, *records):
     """Walk all with one generator, as the board reuses them."""
     generator = StepGenerator(Memory(list(engine_memory.GENERATOR_PARTS)))
     for record in records:
@@ -101,7 +101,7 @@ def main(pulse, gap, room, start, length, shape, *records):
                     joint,
                     generator,
                     out,
-                    *[int(word) for word in (pulse, gap, room, start, length, shape)],
+                    *[int(word) for word in (pulse, gap, space, start, length, shape)],
                 )
 
 

@@ -101,7 +101,7 @@ class StepGenerator:
 
     def prepare(self, until):
         """Queue steps as the evaluator's does: the first of a block by itself, the others as cubics."""
-        while step_queue.has_room(self.queue, until) and not self.ended and not self.at_reversal:
+        while step_queue.has_space(self.queue, until) and not self.ended and not self.at_reversal:
             time, direction = self._steps.at(self._place)
             if direction != self.direction:
                 self.at_reversal = True
@@ -321,7 +321,7 @@ class Rig:
             pulses.ignore()
 
     def turn(self):
-        """One turn of the main loop."""
+        """One pass of the main loop."""
         self.engine.service()
         buffer = array("i", [0] * (4 + 2 * len(self.joints)))
         while self.engine.next_sample(buffer):

@@ -28,7 +28,7 @@ PLACES = [[10 * number, 20, 10 * number + 1, 21] for number in range(9)]
 
 
 class World:
-    """What goes on around a program: ``script`` is called with it in each turn of the loop."""
+    """What goes on around a program: ``script`` is called with it in each pass of the loop."""
 
     def __init__(self, source, script=lambda world: None, legs=LEGS, **more):
         self.app, self.host = connected()

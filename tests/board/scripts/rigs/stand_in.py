@@ -309,7 +309,7 @@ class Port:
     def __init__(self):
         self.inbox = bytearray()
         self.outbox = bytearray()
-        self.room = 1 << 30  # bytes that the host takes before it stalls
+        self.space = 1 << 30  # bytes that the host takes before it stalls
 
     def readinto(self, buffer, count):
         count = min(count, len(self.inbox))
@@ -320,10 +320,10 @@ class Port:
         return count
 
     def write(self, buffer, offset, count):
-        count = min(count, self.room, 64)
+        count = min(count, self.space, 64)
         if not count:
             return None
-        self.room -= count
+        self.space -= count
         self.outbox.extend(bytes(buffer[offset : offset + count]))
         return count
 

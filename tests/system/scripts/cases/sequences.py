@@ -132,8 +132,8 @@ def store(rows):
     return wire.record_crc(record)
 
 
-def without_room(world):
-    """From here on the heap has no room to prepare a motion in."""
+def without_space(world):
+    """From here on the heap has no space to prepare a motion in."""
     from armtempo_board import memory
     from armtempo_shared import engine_memory
 
@@ -207,7 +207,7 @@ def case_the_pins_do_the_same(world):  # on CPython, slow
         assert len(found[0]) == motions, (rows, motions)
         assert watch.prepared() == motions - 1
         trials.append((rows, found))
-    without_room(world)
+    without_space(world)
     for rows, before in trials:
         found = yield from whole(world, watch, store(rows))
         assert watch.prepared() == 0

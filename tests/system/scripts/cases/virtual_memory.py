@@ -38,7 +38,7 @@ def case_flash_is_as_big_as_the_chips():
             except OSError as error:
                 assert error.args[0] == 28
         assert os.statvfs("/flash")[3] == 0
-        small.write(bytes(412))  # its block has room
+        small.write(bytes(412))  # its block has space
         try:
             small.write(b"x")
             raise AssertionError("another block")

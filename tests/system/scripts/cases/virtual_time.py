@@ -180,7 +180,7 @@ def case_a_program_that_receives_waits_for_what_comes():
     assert pyb.USB_VCP().recv(4, timeout=1000) == b"late"
 
 
-def case_a_program_that_sends_waits_for_room():
+def case_a_program_that_sends_waits_for_space():
     board = bare_board.start()
     line = machine_state.serial
     port = pyb.USB_VCP()

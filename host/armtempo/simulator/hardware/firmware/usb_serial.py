@@ -169,7 +169,7 @@ class USB_VCP:
     def read(self, size=-1):
         """The received bytes, up to ``size``; None if there are none.
 
-        A program calls this once in each turn of its main loop, so an empty read also takes the time of the turn's
+        A program calls this once in each pass of its main loop, so an empty read also takes the time of the pass's
         own work on the chip (option ``turn_us``).
         """
         if not self._line.received:

@@ -1,6 +1,6 @@
 """The heap that every arm leaves on MicroPython's own STM32F407 firmware: the tables of host/docs/measurements.md.
 
-    python -m tests.benchmark.room MICROPYTHON [CHANGES]
+    python -m tests.benchmark.arm_heap MICROPYTHON [CHANGES]
 
 MICROPYTHON and how it is run: tests/benchmark/firmware.py. The program, on it and within the firmware, is driven by
 a host's frames: for each arm it is started afresh, gets the arm, a motion, home, start and stop. CHANGES: then, in one
@@ -38,7 +38,7 @@ FLASH_CACHE = interpreters.VIRTUAL / "hardware" / "chip" / "flash_cache.py"
 LIMIT_S = 300.0
 _STAGE = 0x8000
 _BLOCK = 512
-_MOST_ARMS = 10  # whose frames the emulated flash has room for; more come from sending them again
+_MOST_ARMS = 10  # whose frames the emulated flash has space for; more come from sending them again
 _PIECE = MAX_COMMAND - 4
 OWN = 2_400
 """Bytes of heap for what this benchmark itself has in it, given next to the chip's: the stack does not need them."""
