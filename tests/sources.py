@@ -25,6 +25,12 @@ def tree(path: Path) -> ast.Module:
     return parsed(path.read_text(encoding="utf-8"))
 
 
+@cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """Of a file, all of them."""
+    return tuple(ast.walk(tree(path)))
+
+
 def script(path: Path) -> SimpleNamespace:
     """The names of a script that is no module of a package; it is not run as the main program."""
     return SimpleNamespace(**runpy.run_path(str(path)))

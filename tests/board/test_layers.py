@@ -37,7 +37,7 @@ FILES = {
 def imported(path: Path) -> set[str]:
     """Modules of the board package that a file imports, anywhere in it."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in sources.nodes(path):
         if isinstance(node, ast.ImportFrom) and str(node.module).split(".")[0] == BOARD.name:
             for name in [str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)]:
                 module = name.removeprefix(BOARD.name).removeprefix(".")
@@ -56,7 +56,7 @@ def test_packages_import_those_below() -> None:
         if own == "stepgen":
             names = {
                 alias.name if isinstance(node, ast.Import) else str(node.module)
-                for node in ast.walk(ast.parse(FILES[module].read_text()))
+                for node in sources.nodes(FILES[module])
                 if isinstance(node, ast.Import | ast.ImportFrom)
                 for alias in node.names
             }
@@ -75,7 +75,7 @@ def test_no_module_imports_its_user() -> None:
 
 def test_the_package_itself_imports_nothing_at_once() -> None:
     for path in (BOARD / "__init__.py", *BOARD.glob("*/__init__.py")):
-        for node in ast.parse(path.read_text()).body:
+        for node in sources.tree(path).body:
             assert not isinstance(node, ast.Import | ast.ImportFrom), path
 
 
@@ -105,7 +105,7 @@ def test_no_index_is_a_number() -> None:
     for path in PATHS:
         found = [
             f"line {node.lineno}: {ast.unparse(node)}"
-            for node in ast.walk(ast.parse(path.read_text()))
+            for node in sources.nodes(path)
             if isinstance(node, ast.Subscript)
             for _ in literals(node.slice, (0,))
         ]

@@ -103,7 +103,14 @@ def refined(joints: list[int], timing: str, refine: int | str) -> tuple[float, f
     return plan.trajectory.duration_s, plan.searches[0].lower_bound_s
 
 
-@pytest.mark.parametrize(("joint", "most_s"), [(0, 4.946), (1, 6.014), (2, 5.576)])
+@pytest.mark.parametrize(
+    ("joint", "most_s"),
+    [
+        (0, 4.946),
+        pytest.param(1, 6.014, marks=pytest.mark.slow),
+        pytest.param(2, 5.576, marks=pytest.mark.slow),
+    ],
+)
 def test_refined_joints_come_near_their_floor(joint: int, most_s: float) -> None:
     total, bound = refined([joint], "per-joint", 8)
     assert bound < total <= most_s

@@ -333,6 +333,7 @@ def test_where_the_spline_leaves_a_range_the_free_path_is_named_and_plans_it() -
     assert planner.plan(ARM, job).total_s > 0.0
 
 
+@pytest.mark.slow
 def test_a_plan_takes_few_and_small_matrices() -> None:
     """Counted, because seconds depend on the load: of six joints with 1378 variables on the final segments."""
     counted: list[int] = []
@@ -378,6 +379,7 @@ def test_a_solve_that_ends_far_beyond_the_limits_is_not_the_last() -> None:
     assert faults(plan) == []
 
 
+@pytest.mark.slow
 def test_what_ends_slower_than_stopping_starts_from_the_stops_too(monkeypatch: pytest.MonkeyPatch) -> None:
     finished = free_path._finished
     slow = iter([5.0])

@@ -41,6 +41,7 @@ def test_the_help_page_and_the_tab_key_import_no_command() -> None:
     assert subprocess.check_output([sys.executable, "-c", code], text=True).split() == ["0", "False"]
 
 
+@pytest.mark.slow
 def test_a_move_loads_no_planner() -> None:
     """Of 0.8 s until a ``goto`` begins, 0.2 s were the import of what it does not need."""
     code = "import sys, armtempo.cli.posture, armtempo.cli.jog; print('armtempo.planning.planner' in sys.modules)"

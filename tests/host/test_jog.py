@@ -150,7 +150,9 @@ def test_a_held_jog_comes_close_to_the_optimum(name: str) -> None:
         assert ratio.max() <= 1.001
 
 
-@pytest.mark.parametrize("name", OPTIMUM_DEG)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "paper")) for name in OPTIMUM_DEG]
+)
 def test_a_held_jog_goes_never_less_far_at_a_higher_speed(name: str) -> None:
     arm = Arm.load(name)
     for joint in range(len(arm.driven)):

@@ -76,6 +76,7 @@ def plan() -> Plan:
     return planner.plan(ARM, replace(JOB, tool_segments=ways, refine=2))
 
 
+@pytest.mark.slow
 def test_a_line_and_an_arc_keep_speed_tolerance_and_rests(plan: Plan, tmp_path: Path) -> None:
     assert faults(plan) + line_faults(plan) == []
     assert any("no more than 80 mm/s" in note or "no more than 79." in note for note in plan.notes)
@@ -127,6 +128,7 @@ def test_a_redundant_arm_accelerates_its_tool_as_the_closed_form_does() -> None:
     assert 1.0 <= plan.total_s / (2.0 * np.sqrt(distance_mm / 3.0)) < 1.02
 
 
+@pytest.mark.slow
 def test_the_bound_holds_and_is_sharp() -> None:
     """Random splines next to a line: no sample of them is beyond the bound, and it is near to the largest."""
     seed = 31

@@ -163,6 +163,7 @@ def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch)
     assert all(abs(float(part.split(")")[0]) - 0.9) < 0.1 for part in note.split("(")[1:])
 
 
+@pytest.mark.slow
 def test_the_command_line_loads_no_plotting_by_itself() -> None:
     code = (
         "import sys, armtempo.cli.run; assert 'matplotlib' not in sys.modules and 'scipy' not in sys.modules"

@@ -199,6 +199,7 @@ def test_within_another_repeat_it_is_done_again(tmp_path: Path, quick: None) -> 
     encoded_sequence.of_plan(plan)
 
 
+@pytest.mark.slow
 def test_a_place_out_of_reach_is_named(tmp_path: Path, quick: None) -> None:
     with pytest.raises(PlanError) as refused:
         planned(tmp_path, more=SMALL.replace("column_mm = 12", "column_mm = 400"))

@@ -58,6 +58,7 @@ def ends(plan: SequencePlan) -> list[tuple[tuple[float, ...], tuple[float, ...]]
     return [(tuple(leg(0.0)), tuple(leg(leg.duration_s))) for leg in plan.legs]
 
 
+@pytest.mark.slow
 def test_where_a_motion_swings_beyond_its_via_points_is_told(tmp_path: Path) -> None:
     path = written(tmp_path, 'run = "job.toml"', "goto = [20, -60, 40]", 'run = "job.toml"')
     swings = JOB.replace("[1, -60, 40], [2, -60, 41]", "[20, -60, 40], [21, -60, 40], [99, -60, 40]")
@@ -133,6 +134,7 @@ def test_the_first_pass_of_a_repeat_may_begin_elsewhere(tmp_path: Path) -> None:
     assert plan.total.total_s == pytest.approx(whole)
 
 
+@pytest.mark.slow
 def test_a_repeat_that_begins_where_it_ends_stands_once(tmp_path: Path) -> None:
     steps = 'goto = "b"', "repeat = 3", 'goto = "a"', 'goto = "b"', 'end = "repeat"'
     assert words(planned(tmp_path, *steps)) == [

@@ -400,6 +400,7 @@ def test_a_slide_into_a_box_is_seen_between_samples() -> None:
     planner.plan(arm, Job("a", via=((10.0, 0.0), (100.0, 0.0)), **QUICK))
 
 
+@pytest.mark.slow
 def test_a_line_is_followed_with_a_slide() -> None:
     start, end = (20.0, 20.0, 60.0, 0.0), (90.0, 50.0, 40.0, 0.0)
     poses = [armtempo.forward(SCARA, at) for at in (start, end)]

@@ -118,6 +118,31 @@ def test_parameter_inverts_time(degree: int) -> None:
         assert bspline.evaluate(pieces, segment, u) == pytest.approx(time, abs=1e-13 * intervals.sum())
 
 
+@DEGREES
+def test_parameter_takes_few_steps(degree: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At knots, ends and beyond them too, where a bracket that is only halved would take 50."""
+    evaluated, evaluate = [0], bspline.evaluate
+
+    def counted(*arguments: np.ndarray) -> np.ndarray:
+        evaluated[0] += 1
+        return evaluate(*arguments)
+
+    monkeypatch.setattr(bspline, "evaluate", counted)
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        intervals = 10.0 ** rng.uniform(-1, 1, 8)
+        pieces = bspline.polynomials(time_axis.control_points(intervals, degree), degree)
+        whole = pieces[-1].sum()
+        knots = np.append(pieces[:, 0], whole)
+        evaluated[0] = 0
+        segment, u = time_axis.parameter(pieces, np.concatenate([[-1.0, whole + 1.0], knots]))
+        assert evaluated[0] <= 2
+        assert set(u) == {0.0, 1.0}
+        assert list(segment) == [0, 7, *range(8), 7]
+        time_axis.parameter(pieces, np.linspace(0.0, whole, 1000))
+        assert evaluated[0] <= 40
+
+
 # trajectories: Eqs. (17) to (19) against differences, ends, rest, and the paper's printed figures
 
 

@@ -9,7 +9,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 from tests import sources
-from tests.sources import tree
+from tests.sources import nodes, tree
 
 pytestmark = sources.TOGETHER
 
@@ -66,9 +66,9 @@ def part(path: Path) -> str:
     return first.removesuffix(".py")
 
 
-def imported(tree: ast.AST) -> Iterator[str]:
+def imported(path: Path) -> Iterator[str]:
     """Packages of armtempo that are imported anywhere in a module, also inside of functions."""
-    for node in ast.walk(tree):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and node.module == "armtempo":
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("armtempo."):
@@ -81,7 +81,7 @@ def imported(tree: ast.AST) -> Iterator[str]:
 
 def functions(path: Path) -> Iterator[ast.FunctionDef]:
     """All functions and methods of a module."""
-    for node in ast.walk(tree(path)):
+    for node in nodes(path):
         if isinstance(node, ast.FunctionDef):
             yield node
 
@@ -94,7 +94,7 @@ def test_imports_point_one_way() -> None:
     for path in modules():
         here = part(path)
         if here not in LOWEST + HIGHEST:
-            for name in imported(tree(path)):
+            for name in imported(path):
                 assert name not in ORDER or ORDER.index(name) <= ORDER.index(here), f"{path} imports {name}"
 
 
@@ -109,7 +109,7 @@ def test_benchmarks_import_modules_that_there_are() -> None:
     """They run seldom, and some need packages that are not installed here."""
     names = {name_of(path) for path in modules()}
     for path in (HOST.parents[1] / "tests" / "benchmark").glob("*.py"):
-        for node in ast.walk(tree(path)):
+        for node in nodes(path):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("armtempo."):
                 assert node.module in names, f"{path.name} imports {node.module}"
 
@@ -121,7 +121,7 @@ def name_of(path: Path) -> str:
 
 def imported_modules(path: Path, names: Container[str]) -> Iterator[str]:
     """Modules among ``names`` that a file imports, anywhere in it."""
-    for node in ast.walk(tree(path)):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and node.module:
             inner = [f"{node.module}.{alias.name}" for alias in node.names]
             yield from (name for name in inner if name in names)
@@ -144,7 +144,7 @@ def test_functions_take_few_parameters() -> None:
 def test_nobody_sets_attributes_of_a_session() -> None:
     """What a call wants of the link is an argument, or a context with an end: state that others set stays."""
     for path in modules():
-        for node in ast.walk(tree(path)):
+        for node in nodes(path):
             targets = node.targets if isinstance(node, ast.Assign) else []
             for target in (part for one in targets for part in ast.walk(one)):
                 if isinstance(target, ast.Attribute) and isinstance(target.ctx, ast.Store):

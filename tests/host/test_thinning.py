@@ -133,6 +133,7 @@ def test_an_impossible_tolerance_is_refused(tolerance: float) -> None:
         thinning.thinned(np.zeros((3, 2)), tolerance)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_thinned_to_a_motion_is_refused() -> None:
     noise = np.random.default_rng(12).normal(size=(700, 3))
     with pytest.raises(InputError, match=r"more than 513 via points are needed"):

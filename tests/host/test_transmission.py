@@ -173,7 +173,7 @@ def test_motors_keep_what_their_drivers_allow_when_all_joints_are_fastest(seed: 
         assert record["max_rate"] >= np.abs(row) @ kept[:, 0] * joint.motor.steps_per_deg
 
 
-@pytest.mark.parametrize("path", ["through", "free"])
+@pytest.mark.parametrize("path", ["through", pytest.param("free", marks=pytest.mark.slow)])
 def test_a_planned_motion_as_the_board_reads_it(path: str) -> None:
     """The steps of its record are the matrix times the joints' angles, at any u, to the integers' rounding."""
     via = ((0.0,) * 6, (20.0, 10.0, -10.0, 15.0, 40.0, -60.0), (5.0, 0.0, 10.0, -15.0, -30.0, 90.0))
@@ -354,7 +354,7 @@ def test_rows_of_the_file_are_those_of_motors() -> None:
     np.testing.assert_array_equal(np.array(THOR.coupling)[4:, 4:], WRIST)
 
 
-@pytest.mark.parametrize("on_board", [False, True])
+@pytest.mark.parametrize("on_board", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_report_sees_the_joints(on_board: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps and counts of motors become angles of joints, also of a motion that only the board had."""
     made_runs.draw_nothing(monkeypatch)

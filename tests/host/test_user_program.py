@@ -334,6 +334,7 @@ def test_places_and_postures_are_of_the_tool(tmp_path: Path) -> None:
     assert record.source() == found.marked
 
 
+@pytest.mark.slow
 def test_a_place_out_of_reach_is_named_with_its_line(tmp_path: Path) -> None:
     arm = six_joints(tmp_path)
     found = UserProgram.load(written("cell.tool('long')\ncell.pallet('tray')\n", tmp_path), arm)

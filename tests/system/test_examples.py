@@ -74,13 +74,15 @@ def command_lines(page: Path) -> list[list[list[str]]]:
 
 
 def on_stock(block: list[list[str]]) -> list[list[str]]:
-    """What is left of a block for a board that keeps stock MicroPython."""
-    return [words for words in block if words[1] != "flash"]
+    """What is another for a board that keeps stock MicroPython: what follows runs on the firmware's board."""
+    return [words for words in block if words[0] == "export" or words[1] in ("deploy", "home")]
 
 
 BLOCKS = [(page.name, block) for page in PAGES if page.name in COMMANDS for block in command_lines(page)]
 BLOCKS += [
-    (page, on_stock(block)) for page, block in BLOCKS if page == "README.md" and on_stock(block) != block
+    (page, on_stock(block))
+    for page, block in BLOCKS
+    if page == "README.md" and any(words[1] == "flash" for words in block)
 ]
 
 

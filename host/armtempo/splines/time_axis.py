@@ -72,21 +72,24 @@ def parameter(coefficients: Array, time_s: Array) -> tuple[NDArray[np.intp], Arr
     """
     starts = coefficients[:, 0]
     segment = np.clip(np.searchsorted(starts, time_s, side="right") - 1, 0, len(starts) - 1)
-    slope = bspline.derivative(coefficients)
-    wanted, at = np.ravel(time_s), np.ravel(segment)
-    found, now = np.full(wanted.shape, 0.5), np.full(wanted.shape, 0.5)
-    low, high = np.zeros(wanted.shape), np.ones(wanted.shape)
-    moving = np.arange(len(wanted))  # indices of those that have not converged
+    slope, at = bspline.derivative(coefficients), np.ravel(segment)
+    begin, end = starts[at], np.append(starts[1:], coefficients[-1].sum())[at]
+    wanted = np.clip(np.ravel(time_s), begin, end)
+    found: Array = (wanted - begin) / (end - begin)
+    moving = np.flatnonzero((wanted > begin) & (wanted < end))  # indices of those that have not converged
+    wanted, at, now = wanted[moving], at[moving], found[moving]
+    low, high = np.zeros(now.shape), np.ones(now.shape)
     for _ in range(_NEWTON_STEPS):
         error = bspline.evaluate(coefficients, at, now) - wanted
         low, high = np.where(error <= 0, now, low), np.where(error >= 0, now, high)
         step = now - error / bspline.evaluate(slope, at, now)
         step = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
         found[moving] = step
-        if np.max(np.abs(step - now), initial=0.0) < 1e-15:
+        moves = (np.abs(step - now) >= 1e-15) & (np.abs(error) > 2.0 * np.spacing(wanted))  # beyond rounding
+        if not np.any(moves):
             break
-        moves = step != now
-        moving, wanted, at, now, low, high = (each[moves] for each in (moving, wanted, at, step, low, high))
+        moving, at = moving[moves], at[moves]
+        wanted, now, low, high = wanted[moves], step[moves], low[moves], high[moves]
     return segment, found.reshape(np.shape(time_s))
 
 

@@ -172,6 +172,7 @@ def test_a_new_tool_is_taught_from_four_postures_and_can_be_chosen(operator: Pan
         np.testing.assert_allclose(np.array(operator.arm.tool.matrix)[:3, 3], TIP, atol=0.05)
 
 
+@pytest.mark.slow
 def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
     operator: PanelBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
