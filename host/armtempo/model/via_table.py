@@ -69,7 +69,7 @@ def of_text(
     """Via points from the text of a table, as ``via_points``; ``path`` names it in messages."""
     if joint_trajectory.is_ros(text, path):
         return _of_recording(joint_trajectory.of_text(text, path, arm), path, arm, tolerance_deg)
-    return via_points(number_table.of_text(text, path), arm, radians, tolerance_deg)
+    return via_points(number_table.of_text(text, path, table_header.UNITS), arm, radians, tolerance_deg)
 
 
 def is_recording(path: Path) -> bool:
@@ -99,7 +99,7 @@ def recorded(
         found = ros_bag.read(path, arm) if not text else joint_trajectory.of_text(text, path, arm)
         where = [f"{path}: at {time:g} s" for time in found.times_s]
     else:
-        table = number_table.of_text(text, path)
+        table = number_table.of_text(text, path, table_header.UNITS)
         header = _header(table, arm)
         times = _times(table, header)
         if times is None or header.pose or len(times) < 2:
