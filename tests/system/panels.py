@@ -34,9 +34,7 @@ from tests.system.commandline import SOURCES_BLOCKS
 from tests.system.relay import Cable, Relay
 
 _AWAY = "\n[posture.away]\nangles_deg = [30, -50, 30]\n"
-_LONG = f"\n[posture.{6 * 'long-name-'}]\nangles_deg = [10, -60, 40]\n"
-"""No part of a page may be too narrow for it."""
-_ARM_TEXT = shipped.arm_path().read_text(encoding="utf-8") + arms.GRIPPER + arms.PART + _AWAY + _LONG
+_ARM_TEXT = shipped.arm_path().read_text(encoding="utf-8") + arms.GRIPPER + arms.PART + _AWAY
 ARM = armtempo.Arm.of_table(toml_table.parse(_ARM_TEXT, "arm.toml"))
 """The paper's arm with an output and an input."""
 Answer = TypeVar("Answer")
