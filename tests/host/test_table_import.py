@@ -343,3 +343,12 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     named = run(main, ["import", "feed.csv", "--name", 'a"b'])
     assert """feed.csv: name = 'a"b' is not allowed""" in named.output
     assert not Path("out.toml").exists()
+
+
+def test_a_tolerance_of_joints_that_the_arm_has_not_is_refused(tmp_path: Path) -> None:
+    table = tmp_path / "a.csv"
+    table.write_text("j1,j2,j3\n0,-60,40\n10,-50,45\n", encoding="utf-8")
+    result = CliRunner().invoke(main, ["import", str(table), "--tolerance-mm", "1", "--arm", "paper"])
+    assert result.exit_code == 2
+    assert "--tolerance-mm: arm" in result.output
+    assert "has no sliding joint" in result.output

@@ -414,7 +414,7 @@ class PanelBoard:
                 self.live.draw()
                 if board is None:
                     continue
-                with board.client.session.in_a_hurry(LOOK_S) as mine:
+                with board.client.session.by_turns(LOOK_S) as mine:
                     if not mine:
                         continue
                     asked_s = time.monotonic()

@@ -125,7 +125,7 @@ def test_a_fault_of_ours_does_not_end_the_states(
         asked.append(1)
         yield 1 // 0
 
-    board.client.session.in_a_hurry = fail
+    board.client.session.by_turns = fail
     made = fakes.operator(board, tmp_path)
     wait(lambda: len(asked) > 3)
     made.close()
