@@ -255,7 +255,9 @@ class Commands:
 
     def start(self, row: tuple, length: int) -> int:
         """Start a stored motion."""
-        self.controller.release_memory()  # before objects of the command occupy the place of the motion's code
+        if self.board.engine_memory.is_short:
+            # before objects of the command occupy the place of the motion's code
+            self.controller.release_memory()
         flags, crc = self.fields(row)
         name = self.text(row, length)
         self.controller.begin(name, flags, crc)
