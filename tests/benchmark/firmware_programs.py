@@ -225,7 +225,8 @@ def spare(board: Board, folder: Path, program: str = HOLDS) -> int:
         except BoardError:
             high = middle
             board.clear()
-            board.home(ARM)
+        if program == HOMES:
+            board.home(ARM)  # nothing is known after it, as the switches are pressed
         board.goto("home")
     return low * PIECE
 
