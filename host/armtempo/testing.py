@@ -60,7 +60,7 @@ class ProgramRun:
     time_s: float = 0.0
     """What its waits and motions took."""
     stopped: bool = False
-    """Whether it was stopped, by ``moves`` or ``longest_s``; else it came to its end."""
+    """Whether it was stopped, by ``moves`` or after ``LONGEST_S``; else it came to its end."""
 
     @property
     def moves(self) -> int:
@@ -75,7 +75,6 @@ def run(
     *,
     moves: int = 0,
     motion_s: float = 0.0,
-    longest_s: float = LONGEST_S,
     taken: Mapping[str, int] | None = None,
 ) -> ProgramRun:
     """Run a program from the home posture, and return what it did; what it raises passes through.
@@ -92,7 +91,7 @@ def run(
     places = encoded_program.places_of(arm, found)
     table = encoded_program.table(arm, found, places)
     rows = encoded_program.rows(arm, places)
-    work = _Work(found, arm, inputs or {}, _Ends(moves, motion_s, longest_s), rows)
+    work = _Work(found, arm, inputs or {}, _Ends(moves, motion_s), rows)
     work.run.taken.update(taken or {})
     cell = _Recorded(table, work)
     names = {
@@ -119,7 +118,6 @@ def run(
 class _Ends:
     moves: int
     motion_s: float
-    longest_s: float
 
 
 class _Recorded(Cell):
@@ -175,7 +173,7 @@ class _Work:
         self.run.posture_deg = tuple(float(angle) for angle in arm.home_deg)
 
     def check(self) -> None:
-        if self.run.time_s > self._ends.longest_s:
+        if self.run.time_s > LONGEST_S:
             raise Ended
 
     def serve(self) -> None:
