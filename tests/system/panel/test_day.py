@@ -166,9 +166,9 @@ _FREEZES = """() => {
 
 def test_an_arm_that_still_brakes_is_frozen_by_the_button_that_appears_then(page: Any, panel: Panel) -> None:
     """From full speed it brakes for 1.3 s; tried again if a busy browser was late."""
-    home(page)
     freeze = page.locator(".armtempo-freeze")
     for _ in range(20):
+        home(page)  # far from the end of its range
         panels.hold(page)
         page.wait_for_timeout(1500)  # nearly at full speed
         assert not freeze.is_visible()
