@@ -3,7 +3,7 @@
 import gc
 
 OFTEN = 64
-SELDOM = 16  # if memory is not short and time is: a collection takes 5 ms
+SELDOM = 8  # if memory is not short and time is: a collection takes 5 ms
 
 
 def collect_often(parts: int = OFTEN) -> None:

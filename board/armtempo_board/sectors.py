@@ -40,6 +40,7 @@ _PIECE = const(128)  # bytes
 _LONGEST_LINE = const(64)
 _DIGITS = const(6)  # of an offset
 _WORDS = const(2)  # in a line about a module
+_PLACE = const(1)  # of them
 _MOST = const(0x40000)
 _RAM = const(0x10000000)  # no address of RAM is below
 _UNALIGNED = const(15)  # bits that no address of memory from the heap has
@@ -140,7 +141,7 @@ def load() -> None:
         name = name[: -len(_OF_PACKAGE)] if name.endswith(_OF_PACKAGE) else name
         __import__(name)
         if kinds:
-            _settle(sys.modules[name].__dict__, kinds, _AT + int(words[1]))
+            _settle(sys.modules[name].__dict__, kinds, _AT + int(words[_PLACE]))
         gc.collect()
     vfs.umount(_POINT)
     sys.path.remove(_POINT)

@@ -53,12 +53,14 @@ class ProgramRun:
     counters: dict[str, int] = field(default_factory=dict)
     outputs: dict[str, float] = field(default_factory=dict)
     """The last values, in the unit of each; at first the safe ones."""
+    taken: dict[str, int] = field(default_factory=dict)
+    """Number of places taken of pallets that are not full, for the next program."""
     posture_deg: tuple[float, ...] = ()
     """Where the arm is."""
     time_s: float = 0.0
     """What its waits and motions took."""
     stopped: bool = False
-    """Whether it was stopped, by ``moves`` or ``longest_s``; else it came to its end."""
+    """Whether it was stopped, by ``moves`` or after ``LONGEST_S``; else it came to its end."""
 
     @property
     def moves(self) -> int:
@@ -73,13 +75,14 @@ def run(
     *,
     moves: int = 0,
     motion_s: float = 0.0,
-    longest_s: float = LONGEST_S,
+    taken: Mapping[str, int] | None = None,
 ) -> ProgramRun:
     """Run a program from the home posture, and return what it did; what it raises passes through.
 
     ``inputs``: levels by name, False for others. ``moves``: stop it instead of one more motion; 0: never.
-    ``motion_s``: time that each motion takes. A motion that it runs is a planned file NAME.json beside it. Raises
-    InputError as ``UserProgram.load``, and for an input that the arm does not have.
+    ``motion_s``: time that each motion takes. ``taken``: places that a program before has taken of pallets, by name.
+    A motion that it runs is a planned file NAME.json beside it. Raises InputError as ``UserProgram.load``, and for
+    an input that the arm does not have.
     """
     arm = Arm.of(arm)
     found = UserProgram.load(program, arm)
@@ -88,7 +91,8 @@ def run(
     places = encoded_program.places_of(arm, found)
     table = encoded_program.table(arm, found, places)
     rows = encoded_program.rows(arm, places)
-    work = _Work(found, arm, inputs or {}, _Ends(moves, motion_s, longest_s), rows)
+    work = _Work(found, arm, inputs or {}, _Ends(moves, motion_s), rows)
+    work.run.taken.update(taken or {})
     cell = _Recorded(table, work)
     names = {
         "__name__": "__main__",
@@ -114,7 +118,6 @@ def run(
 class _Ends:
     moves: int
     motion_s: float
-    longest_s: float
 
 
 class _Recorded(Cell):
@@ -170,7 +173,7 @@ class _Work:
         self.run.posture_deg = tuple(float(angle) for angle in arm.home_deg)
 
     def check(self) -> None:
-        if self.run.time_s > self._ends.longest_s:
+        if self.run.time_s > LONGEST_S:
             raise Ended
 
     def serve(self) -> None:
@@ -237,6 +240,12 @@ class _Work:
 
     def place(self, number: int) -> list[int]:
         return self._places[number]
+
+    def taken(self, pallet: tuple[Any, ...]) -> int:
+        return self.run.taken.get(pallet[0], 0)
+
+    def note_taken(self, pallet: tuple[Any, ...], taken: int) -> None:
+        self.run.taken[pallet[0]] = taken
 
     def count(self, name: str) -> int:
         self.run.counters[name] = self.run.counters.get(name, 0) + 1

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import itertools
+import math
 import random
+import struct
 from array import array
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -118,11 +121,15 @@ def test_joints_that_stand_cost_no_subintervals() -> None:
     times = [round(0.1 * at * TICK_HZ * 2**limits.TICK_FRACTION_BITS) for at in range(-1, 5)]
     record = motion.pack(3, [[0] * 6, way, *[[5] * 6] * 4], [times], 1, motion.no_ramps(), 0)
     loaded = []
-    interval = SimpleNamespace(
-        load=lambda data, joint: loaded.append(joint), measure=lambda: 0, close=lambda: None
-    )
     with inprocess.board_modules():
         check = importlib.import_module("armtempo_board.motion.motion_check").check
+        control_points = importlib.import_module("armtempo_board.stepgen.control_points")
+        interval = SimpleNamespace(
+            load=lambda data, joint: loaded.append(joint),
+            measure=lambda: 0,
+            close=lambda: None,
+            points=control_points.ControlPoints(memoryview(array("i", [0] * control_points.WINDOW_WORDS))),
+        )
         row = {"min_steps": -FAR, "max_steps": FAR, "max_rate": 1000}
         check(motion.Motion(record), [row] * 6, 1000, interval)
     assert loaded == [1]
@@ -222,6 +229,7 @@ def test_numbers_beyond_the_evaluator(interpreter: str, tmp_path: Path) -> None:
 
 
 SEED = 20261123
+TICKS_SCALE = 12
 LEAST_TICKS, MOST_TICKS = 1 << 20, 1 << 28
 ROUNDED = 8
 """Steps, of the differences' own unit, that the comparison may be off."""
@@ -235,11 +243,11 @@ def rate_check() -> ModuleType:
 
 def compared(rate_check: ModuleType, steps: list[int], ticks: list[int], rate: int) -> int:
     """Differences of five Bezier points each, at the scale at which a tick of time is one of theirs."""
-    mantissa, exponent = rate_check.scaled(rate)
     angle, time = (
-        array("I", [0, *(each + rate_check.DIFFERENCE_BIAS for each in row)]) for row in (steps, ticks)
+        array("I", [scale, *(each + rate_check.DIFFERENCE_BIAS for each in row)])
+        for scale, row in ((0, steps), (TICKS_SCALE, ticks))
     )
-    return int(rate_check.compare(angle, time, mantissa, 30 - exponent))
+    return int(rate_check.compare(angle, time, rate_check.limits(0, 0, rate, 1)))
 
 
 def test_a_rate_just_within_and_just_beyond_the_limit(rate_check: ModuleType) -> None:
@@ -279,3 +287,64 @@ def test_the_rate_that_is_told(rate_check: ModuleType) -> None:
 def test_time_that_does_not_advance_has_no_rate(rate_check: ModuleType) -> None:
     ticks = [LEAST_TICKS, LEAST_TICKS, -1, LEAST_TICKS, LEAST_TICKS]
     assert compared(rate_check, [0] * 5, ticks, TICK_HZ // 4) == rate_check.UNDECIDED
+
+
+def test_what_is_gentle_for_certain_is_so_exactly(rate_check: ModuleType) -> None:
+    """Random steady times, angles and gaps: never taken for gentle if the exact bound says no; 3 % below it always."""
+    random.seed(SEED)
+    found = []
+    with inprocess.board_modules():
+        exact = importlib.import_module("armtempo_board.motion.motion_check")
+    for _ in range(3000):
+        least = 1 << random.randrange(2, 28)
+        ticks = [random.randrange(least, 2 * least + 1) for _ in range(5)]
+        most = 1 << random.randrange(1, 29)
+        steps = [random.randrange(-most, most) for _ in range(5)]
+        scales = random.randrange(13, 29), random.randrange(17, 29)
+        angle, time = (
+            array("I", [scale, *(each + (1 << 29) for each in (*row, min(row), max(row)))])
+            for scale, row in zip(scales, (steps, ticks), strict=True)
+        )
+        numerator, denominator = exact._acceleration(angle, time)
+        gap = (
+            round(math.sqrt(16 * denominator / (100 * numerator)) * random.uniform(0.9, 1.1))
+            if numerator
+            else 1000
+        )
+        gap = min(max(gap, 1), 1 << 20)
+        part = numerator * gap**2 * 100 / (denominator * 16)
+        gentle = rate_check.is_gentle(angle, time, rate_check.limits(0, 0, 1000, gap))
+        assert not gentle or part <= 1.0, (SEED, steps, ticks, gap)
+        if least >= 1 << 10 and most >= 1 << 10 and gap >= 100:
+            assert gentle or part > 0.97, (SEED, steps, ticks, gap, part)
+            found.append(gentle)
+    assert 300 < sum(found) < len(found) - 300
+
+
+def test_what_is_certain_of_control_points_is_so() -> None:
+    """Random numbers of 64 bits, close together and far apart: rising, equal, bounded; what is clear is said."""
+    random.seed(SEED)
+    with inprocess.board_modules():
+        control_points = importlib.import_module("armtempo_board.stepgen.control_points")
+    seen = set()
+    for _ in range(3000):
+        bound = 1 << random.choice((26, 27))
+        centre = random.choice((-1, 1)) * (1 << random.randrange(20, 62))
+        apart = 1 << random.randrange(0, 55)
+        numbers = [min(max(centre + random.randrange(-apart, apart), -(2**63)), 2**63 - 1) for _ in range(6)]
+        numbers = random.choice((numbers, sorted(numbers), [numbers[0]] * 6))
+        words = array("i", struct.pack("<2i6q", 7, 7, *numbers))
+        found = control_points.survey(words, 2, 6, bound)
+        rising = all(one < other for one, other in itertools.pairwise(numbers))
+        most, span = max(map(abs, numbers)), max(numbers) - min(numbers)
+        if found & control_points.BOUNDED:
+            assert most < bound << 28, (SEED, numbers)
+            assert span < limits.MOST_SPAN_STEPS << 28, (SEED, numbers)
+        elif most < bound - 2 << 28 and span < limits.MOST_SPAN_STEPS - 3 << 28:
+            pytest.fail(f"{SEED}: {numbers} are bounded")
+        assert bool(found & control_points.RISING) == rising or most >= 1 << 55
+        assert not found & control_points.RISING or rising
+        assert not found & control_points.EQUAL or len(set(numbers)) == 1
+        assert found & control_points.EQUAL or len(set(numbers)) > 1 or most >= 1 << 55
+        seen.add(found)
+    assert len(seen) >= 5

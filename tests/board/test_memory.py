@@ -12,7 +12,8 @@ from armtempo_shared import engine_memory, limits
 from tests import interpreters
 from tests.board import heap_use
 
-MODULES = 72_000
+MODULES = 72_300
+"""What a word on the stack keeps, that nothing uses, makes this figure vary by 200 with each change of the code."""
 MARGIN = 8_192
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "arm_changes.py"
 CHANGES = 25

@@ -39,6 +39,33 @@ def test_store_commands(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+class Listed:
+    """A session with a board that has motions of these names."""
+
+    def __init__(self, *names: str) -> None:
+        self.names = sorted(names)
+        self.asked = 0
+
+    def command(self, command: str, values: tuple[int, ...]) -> tuple[tuple[int, ...], str]:
+        self.asked += 1
+        if values[0] >= len(self.names):
+            raise BoardError("no", "", wire.ERROR_CODES["not_found"])
+        return (len(self.names), 1, values[0], 0, 3, 0, 0), self.names[values[0]]
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 128])
+def test_a_stored_motion_is_found_by_halving(count: int) -> None:
+    """As the board reads its folder for each question."""
+    names = [f"m{number:03}" for number in range(0, 2 * count, 2)]
+    for number in range(-1, 2 * count + 1):
+        session = Listed(*names)
+        found = Client(session, 1).find(f"m{number:03}")  # type: ignore[arg-type]
+        assert (found.name if found else "") == (f"m{number:03}" if f"m{number:03}" in names else "")
+        assert session.asked <= 1 + count.bit_length()
+    session = Listed(*names)
+    assert [entry.name for entry in Client(session, 1).stored()] == names  # type: ignore[arg-type]
+
+
 def test_run_gives_every_sample_once_in_order(tmp_path: Path) -> None:
     pipe = Pipe(tmp_path / "flash")
     samples, end = follow(started(pipe))

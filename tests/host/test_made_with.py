@@ -18,6 +18,7 @@ from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
 from armtempo.robot.motions import Motions
 from armtempo.robot.programs import Programs
+from armtempo.robot.store import withdraw_old_default
 from armtempo_shared.motion import Motion
 
 from tests.host import test_pallets as pallets
@@ -193,6 +194,7 @@ class Stored:
 
 def test_what_is_old_is_not_run_by_its_name_and_listed(plan: Plan, tmp_path: Path, quick: None) -> None:  # noqa: F811
     now = arm(tmp_path, MORE.replace("floor_mm = -100", "floor_mm = -99"))
+    defaults: list[str] = []
     motion: Any = Stored("j", encoded_motion.of_plan(plan).data, now)
     store: Any = SimpleNamespace(read=lambda name: encoded_motion.of_record(name, motion.data, now))
     with pytest.raises(InputError, match="'j' on the board is old: the workspace"):
@@ -215,4 +217,11 @@ def test_what_is_old_is_not_run_by_its_name_and_listed(plan: Plan, tmp_path: Pat
         Programs(program).run("pick")
     for board in (motion, sequence, program):
         assert "on the board is old" in stored._old(board, board.entry, board.arm)
+        board.entry.default, board.set_default = False, defaults.append
+        assert not withdraw_old_default(board, board.arm)
+        board.entry.default = True
+        assert not withdraw_old_default(board, found)
+        assert not defaults
+        assert withdraw_old_default(board, board.arm).endswith("the board's button starts nothing")
+        assert defaults.pop() == ""
     assert not stored._old(motion, motion.entry, found)

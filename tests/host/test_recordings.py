@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -78,6 +79,7 @@ def test_messages_are_told_from_tables_however_they_begin() -> None:
         ("first.txt", points_first),
         ("remark.yaml", f"# of the feeder\ntrajectory: {content}\n---\n"),
         ("quoted.yml", f'"trajectory": {flow}\n'),
+        ("flow.yaml", flow.replace('"', "")),
         ("pasted text", f"stamp: 0\ntrajectory: {content}\n"),
     ):
         found = via_table.of_text(text, name, ARM)
@@ -94,6 +96,19 @@ def test_points_with_speeds_are_joined_as_controllers_do() -> None:
     assert np.abs(found.angles_deg - MOVE(found.times_s)).max() < 0.5
 
 
+def test_speeds_that_some_points_lack_are_not_used_and_this_is_told() -> None:
+    content = message(TIMES[:3], MOVE(TIMES[:3]))
+    content["points"][1]["velocities"] = [0.0, 0.0, 0.0]
+    found = joint_trajectory.of_text(json.dumps(content), "m.json", ARM)
+    assert found.notes == ("velocities were not used, as not all points have them",)
+
+
+def test_what_is_no_json_may_be_yaml_that_cannot_be_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    with pytest.raises(InputError, match=r"m\.yaml: is not JSON: .*; for YAML PyYAML is needed, install it"):
+        joint_trajectory.of_text("{joint_names: [a]}", "m.yaml", ARM)
+
+
 def spoiled(change: dict[str, Any], point: dict[str, Any] | None = None) -> str:
     content = message(TIMES[:3], MOVE(TIMES[:3])) | change
     content["points"][1].update(point or {})
@@ -104,6 +119,7 @@ def spoiled(change: dict[str, Any], point: dict[str, Any] | None = None) -> str:
     ("text", "said"),
     [
         ("{", "is neither JSON nor YAML"),
+        (spoiled({}, {"time_from_start": {"sec": 1, "ns": 5}}), "point 1: time_from_start .* is no time"),
         ("{}", "has no JointTrajectory"),
         ("[1, 2]", "has no JointTrajectory"),
         (f"[{spoiled({})}, {spoiled({})}]", "has 2 messages"),

@@ -269,17 +269,60 @@ def test_who_is_in_a_hurry_goes_first() -> None:
         thread.join()
 
 
+def test_a_stop_comes_between_two_commands_of_a_request() -> None:
+    """A request of many commands goes before one who talks all the time, and a stop waits for one command at most."""
+    turns, order, asked, ended = BoardLock(), [], threading.Event(), threading.Event()
+
+    def talk() -> None:
+        while not ended.is_set():
+            with turns:
+                order.append("talk")
+                time.sleep(0.001)
+
+    def ask() -> None:
+        with turns.by_turns(5.0) as mine:
+            assert mine
+            order.append("request")
+            for _ in range(1000):
+                with turns:
+                    order.append("late" if turns._stopping else "ask")
+                    asked.set()
+                    time.sleep(0.001)
+                if "stop" in order:
+                    break
+        order.append("end")
+
+    threads = [threading.Thread(target=talk), threading.Thread(target=ask)]
+    for thread in threads:
+        thread.start()
+    try:
+        assert asked.wait(30.0)
+        with turns.in_a_hurry(30.0, stops=True) as mine:
+            assert mine
+            order.append("stop")
+        threads[1].join()
+    finally:
+        ended.set()
+        threads[0].join()
+    within = order[order.index("request") : order.index("end")]
+    assert within.count("talk") <= 1, order  # that waited for the lock when the request came
+    assert within.count("stop") == 1
+    assert within.count("late") <= 1, order  # one that had passed the lock's queue when the stop came
+
+
 class Owner:
     """What ``Sharing`` needs of a client; keeps what the board would have been told."""
 
     def __init__(self) -> None:
         transport = SimpleNamespace(name="/dev/p")
-        self.session = SimpleNamespace(transport=transport, in_a_hurry=self._turn, listen=repr, guard=repr)
+        self.session = SimpleNamespace(
+            transport=transport, by_turns=self._turn, in_a_hurry=self._turn, listen=repr, guard=repr
+        )
         self.told: list[tuple[object, ...]] = []
         self.rate = 1000
 
     @contextmanager
-    def _turn(self, _wait_s: float) -> Iterator[bool]:
+    def _turn(self, _wait_s: float, stops: bool = False) -> Iterator[bool]:
         yield True
 
     def speed(self, rate: int) -> None:

@@ -325,6 +325,13 @@ def test_a_motion_keeps_its_limits_and_goes_out_and_in_with_its_units(tmp_path: 
     job = tomllib.loads(via_table.job_text("a", via_table.of_text(text, "a.csv", LIFT)))
     np.testing.assert_allclose(job["via_joints"][0], [0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(job["via_joints"][-1], [20.0, -30.0], atol=1e-9)
+    fine = via_table.of_text(text, "a.csv", LIFT, tolerance_deg=0.02)
+    coarse = via_table.of_text(text, "a.csv", LIFT, tolerance_deg=[2.0, 0.02])
+    assert len(coarse.via_deg) <= len(fine.via_deg)
+    (off_mm, off_deg) = map(float, re.findall(r"([\d.e-]+) (?:mm|deg)", coarse.thinned_to))
+    assert (off_mm, off_deg) == pytest.approx((100.0 * off_deg, off_deg), rel=0.1)
+    assert off_deg <= 0.02 < off_mm <= 2.0
+    assert fine.thinned_to.endswith(" mm or deg")
     recorded = of_text(plan.to_ros(20.0), "a.yaml", LIFT)
     np.testing.assert_allclose(recorded.angles_deg[-1], [20.0, -30.0], atol=1e-9)
     assert float(re.findall(r"- positions: \[([^,]+)", plan.to_ros(20.0))[-1]) == pytest.approx(0.02)  # m

@@ -168,6 +168,12 @@ RAD = ("0,-1.0471975511965976,0.6981317007977318", "0.349065850,-1.308996939,0.8
         ("j2 j1 j3\n-60 0 40\n-75 20 50\n", None),
         ("joint 2 joint 1 joint 3 (rad)\n-60 0 0.698131701\n-75 20 0.872664626\n", None),
         ("# joint 2 joint 1 joint 3\n-60 0 40\n-75 20 50\n", None),
+        ("j2 j1 j3\n-60,0,40\n-75,20,50\n", None),
+        ("time s joint 2 deg joint 1 deg joint 3 rad\n8 -60 0 0.698131701\n9 -75 20 0.872664626\n", None),
+        ("time s joint 2 joint 1 joint 3\n8,-60,0,40\n9,-75,20,50\n", None),
+        ("joint 2,joint 1,joint 3\n-60 0 40\n-75 20 50\n", None),
+        ("joint 2,joint 1,joint 3\n-60;0;40\n-75;20;50\n", None),
+        ('"joint 2" "joint 1" "joint 3"\n-60 0 40\n-75 20 50\n', None),
         ("\ufeffj1\tj2\tj3\r\n0\t-60\t4e1\r\n20\t-75\t50\r\n", None),
         ("\n".join(RAD), True),
         ("\n".join(("joint 1 (rad),joint 2 [rad],joint_3_rad", *RAD)), None),
@@ -198,6 +204,9 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
         ("0,-60,40,1\n20,-75,50,2\n", "line 1: 4 columns without a header.*time.*time_s,joint 1"),
         ("0,-60\n20,-75\n", "line 1: 2 columns without a header, but 3 joints"),
         ("joint 1,joint 2\n1,2\n", "line 1: the header does not name"),
+        ("j1 j2\n0,-60,40\n20,-75,50\n", "line 2: 3 values, but not as many names in the header"),
+        ("j1,j2,j3\n1_0,-60,40\n20,-75,50\n", "line 2: '1_0' is not a finite number"),
+        ("j0,j1,j2,j3\n0,-60,40,1\n20,-75,50,1\n", "line 1: 'j0' counts the joints from 0; count from 1"),
         ("a,b,c\n0,-60,40\n20,-75,50\n", "does not name.*joint 1,joint 2,joint 3"),
         ("time,shoulder,elbow\n0,-60,40\n1,-75,50\n", "does not name"),
         ("joint 1,joint 2,joint 2\n0,-60,40\n1,-75,50\n", "line 1: two columns are called 'joint2'"),
@@ -334,3 +343,12 @@ def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     named = run(main, ["import", "feed.csv", "--name", 'a"b'])
     assert """feed.csv: name = 'a"b' is not allowed""" in named.output
     assert not Path("out.toml").exists()
+
+
+def test_a_tolerance_of_joints_that_the_arm_has_not_is_refused(tmp_path: Path) -> None:
+    table = tmp_path / "a.csv"
+    table.write_text("j1,j2,j3\n0,-60,40\n10,-50,45\n", encoding="utf-8")
+    result = CliRunner().invoke(main, ["import", str(table), "--tolerance-mm", "1", "--arm", "paper"])
+    assert result.exit_code == 2
+    assert "--tolerance-mm: arm" in result.output
+    assert "has no sliding joint" in result.output

@@ -284,6 +284,9 @@ def test_a_pallet(tmp_path: Path) -> None:
     assert run.said[-1] == "row 2, column 3, layer 1 of pallet 'tray' is filled"
     assert run.counters == {"parts": 6}
     assert not run.stopped
+    run = testing.run(tmp_path / "pallet.py", ARM, taken={"tray": 4})
+    assert run.said[0] == "pallet 'tray' goes on at row 2, column 2, layer 1"
+    assert (run.counters, run.taken) == ({"parts": 2}, {"tray": 0})
 
 
 TOOLS = """

@@ -29,14 +29,12 @@ from tests import interpreters
 from tests.host.firmware import fakes
 from tests.interpreters import ROOT
 from tests.system import commandline
-from tests.system.commandline import small_plan
+from tests.system.commandline import SOURCES_BLOCKS, small_plan
 from tests.system.conftest import FASTEST
 
 README = ROOT / "README.md"
 PAGES = (README, *sorted((ROOT / "host" / "docs").glob("*.md")))
 PORT = "/dev/ttyACM0"
-SOURCES_BLOCKS = 1200
-"""A flash that has space for a firmware's program too."""
 COMMANDS = ("README.md", "cli.md")
 ONCE = ((r"repeat=\d+", "repeat=1"), (r"--repeat \d+", "--repeat 1"))
 """Repetitions take time and show nothing new here."""

@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from armtempo import plan_sequence
 from armtempo.deploy import program_files
-from armtempo.encoding import encode, encoded_motion, encoded_program
+from armtempo.encoding import encode, encoded_motion, encoded_program, encoded_sequence
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Limits, LimitSwitches
+from armtempo.model.sequence import Sequence
 from armtempo.model.user_program import UserProgram
 from armtempo.planning import planner
 from armtempo_shared.limits import TICK_HZ
@@ -37,6 +39,28 @@ ALONE = f"""from armtempo_board import cell
 cell.home()
 print("homed")
 cell.goto({(HOME_DEG + 1.0).tolist()})
+"""
+BY_GOTO = """from armtempo_board import cell
+tray = cell.pallet("tray")
+while tray.left():
+    place = tray.next()
+    cell.goto(place.above)
+    cell.goto(place)
+    cell.goto(place.above)
+cell.goto("home")
+"""
+LINES = """name = "lines"
+start = "home"
+[[step]]
+repeat = "tray"
+[[step]]
+place = "tray"
+[[step]]
+leave = "tray"
+[[step]]
+end = "repeat"
+[[step]]
+goto = "home"
 """
 FEWER = {"micropython": 8, "cpython": 10, "micropython-arm": 12}
 """What the moments are divided by; each interpreter has others."""
@@ -95,6 +119,7 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name / "armtempo" / "pick.atm").write_bytes(program.data)
     _add_legs(folder / "legs" / "armtempo")
     _add_alone(folder / "alone" / "armtempo")
+    _add_pallet(folder / "pallet")
     (folder / "ticks").write_text(str(round(trajectory.duration_s * TICK_HZ)))
     shutil.copytree(folder / "finish", folder / "broken")
     (folder / "broken" / "main.py").write_text("raise ValueError('broken')\n")
@@ -129,6 +154,36 @@ def _add_alone(folder: Path) -> None:
     (folder / "default.txt").write_text(f"alone {program.data[-4:].hex()}\n")
     low = [round((joint.range_deg[0] + 0.5) * joint.steps_per_deg) for joint in arm.driven]
     (folder.parent / "trips").write_text(",".join(map(str, low)))
+
+
+def _add_pallet(folder: Path) -> None:
+    """A flash of an arm with a pallet of two places; ``by-goto``, a program, and ``lines``, a sequence, go to both.
+
+    ``places`` has the steps above each place and at it.
+    """
+    store = folder / "armtempo"
+    store.mkdir(parents=True)
+    quick = tuple(
+        replace(joint, limits=Limits(*(30.0 * each for each in joint.limits.values)))
+        if joint.limits
+        else joint
+        for joint in sequences.SHIPPED.joints
+    )
+    (tray,) = sequences.SHIPPED.pallets
+    arm = replace(sequences.SHIPPED, joints=quick, pallets=(replace(tray, rows=1, columns=2),))
+    (store / "arm.ata").write_bytes(encode.arm_record(arm))
+    for name, text in (("by-goto.py", BY_GOTO), ("lines.toml", LINES)):
+        (folder / name).write_text(text)
+    program = UserProgram.load(folder / "by-goto.py", arm)
+    plan = plan_sequence(arm, Sequence.load(folder / "lines.toml", arm))
+    records = (
+        *encoded_program.of_program(program, arm).records,
+        *encoded_sequence.of_plan(plan).records,
+    )
+    for name, data in records:
+        (store / f"{name}.atm").write_bytes(data)
+    places = encoded_program.rows(arm, encoded_program.places_of(arm, program))
+    (folder / "places").write_text("\n".join(",".join(map(str, place)) for place in places))
 
 
 def _add_legs(folder: Path) -> None:

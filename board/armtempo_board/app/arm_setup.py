@@ -107,6 +107,7 @@ def _take(board: "Board", record: "Record") -> None:
             if sides:
                 backlash_drive.take_sides(board.engine.drives, sides)
     if features.SEQUENCES:
+        board.taken.clear()
         board.starts_alone = head["flags"] & armrecord.FLAG_POWER_UP
     board.silence_ms = head["link_timeout_ms"] if stops else NEVER_MS
     board.joints = len(joints)

@@ -63,6 +63,7 @@ class Board:
         self.pending = fault
         if features.SEQUENCES:
             self.starts_alone = 0  # the arm record lets the default start at power-up
+            self.taken: "dict[tuple[Any, ...], int]" = {}  # places of this arm's pallets
             self.failure = b""  # what a program failed with: for each host, until the fault is cleared
             self.failure_waits = False  # the present host is to be told
 

@@ -61,6 +61,12 @@ if TYPE_CHECKING:
         def place(self, number: int) -> "Sequence[int]":
             """The steps of each joint above a place of a pallet, then those at it."""
 
+        def taken(self, pallet: "tuple[Any, ...]") -> int:
+            """Number of places taken of a pallet, by its name and shape."""
+
+        def note_taken(self, pallet: "tuple[Any, ...]", taken: int) -> None:
+            """Keep this number for this program and later ones."""
+
         def count(self, name: str) -> int:
             """Increment a counter; returns its value."""
 
@@ -149,7 +155,7 @@ class Cell:
     # places and tools
 
     def pallet(self, name: str) -> "Pallet":
-        """A pallet of the arm file; what was taken of it counts until the program ends."""
+        """A pallet of the arm file; it goes on where the last program left it, unless that was full."""
         if name not in self._pallets:
             shape = self._found("pallets", "pallet", name)
             from armtempo_board.app.pallet import Pallet  # here, as most programs have none

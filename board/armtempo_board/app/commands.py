@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     from armtempo_board.link.serial_link import SerialLink
 
 _WHILE_MOVING = ("hello", "status", "stop", "samples", "hold", "speed")  # if the program has them
+_AT_A_PRESS = (
+    "put_once",
+    "start",
+)  # whose rows are kept, too, where memory is not short: to look one up takes 7 ms
 _STORE = range(0x10, 0x20)  # numbers of the commands in store_commands.py,
 _DRIVERS = const(0x29)  # and of one more
 _BYTES_PER_POSITION = const(4)
@@ -62,7 +66,11 @@ class Commands:
         self._session = 0
         self._last: "Any" = (0, None)  # number and row of the last command that was looked up
         self._while_moving: "dict[int, Any]" = {}
+        self._kept: "dict[int, Any]" = {}
+        is_short = self.board.engine_memory.is_short
         for name, number, _, _, _ in rows("C"):
+            if name in _AT_A_PRESS and not is_short:
+                self._kept[number] = self._row(number)
             if name in _WHILE_MOVING and hasattr(type(self), name):
                 self._while_moving[number] = self._row(number)
             if name == "hello":
@@ -114,6 +122,8 @@ class Commands:
 
     def _row(self, number: int) -> tuple:
         """The row of a command; the last one is kept, as an upload asks for the same again and again."""
+        if number in self._kept:
+            return self._kept[number]  # type: ignore[no-any-return]
         if self._last[_NUMBER] != number:
             gc.collect()  # what is kept should lie at a low address
             name, _, fields, _, tail = row_of("C", number)
@@ -245,7 +255,9 @@ class Commands:
 
     def start(self, row: tuple, length: int) -> int:
         """Start a stored motion."""
-        self.controller.release_memory()  # before objects of the command occupy the place of the motion's code
+        if self.board.engine_memory.is_short:
+            # before objects of the command occupy the place of the motion's code
+            self.controller.release_memory()
         flags, crc = self.fields(row)
         name = self.text(row, length)
         self.controller.begin(name, flags, crc)

@@ -149,8 +149,9 @@ class Controller:
     def check_homed(self) -> None:
         """Raise Refused while the position of a joint is unknown."""
         unknown = self._unknown()
-        if unknown:
-            raise Refused(codes.UNHOMED, _lowest(unknown))
+        for joint in range(self.board.joints):
+            if unknown >> joint & 1:
+                raise Refused(codes.UNHOMED, joint)
 
     def _unknown(self) -> int:
         """One bit per joint of unknown position."""
@@ -362,13 +363,6 @@ class Controller:
         if not board.engine:
             return messages.UNCONFIGURED
         return messages.IDLE if board.known() == board.all_joints_mask() else messages.UNHOMED
-
-
-def _lowest(mask: int) -> int:
-    joint = 0
-    while not mask >> joint & 1:
-        joint += 1
-    return joint
 
 
 def _free_heap() -> int:

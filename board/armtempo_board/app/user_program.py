@@ -260,6 +260,14 @@ class UserProgram(Sequencer):
         """Steps above a place of a pallet, and at it."""
         return self._file.place(number, self._controller.board.joints)
 
+    def taken(self, pallet: "tuple[Any, ...]") -> int:
+        """Of a pallet."""
+        return int(self._controller.board.taken.get(pallet, 0))
+
+    def note_taken(self, pallet: "tuple[Any, ...]", taken: int) -> None:
+        """Keep it until another arm is taken, or the power fails."""
+        self._controller.board.taken[pallet] = taken
+
     def count(self, name: str) -> int:
         """Increment a counter."""
         number = self._command.named(name.encode(), MAX_COUNTERS)

@@ -73,6 +73,7 @@ class Engine:
         self._readings = parts.readings
         self._following = parts.following
         self._pulse_us = parts.pulse_us
+        self._is_short = parts.is_short
         self.moving = False
         self.fault = 0
         self.fault_joint = NO_JOINT
@@ -181,7 +182,8 @@ class Engine:
         if not self.skip_check:
             self.check_splines(motion)
         self._check_start(motion)
-        gc.collect()
+        if self._is_short:
+            gc.collect()
         override = Override()
         override.begin(rate, motion, endpoints.duration_ticks(motion))
         if override.end_ticks() > LONGEST_RUN_TICKS:

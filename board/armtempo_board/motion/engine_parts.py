@@ -46,6 +46,7 @@ class EngineParts:
         backlash: "Rows" = (),
     ) -> None:
         self.feeder = engine_memory.feeder
+        self.is_short = engine_memory.is_short
         rows = [row for row in joints if row["encoder"] != armrecord.NONE]
         fitted = [EncoderInput(row["encoder"], row["encoder_inverted"]) for row in rows]
         self.sampler = engine_memory.sampler

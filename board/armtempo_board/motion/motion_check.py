@@ -19,9 +19,11 @@ from micropython import const
 
 from armtempo_board import step_rates
 from armtempo_board.errors import Refused
+from armtempo_board.memory import bytes_of
 from armtempo_board.motion import rate_check
 from armtempo_board.stepgen import subdivision
 from armtempo_board.stepgen.bezier import BIAS, HIGH, LAST_HIGH, LAST_LOW, LOW
+from armtempo_board.stepgen.control_points import BOUNDED, EQUAL, RISING, survey
 from armtempo_board.stepgen.subdivision import (
     DIFFERENCE_BIAS,
     FIRST_DIFFERENCE,
@@ -35,12 +37,12 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from armtempo_shared.motion import MotionHead
 
+    from armtempo_board.stepgen.control_points import ControlPoints
     from armtempo_board.stepgen.subintervals import Subintervals
 
 _SHORT_TICKS = const(1024)
-_OLDEST = const(0)
-_POINT_BYTES = const(8)
 _HIGH_TICKS_BITS = const(12)  # a high word of time counts 2**12 ticks
+_BOUND_OF_TIME = const(1 << 26)  # LONGEST_TICKS in these
 _PASS = const(0)
 _SPLIT = const(-1)
 
@@ -62,9 +64,8 @@ def check(
     try:
         for joint in range(motion.joints):
             if joint == 0 or not motion.shared:
-                segments = motion.segments * motion.refine
-                _check_spline(motion, joint, motion.time_offset(joint), segments, True)
-            if _check_spline(motion, joint, motion.angle_offset(joint), motion.segments, False):
+                _check_spline(motion, joint, motion.time_offset(joint), True, interval.points)
+            if _check_spline(motion, joint, motion.angle_offset(joint), False, interval.points):
                 moving |= 1 << joint
                 interval.load(motion, joint)
                 _check_joint(interval, Judge(interval, joints[joint], gap_ticks), joint)
@@ -94,25 +95,31 @@ def _check_standing(motion: "MotionHead", row: "dict[str, int]", joint: int) -> 
         raise Refused(codes.OUT_OF_RANGE, joint, position)
 
 
-def _check_spline(motion: "MotionHead", joint: int, offset: int, segments: int, is_time: bool) -> bool:
+def _check_spline(
+    motion: "MotionHead", joint: int, offset: int, is_time: bool, points: "ControlPoints"
+) -> bool:
     """Check that all numbers are within the range of the step generator, and that those of time increase.
 
     Returns whether they differ at all.
     """
-    stream = motion.stream(offset)
+    count = motion.degree + 1
+    segments = motion.segments * motion.refine if is_time else motion.segments
+    wanted = BOUNDED | RISING if is_time else BOUNDED
+    bound = _BOUND_OF_TIME if is_time else MOST_STEPS
     differ = False
-    try:
-        control = list(struct.unpack("<%dq" % motion.degree, stream.read(_POINT_BYTES * motion.degree)))
-        for segment in range(segments):
-            control.extend(struct.unpack("<q", stream.read(_POINT_BYTES)))
-            differ = _check_segment(control, joint, segment, is_time) or differ
-            control.pop(_OLDEST)
-    finally:
-        stream.close()
+    points.open(motion.stream(offset), motion.degree)
+    for segment in range(segments):
+        at = points.seek(segment)
+        found = survey(points.words, at, count, bound)
+        if found & wanted != wanted:
+            numbers = struct.unpack("<%dq" % count, bytes_of(points.words, at, at + 2 * count))
+            _check_segment(numbers, joint, segment, is_time)
+        if not found & EQUAL:
+            differ = True
     return differ
 
 
-def _check_segment(control: "list[int]", joint: int, segment: int, is_time: bool) -> bool:
+def _check_segment(control: "tuple[int, ...]", joint: int, segment: int, is_time: bool) -> None:
     if is_time:
         for i in range(len(control) - 1):
             if control[i] >= control[i + 1]:
@@ -124,7 +131,6 @@ def _check_segment(control: "list[int]", joint: int, segment: int, is_time: bool
         raise Refused(codes.TOO_LONG, joint, most)
     if is_time and most >> TICK_FRACTION_BITS >= LONGEST_TICKS:
         raise Refused(codes.TOO_LONG, joint, most >> TICK_FRACTION_BITS)
-    return span > 0
 
 
 class Judge:
@@ -135,13 +141,23 @@ class Judge:
         self._gap_ticks = gap_ticks
         self._low = row["min_steps"] + BIAS
         self._high = row["max_steps"] + BIAS
-        limit = min(row["max_rate"], step_rates.one + step_rates.one // 100)
-        self._mantissa, self._exponent = rate_check.scaled(limit)
+        rate = min(row["max_rate"], step_rates.one + step_rates.one // 100)
+        self._limits = rate_check.limits(self._low, self._high, rate, gap_ticks)
 
     def verdict(self, measured: int) -> int:
         """A code, _PASS, or _SPLIT if its halves must be checked; ``measured``: the result of ``measure``."""
         interval = self._interval
         angle = interval.angle
+        measures, time, limits = interval.angle_measures, interval.time_measures, self._limits
+        if (  # nearly all pass here; what comes below decides the others exactly, in slow byte code
+            rate_check.is_inside(angle, measures, time, limits)
+            and rate_check.compare(measures, time, limits) == rate_check.SLOWER
+            and (
+                measured & subdivision.ANGLE_STEADY
+                or (measured & subdivision.TIME_STEADY and rate_check.is_gentle(measures, time, limits))
+            )
+        ):
+            return _PASS
         for high, low in ((HIGH, LOW), (LAST_HIGH, LAST_LOW)):
             position = angle[high] + (angle[low] >> 27)
             if not self._low <= position <= self._high:
@@ -165,9 +181,7 @@ class Judge:
     def _rate(self) -> int:
         """Rate: proven if |angle'| <= rate * time' for all Bezier points of the derivatives."""
         interval = self._interval
-        angle, time = interval.angle_measures, interval.time_measures
-        shift = 30 - self._exponent + angle[SCALE] - time[SCALE] + _HIGH_TICKS_BITS
-        found = rate_check.compare(angle, time, self._mantissa, shift)
+        found = rate_check.compare(interval.angle_measures, interval.time_measures, self._limits)
         if found == rate_check.SLOWER:
             return _PASS
         if found == rate_check.UNDECIDED and not self._is_short():

@@ -31,7 +31,25 @@ SLOWER = const(1)
 UNDECIDED = const(0)
 FASTER = const(-1)
 
+# words of ``limits``: the rate in steps per tick is mantissa / 2**exponent, the mantissa of 30 bits
+_LOW = const(0)
+_HIGH = const(1)
+_MANTISSA = const(2)
+_EXPONENT = const(3)
+_GAP = const(4)  # five times its square is this, of 9 bits, times 2**GAP_BITS
+_GAP_BITS = const(5)
+_ROUNDED = const(512)
+# as in bezier.py: words of a piece
+_FIRST_HIGH = const(0)  # = HIGH
+_FIRST_LOW = const(6)  # = LOW
+_LAST_HIGH = const(5)
+_LAST_LOW = const(11)
 # as in subdivision.py: measures
+_SCALE = const(0)
+_LEAST = const(6)
+_MOST = const(7)
+_LOWEST = const(8)
+_HIGHEST = const(9)
 _FIRST_DIFFERENCE = const(1)
 _LAST_DIFFERENCE = const(5)
 _DIFFERENCE_BIAS = const(1 << 29)
@@ -42,21 +60,92 @@ _SPANS = const(128)  # of time, in which the joints' rates are summed
 _HIGH_TICKS_BITS = const(12)  # a high word of time counts 2**12 ticks
 
 
-def scaled(rate: int) -> "tuple[int, int]":
-    """(mantissa of 30 bits, exponent): ``rate`` steps/s in steps per tick is mantissa / 2**exponent."""
-    exponent = 0
-    while (rate << exponent) // TICK_HZ < 1 << 29:
+def limits(low: int, high: int, rate: int, gap_ticks: int) -> "array[int]":
+    """A joint's limits for the functions below.
+
+    Its range (+ bezier.BIAS), its rate in steps/s, and the least time between opposite steps.
+    """
+    exponent = 56
+    while rate >> 56 - exponent:
+        exponent -= 1
+    if (rate << exponent) // TICK_HZ < 1 << 29:
         exponent += 1
-    return (rate << exponent) // TICK_HZ, exponent
+    gap_bits = 0
+    gap = 5 * gap_ticks**2
+    while gap >> gap_bits >= _ROUNDED:
+        gap_bits += 1
+    return array("i", (low, high, (rate << exponent) // TICK_HZ, exponent, (gap >> gap_bits) + 1, gap_bits))
 
 
 @micropython.viper
-def compare(angle: ptr32, time: ptr32, mantissa: int, shift: int) -> int:
-    """Compare a subinterval with a rate: its differences with those of time * mantissa / 2**(30 - shift).
+def is_inside(piece: ptr32, angle: ptr32, time: ptr32, limits: ptr32) -> int:
+    """Whether a subinterval was measured and is certainly within the joint's range.
+
+    ``piece``: of the angle; ``angle``, ``time``: its measures.
+    """
+    low = limits[_LOW]
+    high = limits[_HIGH]
+    begin = piece[_FIRST_HIGH] + (piece[_FIRST_LOW] >> 27)
+    end = piece[_LAST_HIGH] + (piece[_LAST_LOW] >> 27)
+    if angle[_SCALE] == 0 or time[_SCALE] == 0 or begin < low or begin > high or end < low or end > high:
+        return 0
+    return 1 if angle[_LOWEST] >= low and angle[_HIGHEST] <= high else 0
+
+
+@micropython.viper
+def is_gentle(angle: ptr32, time: ptr32, limits: ptr32) -> int:
+    """Whether acceleration certainly moves the joint little enough at standstill, see ``Judge``; time is steady.
+
+    ``angle``, ``time``: a subinterval's measures. As ``Judge`` has it exactly, in numbers of 9 bits, each rounded to
+    the safe side: with all of them near their limits 2 % too strict.
+    """
+    most = steps_change = ticks_change = 0
+    i = _FIRST_DIFFERENCE
+    while i < _LAST_DIFFERENCE:
+        change = angle[i + 1] - angle[i]
+        if change < 0:
+            change = 0 - change
+        if change > steps_change:
+            steps_change = change
+        change = time[i + 1] - time[i]
+        if change < 0:
+            change = 0 - change
+        if change > ticks_change:
+            ticks_change = change
+        i += 1
+    most = angle[_MOST] - _DIFFERENCE_BIAS
+    change = _DIFFERENCE_BIAS - angle[_LEAST]
+    if change > most:
+        most = change
+    least = time[_LEAST] - _DIFFERENCE_BIAS
+    bits = 0
+    while least >= _ROUNDED:
+        least >>= 1
+        ticks_change >>= 1
+        bits += 1
+    shift = limits[_GAP_BITS] + 2 * (time[_SCALE] - _HIGH_TICKS_BITS) - angle[_SCALE] - 2 * bits
+    while most >= _ROUNDED or steps_change >= _ROUNDED:
+        most >>= 1
+        steps_change >>= 1
+        shift += 1
+    left = ((steps_change + 1) * (least + 1) + (most + 1) * (ticks_change + 1)) * limits[_GAP]
+    right = least * least * least
+    if shift >= 0:
+        right = (right >> shift) if shift < 31 else 0
+    else:
+        left = ((left >> (0 - shift)) if shift > -31 else 0) + 1
+    return 1 if left <= right else 0
+
+
+@micropython.viper
+def compare(angle: ptr32, time: ptr32, limits: ptr32) -> int:
+    """Compare a subinterval with a rate: its differences with those of time, times the rate.
 
     ``angle``, ``time``: its measures. At the ends the differences give the exact rate, so FASTER is certain there.
     """
     found = SLOWER
+    shift = 30 - limits[_EXPONENT] + angle[_SCALE] - time[_SCALE] + _HIGH_TICKS_BITS
+    mantissa = limits[_MANTISSA]
     high = mantissa >> 15
     low = mantissa & _HALF_MASK
     i = _FIRST_DIFFERENCE

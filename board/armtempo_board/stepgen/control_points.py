@@ -19,6 +19,57 @@ WINDOW_WORDS = const(20)
 _FRESH_AT = const(10)  # word
 
 
+# what is certain of some points
+RISING = const(1)  # each is greater than the one before
+EQUAL = const(2)
+BOUNDED = const(4)  # by ``bound``, and their differences by 2**24
+
+_LOWER = const(0)  # words of a point
+_UPPER = const(1)
+_TOP_MASK = const(255)
+_HIGH_MASK = const((1 << 25) - 1)
+_LOW_MASK = const((1 << 28) - 1)
+_BIAS = const(1 << 28)
+_MOST_SPAN = const((1 << 24) - 1)
+
+
+@micropython.viper
+def survey(words: ptr32, at: int, count: int, bound: int) -> int:
+    """What is certain of ``count`` points from the word ``at`` on: bits. What is not may be nearly so.
+
+    ``bound``: of their magnitudes, below 2**28; all in units of 2**28 (``bezier.HIGH``).
+    """
+    point = ptr32(int(words) + 4 * at)
+    found = RISING | EQUAL
+    least = most = high_before = low_before = i = 0
+    while i < count:
+        top = (point[_UPPER] >> 24) & _TOP_MASK  # both signs, also where words have 64 bits
+        if top and top != _TOP_MASK:
+            return 0
+        low = point[_LOWER]
+        high = (((point[_UPPER] & _HIGH_MASK) << 4) | ((low >> 28) & 15)) ^ _BIAS
+        low &= _LOW_MASK
+        if not i:
+            least = most = high
+        elif high != high_before or low != low_before:
+            found &= RISING
+            if high < high_before or (high == high_before and low < low_before):
+                found = 0
+        else:
+            found &= EQUAL
+        if high < least:
+            least = high
+        if high > most:
+            most = high
+        high_before = high
+        low_before = low
+        point = ptr32(int(point) + 8)
+        i += 1
+    if most - least < _MOST_SPAN and most - _BIAS < bound - 1 and _BIAS - least < bound:
+        found |= BOUNDED
+    return found
+
+
 @micropython.viper
 def _keep_last(words: ptr32) -> object:
     """Move the last _KEPT points to the beginning."""

@@ -34,8 +34,8 @@ class Subintervals:
 
     ``angle`` and ``time`` begin with the Bezier points of the subinterval (bezier.py); ``angle_measures`` and
     ``time_measures`` are what was measured of them (subdivision.py); ``arrays`` holds all four, in the order of the
-    words above. ``min_ticks``: a subinterval no longer than this that comes back to the position where it began is
-    passed over.
+    words above. ``points``: the control points of angle, free for others before ``load``. ``min_ticks``: a subinterval
+    no longer than this that comes back to the position where it began is passed over.
     """
 
     def __init__(self, memory: Memory) -> None:
@@ -43,7 +43,7 @@ class Subintervals:
         take = memory.take_for_processor
         self.angle = take(PIECES_SIZE)
         self.time = take(PIECES_SIZE)
-        self._angle_points = ControlPoints(take(WINDOW_WORDS))
+        self.points = ControlPoints(take(WINDOW_WORDS))
         self._time_points = ControlPoints(take(WINDOW_WORDS))
         self.angle_measures = take(MEASURES_SIZE)
         self.time_measures = take(MEASURES_SIZE)
@@ -52,7 +52,7 @@ class Subintervals:
 
     def load(self, motion: "MotionHead", joint: int) -> None:
         """Stand before the first subinterval."""
-        self._angle_points.open(motion.stream(motion.angle_offset(joint)), motion.degree)
+        self.points.open(motion.stream(motion.angle_offset(joint)), motion.degree)
         self._time_points.open(motion.stream(motion.time_offset(joint)), motion.degree)
         self._weights = bezier.weights(motion.degree)
         self._refine = motion.refine
@@ -65,7 +65,7 @@ class Subintervals:
 
     def close(self) -> None:
         """The motion is read no further."""
-        self._angle_points.close()
+        self.points.close()
         self._time_points.close()
 
     def load_segment(self) -> bool:
@@ -74,7 +74,7 @@ class Subintervals:
         if number == self._segments:
             return False
         self._number = number
-        points = self._angle_points
+        points = self.points
         bezier.from_control_points(
             points.words, points.seek(number // self._refine), self._weights, self.angle
         )

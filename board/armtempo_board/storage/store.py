@@ -30,9 +30,9 @@ _DEFAULT = "default.txt"
 _NEW = ".new"
 _ENOSPC = const(28)
 _ERRNO = const(0)  # of an exception's arguments
-_ST_MODE = const(0)  # of os.stat
-_FOLDER = const(0x4000)  # a bit of it
-_ST_SIZE = const(6)
+_NAME, _KIND = const(0), const(1)  # of an entry of os.ilistdir
+_FOLDER = const(0x4000)  # the kind of a folder, which somebody else made
+_ST_SIZE = const(6)  # of os.stat
 _F_BSIZE = const(0)  # of os.statvfs
 _F_BAVAIL = const(3)
 _CRC_BYTES = const(4)
@@ -106,8 +106,18 @@ class Store:
 
     def names(self) -> "list[str]":
         """Names of the stored motions and sequences, sorted."""
-        files = [name for name in self._files() if name.endswith(_MOTION) and not self._is_folder(name)]
-        return sorted([name[: -len(_MOTION)] for name in files])
+        found = []
+        try:
+            entries: "Any" = os.ilistdir(
+                self._root
+            )  # with their kinds: to ask for each would search the folder
+            for entry in entries:
+                name = entry[_NAME]
+                if name.endswith(_MOTION) and entry[_KIND] != _FOLDER:
+                    found.append(name[: -len(_MOTION)])
+        except OSError:
+            pass
+        return sorted(found)
 
     def begin(self, name: str, size: int) -> None:
         """Begin an upload; aborts one in progress."""
@@ -323,13 +333,6 @@ class Store:
             return os.listdir(self._root)
         except OSError:
             return []
-
-    def _is_folder(self, file_name: str) -> bool:
-        """Whether it is a folder, which somebody else made."""
-        try:
-            return os.stat(self._path(file_name))[_ST_MODE] & _FOLDER != 0
-        except OSError:
-            return True
 
     def _size_of(self, file_name: str) -> int:
         """Bytes of a file; NOT_FOUND."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,30 +53,38 @@ def text_of(path: Path) -> str:
         ) from None
 
 
-def of_text(text: str, path: Path | str) -> NumberTable:
+def of_text(text: str, path: Path | str, units: Collection[str] = ()) -> NumberTable:
     """The table in a text from ``path``; skips empty lines, and those that begin with ``#``.
 
-    A first line without a number is a header; so is the last line with ``#`` above the numbers, if it has as many words
-    as they have columns, whatever is between the words. Raises InputError if the text is not a table, for a
-    first line of words and numbers, and for a line with more or fewer cells than the first one.
+    A first line without a number is a header; so is the last line with ``#`` above the numbers, if it has as many names
+    as they have columns. A header may have other separators than the numbers; between blanks, a number, a word in
+    brackets or one of ``units`` belongs to the name before it. Raises InputError if the text is not a table, for a
+    first line of words and numbers, and for a line with more or fewer cells than the first one, or the header.
     """
-    separator = _separator(text)
+    lines = text.removeprefix("\ufeff").splitlines()
     try:
-        lines = list(enumerate(_cells(text.removeprefix("\ufeff").splitlines(), separator), 1))
+        separator = _separator(lines)
+        cells = list(enumerate(_cells(lines, separator, units), 1))
     except csv.Error as error:
         raise InputError(f"{path}: is not a table: {error}", "give a CSV file") from None
-    rows = [(number, [cell.strip() for cell in row]) for number, row in lines if any(map(str.strip, row))]
+    rows = [(number, [cell.strip() for cell in row]) for number, row in cells if any(map(str.strip, row))]
     remarks = [row for row in rows if row[1][0].startswith("#")]
     rows = [row for row in rows if row not in remarks]
     header = None
     if rows and not any(map(is_number, _pointed(rows[0][1], separator))):
-        header = rows.pop(0)[1]
+        number, header = rows.pop(0)
+        if rows and len(_trimmed(header)) != len(_trimmed(rows[0][1])):
+            header = _names(lines[number - 1], separator, len(_trimmed(rows[0][1])), units) or header
     above = [number for number, _ in remarks if rows and number < rows[0][0]]
     if header is None and above:
-        header = _names(text.splitlines()[above[-1] - 1], separator, len(rows[0][1]))
-    while header and not header[-1]:
-        header.pop()
+        header = _names(lines[above[-1] - 1].lstrip("# \t"), separator, len(rows[0][1]), units)
+    header = header and _trimmed(header)
     width = len(header) if header is not None else len(rows[0][1]) if rows else 0
+    if header and rows and not len(_trimmed(rows[0][1])) <= width <= len(rows[0][1]):
+        raise InputError(
+            f"{path}: line {rows[0][0]}: {len(rows[0][1])} values, but not as many names in the header",
+            "give each column a name, with commas between the names",
+        )
     rows = [
         (number, _fitted(_pointed(row, separator), width, f"{path}: line {number}")) for number, row in rows
     ]
@@ -88,49 +96,68 @@ def of_text(text: str, path: Path | str) -> NumberTable:
     return NumberTable(path, header, rows)
 
 
-def _separator(text: str) -> str:
-    """The separator of the first line that is no remark; "" for blanks."""
-    lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    first = next(lines, "")
-    return next((separator for separator in _SEPARATORS if separator in first), "")
+def _separator(lines: list[str]) -> str:
+    """The separator of the first line of several numbers, else of the first one that is no remark; "" for blanks."""
+    own = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    for line in own:
+        for separator in (*_SEPARATORS, ""):
+            row = _pointed(_split(line, separator), separator)
+            if (
+                len(row) > 1
+                and is_number(row[0])
+                and all(is_number(cell) or not cell.strip() for cell in row)
+            ):
+                return separator
+    return next((separator for separator in _SEPARATORS if separator in "".join(own[:1])), "")
 
 
-def _names(remark: str, separator: str, width: int) -> list[str] | None:
-    """The names of so many columns in a line that begins with ``#``; None if it has more or fewer."""
-    bare = remark.removeprefix("\ufeff").strip().lstrip("# \t")
-    for each in dict.fromkeys((separator, *_SEPARATORS, "")):
-        words = next(iter(csv.reader([bare], delimiter=each)), []) if each else _BLANKS.split(bare)
+def _split(line: str, separator: str) -> list[str]:
+    return next(csv.reader([line], delimiter=separator), []) if separator else _BLANKS.split(line.strip())
+
+
+def _names(line: str, separator: str, width: int, units: Collection[str]) -> list[str] | None:
+    """The names of so many columns in a line; None if it has more or fewer."""
+    bare = line.removeprefix("\ufeff").strip()
+    for each in (separator, *_SEPARATORS):
+        words = _split(bare, each) if each else []
         if len(words) == width > 1:
             return [word.strip() for word in words]
-    return _of_width(width, bare, _BLANKS.split(bare)) if width > 1 else None
+    return _of_width(width, bare, _BLANKS.split(bare), units) if width > 1 else None
 
 
-def _cells(lines: list[str], separator: str) -> Iterable[list[str]]:
+def _cells(lines: list[str], separator: str, units: Collection[str]) -> Iterable[list[str]]:
     if separator:
         return csv.reader(lines, delimiter=separator)
     rows = [_BLANKS.split(line.strip()) for line in lines]
     width = max((len(row) for row in rows if row and all(map(is_number, row))), default=0)
     # a header's names may have single blanks in them
     return [
-        row if len(row) == width else _of_width(width, line.strip(), row) or row
+        row if all(map(is_number, row)) else _names(line, "", width, units) or row
         for line, row in zip(lines, rows, strict=True)
     ]
 
 
-def _of_width(width: int, line: str, words: list[str]) -> list[str] | None:
-    """So many names that have single blanks in them; None if there are more or fewer."""
-    return next((names for names in (_WIDE_BLANKS.split(line), _joined(words)) if len(names) == width), None)
+def _of_width(width: int, line: str, words: list[str], units: Collection[str]) -> list[str] | None:
+    """So many names between blanks, some of which may have blanks in them; None if there are more or fewer."""
+    quoted = _split(" ".join(words), " ")
+    found = (words, quoted, _WIDE_BLANKS.split(line), _joined(words, units))
+    return next((names for names in found if len(names) == width), None)
 
 
-def _joined(words: list[str]) -> list[str]:
-    """Each word with the numbers, and units in brackets, after it."""
+def _joined(words: list[str], units: Collection[str]) -> list[str]:
+    """Each word with the numbers and units after it."""
     names = words[:1]
     for word in words[1:]:
-        if is_number(word) or word[:1] in ("(", "["):
+        if is_number(word) or word[:1] in ("(", "[") or word.lower() in units:
             names[-1] += f" {word}"
         else:
             names.append(word)
     return names
+
+
+def _trimmed(row: list[str]) -> list[str]:
+    """The row without the empty cells at its end."""
+    return row[: max((number for number, cell in enumerate(row, 1) if cell), default=0)]
 
 
 def _fitted(row: list[str], width: int, where: str) -> list[str]:

@@ -18,12 +18,12 @@ def hidden(text: str) -> str:
 
 
 def is_number(text: str) -> bool:
-    """Whether the text is a number, finite or not."""
+    """Whether the text is a number, finite or not; "1_0", which Python reads as 10, is none."""
     try:
         float(text)
     except ValueError:
         return False
-    return True
+    return "_" not in text
 
 
 def visible(text: str) -> str:

@@ -177,8 +177,22 @@ def _of_file(error: OSError) -> ArmtempoError:
     )
 
 
+def _show_version(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+    """Look it up only if it is asked for: every command would wait for it."""
+    if wanted:
+        click.echo(f"armtempo, version {installed_version()}")
+        context.exit()
+
+
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EXAMPLES)
-@click.version_option(installed_version(), prog_name="armtempo")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_version,
+    help="Show the version and exit.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="No progress bars and no remarks: only results and errors.")
 def main(quiet: bool) -> None:
     """Time-optimal B-spline motions for stepper arms, replayed by an STM32F407 with MicroPython."""

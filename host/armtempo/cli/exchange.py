@@ -36,8 +36,10 @@ from armtempo.new_arm import urdf_reader as reader
     "--tolerance-deg",
     type=options.FiniteNumber(),
     metavar="DEG",
-    help="Leave out lines that change the path by less than DEG, or as many mm of sliding joints. Default for a "
-    "table with a column time_s: 0.1.",
+    help="Leave out lines that change the path by less than DEG. Default for a table with a column time_s: 0.1.",
+)
+@click.option(
+    "--tolerance-mm", type=options.FiniteNumber(), metavar="MM", help="The same of sliding joints, also 0.1."
 )
 @click.option(
     "--own-timing",
@@ -59,6 +61,7 @@ def import_table(
     frame: str,
     radians: bool | None,
     tolerance_deg: float | None,
+    tolerance_mm: float | None,
     own_timing: bool,
     output: Path | None,
     force: bool,
@@ -76,14 +79,15 @@ def import_table(
     title = name or table.stem
     target = output or Path(f"{title}.json" if own_timing else f"{title}.toml")
     check_not_input(target, (table, arm.source))
+    tolerance = _tolerance(arm, tolerance_deg, tolerance_mm)
     if own_timing:
         if frame != BASE:
             raise InputError("--own-timing is for angles, which are in no frame", "leave --frame out")
-        plan = resolve.as_recorded(table, arm, title, radians, tolerance_deg)
+        plan = resolve.as_recorded(table, arm, title, radians, tolerance)
         plan.save(target, force)
         _show_timed(plan, target, as_json)
         return
-    found = via_table.read(table, arm, radians, tolerance_deg)
+    found = via_table.read(table, arm, radians, tolerance)
     if frame != BASE and not found.poses:
         raise InputError(f"{table}: has angles, which are in no frame", "leave --frame out")
     text = via_table.job_text(title, found, frame)
@@ -98,6 +102,25 @@ def import_table(
         "notes": list(found.notes),
     }
     results.show(as_json, values, _import_lines(target, found))
+
+
+def _tolerance(arm: Arm, turning_deg: float | None, sliding_mm: float | None) -> list[float] | None:
+    """The tolerance of each driven joint; None for the default. InputError for that of joints that the arm has not."""
+    if turning_deg is None and sliding_mm is None:
+        return None
+    for option, given, slides in (
+        ("--tolerance-deg", turning_deg, False),
+        ("--tolerance-mm", sliding_mm, True),
+    ):
+        if given is not None and all(joint.slides != slides for joint in arm.driven):
+            raise InputError(
+                f"{option}: arm {arm.name!r} has no {'sliding' if slides else 'turning'} joint",
+                "leave it out",
+            )
+    turning, sliding = (
+        via_table.TOLERANCE_DEG if given is None else given for given in (turning_deg, sliding_mm)
+    )
+    return [sliding if joint.slides else turning for joint in arm.driven]
 
 
 def _show_timed(plan: Plan, target: Path, as_json: bool) -> None:
@@ -117,7 +140,7 @@ def _import_lines(target: Path, found: ImportedPath) -> list[str]:
         return [*notes, written]
     thinned = (
         f"{found.lines} lines reduced to {len(found.via_deg)} via points: the planned path stays within "
-        f"{found.thinned_to_deg:.2g} {found.units} of the table (proven); 'armtempo plan' computes new times"
+        f"{found.thinned_to} of the table (proven); 'armtempo plan' computes new times"
     )
     return [*notes, thinned, written]
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # planner and link take long to import, and many commands nee
     from armtempo.link.traffic import Sink
     from armtempo.model.plan import Plan
     from armtempo.model.sequence_plan import AnyPlan
+    from armtempo.model.thinning import Tolerance
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
     from armtempo.robot.shared_board import SharedBoard
@@ -178,14 +179,14 @@ def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> AnyPl
 
 
 def as_recorded(
-    path: Path, arm: Arm, name: str, radians: bool | None = None, tolerance_deg: float | None = None
+    path: Path, arm: Arm, name: str, radians: bool | None = None, tolerance: Tolerance | None = None
 ) -> Plan:
     """A plan on the recording's own times; errors as in ``recorded.plan``."""
     from armtempo.planning import recorded  # here, as it loads the planner
 
-    found = via_table.recorded(path, arm, radians, tolerance_deg)
-    tolerance = recorded.TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
-    return recorded.plan(arm, name, found.times_s, found.angles_deg, tolerance, found.notes)
+    found = via_table.recorded(path, arm, radians, tolerance)
+    given = recorded.TOLERANCE_DEG if tolerance is None else tolerance
+    return recorded.plan(arm, name, found.times_s, found.angles_deg, given, found.notes)
 
 
 # board

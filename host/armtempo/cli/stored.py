@@ -14,12 +14,13 @@ from armtempo.basics.text import aligned
 from armtempo.cli import options, posture, programs, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
-from armtempo.encoding import encoded_program, encoded_sequence, made_with
+from armtempo.encoding import encoded_sequence
 from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.robot.board import Board
 from armtempo.robot.board_state import record_crc
+from armtempo.robot.store import what_is_old
 
 
 @click.command("upload")
@@ -118,14 +119,7 @@ def _row(entry: StoredMotion) -> str:
 
 def _old(board: Board, entry: StoredMotion, arm: Arm | None) -> str:
     """What has changed in the arm since a motion, sequence or program was planned with it; "" for nothing."""
-    if arm is None:
-        return ""
-    check = encoded_program.check_stored if entry.program else made_with.check_stored
-    try:
-        check(entry.name, board.client.fetch(entry.name), arm)
-    except InputError as error:
-        return str(error)
-    return ""
+    return "" if arm is None else what_is_old(board.client, entry, arm)
 
 
 def _ends(board: Board, entry: StoredMotion, arm: Arm | None) -> list[str]:

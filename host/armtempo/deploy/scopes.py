@@ -37,17 +37,6 @@ def imported_inside(tree: ast.Module, program: Collection[str]) -> dict[str, Tar
     return imported([node for node in ast.walk(tree) if node not in top], program)
 
 
-def top_names(tree: ast.Module) -> set[str]:
-    """Names that a module itself defines."""
-    found: set[str] = set()
-    for node in tree.body:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            found.add(node.name)
-        elif not isinstance(node, ast.Import | ast.ImportFrom):
-            found |= stored(node)
-    return found
-
-
 def local_names(function: Function) -> set[str]:
     """Names that belong to a function: parameters and all that it binds and does not declare global."""
     arguments = function.args

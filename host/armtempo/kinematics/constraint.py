@@ -28,7 +28,7 @@ class Miss(NamedTuple):
     """Angle between the orientations, the directions, or the constrained roll, pitch or yaw."""
 
     def __str__(self) -> str:
-        return f"{self.position_mm:.4g} mm and {self.rotation_deg:.4g} deg"
+        return f"{round(self.position_mm, 6):.4g} mm and {round(self.rotation_deg, 6):.4g} deg"
 
 
 class Turned(NamedTuple):

@@ -172,28 +172,41 @@ class Client:
     def stored(self) -> list[board_messages.StoredMotion]:
         """All stored motions."""
         found: list[board_messages.StoredMotion] = []
-        while True:
-            try:
-                (count, size, crc, duration, joints, default, kind), name = self.session.command(
-                    "list", (len(found),)
-                )
-            except BoardError as error:
-                if error.code == wire.ERROR_CODES["not_found"]:
-                    return found
-                raise
-            if not name:
-                return found
-            found.append(
-                board_messages.StoredMotion(
-                    name, size, crc, duration, joints, bool(default), kind == SEQUENCE, kind == PROGRAM
-                )
-            )
-            if len(found) >= count:
-                return found
+        count = 1
+        while len(found) < count:
+            entry, count = self._listed(len(found))
+            if entry is None:
+                break
+            found.append(entry)
+        return found
 
     def find(self, name: str) -> board_messages.StoredMotion | None:
-        """The stored motion of this name, or None."""
-        return next((entry for entry in self.stored() if entry.name == name), None)
+        """The stored motion of this name, or None; by halving, as the board's names are sorted."""
+        low, behind = 0, 1
+        while low < behind:
+            middle = (low + behind) // 2
+            entry, count = self._listed(middle)
+            if entry is None or entry.name == name:
+                return entry
+            if middle == 0:  # the first, which says how many there are
+                behind = count
+            low, behind = (middle + 1, behind) if entry.name < name else (low, middle)
+        return None
+
+    def _listed(self, index: int) -> tuple[board_messages.StoredMotion | None, int]:
+        """The stored motion of a number, from 0, by names, None if there is none; and how many there are."""
+        try:
+            (count, size, crc, duration, joints, default, kind), name = self.session.command("list", (index,))
+        except BoardError as error:
+            if error.code == wire.ERROR_CODES["not_found"]:
+                return None, 0
+            raise
+        if not name:
+            return None, 0
+        found = board_messages.StoredMotion(
+            name, size, crc, duration, joints, bool(default), kind == SEQUENCE, kind == PROGRAM
+        )
+        return found, count
 
     def fetch(self, name: str) -> bytes:
         """A stored record, read back."""

@@ -188,10 +188,17 @@ class Session:
         self.transport.wake()
 
     @contextmanager
-    def in_a_hurry(self, timeout_s: float) -> Iterator[bool]:
-        """The lock next, for a request of another program; see ``BoardLock.in_a_hurry``."""
+    def in_a_hurry(self, timeout_s: float, stops: bool = False) -> Iterator[bool]:
+        """The lock next, for a request from another thread; see ``BoardLock.in_a_hurry``."""
         self.transport.wake()
-        with self.lock.in_a_hurry(timeout_s) as mine:
+        with self.lock.in_a_hurry(timeout_s, stops) as mine:
+            yield mine
+
+    @contextmanager
+    def by_turns(self, timeout_s: float) -> Iterator[bool]:
+        """The next commands, for a request from another thread; see ``BoardLock.by_turns``."""
+        self.transport.wake()
+        with self.lock.by_turns(timeout_s) as mine:
             yield mine
 
     def _no_answer(self, name: str, waited_s: float) -> NoAnswerError:

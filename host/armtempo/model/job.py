@@ -201,14 +201,15 @@ class Job:
         path: Path | str,
         arm: Arm | Path | str,
         radians: bool | None = None,
-        tolerance_deg: float | None = None,
+        tolerance_deg: float | Sequence[float] | None = None,
     ) -> Job:
         """A job through the via points of a CSV file: one line per point, its columns named in the first line.
 
         A column for each driven joint, or positions and orientations; without a header one for each driven joint in
         their order. ``radians``: unit of columns that do not name theirs; None: degrees, unless that is doubtful.
         Its name is the file's. A table with a time, as ``Plan.to_csv`` writes, is a sampled motion: it is thinned to
-        ``tolerance_deg`` (default 0.1), with shared timing. Raises InputError with line and value for an invalid angle.
+        ``tolerance_deg`` (default 0.1; one for all joints, or for each in its unit), with shared timing. Raises
+        InputError with line and value for an invalid angle.
         """
         file = Path(path)
         found = via_table.read(file, Arm.of(arm), radians, tolerance_deg)

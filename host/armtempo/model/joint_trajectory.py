@@ -26,6 +26,8 @@ _DEEPEST = 8
 """Levels of messages and lists in which a trajectory is looked for."""
 _BEFORE = "\ufeff \t\r\n"
 """What may stand before JSON."""
+_TIMES_S = {"sec": 1.0, "secs": 1.0, "nanosec": 1e-9, "nsecs": 1e-9, "nsec": 1e-9}
+"""Keys of a time, and their seconds."""
 _STEP_S = 0.01
 """Largest step of the points of a trajectory with speeds."""
 
@@ -103,15 +105,33 @@ def of_content(content: Mapping[str, Any], path: Path | str, arm: Arm) -> Record
         )
         times, angles = _between(times, angles[:, columns], speeds[:, columns])
         return Recorded(times, angles, notes)
+    if any(point.get("velocities") for point in points):
+        notes = (*notes, "velocities were not used, as not all points have them")
     return Recorded(times, angles[:, columns], notes)
 
 
 def _content(text: str, path: Path | str) -> Mapping[str, Any]:
     try:
-        found = json.loads(text.lstrip(_BEFORE)) if _is_json(text) else _yaml(text)
-    except ValueError as error:
-        raise InputError(f"{path}: is neither JSON nor YAML: {error}", "give a whole message") from None
+        found = _json(text)
+    except ValueError as no_json:
+        try:
+            found = _yaml(text)  # which may begin like JSON
+        except ValueError as error:
+            raise InputError(
+                f"{path}: is neither JSON nor YAML: {no_json if _is_json(text) else error}",
+                "give a whole message",
+            ) from None
+        except MissingPackageError as error:
+            if _is_json(text):
+                raise InputError(
+                    f"{path}: is not JSON: {no_json}", f"for YAML PyYAML is needed, {error.hint}"
+                ) from None
+            raise
     return _trajectory(found, path)
+
+
+def _json(text: str) -> Any:
+    return json.loads(text.lstrip(_BEFORE))
 
 
 def _is_json(text: str) -> bool:
@@ -154,11 +174,8 @@ def _entry(point: Any, number: int, path: Path | str) -> Mapping[str, Any]:
 def _time_s(point: Mapping[str, Any], number: int, path: Path | str) -> float:
     given = point.get("time_from_start")
     if isinstance(given, Mapping):
-        seconds, nanoseconds = (
-            given.get(one, given.get(other, 0)) for one, other in (("sec", "secs"), ("nanosec", "nsecs"))
-        )
-        if _is_number(seconds) and _is_number(nanoseconds):
-            return float(seconds) + 1e-9 * float(nanoseconds)
+        if given and given.keys() <= _TIMES_S.keys() and all(map(_is_number, given.values())):
+            return sum(float(value) * _TIMES_S[key] for key, value in given.items())
     elif given is not None and _is_number(given):
         return float(given)
     raise InputError(

@@ -20,6 +20,7 @@ RESTS_DEG = 0.01
 _TIMES = ("time", "t", "times", "timestamp", "stamp", "timefromstart")
 _ANGLE_WORDS = ("", "angle", "position", "pos")
 _NUMBERED = ("j", "joint", "axis", "q", "theta")
+_FROM_0 = {f"{word}0{angle}" for word in _NUMBERED for angle in _ANGLE_WORDS}
 _DERIVED = {"speed", "velocity", "vel", "acceleration", "accel", "acc", "jerk", "effort", "torque", "current"}
 _ANGLE = {
     "deg": "deg",
@@ -32,6 +33,8 @@ _ANGLE = {
 }
 _LENGTH = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
 _DURATION = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+UNITS = frozenset({**_ANGLE, **_LENGTH, **_DURATION})
+"""Words that may say the unit of a column after its name."""
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 _GAPS = re.compile(r"[\s_\-./]+")
 
@@ -106,6 +109,9 @@ def read(names: Sequence[str], arm: Arm, where: str) -> Header:
             )
         else:
             found[meaning] = Column(index, unit)
+    for name in unused:
+        if _plain(_split(name)[0]) in _FROM_0:
+            raise InputError(f"{where}: {name!r} counts the joints from 0", f"count from 1, or {hint}")
     joints = {key: column for key, column in found.items() if isinstance(key, int)}
     pose = {key: found[key] for key in (*POSITION, *WHOLE, *QUATERNION) if key in found}
     driven = [joints.pop(index) for index in arm.driven_indices if index in joints]
@@ -177,8 +183,7 @@ def _split(name: str) -> tuple[str, str]:
     if found := _BRACKETS.fullmatch(name):
         return found[1], found[2].lower()
     base, _, last = _GAPS.sub(" ", name.strip()).rpartition(" ")
-    known = last.lower() in {**_ANGLE, **_LENGTH, **_DURATION}
-    return (base, last.lower()) if base and known else (name, "")
+    return (base, last.lower()) if base and last.lower() in UNITS else (name, "")
 
 
 def _known(unit: str, units: Mapping[str, object], name: str, where: str) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.model.joint_unit import DEG
+from armtempo.model.joint_unit import DEG, JointUnit
 from armtempo.splines import bspline, extremes
 from armtempo.splines.bspline import REST_PIECES
 
@@ -32,6 +32,39 @@ _TRIES = 5
 _INSIDE = 1.5
 """Distance from the end of a range, for a spline that was beyond it by 1."""
 _ROUNDING = 1e-9
+
+
+Tolerance = float | Sequence[float]
+"""One for all joints, or one for each, (J,), each in its joint's unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointTolerance:
+    """The tolerance of each joint of an arm as one number, in which positions are divided by ``scale``."""
+
+    one: float
+    """Of the turning joints in degrees; of an arm whose joints all slide in mm."""
+    scale: Array
+    """(J,): 1 for turning joints."""
+    units: tuple[JointUnit, ...]
+
+    @classmethod
+    def of(cls, tolerance: Tolerance, units: Sequence[JointUnit]) -> JointTolerance:
+        """Of joints with these units; raises InputError for one outside (0, LARGEST_DEG]."""
+        each = np.broadcast_to(np.asarray(tolerance, dtype=float), (len(units),))
+        for value, unit in zip(each.tolist(), units, strict=True):
+            _check(value, unit.word)
+        first = next((value for value, unit in zip(each, units, strict=True) if unit is DEG), each[0])
+        return cls(float(first), each / first, tuple(units))
+
+    def format(self, off: float) -> str:
+        """A distance in which positions are divided by ``scale``, in the joints' units."""
+        values = dict.fromkeys(
+            (f"{off * factor:.2g}", unit.name) for factor, unit in zip(self.scale, self.units, strict=True)
+        )
+        if len({value for value, _ in values}) == 1:
+            return f"{next(iter(values))[0]} {' or '.join(name for _, name in values)}"
+        return " and ".join(f"{value} {name}" for value, name in values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +95,7 @@ def thinned(
     Raises InputError for a tolerance outside (0, LARGEST_DEG], points that do not move, and if more via points are
     needed than a motion can have.
     """
-    if not 0.0 < tolerance_deg <= LARGEST_DEG:
-        raise InputError(
-            f"a tolerance of {tolerance_deg:g} {unit_words} is not allowed",
-            f"give one above 0, at most {LARGEST_DEG:g}",
-        )
+    _check(tolerance_deg, unit_words)
     legs, waits_s = _at_rests(points_deg, times_s, _STILL * tolerance_deg)
     if not legs:
         raise InputError("all points are the same within the tolerance", "give a path that moves")
@@ -95,12 +124,20 @@ def thinned(
     else:
         raise InputError(
             f"its rests and the ends of ranges cannot be kept within {tolerance_deg:g} {unit_words}",
-            "allow more with --tolerance-deg",
+            "allow more with --tolerance-deg or --tolerance-mm",
         )
     numbers = np.cumsum([len(each) - 1 for each in via]).tolist()
     rests = dict(zip(numbers[:-1], waits_s[1:-1], strict=True))
     points = np.concatenate([via[0], *(each[1:] for each in via[1:])])
     return Thinned(points, rests, off_deg, (waits_s[0], waits_s[-1]))
+
+
+def _check(tolerance: float, unit_words: str) -> None:
+    if not 0.0 < tolerance <= LARGEST_DEG:
+        raise InputError(
+            f"a tolerance of {tolerance:g} {unit_words} is not allowed",
+            f"give one above 0, at most {LARGEST_DEG:g}",
+        )
 
 
 def _excess(whole: Array, low: Array, high: Array) -> Array:
@@ -186,7 +223,7 @@ def _enough(line: _Polyline, tolerance_deg: float, unit_words: str) -> Array:
         if len(places) > MAX_SEGMENTS + 1:
             raise InputError(
                 f"more than {MAX_SEGMENTS + 1} via points are needed to keep within {tolerance_deg:g} {unit_words}",
-                "allow more with --tolerance-deg, or cut the table into several motions",
+                "allow more with --tolerance-deg or --tolerance-mm, or cut the table into several motions",
             )
 
 
@@ -244,7 +281,7 @@ def _whole(via: Sequence[Array]) -> Array:
     if knots[-1] > MAX_SEGMENTS - DEGREE * (len(via) - 1):
         raise InputError(
             f"{sum(map(len, via))} via points with {len(via) - 1} rests do not fit the board",
-            "allow more with --tolerance-deg, or cut the table into several motions",
+            "allow more with --tolerance-deg or --tolerance-mm, or cut the table into several motions",
         )
     return bspline.fit(np.concatenate(rows), DEGREE, knots[1:-1])
 

@@ -19,6 +19,7 @@ from armtempo.model.joint_trajectory import Recorded
 from armtempo.model.joint_unit import DEG, NEUTRAL
 from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.table_header import Column, Header
+from armtempo.model.thinning import JointTolerance, Tolerance
 from armtempo.model.tool_pose import BASE, WHOLE
 
 TOLERANCE_DEG = 0.1
@@ -43,13 +44,13 @@ class ImportedPath:
     poses: tuple[Mapping[str, Sequence[float] | float], ...] = ()
     """The keys of each pose, as in a job file."""
     thinned_to_deg: float | None = None
-    """How far the planned spline is from the table at most; None if every line is a via point."""
+    """How far the planned spline is from the table at most, of turning joints; None if every line is a via point."""
+    thinned_to: str = ""
+    """The same in words, of sliding joints too."""
     rests_s: Mapping[int, float] = field(default_factory=dict)
     """Seconds of rest at via points, by their number from 0."""
     notes: tuple[str, ...] = ()
     """How the columns were taken, for the user."""
-    units: str = DEG.name
-    """Of the joints' positions."""
     neutral: bool = False
     """Whether the arm has a sliding joint, so that the keys of a job say nothing of units."""
 
@@ -64,12 +65,12 @@ class ImportedPath:
 
 
 def of_text(
-    text: str, path: Path | str, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
+    text: str, path: Path | str, arm: Arm, radians: bool | None = None, tolerance_deg: Tolerance | None = None
 ) -> ImportedPath:
     """Via points from the text of a table, as ``via_points``; ``path`` names it in messages."""
     if joint_trajectory.is_ros(text, path):
         return _of_recording(joint_trajectory.of_text(text, path, arm), path, arm, tolerance_deg)
-    return via_points(number_table.of_text(text, path), arm, radians, tolerance_deg)
+    return via_points(number_table.of_text(text, path, table_header.UNITS), arm, radians, tolerance_deg)
 
 
 def is_recording(path: Path) -> bool:
@@ -84,14 +85,16 @@ def is_recording(path: Path) -> bool:
         return False
 
 
-def _of_recording(found: Recorded, path: Path | str, arm: Arm, tolerance_deg: float | None) -> ImportedPath:
+def _of_recording(
+    found: Recorded, path: Path | str, arm: Arm, tolerance_deg: Tolerance | None
+) -> ImportedPath:
     where = [f"{path}: at {time:g} s" for time in found.times_s]
     angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
     return _thinned(angles, found.times_s, arm, tolerance_deg, (*found.notes, *notes), where)
 
 
 def recorded(
-    path: Path, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
+    path: Path, arm: Arm, radians: bool | None = None, tolerance_deg: Tolerance | None = None
 ) -> Recorded:
     """A motion with its times, from a table with a time or a JointTrajectory; errors as in ``read``."""
     text = "" if ros_bag.is_bag(path) else number_table.text_of(path)
@@ -99,7 +102,7 @@ def recorded(
         found = ros_bag.read(path, arm) if not text else joint_trajectory.of_text(text, path, arm)
         where = [f"{path}: at {time:g} s" for time in found.times_s]
     else:
-        table = number_table.of_text(text, path)
+        table = number_table.of_text(text, path, table_header.UNITS)
         header = _header(table, arm)
         times = _times(table, header)
         if times is None or header.pose or len(times) < 2:
@@ -111,12 +114,12 @@ def recorded(
         found = Recorded(times, _angles(table, header, arm, radians), _notes(table, header, arm))
         where = [f"{path}: line {line}" for line, _ in table.rows]
     angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
-    _check_ranges(where, angles, arm, TOLERANCE_DEG if tolerance_deg is None else tolerance_deg)
+    _check_ranges(where, angles, arm, _tolerance(arm, tolerance_deg))
     return Recorded(found.times_s, angles, (*found.notes, *notes))
 
 
 def read(
-    path: Path, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
+    path: Path, arm: Arm, radians: bool | None = None, tolerance_deg: Tolerance | None = None
 ) -> ImportedPath:
     """Via points from a file, as ``of_text``; raises InputError if it cannot be read."""
     if ros_bag.is_bag(path):
@@ -125,7 +128,7 @@ def read(
 
 
 def via_points(
-    table: NumberTable, arm: Arm, radians: bool | None = None, tolerance_deg: float | None = None
+    table: NumberTable, arm: Arm, radians: bool | None = None, tolerance_deg: Tolerance | None = None
 ) -> ImportedPath:
     """Via points from a table: one line per point, its columns as ``table_header`` describes.
 
@@ -148,28 +151,35 @@ def via_points(
         angles, jumps = _unwound(angles, times, arm, where)
         notes += jumps
     if tolerance_deg is None and times is None:
-        return ImportedPath(angles, len(angles), notes=notes, units=arm.texts.units, neutral=arm.slides)
+        return ImportedPath(angles, len(angles), notes=notes, neutral=arm.slides)
     return _thinned(angles, times, arm, tolerance_deg, notes, where)
 
 
+def _tolerance(arm: Arm, given: Tolerance | None) -> JointTolerance:
+    units = [joint.unit for joint in arm.driven]
+    return JointTolerance.of(TOLERANCE_DEG if given is None else given, units)
+
+
 def _thinned(
-    angles: Array, times_s: Array | None, arm: Arm, tolerance_deg: float | None, notes: tuple[str, ...],
+    angles: Array, times_s: Array | None, arm: Arm, tolerance_deg: Tolerance | None, notes: tuple[str, ...],
     where: Sequence[str],
 ) -> ImportedPath:  # fmt: skip
-    tolerance = TOLERANCE_DEG if tolerance_deg is None else tolerance_deg
-    _check_ranges(where, angles, arm, 0.5 * tolerance)
-    ranges = np.array([joint.range_deg for joint in arm.driven])
-    found = thinning.thinned(angles, tolerance, times_s, ranges, arm.texts.unit_words)
+    tolerance = _tolerance(arm, tolerance_deg)
+    _check_ranges(where, angles, arm, tolerance, 0.5)
+    scale = tolerance.scale
+    ranges = np.array([joint.range_deg for joint in arm.driven]) / scale[:, None]
+    words = DEG.word if np.any(scale != 1.0) else arm.texts.unit_words
+    found = thinning.thinned(angles / scale, tolerance.one, times_s, ranges, words)
     for place, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
         if left_out_s:
             notes += (f"{left_out_s:.3g} s of rest at the {place} are left out",)
     return ImportedPath(
-        found.via_deg,
+        found.via_deg * scale,
         len(angles),
         thinned_to_deg=found.off_deg,
+        thinned_to=tolerance.format(found.off_deg),
         rests_s=found.rests_s,
         notes=notes,
-        units=arm.texts.units,
         neutral=arm.slides,
     )
 
@@ -298,9 +308,12 @@ def _check_resting(table: NumberTable, header: Header, arm: Arm, radians: bool |
                 )
 
 
-def _check_ranges(where: Sequence[str], angles: Array, arm: Arm, allowed_deg: float) -> None:
-    for joint, column in zip(arm.driven, angles.T, strict=True):
+def _check_ranges(
+    where: Sequence[str], angles: Array, arm: Arm, tolerance: JointTolerance, share: float = 1.0
+) -> None:
+    for joint, column, factor in zip(arm.driven, angles.T, tolerance.scale, strict=True):
         low, high = joint.range_deg
+        allowed_deg = share * tolerance.one * factor
         for place, angle in zip(where, column.tolist(), strict=True):
             if not low - allowed_deg <= angle <= high + allowed_deg:
                 raise InputError(
@@ -310,13 +323,13 @@ def _check_ranges(where: Sequence[str], angles: Array, arm: Arm, allowed_deg: fl
 
 
 def _poses(
-    table: NumberTable, header: Header, radians: bool | None, tolerance_deg: float | None
+    table: NumberTable, header: Header, radians: bool | None, tolerance_deg: Tolerance | None
 ) -> ImportedPath:
     """Via points from columns of positions and orientations."""
     if header.time is not None or tolerance_deg is not None:
         raise InputError(
             f"{table.path}: poses are not thinned: every line becomes a via point, and times are planned anew",
-            "leave the time and --tolerance-deg out, and give only the poses to pass",
+            "leave the time, --tolerance-deg and --tolerance-mm out, and give only the poses to pass",
         )
     columns = {key: np.array(table.numbers([column.index]))[:, 0] for key, column in header.pose.items()}
     position = np.column_stack([columns[key] for key in table_header.POSITION])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -35,6 +36,8 @@ _REASONS = {
     "floating": "it is free in all directions, and a motor turns about one axis",
     "planar": "it moves in a plane, and a motor turns about one axis",
 }
+_FAR_M = 10.0
+"""Farther from joint to joint than the links of any small arm."""
 _MOST = 8
 """Largest number of candidates in a message."""
 
@@ -81,7 +84,7 @@ class Chain:
     couplings: tuple[Coupling, ...] = ()
     """Transmissions that turn two of its joints together."""
     unclear: tuple[str, ...] = ()
-    """What is said of other such transmissions."""
+    """What is said of other such transmissions, and of lengths and angles that may have another unit."""
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -145,7 +148,7 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     or an arm file cannot describe one of its joints (with all reasons).
     """
     urdf = _reader()
-    _check_text(path)
+    root = _checked(path)
     try:
         with np.errstate(all="ignore"):  # it divides by the length of an axis that has none
             model = urdf.load(str(path), load_meshes=False, build_scene_graph=True)
@@ -171,7 +174,8 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     names = [joint.name for joint in moving if joint.mimic is None and joint.type != _SLIDING]
     couplings, unclear = urdf_transmissions.of_file(path, names)
     zero = _transform(model, last, first)
-    return Chain(model.robot.name, first, last, found, zero, model, couplings, unclear)
+    doubtful = _doubtful_origins(root, {joint.name for joint in joints})
+    return Chain(model.robot.name, first, last, found, zero, model, couplings, (*unclear, *doubtful))
 
 
 def _reader() -> Any:
@@ -182,8 +186,8 @@ def _reader() -> Any:
     return URDF
 
 
-def _check_text(path: Path) -> None:
-    """Raise InputError unless the file is valid XML with a robot, as the reader silently repairs errors."""
+def _checked(path: Path) -> ElementTree.Element:
+    """The file's outermost element; InputError unless it is a robot in valid XML, as the reader repairs errors."""
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except FileNotFoundError:
@@ -199,6 +203,14 @@ def _check_text(path: Path) -> None:
     if root.get("name") is None:
         raise InputError(f"{path}: its <robot> element has no name", 'give it one: <robot name="my_arm">')
     values = [value for element in root.iter() for value in element.attrib.values()]
+    for kind in ("link", "joint"):
+        twice = [
+            name
+            for name, count in Counter(each.get("name") for each in root.findall(kind)).items()
+            if count > 1
+        ]
+        if twice:
+            raise InputError(f"{path}: two {kind}s are called {twice[0]!r}", "give each a name of its own")
     joints = {joint.get("name"): joint.find("mimic") for joint in root.findall("joint")}
     for name, mimic in joints.items():
         master = None if mimic is None else mimic.get("joint")
@@ -212,6 +224,24 @@ def _check_text(path: Path) -> None:
             f"{path}: is a xacro file{left}",
             f"make a URDF of it first: xacro {path} > robot.urdf (xacro is a part of ROS)",
         )
+    return root
+
+
+def _doubtful_origins(root: ElementTree.Element, names: set[str]) -> list[str]:
+    """What is said of these joints' places, which were probably in mm, and directions, in degrees."""
+    doubts = []
+    for joint in root.findall("joint"):
+        name, origin = joint.get("name"), joint.find("origin")
+        if origin is None or name not in names:
+            continue
+        xyz, rpy = (origin.get(key, "") for key in ("xyz", "rpy"))
+        if max((abs(float(value)) for value in xyz.split()), default=0.0) > _FAR_M:
+            doubts.append(f"joint {name!r}: its xyz, {xyz}: is it in mm? A URDF has metres; correct it there")
+        if max((abs(float(value)) for value in rpy.split()), default=0.0) > math.tau:
+            doubts.append(
+                f"joint {name!r}: its rpy, {rpy}: is it in degrees? A URDF has radians; correct it there"
+            )
+    return doubts
 
 
 def _path(path: Path, model: Any, base: str | None, tip: str | None) -> list[Any]:

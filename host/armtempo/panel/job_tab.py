@@ -19,7 +19,7 @@ from armtempo.panel.fields import Fields
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.job_editor import ANGLES, OPTIONS, POSE, WAY_KEYS, Via
 from armtempo.panel.job_plan import JobPlan
-from armtempo.panel.panel_page import named
+from armtempo.panel.panel_page import build_rows, named
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -68,11 +68,11 @@ class JobTab:
         self._built = self._form()
         joints = self._operator.arm.driven
         columns = f"2.2rem 4.6rem repeat({len(joints)}, minmax(4rem, 6rem)) auto"
-        with ui.element("div").classes("armtempo-grid").style(f"grid-template-columns: {columns}"):
+        grid = ui.element("div").classes("armtempo-grid").style(f"grid-template-columns: {columns}")
+        with grid:
             for text in ("", "", *(joint.labelled for joint in joints), ""):
                 ui.label(words.plain(text)).classes("text-caption ellipsis")
-            for number, via in enumerate(self._jobs.vias):
-                self._row(number, via)
+        build_rows(grid, len(self._jobs.vias), self._row)
         with ui.row():
             ui.button(
                 words.NEW_VIA, on_click=lambda: self._edit(self._jobs.insert, len(self._jobs.vias))
@@ -92,7 +92,8 @@ class JobTab:
         """A text of a via point, as it is when it is asked for."""
         return lambda: text(self._jobs.vias[number])
 
-    def _row(self, number: int, via: Via) -> None:
+    def _row(self, number: int) -> None:
+        via = self._jobs.vias[number]
         ui.label(f"P{number}")
         with ui.label(_kind(via)).classes("armtempo-note") as kind:
             hint = ui.tooltip(_hint(via))

@@ -108,16 +108,21 @@ def _views(page: PanelPage) -> None:
 
 def _dock(page: PanelPage) -> None:
     """Position, last message, pause and speed: in view on every tab."""
+
+    def why_no_resume() -> str:
+        state = page.operator.live.state
+        return words.NOT_PAUSED if state is not None and state.speed_percent else ""
+
     with ui.element("footer").classes("armtempo-dock"):
         ui.label("").props('id="armtempo-where"')
         ui.label("").props('id="armtempo-said" role="status"')
         with ui.element("div").classes("armtempo-speeds"):
-            for text, icon, call in (
-                (words.PAUSE, "pause", Board.pause),
-                (words.RESUME, "play_arrow", Board.resume),
+            for text, icon, call, why_not in (
+                (words.PAUSE, "pause", Board.pause, str),
+                (words.RESUME, "play_arrow", Board.resume, why_no_resume),
             ):
                 give = partial(page.at_once, call=call, needs=Needs.PAUSE)
-                page.button(text, give, Needs.PAUSE, look=f"outline dense icon={icon}")
+                page.button(text, give, Needs.PAUSE, why_not, f"outline dense icon={icon}")
             _speed(page)
 
 

@@ -36,6 +36,21 @@ FREEZE_AFTER_S = 0.5
 _LOG = logging.getLogger("armtempo")
 
 
+class _Warnings(logging.Handler):
+    """Shows the library's warnings on the pages, which a terminal shows too; not those on the panel's own server."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        super().__init__(logging.WARNING)
+        self._say = say
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show a warning, in the terminal as well: Python does so only while no handler takes it."""
+        if logging.lastResort is not None and not logging.getLogger().handlers:
+            logging.lastResort.handle(record)
+        if not (text := record.getMessage()).startswith("panel:"):
+            self._say(text)
+
+
 class Needs(Flag):
     """Requirements of a command, besides control by its client."""
 
@@ -111,7 +126,9 @@ class PanelBoard:
         self._stop_sent_s = 0.0
         self._connect = connect
         self._board: Board | None = None
+        self._warnings = _Warnings(self.say)
         self._open()
+        _LOG.addHandler(self._warnings)
         self._looker = Thread(target=self._look, name="armtempo panel states", daemon=True)
         self._looker.start()
 
@@ -190,6 +207,7 @@ class PanelBoard:
     def close(self) -> None:
         """Stop a motion, and close the board."""
         self._closed.set()
+        _LOG.removeHandler(self._warnings)
         if self.busy:
             self.stop("the panel's end")
         self._looker.join(2 * LOOK_S)
@@ -396,7 +414,7 @@ class PanelBoard:
                 self.live.draw()
                 if board is None:
                     continue
-                with board.client.session.in_a_hurry(LOOK_S) as mine:
+                with board.client.session.by_turns(LOOK_S) as mine:
                     if not mine:
                         continue
                     asked_s = time.monotonic()

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from nicegui import run, ui
+from nicegui import background_tasks, run, ui
 from nicegui.element import Element
 
 from armtempo.basics.arrays import Array
@@ -28,6 +28,7 @@ from armtempo.robot.board import Board
 T = TypeVar("T")
 _WAY_POINTS = 40
 _PLAY_S = 0.05
+_ROWS_AT_ONCE = 8
 LOOK_S = 0.25
 """Interval at which a page updates, except for moving parts."""
 
@@ -324,6 +325,27 @@ class PanelPage:
         for tab, listener in self.listeners:
             if tab in ("", self.shown):
                 listener()
+
+
+def build_rows(place: Element, count: int, row: Callable[[int], object]) -> None:
+    """Build rows in a place, the first at once, the others with a pause after each.
+
+    One takes 5 to 10 ms, and stop and the buttons that are held must not wait for a hundred.
+    """
+
+    async def others() -> None:
+        for number in range(_ROWS_AT_ONCE, count):
+            await asyncio.sleep(0)
+            if place.is_deleted:  # it is built anew, or the page is closed
+                return
+            with place:
+                row(number)
+
+    with place:
+        for number in range(min(count, _ROWS_AT_ONCE)):
+            row(number)
+    if count > _ROWS_AT_ONCE:
+        background_tasks.create(others())
 
 
 def named(element: Element, name: str) -> Element:

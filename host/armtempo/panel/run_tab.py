@@ -109,10 +109,10 @@ class RunTab:
             self._plan.set_text(
                 words.PLANNED.format(name=jobs.plan.job.name, total=jobs.plan.total_s, file=file)
             )
-        running = operator.live.plan
+        running = operator.live.plan if operator.busy else None
         self._bar.set_visibility(running is not None)
         self._left.set_visibility(running is not None)
-        if running is not None and operator.busy:
+        if running is not None:
             left_s = max(0.0, (1.0 - operator.progress) * running.total_s)
             self._bar.set_value(operator.progress)
             self._left.set_text(words.LEFT.format(name=running.job.name, part=operator.progress, left=left_s))

@@ -16,7 +16,7 @@ from armtempo.panel import words
 from armtempo.panel.fields import Fields, in_words
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.panel_board import Needs
-from armtempo.panel.panel_page import named
+from armtempo.panel.panel_page import build_rows, named
 from armtempo.panel.sequence_editor import KINDS, kind_of
 
 if TYPE_CHECKING:
@@ -84,22 +84,22 @@ class SequenceTab:
         self._rows, self._times, self._timed = [], [], None
         self._fields.clear()
         self._built, self._lit = self._form(), 0
-        steps = self._editor.steps
-        jobs = self._operator.jobs.files()
-        for index, (step, depth) in enumerate(zip(steps, self._editor.depths, strict=True)):
-            self._rows.append(self._row(index, step, depth, jobs))
+        count, jobs = len(self._editor.steps), self._operator.jobs.files()
+        build_rows(ui.column(), count, lambda index: self._row(index, jobs))
         if self._editor.is_open:
             with ui.row():
-                add = partial(self._file.change, self._editor.add, len(steps))
+                add = partial(self._file.change, self._editor.add, count)
                 self._page.button(words.ADD_STEP, add, Needs.CONTROL)
-                self._page.button(words.ADD_HERE, partial(self._add_here, len(steps)), Needs.CONTROL)
+                self._page.button(words.ADD_HERE, partial(self._add_here, count), Needs.CONTROL)
 
     def _add_here(self, index: int, press: Press) -> None:
         here_deg = [round(float(angle), 4) + 0.0 for angle in self._operator.live.angles_deg]
         self._file.change(self._editor.add, index, {"goto": here_deg}, press)
 
-    def _row(self, index: int, step: dict[str, str], depth: int, jobs: list[str]) -> ui.row:
-        page, editor, kind = self._page, self._editor, kind_of(step)
+    def _row(self, index: int, jobs: list[str]) -> None:
+        page, editor = self._page, self._editor
+        step, depth = editor.steps[index], editor.depths[index]
+        kind = kind_of(step)
         with ui.row().classes("armtempo-step").style(f"margin-left: {1.5 * depth}rem") as row:
             ui.label(str(index + 1)).classes("armtempo-number")
             choice = ui.select(words.STEP_KINDS, value=kind).props("dense outlined")
@@ -107,9 +107,9 @@ class SequenceTab:
             choice.on_value_change(lambda event: editor.set_kind(index, str(event.value)))
             page.control(choice, Needs.CONTROL)
             for key in (kind, *KINDS[kind]):
-                self._field(
-                    index, key, step.get(key, ""), None if key == kind else words.STEP_KEYS[key], jobs
-                )
+                label = None if key == kind else words.STEP_KEYS[key]
+                box = self._field(index, key, step.get(key, ""), label, jobs)
+                box.classes("armtempo-value" if KINDS[kind] else "armtempo-wide")
             for icon, text, call in (
                 ("arrow_upward", words.UP, partial(editor.move, index, -1)),
                 ("arrow_downward", words.DOWN, partial(editor.move, index, 1)),
@@ -119,10 +119,11 @@ class SequenceTab:
                 name = f"{text} {words.STEP} {index + 1}"
                 change = partial(self._file.change, call)
                 page.button("", change, Needs.CONTROL, look=f"flat dense icon={icon}", name=name)
-            self._times.append(ui.label("").classes("armtempo-note"))
-        return row
+            time = "" if self._timed is None else _time_of(self._timed, index + 1)
+            self._times.append(ui.label(time).classes("armtempo-note"))
+        self._rows.append(row)
 
-    def _field(self, index: int, key: str, value: str, label: str | None, jobs: list[str]) -> None:
+    def _field(self, index: int, key: str, value: str, label: str | None, jobs: list[str]) -> ui.input:
         """A field for the value of a key, with what it can name as a list."""
         # A name that cannot be shown as it is could only be completed to another one
         choices = [name for name in self._editor.choices(key, jobs) if name == words.plain(name)]
@@ -130,7 +131,8 @@ class SequenceTab:
         named(box.props("dense outlined"), f"{words.STEP} {index + 1}: {label or words.STEP_KINDS[key]}")
         self._fields.add(box.set_value, lambda: self._editor.steps[index].get(key, ""))
         box.on("change", lambda event: self._set(index, key, str(event.args or "").strip()))
-        self._page.control(box.classes("armtempo-value"), Needs.CONTROL)
+        self._page.control(box, Needs.CONTROL)
+        return box
 
     def _set(self, index: int, key: str, text: str) -> None:
         """Set a value, and show how the file has it at once: later it would replace what is typed next."""

@@ -7,6 +7,7 @@ import ipaddress
 import json
 import logging
 import socket
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -28,6 +29,9 @@ from armtempo.report.comparison import PAGE as COMPARISON
 
 _RECONNECT_S = 60.0
 """Time for which a page is kept after its connection breaks (a busy browser, a sleeping tablet)."""
+_SWITCH_S = 0.0005
+"""How long a thread that computes, such as a plan, keeps the interpreter from others that wait, a stop's among them:
+Python's own 5 ms count several times on the way of a press to the board."""
 _KEPT_MESSAGES = 2000
 """Messages kept for such a page: about 15 per second, for up to 132 s until it is dropped."""
 _NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
@@ -70,6 +74,7 @@ class Panel:
     def serve(self, listening: socket.socket, token: str) -> None:
         """Serve on a bound socket; a client needs the ``token``."""
         host, port = listening.getsockname()[:2]
+        sys.setswitchinterval(_SWITCH_S)
         guarded = Access(self._api, served_hosts(host), token, port)
         config = uvicorn.Config(
             guarded,

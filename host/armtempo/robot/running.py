@@ -136,7 +136,7 @@ def request_stop(client: Client, stops: Iterable[StopRequest], now: bool, by: st
     """
     for request in [*stops]:
         request.ask(by)
-    with client.session.in_a_hurry(LOCK_S) as mine:
+    with client.session.in_a_hurry(LOCK_S, stops=True) as mine:
         if not mine:
             raise NoAnswerError(
                 "the board does not answer the program that has its port",

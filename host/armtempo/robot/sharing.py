@@ -117,7 +117,7 @@ class Sharing:
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
-        with self._client.session.in_a_hurry(LOCK_S) as mine:
+        with self._client.session.by_turns(LOCK_S) as mine:
             if not mine:
                 raise NoAnswerError(
                     "the program that has the port is waiting for the board's answer", "try again"

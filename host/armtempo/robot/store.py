@@ -11,7 +11,7 @@ from armtempo_shared.sequence import KIND_BYTES, SequenceData, SequenceError
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion, flash_use
+from armtempo.encoding import encoded_motion, encoded_program, flash_use, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
 from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
@@ -23,6 +23,29 @@ from armtempo.robot.connection import Connection
 
 _KINDS = {sequence.MAGIC[:KIND_BYTES]: "sequence", program.MAGIC[:KIND_BYTES]: "program"}
 """What records of other kinds than motions begin with."""
+
+
+def what_is_old(client: Client, entry: StoredMotion, arm: Arm) -> str:
+    """What has changed in the arm since a stored motion, sequence or program was made with it; "" for nothing."""
+    check = encoded_program.check_stored if entry.program else made_with.check_stored
+    try:
+        check(entry.name, client.fetch(entry.name), arm)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def withdraw_old_default(client: Client, arm: Arm) -> str:
+    """Take from the board's button what is old: the board does not know frames, tools and pallets of the arm file.
+
+    Returns what to tell the user; "" if the default, if there is one, is as the arm is now.
+    """
+    default = next((entry for entry in client.stored() if entry.default), None)
+    old = what_is_old(client, default, arm) if default else ""
+    if not old:
+        return ""
+    client.set_default("")
+    return f"{old} with --default: until then the board's button starts nothing"
 
 
 @checked_as("Board")

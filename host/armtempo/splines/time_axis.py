@@ -33,21 +33,6 @@ def mirrored(count: int, edge: int) -> NDArray[np.intp]:
     return np.pad(np.arange(count), edge, mode="symmetric")
 
 
-@cache
-def free_map(count: int, degree: int) -> Array:
-    """The linear map from differences of control points to control points, with t = 0 at the start.
-
-    The ends are free, unlike in ``step_map``. Shape (count + degree - 1, count + degree).
-    """
-    differences = count + degree - 1
-    points = np.zeros((differences, count + degree))
-    points[:, 1:] = np.cumsum(np.eye(differences), axis=1)
-    start = points[:, : degree + 1] @ bspline.basis(degree)[0]
-    matrix = np.asarray(points - start[:, None])
-    matrix.setflags(write=False)
-    return matrix
-
-
 def refined(differences_s: Array, parts: int, degree: int) -> Array:
     """Differences of the control points of the same axis with each segment divided into ``parts``.
 

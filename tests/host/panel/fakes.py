@@ -65,7 +65,7 @@ class Session:
     def listen(self, listener: object) -> None:
         """Nothing is to be heard."""
 
-    def in_a_hurry(self, timeout_s: float) -> Any:
+    def by_turns(self, timeout_s: float) -> Any:
         raise LinkError("nothing answers")
 
 

@@ -116,3 +116,12 @@ def test_a_motion_that_is_played_ends_in_time_or_when_it_is_stopped(operator: Pa
         assert not page.of.is_playing
         assert page.loop.run_until_complete(page.of.play(1e-3, shown.append))
         assert shown[0] < shown[-1] == 1e-3
+
+
+def test_only_a_paused_motion_is_resumed(operator: PanelBoard) -> None:
+    with pages(operator) as page:
+        for percent in (50.0, 0.0):
+            operator.live.state = board_state(moving=True, speed_percent=percent)
+            page.look()
+            assert page.named(words.PAUSE).enabled  # also a second time
+            assert page.named(words.RESUME).enabled == (percent == 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -107,6 +108,8 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
     told[-1]("the cable is out; waiting for it to come back")
     assert "cable" in made.why_not(ME, Needs.BOARD)
     assert "cable" in made.log.last[-1]
+    logging.getLogger("armtempo").warning("the link of joint 1 is inside of the floor")  # by a plan
+    assert "inside of the floor" in made.log.last[-1]
     made.close()
 
 
@@ -122,7 +125,7 @@ def test_a_fault_of_ours_does_not_end_the_states(
         asked.append(1)
         yield 1 // 0
 
-    board.client.session.in_a_hurry = fail
+    board.client.session.by_turns = fail
     made = fakes.operator(board, tmp_path)
     wait(lambda: len(asked) > 3)
     made.close()

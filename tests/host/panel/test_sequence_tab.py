@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
+import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.link.board_messages import SequenceState
 from armtempo.panel import words
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.sequence_editor import SequenceEditor
+from nicegui import ui
 
 from tests.host.panel.fakes import ARM, board_state
 from tests.host.panel.pages import pages
@@ -149,3 +152,23 @@ def test_planning_is_seen_and_not_begun_twice(
         assert during[-2:] == ["False", "False"]
         assert words.PLANNING not in page.texts()
         assert page.named(words.PLAN).enabled
+
+
+def test_stop_does_not_wait_for_a_long_table(operator: PanelBoard) -> None:
+    (operator.sequences.folder / "long.toml").write_text('name = "long"\n' + 40 * '[[step]]\ngoto = "home"\n')
+    passes = []
+
+    async def others() -> None:
+        while True:
+            passes.append(len(page.elements(ui.input)))
+            await asyncio.sleep(0)
+
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        operator.sequences.open("long.toml")
+        task = page.loop.create_task(others())
+        page.look()
+        task.cancel()
+        assert max(np.diff(passes)) < 10  # rows are built at once
+        assert passes[-1] - passes[0] == 40
+        assert page.named("step 40: goto").value == "home"

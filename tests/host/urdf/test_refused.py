@@ -91,6 +91,7 @@ LINK = '<link name="a"/>'
         (f"<robot>{LINK}</robot>", "has no name"),
         (f'<robot name="x">{LINK}<joint name="j" type="revolute"/></robot>', "not a URDF that can be read"),
         ('<robot name="x"/>', "has no joints"),
+        (f'<robot name="x">{LINK}{LINK}</robot>', "two links are called 'a'"),
         (f'<robot name="x">{LINK}</robot>', "has no joints"),
     ],
 )

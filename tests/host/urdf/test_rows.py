@@ -237,6 +237,17 @@ def test_capsules_of_a_slide_contain_its_shapes_wherever_it_is(
         assert np.min(away, axis=0).max() <= arm.joints[row].radius_mm + 1e-6
 
 
+def test_places_in_mm_and_directions_in_degrees_are_suspected(tmp_path: Path) -> None:
+    text = (FOLDER / "three_planar.urdf").read_text()
+    urdf = tmp_path / "units.urdf"
+    urdf.write_text(text.replace('xyz="0.25 0 0.02" rpy="0 0 0"', 'xyz="250 0 20" rpy="0 90 0"'))
+    result = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(tmp_path / "arm.toml")])
+    assert result.exit_code == 0, result.output
+    said = " ".join(result.output.split())
+    assert "its xyz, 250 0 20: is it in mm? A URDF has metres; correct it there" in said
+    assert "its rpy, 0 90 0: is it in degrees? A URDF has radians; correct it there" in said
+
+
 def test_a_new_project_says_what_is_doubtful_in_a_urdf(tmp_path: Path) -> None:
     urdf = tmp_path / "robot.urdf"
     text = (FOLDER / "three_planar.urdf").read_text()

@@ -14,6 +14,8 @@ from tests.system.panels import Panel, home, press, wait_for
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("panel")]
 
 
+_LONG = "tray" + 30 * "-long"
+"""The name of a posture, for which no part of a page may be too narrow."""
 _SHIFTS = """begin => new Promise(resolve => {
   let [most, sum, first, last] = [0, 0, -1e9, -1e9];
   new PerformanceObserver(list => list.getEntries().forEach(one => {
@@ -141,10 +143,10 @@ def test_a_target_is_shown_then_approached_while_held_and_postures_are_stored(
     wait_for(page, "31.0", place="armtempo-where")
     page.get_by_role("button", name="While held").click()
     page.get_by_role("button", name="Store…").click()
-    page.get_by_role("dialog").get_by_label("Name").fill("tray")
+    page.get_by_role("dialog").get_by_label("Name").fill(_LONG)
     panels.answer(page, "Store")
-    page.get_by_role("button", name="Go to tray").wait_for()
-    assert "[posture.tray]\nangles_deg = [31" in (panel.folder / "arm.toml").read_text()
+    page.get_by_role("button", name=f"Go to {_LONG}").wait_for()
+    assert f"[posture.{_LONG}]\nangles_deg = [31" in (panel.folder / "arm.toml").read_text()
     page.get_by_role("button", name="Guide by hand…").click()
     panels.answer(page, "Guide by hand…")
     wait_for(page, "unhomed", "Guide by hand…")

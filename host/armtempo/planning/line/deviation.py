@@ -74,15 +74,13 @@ def _at_ends(
     angles_deg: Array, distances: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...]
 ) -> Array:
     """The larger deviation of the two ends of pieces, (N, 2): position in mm, and chord of the rotation."""
-    found = []
-    for end in (0, -1):
-        state = tool.at(angles_deg[:, end])
-        position, rotation = path.poses(distances[:, end])
-        away = np.linalg.norm(state.position_mm - position, axis=1)
-        axes = slice(2, 3) if fixed == (APPROACH,) else slice(0, 3)
-        turned = (state.rotation - rotation)[:, :, axes]
-        found.append(np.stack([away, _per_axis(fixed) * np.linalg.norm(turned, axis=(1, 2))], axis=1))
-    return np.asarray(np.maximum(found[0], found[1]))
+    state = tool.at(np.concatenate([angles_deg[:, 0], angles_deg[:, -1]]))
+    position, rotation = path.poses(np.concatenate([distances[:, 0], distances[:, -1]]))
+    away = np.linalg.norm(state.position_mm - position, axis=1)
+    axes = slice(2, 3) if fixed == (APPROACH,) else slice(0, 3)
+    turned = (state.rotation - rotation)[:, :, axes]
+    found = np.stack([away, _per_axis(fixed) * np.linalg.norm(turned, axis=(1, 2))], axis=1)
+    return np.asarray(np.maximum(*np.split(found, 2)))
 
 
 def _per_axis(fixed: tuple[str, ...]) -> float:

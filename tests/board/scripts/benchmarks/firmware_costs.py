@@ -154,7 +154,15 @@ def start(name):
         (False, motion.angle_offset(0)),
         (False, motion.angle_offset(1)),
     ):
-        cost("spline_" + name, motion_check._check_spline, motion, 0, at, motion.segments, is_time)
+        cost(
+            "spline_" + name,
+            motion_check._check_spline,
+            motion,
+            0,
+            at,
+            is_time,
+            generator.subintervals.points,
+        )
     cost("ends_" + name, endpoints.start_offset, motion, 0, 0)
     cost("duration_" + name, endpoints.duration_ticks, motion)
     for joint in range(motion.joints):

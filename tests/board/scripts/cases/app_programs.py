@@ -129,6 +129,40 @@ def case_places_of_a_pallet_one_after_the_other_until_it_is_full():
     ], world.said()
 
 
+def case_a_pallet_goes_on_where_a_program_left_it():
+    def script(world):
+        if world.said() and world.said()[-1].startswith("row 1, column 1, layer 2"):
+            world.host.ask("stop", (0,))
+
+    world = World(
+        "tray = cell.pallet('tray')\n"
+        "while __at__(3) and tray.left():\n"
+        "    print(tray.next())\n"
+        "    cell.sleep(0.1)\n",
+        script,
+    )
+    assert world.run()[0] == "stopped"
+    places = ["row %d, column 1, layer %d of pallet 'tray'" % (n % 2 + 1, n // 2 + 1) for n in range(4)]
+    assert world.said() == places[:3]
+    world.script = lambda world: None
+    for told in (["pallet 'tray' goes on at row 2, column 1, layer 2", places[3]], places):
+        world.host.events.clear()
+        assert world.start_stored()[0] == "ok"
+        world.execute()
+        assert (world.stands()[0], world.said()) == ("finished", told), world.said()
+    assert set(world.board.taken.values()) == {0}
+    world.board.taken = {("tray", 2, 1, 2): 1, ("far", 1, 1, 2): 1}  # of another shape
+    world.host.events.clear()
+    again = World("cell.pallet('far')\ntray = cell.pallet('tray')\ntray.reset()\nprint(tray.left())\n")
+    again.board.taken = world.board.taken
+    assert again.run()[0] == "finished"
+    assert again.said() == ["pallet 'tray' goes on at row 2, column 1, layer 1", "4"], again.said()
+    assert again.board.taken["tray", 2, 1, 2] == 0
+    again.board.outputs = again.board.inputs = None
+    assert again.host.upload("/arm", stand_in.arm(low=-1))[-1][0] == "ok"
+    assert not again.board.taken
+
+
 def case_what_is_not_possible_is_an_exception_with_words():
     for call, words in (
         ("goto('nowhere')", "the arm has no posture 'nowhere'; it has away, home, there"),

@@ -38,7 +38,7 @@ def begin_of(part):
 def parts_of(generator):
     """All words of a step generator."""
     now = generator.subintervals
-    windows = [points.words for points in (now._angle_points, now._time_points)]
+    windows = [points.words for points in (now.points, now._time_points)]
     own = [generator._solver, generator._law_words, generator.queue]
     return [now.angle, now.time] + windows + [now.angle_measures, now.time_measures] + own
 

@@ -57,6 +57,9 @@ class Flash:
     def listdir(self, path):
         return [name[len(path) + 1 :] for name in self.files]
 
+    def ilistdir(self, path):
+        return [(name, 0x8000, 0) for name in self.listdir(path)]
+
     def stat(self, path):
         if path == self.root:
             return (0x4000,)

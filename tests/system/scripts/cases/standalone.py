@@ -263,13 +263,36 @@ def case_button_starts_a_program_and_ends_it(world):  # not compiled
         yield from world.until(lambda: world.led() == "moving")
 
 
-def case_before_homing_no_program_starts(world):  # not compiled
+def visited(world, name, places):
+    """Run what is stored; how many of the places it comes to, one after the other."""
+    crc = wire.record_crc(whole_board.read(FLASHES + "/pallet/armtempo/" + name + ".atm"))
+    yield from world.ask("start", (0, crc), name)
+    count = quiet = 0
+    while quiet < 300:
+        yield
+        quiet = 0 if machine_state.board.timers[2].running else quiet + 1
+        if (
+            count < len(places)
+            and [home + moved for home, moved in zip(HOME, world.steps())] == places[count]
+        ):
+            count += 1
+    return count
+
+
+def case_a_pallet_by_a_program_and_by_a_sequence(world):  # not compiled
+    """By the pins: above each place, at it, above it again, and home at last."""
     yield from world.hello()
-    yield from world.ask("set_default", (), "pick")
-    yield from tap(world)
-    yield from unmoved(world)
-    told = notices(world)
-    assert told == ["button: error %d" % wire.ERROR_CODES["unhomed"]], told
+    yield from world.home(HOME)
+    rows = whole_board.read(FLASHES + "/pallet/places").decode().split("\n")
+    places = []
+    for row in rows:
+        steps = [int(each) for each in row.split(",")]
+        places += [steps[:3], steps[3:], steps[:3]]
+    for name in ("by-goto", "lines"):
+        count = yield from visited(world, name, places)
+        assert (count, world.steps()) == (len(places), [0, 0, 0]), (name, count, world.steps())
+        status = yield from world.status()
+        assert (status["state"], status["fault"]) == ("idle", ""), status
 
 
 class Switches:
@@ -375,6 +398,7 @@ def case_a_failing_start_is_a_fault_not_the_end(world):  # not compiled
 
 for name in cases.wanted(globals()):
     held = (lambda world: world.press()) if "power_up" in name else None
-    flash = FLASHES + ("/stop" if "no_host" in name else "/alone" if "when_powered" in name else "/finish")
+    flash = "/stop" if "no_host" in name else "/alone" if "when_powered" in name else "/finish"
+    flash = FLASHES + ("/pallet" if "pallet" in name else flash)
     whole_board.run(globals()[name], flash, PROGRAM, held)
     print(name)
