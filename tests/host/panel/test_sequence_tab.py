@@ -171,4 +171,4 @@ def test_stop_does_not_wait_for_a_long_table(operator: PanelBoard) -> None:
         task.cancel()
         assert max(np.diff(passes)) < 10  # rows are built at once
         assert passes[-1] - passes[0] == 40
-        assert page.named("step 40: goto").value == "home"
+        assert page.named("step 40: go to").value == "home"
