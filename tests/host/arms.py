@@ -206,14 +206,18 @@ def with_wrist_at(planar: float, up: float, turn: float = 0.0) -> np.ndarray:
 # arm files with something changed, and ``armtempo check`` on them
 
 
-def changed(tmp_path: Path, *changes: tuple[str, str], of: str = shipped.PAPER) -> Path:
-    """A shipped arm file with texts replaced, each once."""
-    text = shipped.files()[of].read_text()
+def replaced(text: str, *changes: tuple[str, str]) -> str:
+    """A text with parts of it replaced, each once."""
     for old, new in changes:
         assert old in text
         text = text.replace(old, new, 1)
+    return text
+
+
+def changed(tmp_path: Path, *changes: tuple[str, str], of: str = shipped.PAPER) -> Path:
+    """A shipped arm file with texts replaced, each once."""
     path = tmp_path / "arm.toml"
-    path.write_text(text)
+    path.write_text(replaced(shipped.files()[of].read_text(), *changes))
     return path
 
 
@@ -221,6 +225,28 @@ def run_check(*arguments: str | Path) -> Result:
     return CliRunner().invoke(main, ["check", *map(str, arguments)])
 
 
+SLIDE_AND_TURN = """
+name = "lift"
+[[joint]]
+name = "z"
+type = "prismatic"
+d_mm = 10.0
+a_mm = 100.0
+alpha_deg = 0.0
+range_mm = [0.0, 200.0]
+limits = { speed_mm_s = 40.0, acceleration_mm_s2 = 200.0, jerk_mm_s3 = 2000.0 }
+motor = { channel = 1, steps_per_rev = 200, microsteps = 4, mm_per_rev = 8.0 }
+encoder = { channel = 1, counts_per_rev = 2000, following_error_mm = 2.0 }
+[[joint]]
+name = "turn"
+d_mm = 0.0
+a_mm = 50.0
+alpha_deg = 0.0
+range_deg = [-90.0, 90.0]
+limits = { speed_deg_s = 90.0, acceleration_deg_s2 = 90.0, jerk_deg_s3 = 900.0 }
+motor = { channel = 2, steps_per_rev = 200, microsteps = 4, gear_ratio = 20.0 }
+"""
+"""A joint that slides, and one that turns on it."""
 GRIPPER = """
 [output.gripper]
 kind = "servo"

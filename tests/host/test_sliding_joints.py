@@ -35,40 +35,19 @@ from armtempo.planning.jog.jog_motion import JogMove, move_of
 from armtempo.planning.tool import Tool
 from armtempo.simulator.launch_options import describe
 
-from tests.host.arms import SIX
+from tests.host.arms import SIX, SLIDE_AND_TURN
 
 SEED = 20_261_127
 TOLERANCE = 1e-9
 QUICK: dict[str, Any] = {"path": "through", "optimiser": "gradient", "starts": 1, "refine": 2}
 SCARA, RAIL = Arm.load("scara_z"), Arm.load("community_rail")
-SMALL = """
-name = "lift"
-[[joint]]
-name = "z"
-type = "prismatic"
-d_mm = 10.0
-a_mm = 100.0
-alpha_deg = 0.0
-range_mm = [0.0, 200.0]
-limits = { speed_mm_s = 40.0, acceleration_mm_s2 = 200.0, jerk_mm_s3 = 2000.0 }
-motor = { channel = 1, steps_per_rev = 200, microsteps = 4, mm_per_rev = 8.0 }
-encoder = { channel = 1, counts_per_rev = 2000, following_error_mm = 2.0 }
-[[joint]]
-name = "turn"
-d_mm = 0.0
-a_mm = 50.0
-alpha_deg = 0.0
-range_deg = [-90.0, 90.0]
-limits = { speed_deg_s = 90.0, acceleration_deg_s2 = 90.0, jerk_deg_s3 = 900.0 }
-motor = { channel = 2, steps_per_rev = 200, microsteps = 4, gear_ratio = 20.0 }
-"""
 
 
 def arm_of(text: str) -> Arm:
     return Arm.of_table(toml_table.parse(text, "arm.toml"))
 
 
-LIFT = arm_of(SMALL)
+LIFT = arm_of(SLIDE_AND_TURN)
 
 
 def drawn(rng: np.random.Generator, sliding: str) -> Arm:
@@ -272,7 +251,7 @@ def test_steps_counts_and_limits_are_those_of_the_screw() -> None:
     row = encode.motor_rows(LIFT)[0]
     assert (row["min_steps"], row["max_steps"], row["following_counts"]) == (0, 20_000, 500)
     assert row["max_rate"] == encode.with_margin(4000.0)
-    geared = arm_of(SMALL.replace("mm_per_rev = 8.0", "mm_per_rev = 8.0, gear_ratio = 3.0"))
+    geared = arm_of(SLIDE_AND_TURN.replace("mm_per_rev = 8.0", "mm_per_rev = 8.0, gear_ratio = 3.0"))
     assert geared.driven[0].steps_per_deg == 300.0
 
 
@@ -295,9 +274,9 @@ def test_steps_counts_and_limits_are_those_of_the_screw() -> None:
     ],
 )  # fmt: skip
 def test_a_wrong_unit_in_an_arm_file_is_said(old: str, new: str, said: list[str]) -> None:
-    assert old in SMALL
+    assert old in SLIDE_AND_TURN
     with pytest.raises(InputError) as error:
-        arm_of(SMALL.replace(old, new, 1))
+        arm_of(SLIDE_AND_TURN.replace(old, new, 1))
     for words in said:
         assert words in str(error.value)
 
@@ -322,7 +301,9 @@ def test_lists_of_positions_say_nothing_of_degrees() -> None:
         Job.of_table(toml_table.parse(both, "a"), two)
     with pytest.raises(InputError, match="within the range of z, 0 to 200 mm"):
         Job.of_table(toml_table.parse(neutral.replace("150.0", "250.0"), "a"), LIFT)
-    posture = SMALL.replace('name = "lift"', 'name = "lift"\nposture.up = { joints = [150.0, 10.0] }')
+    posture = SLIDE_AND_TURN.replace(
+        'name = "lift"', 'name = "lift"\nposture.up = { joints = [150.0, 10.0] }'
+    )
     assert arm_of(posture).posture("up").where == (150.0, 10.0)
     with pytest.raises(InputError, match=r"posture\.up\.angles_deg: z slides, so"):
         arm_of(posture.replace("joints = [150", "angles_deg = [150"))
@@ -394,7 +375,7 @@ def test_a_slide_into_a_box_is_seen_between_samples() -> None:
     box = (
         '\n[workspace]\nkeep_out = [{ name = "shelf", low_mm = [80, -40, 150], high_mm = [120, 40, 152] }]\n'
     )
-    arm = arm_of(SMALL + box)
+    arm = arm_of(SLIDE_AND_TURN + box)
     bodies = workspace_check.Bodies(arm)
     rng = np.random.default_rng(SEED)
     here = np.column_stack([rng.uniform(0, 200, 200), rng.uniform(-90, 90, 200)])

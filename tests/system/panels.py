@@ -232,13 +232,14 @@ def in_control(page: Any) -> Any:
     return page
 
 
-def wait_for(page: Any, *words: str, place: str = "armtempo-state") -> None:
+def wait_for(page: Any, *words: str, place: str = "armtempo-state", within_s: float = WAIT_S) -> None:
     """Until the line of the state, or another place, has all the words."""
     try:
         page.wait_for_function(
             "([place, words]) => words.every(word => document.getElementById(place).textContent.includes(word))",
             arg=[place, words],
             polling=50,
+            timeout=within_s * 1000,
         )
     except Exception as error:
         raise AssertionError(f"{words} were waited for; {page.inner_text('body')}") from error

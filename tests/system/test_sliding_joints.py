@@ -13,34 +13,26 @@ from armtempo.model.arm import Arm
 from armtempo.simulator import LaunchOptions, edgelog, launch
 from click.testing import CliRunner
 
-ARM = """
-name = "lift"
-[[joint]]
-name = "z"
-type = "prismatic"
-d_mm = 10.0
-a_mm = 100.0
-alpha_deg = 0.0
-range_mm = [0.0, 200.0]
-limits = { speed_mm_s = 100.0, acceleration_mm_s2 = 800.0, jerk_mm_s3 = 20000.0 }
-motor = { channel = 1, steps_per_rev = 200, microsteps = 4, mm_per_rev = 8.0 }
-encoder = { channel = 1, counts_per_rev = 2000, following_error_mm = 2.0 }
-switches = { low = "PD0", low_mm = -1.0 }
+from tests.host import arms
+
+_ENCODER = "following_error_mm = 2.0 }\n"
+_MODEL = """switches = { low = "PD0", low_mm = -1.0 }
 [joint.model]
 holding_torque_nm = 0.4
 rotor_inertia_kg_m2 = 5e-6
 damping_nm_s = 0.01
 moved_kg = 2.0
 gravity_force_n = 20.0
-[[joint]]
-name = "turn"
-d_mm = 0.0
-a_mm = 50.0
-alpha_deg = 0.0
-range_deg = [-90.0, 90.0]
-limits = { speed_deg_s = 90.0, acceleration_deg_s2 = 900.0, jerk_deg_s3 = 9000.0 }
-motor = { channel = 2, steps_per_rev = 200, microsteps = 4, gear_ratio = 20.0 }
 """
+ARM = arms.replaced(
+    arms.SLIDE_AND_TURN,
+    (
+        "speed_mm_s = 40.0, acceleration_mm_s2 = 200.0, jerk_mm_s3 = 2000.0",
+        "speed_mm_s = 100.0, acceleration_mm_s2 = 800.0, jerk_mm_s3 = 20000.0",
+    ),
+    (_ENCODER, _ENCODER + _MODEL),
+    ("acceleration_deg_s2 = 90.0, jerk_deg_s3 = 900.0", "acceleration_deg_s2 = 900.0, jerk_deg_s3 = 9000.0"),
+)
 JOB = """
 name = "lift"
 path = "through"

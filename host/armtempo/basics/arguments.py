@@ -17,6 +17,7 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 import numpy as np
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.text import hidden
 
 T = TypeVar("T")
 
@@ -77,6 +78,11 @@ def _wrapped(function: Callable[..., Any], owner: str = "") -> Callable[..., Any
 
 
 def _wrong(name: str, argument: str, value: object, kind: Any) -> InputError:
+    if isinstance(value, str) and (character := hidden(value)) and fits("", kind):
+        return InputError(
+            f"{name}: {argument} has the character {character}, which cannot be shown: {reprlib.repr(value)}",
+            "take it out; if it is in the name of a file, rename the file",
+        )
     return InputError(f"{name}: {argument} is {reprlib.repr(value)}", f"give {describe_kind(kind)}")
 
 

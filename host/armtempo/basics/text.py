@@ -12,6 +12,11 @@ def is_plain(text: str) -> bool:
     return text.isprintable()
 
 
+def hidden(text: str) -> str:
+    """The first character that is not printable, as "U+202E"; "" if all are."""
+    return next((f"U+{ord(char):04X}" for char in text if not char.isprintable()), "")
+
+
 def is_number(text: str) -> bool:
     """Whether the text is a number, finite or not; "1_0", which Python reads as 10, is none."""
     try:

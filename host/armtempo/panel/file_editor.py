@@ -12,6 +12,7 @@ import tomlkit
 from armtempo.basics import toml_table
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError
+from armtempo.basics.text import hidden
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
 
@@ -83,6 +84,11 @@ class FileEditor(ABC):
         """A file of the folder and its text, checked in any thread; raises InputError if it is none of this kind."""
         if name not in self.files():
             raise InputError(f"{name}: there is no such {self.kind} in the project folder", "choose another")
+        if character := hidden(name):
+            raise InputError(
+                f"{name}: the file's name has the character {character}, which cannot be shown",
+                "rename the file",
+            )
         return (file := self.folder / name), self._checked(file)
 
     def _checked(self, file: Path) -> str:

@@ -128,7 +128,7 @@ class SequenceTab:
         # A name that cannot be shown as it is could only be completed to another one
         choices = [name for name in self._editor.choices(key, jobs) if name == words.plain(name)]
         box = ui.input(label, value=value, autocomplete=choices)
-        named(box.props("dense outlined"), f"{words.STEP} {index + 1}: {key}")
+        named(box.props("dense outlined"), f"{words.STEP} {index + 1}: {label or words.STEP_KINDS[key]}")
         self._fields.add(box.set_value, lambda: self._editor.steps[index].get(key, ""))
         box.on("change", lambda event: self._set(index, key, str(event.args or "").strip()))
         self._page.control(box, Needs.CONTROL)

@@ -106,7 +106,7 @@ def test_what_is_typed_on_into_a_step_that_was_just_taken_stays(operator: PanelB
     operator.sequences.open("day.toml")
     with pages(operator) as page:
         page.show(words.TAB_SEQUENCE)
-        typed = page.named("step 3: wait_s")
+        typed = page.named("step 3: wait, s")
         for event, text in (("update:value", "7"), ("change", "7"), ("update:value", "7.5")):
             page.fire(typed, event, text)
         page.look()
@@ -123,12 +123,12 @@ def test_what_is_being_typed_into_a_step_stays_when_another_changes(
     operator.sequences.open("day.toml")
     with pages(operator) as page:
         page.show(words.TAB_SEQUENCE)
-        typed = page.named("step 3: wait_s")
+        typed = page.named("step 3: wait, s")
         page.fire(typed, "update:value", "7")
         operator.sequences.set(0, "repeat", "5")  # on another page
         page.look()
         assert page.named("step 1: repeat").value == "5"
-        assert page.named("step 3: wait_s") is typed
+        assert page.named("step 3: wait, s") is typed
         assert typed.value == "7"
 
 
@@ -171,4 +171,4 @@ def test_stop_does_not_wait_for_a_long_table(operator: PanelBoard) -> None:
         task.cancel()
         assert max(np.diff(passes)) < 10  # rows are built at once
         assert passes[-1] - passes[0] == 40
-        assert page.named("step 40: goto").value == "home"
+        assert page.named("step 40: go to").value == "home"

@@ -8,9 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from armtempo.basics.errors import InputError
 from armtempo.diagnosis.finding import Level
 from armtempo.diagnosis.selftest.result import Measurement, SelfTest
 from armtempo.link.board_messages import StoredMotion
+from armtempo.model.job import Job
 from armtempo.panel import layout, words
 from armtempo.panel.panel_board import PanelBoard
 from nicegui import ui
@@ -115,6 +117,15 @@ def test_names_from_files_and_boards_turn_no_line_on_any_tab(operator: PanelBoar
             assert not any("\u202e" in one or "\x1b" in one for one in found), (element, found)
             shown += found
         assert {'j"□<b>□.toml', 'allj"□<b>□.toml', 'j"□<b>□'} <= set(shown)
+
+
+def test_a_file_whose_name_cannot_be_shown_is_refused_for_that(operator: PanelBoard) -> None:
+    text = 'name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n'
+    (operator.jobs.folder / "j\u202e.toml").write_text(text)
+    with pytest.raises(InputError, match=r"file's name has the character U\+202E.*rename the file"):
+        operator.jobs.open("j\u202e.toml")
+    with pytest.raises(InputError, match=r"path has the character U\+202E.*rename the file"):
+        Job.load(str(operator.jobs.folder / "j\u202e.toml"), fakes.ARM)
 
 
 def test_each_command_that_the_panel_has_a_button_for_is_that_button(operator: PanelBoard) -> None:

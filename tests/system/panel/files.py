@@ -55,6 +55,16 @@ def paste(page: Any, text: str) -> str:
     return panels.refusal_of_answer(page, "Paste")
 
 
+def undo_all(page: Any) -> bool:
+    """Show the job as it was opened; whether it was another."""
+    undo, undone = page.get_by_role("button", name="Undo", exact=True), False
+    while undo.is_enabled():
+        panels.press(page, undo)
+        page.wait_for_timeout(300)  # grey a little later
+        undone = True
+    return undone
+
+
 def open_sequence(page: Any, file: str, last: str) -> None:
     """Open the file of a sequence, until its last field is there; a list that is just being filled is opened again."""
     option = page.get_by_role("option", name=file)

@@ -21,6 +21,7 @@ from tests.system.panels import Panel, home, refusal_of
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("panel")]
 _FIELDS = """() => [...document.querySelectorAll('.q-tab-panel input:not([role=combobox])')]
   .filter(one => one.checkVisibility() && one.ariaLabel).map(one => [one.ariaLabel, one.type])"""
+_STEP_KEYS = {name: key for key, name in {**words.STEP_KINDS, **words.STEP_KEYS}.items()}
 
 
 def put(content: Any, label: str, text: str) -> None:
@@ -29,7 +30,7 @@ def put(content: Any, label: str, text: str) -> None:
     if via := re.fullmatch(r"P(\d+) joint (\d+)", label):
         content["via_deg"][int(via[1])][int(via[2]) - 1] = value
     elif step := re.fullmatch(r"step (\d+): (.*)", label):
-        content["step"][int(step[1]) - 1][step[2]] = value
+        content["step"][int(step[1]) - 1][_STEP_KEYS[step[2]]] = value
     else:
         content[{name: key for key, name in words.OPTIONS.items()}[label]] = value
 
@@ -62,7 +63,7 @@ def test_each_field_refuses_wrong_input_in_the_words_of_the_command_line(
     else:
         good = SEQUENCE
         show(page, tab)
-        open_sequence(page, file, "step 10: end")
+        open_sequence(page, file, "step 10: end of")
     fields = page.evaluate(_FIELDS)
     assert len(fields) == count
     for number, (label, kind) in enumerate(fields):
