@@ -390,7 +390,9 @@ def test_polling_a_sensor_while_moving(tmp_path: Path, monkeypatch: pytest.Monke
     assert run.said[0].startswith("at [")
 
 
-def test_what_a_program_raises_passes_and_endless_ones_end(tmp_path: Path) -> None:
+def test_what_a_program_raises_passes_and_endless_ones_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(CellError, match="joint 2 would leave its range"):
         testing.run(written("cell.goto([0, 300, 0])\n", tmp_path), ARM)
     with pytest.raises(InputError, match="does not exist"):
@@ -400,7 +402,9 @@ def test_what_a_program_raises_passes_and_endless_ones_end(tmp_path: Path) -> No
         testing.run(written("cell.run('other')\n", tmp_path), "ar4")
     with pytest.raises(InputError, match="no input"):
         testing.run(written("pass\n", tmp_path), ARM, {"parts": True})
-    run = testing.run(written("while True:\n    pass\n", tmp_path), ARM, longest_s=1.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(testing, "LONGEST_S", 1.0)
+        run = testing.run(written("while True:\n    pass\n", tmp_path), ARM)
     assert run.stopped
     assert run.time_s == pytest.approx(1.0, abs=0.01)
     run = testing.run(written("cell.set('gripper', 'closed')\ncell.sleep(2)\n", tmp_path), ARM)

@@ -180,7 +180,7 @@ def _of_file(error: OSError) -> ArmtempoError:
 def _show_version(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
     """Look it up only if it is asked for: every command would wait for it."""
     if wanted:
-        click.echo(f"armtempo, version {installed_version()}")
+        results.echo(f"armtempo, version {installed_version()}")
         context.exit()
 
 

@@ -39,7 +39,8 @@ class _Finite:
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         found = super().convert(value, param, ctx)  # type: ignore[misc]
         if not math.isfinite(found):
-            raise click.BadParameter(f"{value} is not a finite number", ctx, param)
+            name = param.opts[0] if param else "number"
+            raise InputError(f"{name}: {value} is not a finite number", "give a finite one")
         return found
 
 

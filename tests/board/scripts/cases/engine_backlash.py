@@ -6,6 +6,7 @@ the same motion without backlash.
 
 # all cases: not on CPython
 
+import gc
 import math
 import random
 
@@ -20,6 +21,7 @@ from firmware import external_interrupts
 from armtempo_board.motion.next_motion import NextMotion
 
 SEED = 20264
+gc.threshold(1 << 20)  # else the steps that are kept lie everywhere in the heap, and no long list has a place
 ACCELERATION = 2000.0
 """Of the steps that cross the play, steps/s**2."""
 PLAY = (30, 181, 0)
