@@ -436,7 +436,7 @@ def test_firmware(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_what_is_wrong_is_said_before_a_port_is_opened(words: str, said: str) -> None:
-    given = words.format(job=shipped.job_path()).split()
+    given = [word.format(job=shipped.job_path()) for word in words.split()]
     arm = [] if words.startswith("speed") else ["--arm", str(shipped.arm_path())]
     result = CliRunner().invoke(main, [*given, *arm, "--port", "nowhere"])
     assert result.exit_code == 2, result.output

@@ -40,6 +40,14 @@ def test_no_page_installs_armtempo_from_an_index() -> None:
     assert [path.name for path in PAGES if wanted.search(path.read_text(encoding="utf-8"))] == []
 
 
+def test_prose_is_wrapped_at_120_columns() -> None:
+    """Tables, code, pictures and links cannot be."""
+    code = re.compile(r"^```.*?^```$|^    .*$|`[^`]+`|\]\([^)]+\)", re.MULTILINE | re.DOTALL)
+    for page in (*LINKING, ROOT / "tests" / "README.md"):
+        lines = code.sub("", page.read_text(encoding="utf-8")).splitlines()
+        assert [line for line in lines if len(line) > 120 and not line.startswith(("|", "!"))] == [], page
+
+
 @pytest.mark.parametrize("name", SCRIPT.TABLES)
 def test_page_is_current(name: str) -> None:
     text = (ROOT / "host" / "docs" / name).read_text(encoding="utf-8")
