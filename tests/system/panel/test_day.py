@@ -169,6 +169,9 @@ _FREEZES = """() => {
 def test_an_arm_that_still_brakes_is_frozen_by_the_button_that_appears_then(page: Any, panel: Panel) -> None:
     """From full speed it brakes for 1.3 s; tried again if a busy browser was late."""
     freeze = page.locator(".armtempo-freeze")
+    home(page)
+    speed = page.get_by_role("slider", name="Speed of jogs and targets", exact=True)
+    speed.click(position={"x": speed.bounding_box()["width"] - 1, "y": 10})
     for _ in range(20):
         home(page)  # far from the end of its range
         panels.hold(page)

@@ -136,6 +136,8 @@ def test_each_tab_is_in_view_readable_and_for_the_keyboard(page: Any) -> None:
 
 
 _UNFOLD = "document.querySelectorAll('.q-expansion-item--collapsed .q-item').forEach(one => one.click())"
+_BUILT = """() => [...document.querySelectorAll('.armtempo-expansion')].filter(one => one.checkVisibility())
+  .every(one => one.querySelector('.q-expansion-item__content').textContent)"""
 _BUTTONS = """() => [...document.querySelectorAll('.armtempo-page button')]
   .filter(one => one.checkVisibility() && !one.disabled)
   .map(one => one.ariaLabel || [...one.querySelectorAll('.block')].map(text => text.textContent).join(' '))"""
@@ -154,6 +156,7 @@ def test_each_button_is_pressed_once(page: Any, panel: Panel) -> None:
         show(page, tab)
         page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
         page.evaluate(_UNFOLD)
+        page.wait_for_function(_BUILT)
         page.wait_for_timeout(500)
         while left := [name for name in page.evaluate(_BUTTONS) if name not in pressed]:
             name = left[0]  # others may come and go with it
