@@ -197,7 +197,11 @@ def test_completeness_needs_the_start_files() -> None:
     [
         ({"machine": "PYBD-SF6W with STM32F767IIK"}, "is a PYBD"),
         ({"machine": "PYBv1.1 with STM32F405RG"}, "64 pins, and none of the ports D and E"),
-        ({"version": (1, 12, 0)}, "MicroPython 1.12.0; install 1.24"),
+        ({"version": (1, 12, 0)}, "MicroPython 1.12.0, which is too old; install 1.28"),
+        (
+            {"version": (1, 27, 0)},
+            "MicroPython 1.27.0, which compiles code for this chip wrongly; install 1.28",
+        ),
         ({"sd_card": True}, "SD card"),
         ({"free_heap": 20_000}, "20000 bytes of free memory"),
         ({"firmware_crc": own_crc() ^ 1}, "the firmware must be updated"),

@@ -12,8 +12,11 @@ from armtempo.deploy import program_files, sectors
 from armtempo.deploy.remote import Survey
 from armtempo.link.program_version import own_crc
 
-LEAST_RELEASE = (1, 24)
+_LEAST_RELEASE = (1, 24)
 """The oldest version on which the program was run: ``python -m tests.benchmark.firmware_run``."""
+_MISCOMPILING = ((1, 26), (1, 27))
+"""Their compiler loses the index of loads and stores in viper functions for this chip (micropython/micropython#18821):
+on 1.27 in QEMU the board refused the shipped motion, or restarted."""
 LEAST_HEAP = 83_500
 """Free heap needed before the program is loaded, bytes: see board/docs/memory.md."""
 _MOST_NAMED = 4
@@ -65,9 +68,8 @@ def check_suitable(found: Survey) -> None:
         )
     if lacks_pins(found.machine):
         raise LinkError(f"the board is a {found.machine}: {NO_PINS}", MORE_PINS)
-    if found.version < LEAST_RELEASE:
-        least = ".".join(map(str, LEAST_RELEASE))
-        raise LinkError(f"the board runs MicroPython {found.release}", f"install {least} or newer")
+    if problem := release_problem(found.version):
+        raise LinkError(f"the board runs MicroPython {found.release}, {problem}", "install 1.28 or newer")
     if found.sd_card:
         raise LinkError(
             "an SD card is in the board, and the board starts from it",
@@ -78,6 +80,13 @@ def check_suitable(found: Survey) -> None:
             f"the board has {found.free_heap} bytes of free memory; {LEAST_HEAP} are needed",
             "look for a boot.py that loads something, remove it, press reset, deploy again",
         )
+
+
+def release_problem(version: tuple[int, ...]) -> str:
+    """What is wrong with a release of MicroPython, (major, minor, ...), for this program; "" for nothing."""
+    if version[:2] < _LEAST_RELEASE:
+        return "which is too old"
+    return "which compiles code for this chip wrongly" if version[:2] in _MISCOMPILING else ""
 
 
 def lacks_pins(machine: str) -> bool:

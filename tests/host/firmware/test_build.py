@@ -205,11 +205,12 @@ def test_a_checkout_that_does_not_suit(
     assert not (tmp_path / "make.log").exists(), "nothing was begun"
 
 
-def test_an_old_checkout_is_refused(micropython: Path) -> None:
+@pytest.mark.parametrize(("minor", "why"), [(19, "is too old"), (27, "compiles code for this chip wrongly")])
+def test_an_unfit_release_is_refused(micropython: Path, minor: int, why: str) -> None:
     header = micropython / "py" / "mpconfig.h"
-    header.write_text(header.read_text().replace("MINOR 28", "MINOR 19"))
+    header.write_text(header.read_text().replace("MINOR 28", f"MINOR {minor}"))
     with pytest.raises(
-        InputError, match=r"is MicroPython 1\.19\.0, which is too old; get a newer one: git clone"
+        InputError, match=rf"is MicroPython 1\.{minor}\.0, which {why}; get a newer one: git clone"
     ):
         checkout.look(micropython)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armtempo.basics.errors import InputError
-from armtempo.deploy.changes import LEAST_RELEASE
+from armtempo.deploy.changes import release_problem
 from armtempo.deploy.firmware import frozen
 
 RELEASE = "v1.28.0"
@@ -64,7 +64,7 @@ def how_to_get(folder: Path) -> str:
 
 
 def look(folder: Path) -> Checkout:
-    """The checkout in a folder; InputError if there is none, or too old a one."""
+    """The checkout in a folder; InputError if there is none, or its release is not fit."""
     try:
         text = (folder / "py" / "mpconfig.h").read_text(encoding="utf-8", errors="replace")
         numbers = [re.findall(rf"define MICROPY_VERSION_{part} (\d+)", text)[0] for part in _PARTS]
@@ -73,9 +73,9 @@ def look(folder: Path) -> Checkout:
             f"{folder} is not a MicroPython checkout", f"get one: {how_to_get(folder)}"
         ) from None
     found = Checkout(folder.resolve(), (int(numbers[0]), int(numbers[1]), int(numbers[2])))
-    if found.version[:2] < LEAST_RELEASE:
+    if problem := release_problem(found.version):
         raise InputError(
-            f"{folder} is MicroPython {found.release}, which is too old",
+            f"{folder} is MicroPython {found.release}, {problem}",
             f"get a newer one: {how_to_get(Path('DIR'))}",
         )
     if " " in str(found.folder):
