@@ -166,6 +166,7 @@ _FREEZES = """() => {
 }"""
 
 
+@pytest.mark.long  # a busy browser does not hold a jog for long enough; tests/host/panel has the button's state
 def test_an_arm_that_still_brakes_is_frozen_by_the_button_that_appears_then(page: Any, panel: Panel) -> None:
     """From full speed it brakes for 1.3 s; tried again if a busy browser was late."""
     freeze = page.locator(".armtempo-freeze")

@@ -141,7 +141,14 @@ _BUILT = """() => [...document.querySelectorAll('.armtempo-expansion')].filter(o
 _BUTTONS = """() => [...document.querySelectorAll('.armtempo-page button')]
   .filter(one => one.checkVisibility() && !one.disabled)
   .map(one => one.ariaLabel || [...one.querySelectorAll('.block')].map(text => text.textContent).join(' '))"""
-"""Names of the buttons that can be pressed."""
+
+
+def _buttons(page: Any) -> list[str]:
+    """Names of the buttons that can be pressed, also in what is folded."""
+    page.evaluate(_UNFOLD)
+    page.wait_for_function(_BUILT)
+    found: list[str] = page.evaluate(_BUTTONS)
+    return found
 
 
 def test_each_button_is_pressed_once(page: Any, panel: Panel) -> None:
@@ -150,15 +157,15 @@ def test_each_button_is_pressed_once(page: Any, panel: Panel) -> None:
     page.on("pageerror", lambda error: errors.append(str(error)))
     opened: list[Any] = []
     page.context.on("page", lambda other: opened.append(other))
+    page.reload()  # what other tests left on it is gone
+    page.wait_for_selector("text=In control")
     home(page)
     pressed: set[str] = set()
     for tab in TABS:
         show(page, tab)
         page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
-        page.evaluate(_UNFOLD)
-        page.wait_for_function(_BUILT)
         page.wait_for_timeout(500)
-        while left := [name for name in page.evaluate(_BUTTONS) if name not in pressed]:
+        while left := [name for name in _buttons(page) if name not in pressed]:
             name = left[0]  # others may come and go with it
             button = page.get_by_role("button", name=name, exact=True).first
             pressed.add(name)
