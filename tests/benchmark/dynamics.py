@@ -27,6 +27,7 @@ from armtempo.model.joint_unit import PRISMATIC, REVOLUTE
 from armtempo.model.parts import Dynamics, Joint, Limits, Load, Motor
 from armtempo.new_arm import urdf_reader
 from armtempo.new_arm import urdf_rows as dh
+from armtempo.new_arm.urdf_chain import Chain
 from armtempo.planning.tool import Tool
 
 FOLDER = Path(__file__).parents[1] / "data" / "urdf"
@@ -53,7 +54,7 @@ def with_masses(text: str, rng: np.random.Generator) -> str:
     return re.sub(r'<link name="([^"]+)"/>', inertial, text)
 
 
-def arm_of(chain: urdf_reader.Chain) -> Arm:
+def arm_of(chain: Chain) -> Arm:
     """The arm of a chain with all digits."""
     axes = [dh.AxisLine(joint.point_mm, joint.direction) for joint in chain.joints]
     rows = dh.derive(axes, chain.zero_pose, dh.Near(1e-10, 1e-8))

@@ -16,8 +16,8 @@ from armtempo.kinematics import all_frames
 from armtempo.model.joint_unit import DEG, PRISMATIC, JointUnit
 from armtempo.model.parts import Dynamics
 from armtempo.new_arm import urdf_meshes
+from armtempo.new_arm.urdf_chain import Chain, ChainJoint
 from armtempo.new_arm.urdf_fitting import Fit
-from armtempo.new_arm.urdf_reader import Chain, ChainJoint
 from armtempo.new_arm.urdf_rows import DhRow, geometry
 
 _STILL_DEG = 0.001

@@ -10,7 +10,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 from armtempo.kinematics import forward
 from armtempo.new_arm import urdf_rows as dh
-from armtempo.new_arm.urdf_reader import Chain
+from armtempo.new_arm.urdf_chain import Chain
 
 POSTURES = 1000
 SEED = 1

@@ -12,8 +12,8 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.kinematics import all_frames
 from armtempo.new_arm import urdf_bodies
+from armtempo.new_arm.urdf_chain import MM, Chain
 from armtempo.new_arm.urdf_fitting import Fit
-from armtempo.new_arm.urdf_reader import MM, Chain
 from armtempo.new_arm.urdf_rows import geometry
 from armtempo.planning.capsules import point_distance
 

@@ -15,7 +15,6 @@ from armtempo.panel import words
 from armtempo.report import run_reader, run_report
 from armtempo.report.run_folder import META
 
-REPORT_PAGE = "report.html"
 _known: dict[Path, tuple[int, PastRun]] = {}
 """What was read, with the time of its file."""
 _making = Lock()
@@ -64,7 +63,7 @@ def report(runs: Path, name: str) -> bytes:
     """
     with _making:
         (folder,) = _folders(runs, [name])
-        page, changed_ns = folder / REPORT_PAGE, (folder / META).stat().st_mtime_ns
+        page, changed_ns = folder / run_report.PAGE, (folder / META).stat().st_mtime_ns
         if not page.is_file() or page.stat().st_mtime_ns < changed_ns:
             run_report.write(folder)
             os.utime(page, ns=(changed_ns, changed_ns))  # older than a run that was written again meanwhile

@@ -16,7 +16,8 @@ from armtempo.panel import past_runs, words
 from armtempo.panel.charts import CurveChart
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
-from armtempo.panel.past_runs import REPORT_PAGE, PastRun
+from armtempo.panel.past_runs import PastRun
+from armtempo.report import run_report
 from armtempo.report.comparison import PAGE as COMPARISON
 from armtempo.robot.motions import MOST_REPETITIONS
 
@@ -146,7 +147,7 @@ class RunTab:
                 named(box.props("dense"), f"{words.COMPARE}: {name}")
                 for text in (name, one.date, one.duration, one.ending):
                     ui.label(words.plain(text))
-                report = _link(ui.button(words.REPORT), f"{_ADDRESS}/{quote(name)}/{REPORT_PAGE}")
+                report = _link(ui.button(words.REPORT), f"{_ADDRESS}/{quote(name)}/{run_report.PAGE}")
                 named(report.props("flat dense no-caps"), f"{words.REPORT}: {name}")
         if len(names) > 1:
             compare = _link(ui.button(words.COMPARE), "").props("outline no-caps")

@@ -25,6 +25,7 @@ from armtempo.panel.access import MOST_BYTES, Access, Policy
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
 from armtempo.panel.panel_board import PanelBoard
+from armtempo.report import run_report
 from armtempo.report.comparison import PAGE as COMPARISON
 
 _RECONNECT_S = 60.0
@@ -148,7 +149,7 @@ class Panel:
         path = (runs / name / file).resolve()
         if path.suffix not in _SUFFIXES or not path.is_relative_to(runs):
             return PlainTextResponse("no such file", 404)
-        if file == past_runs.REPORT_PAGE:
+        if file == run_report.PAGE:
             return await _made(lambda: past_runs.report(runs, name))
         if not path.is_file():
             return PlainTextResponse("no such file", 404)

@@ -245,7 +245,7 @@ def read(client: Client, port: str) -> BoardState:
 
 
 def _said(client: Client) -> str:
-    from armtempo.link.board_messages import Notice
+    from armtempo.link.board_messages import Notice  # here, as 'armtempo stop' does not need it
     from armtempo.link.refusal import describe_notice
 
     texts = [event.text for event in client.session.events if isinstance(event, Notice)]

@@ -71,7 +71,7 @@ def test_a_report_is_made_once_and_again_when_the_run_was_written_since(
     def write(folder: Path) -> None:
         made.append(folder)
         time.sleep(0.05)  # the other thread asks for it meanwhile
-        (folder / past_runs.REPORT_PAGE).write_text(f"report {len(made)}")
+        (folder / run_report.PAGE).write_text(f"report {len(made)}")
         if len(made) == 2:
             meta.write_text('{"ended": true}')  # by the program that runs it
 
@@ -81,7 +81,7 @@ def test_a_report_is_made_once_and_again_when_the_run_was_written_since(
 
     monkeypatch.setattr(run_report, "write", write)
     assert asked() == {b"report 1"}
-    os.utime(meta.with_name(past_runs.REPORT_PAGE), (1, 1))  # the run was written since
+    os.utime(meta.with_name(run_report.PAGE), (1, 1))  # the run was written since
     assert asked() == {b"report 2", b"report 3"}
     assert past_runs.report(tmp_path, "feed") == b"report 3"
 
@@ -139,7 +139,7 @@ def test_reports_and_comparisons_open_where_the_server_has_them(operator: PanelB
     with pages(operator) as page:
         page.show(words.TAB_RUN)
         page.look()
-        assert page.named(f"{words.REPORT}: a").props["href"] == f"/runs/a/{past_runs.REPORT_PAGE}"
+        assert page.named(f"{words.REPORT}: a").props["href"] == f"/runs/a/{run_report.PAGE}"
         for name in ("b", "a"):
             page.named(f"{words.COMPARE}: {name}").set_value(True)
         assert page.named(words.COMPARE).props["href"] == f"/runs/{COMPARISON}?run=a&run=b"
