@@ -25,7 +25,7 @@ NEEDS = {
     "host/test_site.py": "docutils",
     "host/panel": "nicegui",
     "host/test_recordings.py": "rosbags",
-    "host/test_urdf.py": "trimesh",
+    "host/urdf": "trimesh",
     "system/panel": "nicegui",
 }
 """What test modules, or all of a folder, import that armtempo itself does without: an extra, or a tool of the tests."""

@@ -12,7 +12,7 @@ import click
 import pytest
 from armtempo.cli import main
 
-from tests import sources
+from tests import conftest, sources
 from tests.interpreters import ROOT
 
 FILES = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
@@ -24,6 +24,10 @@ LINES = [
     for line in re.findall(r"run: (.*?)(?: #.*)?$", file.read_text(encoding="utf-8"), re.MULTILINE)
     for command in line.split("&&")
 ]
+
+
+def test_what_may_be_left_out_without_a_package_is_there() -> None:
+    assert [name for name in conftest.NEEDS if not (ROOT / "tests" / name).exists()] == []
 
 
 def test_there_are_workflows() -> None:
