@@ -24,7 +24,7 @@ from armtempo_shared import wire
 
 from tests import interpreters
 
-SCRIPT = interpreters.ROOT / "tests" / "board" / "scripts" / "benchmarks" / "memory_use.py"
+SCRIPTS = interpreters.ROOT / "tests" / "board" / "scripts"
 INTERPRETER = "micropython-arm"
 SESSION = ("hello", "home", "start")
 HEAP = 103_400
@@ -77,16 +77,14 @@ def accepted(answers: bytes) -> int:
 
 
 def _run(folder: Path, heap: int) -> str:
-    arguments = [
-        str(folder),
-        str(folder / "frames"),
-        str(folder / "answers"),
-        str(heap),
-        str(folder / "sectors"),
-    ]
-    command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", str(SCRIPT), *arguments]
-    environment = {**os.environ, "MICROPYPATH": f"{folder / 'lib'}{os.pathsep}.frozen"}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=1200, check=False)
+    """Run in the folder and by short names: the names of files are in the heap, by their length."""
+    (folder / "scripts").symlink_to(SCRIPTS)
+    arguments = [".", "frames", "answers", str(heap), "sectors"]
+    command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", "scripts/benchmarks/memory_use.py", *arguments]
+    environment = {**os.environ, "MICROPYPATH": f"lib{os.pathsep}.frozen"}
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=1200, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -12,8 +12,9 @@ from armtempo_shared import engine_memory, limits
 from tests import interpreters
 from tests.board import heap_use
 
-MODULES = 72_300
-"""What a word on the stack keeps, that nothing uses, makes this figure vary by 200 with each change of the code."""
+MODULES = 72_800
+"""A word on the stack that nothing uses may keep a block: by the place of the checkout and with each change of the
+code this figure varies by 600 (71 808 to 72 400 seen)."""
 MARGIN = 8_192
 SCRIPT = Path(__file__).parent / "scripts" / "probes" / "arm_changes.py"
 CHANGES = 25
