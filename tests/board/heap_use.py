@@ -80,7 +80,13 @@ def _run(folder: Path, heap: int) -> str:
     """Run in the folder and by short names: the names of files are in the heap, by their length."""
     (folder / "scripts").symlink_to(SCRIPTS)
     arguments = [".", "frames", "answers", str(heap), "sectors"]
-    command = [interpreters.starter(INTERPRETER), "-X", "heapsize=2M", "scripts/benchmarks/memory_use.py", *arguments]
+    command = [
+        interpreters.starter(INTERPRETER),
+        "-X",
+        "heapsize=2M",
+        "scripts/benchmarks/memory_use.py",
+        *arguments,
+    ]
     environment = {**os.environ, "MICROPYPATH": f"lib{os.pathsep}.frozen"}
     done = subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=1200, check=False
