@@ -169,7 +169,14 @@ def _thinned(
     scale = tolerance.scale
     ranges = np.array([joint.range_deg for joint in arm.driven]) / scale[:, None]
     words = DEG.word if np.any(scale != 1.0) else arm.texts.unit_words
-    found = thinning.thinned(angles / scale, tolerance.one, times_s, ranges, words)
+    found = thinning.thinned(
+        angles / scale,
+        tolerance.one,
+        times_s,
+        ranges,
+        words,
+        lambda points: arm.transmission.steps(points * scale),
+    )
     for place, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
         if left_out_s:
             notes += (f"{left_out_s:.3g} s of rest at the {place} are left out",)
