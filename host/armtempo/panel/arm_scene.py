@@ -266,8 +266,8 @@ class ArmScene:
         self._walls: list[Object3D] = []
         self.draw_workspace()
         self.draw_frames()
-        self._dots: list[tuple[Object3D, Object3D]] = []
-        """A ball for each via point, and its name."""
+        self._dots: list[Object3D] = []
+        """A ball for each via point, which the page's script names."""
         self.look("free")
 
     def _body(self, colour: str, colour_of_joints: str, opacity: float) -> list[str]:
@@ -325,8 +325,10 @@ class ArmScene:
     def look(self, view: str) -> None:
         """Look from the side, from above, from in front and above, or follow the tool."""
         if view != FOLLOW:
-            middle = self._shape.middle
-            self.scene.move_camera(*(middle + EYES[view]), *(middle + _TARGET), duration=0.3)
+            names = ("x", "y", "z", "look_at_x", "look_at_y", "look_at_z")
+            eye, target = self._shape.middle + EYES[view], self._shape.middle + _TARGET
+            places = dict(zip(names, (*eye.tolist(), *target.tolist()), strict=True))
+            self.scene.move_camera(**places, duration=0.3)
         ui.run_javascript(f"armtempo.follow = {json.dumps(view == FOLLOW)}")
 
     def draw(self, name: str, points_mm: Array, colour: str | Array) -> None:
@@ -342,18 +344,16 @@ class ArmScene:
         """Draw a ball at each via point, (N, 3), that can be clicked and dragged."""
         points = (np.asarray(points_mm) / self._shape.reach_mm).tolist()
         while len(self._dots) > len(points):
-            for one in self._dots.pop():
-                one.delete()
+            self._dots.pop().delete()
         with self.scene:
             while len(self._dots) < len(points):
                 number = len(self._dots)
                 ball = self.scene.sphere(_DOT, 16, 12).material(VIA).with_name(f"{_VIA_NAME}{number}")
-                label = self.scene.text(f"P{number}", "font-size: 0.75rem; pointer-events: none;")
-                self._dots.append((ball.draggable(), label))
-        for (dot, name), (x, y, z) in zip(self._dots, points, strict=True):
-            dot.move(x, y, z)
-            name.move(x, y, z + 2 * _DOT)
-        ui.run_javascript("armtempo.changes += 1")
+                self._dots.append(ball.draggable())
+        for dot, place in zip(self._dots, points, strict=True):
+            dot.move(*place)
+        names = json.dumps([[x, y, z + 2 * _DOT] for x, y, z in points])
+        ui.run_javascript(f"armtempo.vias = {names}; armtempo.changes += 1")
 
     def _clicked(self, event: SceneClickEventArguments) -> object:
         numbers = [_via_number(hit.object_name) for hit in event.hits]
