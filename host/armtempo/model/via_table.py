@@ -225,7 +225,9 @@ def _value(value: Sequence[float] | float) -> str:
 
 def _header(table: NumberTable, arm: Arm) -> Header:
     if table.header is not None:
-        return table_header.read(table.header, arm, f"{table.path}: line 1")
+        where = f"{table.path}: line 1"
+        names = table_header.with_units(table.header, table.units or (), where)
+        return table_header.read(names, arm, where)
     columns = len(table.rows[0][1]) if table.rows else len(arm.driven)
     for least in (0, 1):
         if columns > 1 and table.rows and table.rows[0][1] == [str(least + n) for n in range(columns)]:
