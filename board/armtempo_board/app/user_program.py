@@ -16,7 +16,7 @@ from micropython import const
 
 import armtempo_board
 from armtempo_board import step_rates
-from armtempo_board.app.cell import Cell, CellError, Ended
+from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended
 from armtempo_board.app.sequence_command import STEP
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.code_names import name_of
@@ -96,11 +96,11 @@ class UserProgram(Sequencer):
         gc.collect()
         before = list(sys.modules)
         armtempo_board.cell = cell
-        self._app.fills_heap = True
+        self._app.runs_program = True
         try:
             exec(code, names)
         finally:
-            self._app.fills_heap = False
+            self._app.runs_program = False
             del armtempo_board.cell
             _forget_modules(before)
 
@@ -115,8 +115,8 @@ class UserProgram(Sequencer):
         try:
             text, line = _traceback(error, self.table["file"])
             self.status[STEP] = line or self.status[STEP]
-        except MemoryError:
-            text = "MemoryError in line %d" % self.status[STEP]
+        except Exception:  # memory is short, or what it printed is no text
+            text = "%s in line %d" % (type(error).__name__, self.status[STEP])
         self._is_said()
         self._app.events.note_failure(text)
 
@@ -272,7 +272,7 @@ class UserProgram(Sequencer):
         """Increment a counter."""
         number = self._command.named(name.encode(), MAX_COUNTERS)
         if number < 0:
-            raise CellError("more than %d counters" % MAX_COUNTERS)
+            raise CellError(TOO_MANY_COUNTERS)
         return self._command.count(number)
 
     def say(self, text: str) -> None:

@@ -189,6 +189,11 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("goto([0.1, 0])", "goto is refused: too_long, 100"),
         ("run('back')", "run('back') is refused: wrong_start"),
         ("run('none')", "run('none') is refused: not_found"),
+        ("goto({})", "a posture has 2 angles, not 0"),
+        ("wait(['part'])", "the name of the input is a text, not ['part']"),
+        ("run(3)", "the name of the motion is a text, not 3"),
+        ("count(None)", "the name of the counter is a text, not None"),
+        ("pallet({})", "the name of the pallet is a text, not {}"),
         ("count('n' * 25)", "count: the name 'nnnnnnnnnnnnnnnnnnnnnnnnn' has not 1 to 24 bytes"),
     ):
         world = World(
