@@ -22,7 +22,7 @@ from typing import Any
 
 import armtempo_board
 import numpy as np
-from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended
+from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended, opener
 from armtempo_board.app.pallet import Place
 from armtempo_shared.program import EACH, MARK
 from armtempo_shared.rest_to_rest import PERCENT
@@ -98,6 +98,7 @@ def run(
     names = {
         "__name__": "__main__",
         "print": work.print,
+        "open": opener(work),
         MARK: cell.at,
         EACH: cell.each,
     }
@@ -255,6 +256,9 @@ class _Work:
 
     def say(self, text: str) -> None:
         self.run.said += filter(None, text.split("\n"))
+
+    def will_write(self) -> None:
+        """Nothing to do."""
 
     def print(self, *values: object, sep: str = " ", end: str = "\n", file: object = None) -> None:
         """As on the board; also where pytest shows it."""

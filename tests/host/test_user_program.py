@@ -14,7 +14,9 @@ import pytest
 from armtempo import testing
 from armtempo.basics.errors import InputError, LinkError, PlanError
 from armtempo.deploy import program_files
+from armtempo.diagnosis.arm_check import check_arm
 from armtempo.encoding import encode, encoded_motion, encoded_program
+from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.of_arm import forward
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello
@@ -162,6 +164,28 @@ def test_what_moves_by_itself_has_switches_and_an_estop(
         return
     with pytest.raises(InputError, match=f'arm.toml: safety.at_power_up = "program": .*{problem}'):
         Arm.load(tmp_path / "arm.toml")
+
+
+def test_a_way_to_a_switch_that_would_leave_the_workspace_is_told(tmp_path: Path) -> None:
+    """Joint 1 turns to its switch at the low end of its range, through what stands there."""
+    arm = with_switches(1, 2, 3)
+    found = encoded_program.of_program(UserProgram.load(written("cell.home()\n", tmp_path), arm), arm)
+    assert not encoded_program.moves_that_touch(found)
+    there = forward(arm, all_angles_deg(arm, np.array([arm.driven[0].range_deg[0], *arm.home_deg[1:]])))[
+        :3, 3
+    ]
+    box = KeepOut("post", tuple(there - 5.0), tuple(there + 5.0))
+    (problem,) = encoded_program.moves_that_touch(
+        replace(found, arm=replace(arm, workspace=Workspace((box,))))
+    )
+    assert problem.startswith("between home and the switch of joint 1: ")
+    assert "post" in problem
+    (told,) = [
+        each for each in check_arm(replace(arm, workspace=Workspace((box,)))) if each.where == "homing"
+    ]
+    assert problem in told.what
+    plain = encoded_program.of_program(UserProgram.load(written("cell.goto('home')\n", tmp_path), arm), arm)
+    assert not encoded_program.moves_that_touch(replace(plain, arm=replace(arm, workspace=Workspace((box,)))))
 
 
 def test_other_refusals(tmp_path: Path) -> None:
@@ -438,6 +462,10 @@ def test_what_a_program_raises_passes_and_endless_ones_end(
     assert run.said == ["a", "b"]  # as the host is told
     with pytest.raises(CellError, match="more than 8 counters"):
         testing.run(written("for n in range(9):\n    cell.count('n%d' % n)\n", tmp_path), ARM)
+    with pytest.raises(CellError, match="'log' cannot be written while the arm moves"):
+        testing.run(
+            written("cell.goto([5, -60, 40], wait=False)\nopen('log', 'a')\n", tmp_path), ARM, motion_s=1.0
+        )
     with pytest.raises(NameError):
         testing.run(written("print(__file__)\n", tmp_path), ARM)
     source = (

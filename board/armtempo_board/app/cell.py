@@ -74,6 +74,9 @@ if TYPE_CHECKING:
         def say(self, text: str) -> None:
             """Show a text to the host."""
 
+        def will_write(self) -> None:
+            """The program opens a file for writing: nothing of it may be left to write when a motion starts."""
+
 
 TOO_MANY_COUNTERS = "more than %d counters" % MAX_COUNTERS
 _FULL = 65535  # value of an output at the upper end of its range
@@ -305,6 +308,21 @@ class Cell:
             has = "the program's text" if kind in _NAMED else "the arm"
             raise CellError("%s has no %s %r; it has %s" % (has, word, name, _names(found)))
         return found[name]
+
+
+def opener(work: "Work") -> "Any":
+    """``open`` for a program: for writing only at rest, as the chip stands still while its flash is written."""
+
+    def opened(path: str, mode: str = "r", **more: "Any") -> "Any":
+        if mode.strip("rbt"):
+            if work.moving():
+                raise CellError(
+                    "open: %r cannot be written while the arm moves; cell.wait() waits for rest" % path
+                )
+            work.will_write()
+        return open(path, mode, **more)
+
+    return opened
 
 
 def _check_name(word: str, name: "Any") -> None:

@@ -6,6 +6,7 @@ nothing else is started while it runs.
 
 import gc
 import io
+import os
 import sys
 import time
 
@@ -16,7 +17,7 @@ from micropython import const
 
 import armtempo_board
 from armtempo_board import step_rates
-from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended
+from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended, opener
 from armtempo_board.app.sequence_command import STEP
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.code_names import name_of
@@ -53,6 +54,7 @@ class UserProgram(Sequencer):
         self._run_once: "Callable[[], None]" = self.prepare
         self._served_ms: "Any" = 0
         self._skipped = 0
+        self._writes = False  # it has opened a file for writing
         self._percent = _PERCENT  # of the speed, in the present motion
 
     def begin(self) -> None:
@@ -87,6 +89,7 @@ class UserProgram(Sequencer):
         names = {
             "__name__": "__main__",
             "print": self._print,
+            "open": opener(self),
             program.MARK: cell.at,
             program.EACH: cell.each,
         }
@@ -200,6 +203,8 @@ class UserProgram(Sequencer):
         self._begin(messages.ONCE_NAME, None, _PERCENT, what, flags)
 
     def _begin(self, name: str, crc: "int | None", percent: int, what: str, flags: int = 0) -> None:
+        if self._writes:
+            os.sync()  # otherwise MicroPython writes its cache later, while the arm moves
         try:
             self._percent = percent
             self._controller.begin_motion(name, crc, self._share(self._rate), flags)
@@ -288,6 +293,10 @@ class UserProgram(Sequencer):
                 if not app.commands.greeted:
                     self._run_once()  # at the REPL ``replay`` shows it; the next host does not get it
                     app.events.notice = b""
+
+    def will_write(self) -> None:
+        """The flash must be at rest when a motion starts."""
+        self._writes = True
 
     def _is_said(self) -> bool:
         """Wait until the text before was sent; returns whether it was."""

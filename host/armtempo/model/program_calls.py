@@ -185,7 +185,7 @@ def _of_call(node: ast.Call, called: str, arm: PinUser, cell: str) -> Iterator[C
         number = node.args[0]
         timers = engine_pins.taken_timers(arm)
         timers |= {place.timer: f"output {name!r}" for name, place in pin_use.timer_outputs(arm).items()}
-        if isinstance(number, ast.Constant) and number.value in timers:
+        if isinstance(number, ast.Constant) and isinstance(number.value, int) and number.value in timers:
             yield CallProblem(
                 node.lineno,
                 f"{called}: timer {number.value} is taken for {timers[number.value]}",

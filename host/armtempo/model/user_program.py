@@ -121,10 +121,13 @@ class _Reader:
                 self._known(node)
             if isinstance(node, ast.Import | ast.ImportFrom):
                 self._check_import(node)
-            if isinstance(node, ast.Call):
-                if isinstance(node.func, ast.Attribute) and _is_name(node.func.value, self.cell):
-                    self._known(node.func)
-                    self._check(node, node.func.attr)
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Attribute)
+                and _is_name(node.func.value, self.cell)
+            ):
+                self._known(node.func)
+                self._check(node, node.func.attr)
         for found in program_calls.problems(tree, self.arm, self.cell):
             raise InputError(f"{self.path}, line {found.line}: {found.what}", found.next_step)
         if len(self.counters) > MAX_COUNTERS:

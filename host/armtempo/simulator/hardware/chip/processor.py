@@ -7,8 +7,9 @@ the chip's latency.
 
 import sys
 
-from chip import capture, dma, gpio, memory, timers
 from machine_state import PowerOff, Reset
+
+from chip import capture, dma, gpio, memory, timers
 
 TICKS_PER_MS = 84_000
 TICKS_PER_US = 84
