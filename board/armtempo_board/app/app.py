@@ -37,6 +37,7 @@ if features.SEQUENCES:
         "armtempo_board.app.cell",
         "armtempo_board.app.pallet",
         "armtempo_board.app.homing",
+        "armtempo_shared.homing",
         "armtempo_shared.rest_to_rest",
         "armtempo_shared.shapes",
     )

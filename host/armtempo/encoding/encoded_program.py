@@ -133,17 +133,8 @@ def _homing(arm: Arm) -> dict[str, Any]:
 
 
 def _home_switch(joint: DrivenJoint, number: int, switch: HomeSwitch) -> list[int]:
-    whole = (
-        switch.trip_deg,
-        switch.edge_deg,
-        switch.span_deg,
-        switch.farthest_deg,
-        switch.away_deg,
-        home_switches.BACK_DEG,
-        home_switches.MOST_PRESSED_DEG,
-        home_switches.TOLERANCE_DEG,
-    )
-    return [number, switch.side, *(round(each * joint.steps_per_deg) for each in whole)]
+    _, side, *lengths_deg = switch.row(number)
+    return [number, int(side), *(round(each * joint.steps_per_deg) for each in lengths_deg)]
 
 
 def _others(bare: dict[str, list[int]], now: dict[str, list[int]]) -> dict[str, list[int]]:
