@@ -235,7 +235,6 @@ STEP_KEYS = {
     "reverse": "from the last",
 }
 ADD_HERE = "Add where the arm is"
-PLANNING = "Planning…"
 TOTAL_TIME, CYCLE_TIME = "{time:.2f} s in all, without waits for inputs", "{time:.2f} s a cycle"
 
 STATE_KEYS = {
