@@ -26,7 +26,7 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
         arm = arm.with_tool(job.tool)
         suspected = _units(arm, job)
         checks.check_job(arm, job)
-        via_deg, notes = planner.via_angles(arm, job)
+        job, via_deg, notes = planner.points_of(arm, job)
     except ArmtempoError as refused:
         text = "correct that; the rest of the job was not checked"
         return [*suspected, error("job", str(refused), text)]

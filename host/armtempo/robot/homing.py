@@ -26,7 +26,7 @@ from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.parts import Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
-from armtempo.robot.running import follow, put_once, raise_fault
+from armtempo.robot.running import attended, follow, put_once, raise_fault
 from armtempo.robot.stop_request import StopRequest
 
 HomingProgress = Callable[[str, int, int], object]
@@ -244,11 +244,9 @@ class _GroupHoming:
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
         motion = encoded_motion.of_trajectory(trajectory, self.arm)
         key, flags = put_once(self.client, motion.data), self._flags(turns_deg)
-        end = follow(
-            self.client,
-            self.stop,
-            lambda: MotionFollower(self.client, self.client.start(key.name, key.crc, flags)),
-        ).end
+        with attended(self.client, self.stop):
+            follower = MotionFollower(self.client, self.client.start(key.name, key.crc, flags))
+            end = follow(self.client, self.stop, follower).end
         tripped = self.client.status().fault_joint
         raise_fault(end)
         self.stop.check()
