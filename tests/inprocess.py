@@ -282,11 +282,10 @@ def replay(
     board: Client, key: MotionKey, stop: StopRequest, take: Callable[[Sample], object] = lambda _: None
 ) -> RunEnd:
     """Start a motion and follow it to its end; ``take`` gets its samples."""
-
-    def start() -> MotionFollower:
-        return MotionFollower(board, board.start(key.name, key.crc))
-
-    return running.follow(board, stop, start, lambda event: isinstance(event, Sample) and take(event)).end
+    with running.attended(board, stop):
+        follower = MotionFollower(board, board.start(key.name, key.crc))
+        running.follow(board, stop, follower, lambda event: isinstance(event, Sample) and take(event))
+    return follower.end
 
 
 def follow(follower: MotionFollower) -> tuple[list[Sample], RunEnd]:

@@ -19,7 +19,8 @@ from armtempo_shared.limits import TICK_HZ
 from tests import inprocess, interpreters
 from tests.board import motions, oracle
 
-SCRIPT = Path(__file__).parent / "scripts" / "probes" / "judge.py"
+PROBES = Path(__file__).parent / "scripts" / "probes"
+SCRIPT = PROBES / "judge.py"
 FAR = 10_000_000
 Verdict = tuple[int, int, int] | None
 
@@ -262,6 +263,22 @@ def test_a_rate_just_within_and_just_beyond_the_limit(rate_check: ModuleType) ->
         steps[place] += ROUNDED if steps[place] > 0 else -ROUNDED
         beyond = rate_check.FASTER if place in (0, 4) else rate_check.UNDECIDED
         assert compared(rate_check, steps, ticks, rate) == beyond, (SEED, rate, ticks, place)
+
+
+@pytest.mark.parametrize(
+    ("name", "cases"),
+    [
+        pytest.param(name, 100, marks=pytest.mark.slow) if name == "micropython-arm" else (name, 1000)
+        for name in interpreters.AVAILABLE[1:]
+    ],
+)
+def test_what_is_compiled_finds_what_exact_numbers_find(name: str, cases: int) -> None:
+    """Words of 64 bits, and of 32 as on the chip: nothing of random subintervals and points overflows."""
+    words = [str(SEED), str(cases)]
+    exact, found = (
+        interpreters.run(each, PROBES / "compiled_check.py", *words) for each in ("cpython", name)
+    )
+    assert found == exact, SEED
 
 
 def interval(rate_check: ModuleType, steps: list[int], ticks: list[int]) -> SimpleNamespace:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
+from armtempo.basics import atomic_file
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_names, shipped
 from armtempo.model.arm import Arm
@@ -36,19 +39,28 @@ def file(tmp_path: Path) -> Path:
     made.write_bytes((shipped.files()["ar4"].read_text(encoding="utf-8") + TABLES).encode())
     (tmp_path / "feed.toml").write_text(JOB)
     (tmp_path / "day.toml").write_text('name = "day"\n[[step]]\ngoto = "away"\n[[step]]\ntool = "pen"\n')
-    (tmp_path / "turn.py").write_text('cell.tool("pen")\n')
+    (tmp_path / "turn.py").write_text('# with the pen\ncell.tool("pen")\n')
     (tmp_path / "broken.toml").write_text('frame = "tray"\n[')
     return made
 
 
 def test_what_uses_a_name_is_told(file: Path) -> None:
+    (file.parent / "other.toml").write_text(file.read_text(encoding="utf-8"))  # an arm with names of its own
+    row = file.read_text(encoding="utf-8").splitlines().index('frame = "tray"  # of the tray') + 1
     expected = {
-        ("frame", "tray"): ["frame.bin", "feed.toml"],
+        ("frame", "tray"): [
+            ("arm.toml", row, True),
+            ("broken.toml", 1, False),
+            ("feed.toml", 5, True),
+        ],
         ("frame", "bin"): [],
-        ("tool", "pen"): ["day.toml", "feed.toml", "turn.py"],
-        ("posture", "away"): ["day.toml", "feed.toml"],
+        ("tool", "pen"): [("day.toml", 5, True), ("feed.toml", 2, True), ("turn.py", 2, False)],
+        ("posture", "away"): [("day.toml", 3, True), ("feed.toml", 7, True)],
     }
-    assert {place: arm_names.users(file, file.parent, *place) for place in expected} == expected
+    for place, lines in expected.items():
+        found = arm_names.uses_in_files(file, file.parent, *place)
+        assert [(use.file.name, use.line, use.follows) for use in found] == lines
+    assert found[0].text == 'goto = "away"'
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
@@ -64,6 +76,44 @@ def test_another_name_is_given_where_the_file_uses_it(file: Path, end: str) -> N
     arm_names.rename(file, "posture", "away", "up")
     expected = expected.replace("[tool.pen]", "[tool.brush]").replace("[posture.away]", "[posture.up]")
     assert file.read_bytes() == b"\xef\xbb\xbf" + expected.encode()
+
+
+def _contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_jobs_and_sequences_follow_and_keep_their_comments(file: Path) -> None:
+    (file.parent / "feed.toml").write_bytes(
+        JOB.replace('"pen"', "'pen'  # mine").replace("\n", "\r\n").encode()
+    )
+    (file.parent / "other.toml").write_text(file.read_text(encoding="utf-8"))
+    before = _contents(file.parent)
+    arm_names.rename(file, "tool", "pen", "brush", file.parent)
+    assert _contents(file.parent) == before | {
+        "arm.toml": before["arm.toml"].replace(b"[tool.pen]", b"[tool.brush]"),
+        "feed.toml": before["feed.toml"].replace(b"'pen'  # mine", b'"brush"  # mine'),
+        "day.toml": before["day.toml"].replace(b'"pen"', b'"brush"'),
+    }
+
+
+@pytest.mark.parametrize("fails_at", range(3))
+def test_all_files_are_written_or_none(file: Path, monkeypatch: pytest.MonkeyPatch, fails_at: int) -> None:
+    """The disk fails at one of the files, before or after others were replaced."""
+    before = _contents(file.parent)
+    replaced: list[object] = []
+
+    def replace(source: Path, target: Path) -> None:
+        replaced.append(target)
+        if len(replaced) == fails_at + 1:
+            raise OSError(errno.EIO, "Input/output error")
+        os.rename(source, target)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(atomic_file.os, "replace", replace)
+        with pytest.raises(InputError, match=r"cannot be written: Input/output error; no file was changed"):
+            arm_names.rename(file, "tool", "pen", "brush", file.parent)
+    assert _contents(file.parent) == before
+    assert len(replaced) == 2 * fails_at + 1  # those that were replaced went back
 
 
 @pytest.mark.parametrize(

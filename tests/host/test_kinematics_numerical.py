@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from armtempo.kinematics import Geometry, Ranges, all_frames, forward, inverse
-from armtempo.kinematics.constraint import Constraint
+from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.forward import array_frames, frames
 from armtempo.kinematics.numerical import MovingArm, NumericalSolutions, search
 from armtempo.kinematics.shape import refusals
@@ -293,3 +294,33 @@ def test_floats_and_arrays_of_any_shape_turn_alike(name: str) -> None:
 def test_a_parallelogram_turns_the_joint_behind_back() -> None:
     assert GEOMETRY.linked == (2, 3)
     np.testing.assert_allclose(GEOMETRY.turns([0.1, 0.2, 0.4, 0.8]), [0.1, 0.2, 0.2, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("arm", "position_mm", "said"),
+    [
+        (
+            "ar4",
+            (900, 0, 300),
+            r"283\.1 mm .*which comes to x 621\.\d, y -?0(\.\d)?, z 249\.\d mm in the base",
+        ),
+        (
+            "ar4",
+            (300, 0, 300),
+            r"joint 5 at the end of its range, 105 deg.* position is reached with roll .*, pitch ",
+        ),
+        ("community_rail", (100, 1500, 50), r"joint 2 at the end of its range, 300 mm"),
+    ],
+)
+def test_a_pose_out_of_reach_is_told_how_near_the_arm_comes(
+    arm: str, position_mm: tuple[float, ...], said: str
+) -> None:
+    """A tolerance, which is the cure of a pose that is nearly reached, is not."""
+    moved = Arm.of(arm)
+    turns = {"roll": 0.0, "pitch": 180.0 if position_mm[0] == 900 else 0.0, "yaw": 0.0}
+    target = Pose.of_angles(position_mm, turns if arm == "ar4" else {})
+    far = search(MovingArm.of(moved), target, np.radians(moved.all_home_deg).tolist())
+    assert re.search(said, far.reason.splitlines()[0])
+    assert "tolerance_mm" not in far.reason
+    near = replace(far, nearest=replace(far.nearest, miss=Miss(0.5, 0.5)))
+    assert "allow more by tolerance_mm" in near.reason

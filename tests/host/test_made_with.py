@@ -17,8 +17,9 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
 from armtempo.robot.motions import Motions
+from armtempo.robot.position import ArmPosition
 from armtempo.robot.programs import Programs
-from armtempo.robot.store import withdraw_old_default
+from armtempo.robot.store import BoardStore
 from armtempo_shared.motion import Motion
 
 from tests.host import test_pallets as pallets
@@ -191,8 +192,38 @@ class Stored:
     def known_arm(self) -> Arm:
         return self.arm
 
+    def configure(self, _: Arm) -> None:
+        pass
 
-def test_what_is_old_is_not_run_by_its_name_and_listed(plan: Plan, tmp_path: Path, quick: None) -> None:  # noqa: F811
+    def home(self, _: object) -> None:
+        pass
+
+
+def test_a_default_that_is_no_program_starts_nothing_at_power_up(
+    plan: Plan,
+    quick: None,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr("armtempo.robot.store.store", lambda *_: None)
+    motion = encoded_motion.of_plan(plan)
+    alone = replace(motion, arm=replace(motion.arm, safety=replace(motion.arm.safety, at_power_up="program")))
+    for what, told in ((motion, 0), (alone, 1)):
+        defaults: list[str] = []
+        client = SimpleNamespace(set_default=defaults.append)
+        board: Any = SimpleNamespace(client=client, encoded=lambda what, _: what)
+        BoardStore(board).upload(what, default=True)
+        assert defaults == [motion.name]
+        assert len(caplog.messages) == told
+    assert "nothing starts at power-up" in caplog.text
+
+
+def test_what_is_old_is_not_run_by_its_name_and_listed(
+    plan: Plan,
+    tmp_path: Path,
+    quick: None,  # noqa: F811
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     now = arm(tmp_path, MORE.replace("floor_mm = -100", "floor_mm = -99"))
     defaults: list[str] = []
     motion: Any = Stored("j", encoded_motion.of_plan(plan).data, now)
@@ -218,10 +249,14 @@ def test_what_is_old_is_not_run_by_its_name_and_listed(plan: Plan, tmp_path: Pat
     for board in (motion, sequence, program):
         assert "on the board is old" in stored._old(board, board.entry, board.arm)
         board.entry.default, board.set_default = False, defaults.append
-        assert not withdraw_old_default(board, board.arm)
+        homed = ArmPosition(board).home  # of a command, the panel and the library
+        homed(board.arm)
         board.entry.default = True
-        assert not withdraw_old_default(board, found)
+        homed(found)
         assert not defaults
-        assert withdraw_old_default(board, board.arm).endswith("the board's button starts nothing")
+        assert not caplog.messages
+        homed(board.arm)
+        assert caplog.messages.pop().endswith("the board's button starts nothing")
         assert defaults.pop() == ""
+        caplog.clear()
     assert not stored._old(motion, motion.entry, found)

@@ -39,11 +39,17 @@ def sequence_of(pipe: Pipe, times: int) -> tuple[Client, MotionKey]:
     return board, MotionKey("again", wire.record_crc(record))
 
 
-def starting(
-    board: Client, key: MotionKey, on_state: SequenceWatcher = lambda _: None
-) -> Callable[[], SequenceFollower]:
-    """Starts a sequence."""
-    return lambda: SequenceFollower(board, key.name, board.start(key.name, key.crc), on_state)
+def run(
+    board: Client,
+    key: MotionKey,
+    take: Callable[[Followed], object],
+    on_state: SequenceWatcher = lambda _: None,
+) -> SequenceFollower:
+    """Run a sequence to its end."""
+    wanted = StopRequest()
+    with running.attended(board, wanted):
+        follower = SequenceFollower(board, key.name, board.start(key.name, key.crc), on_state)
+        return running.follow(board, wanted, follower, take)
 
 
 def sequence_samples(
@@ -58,7 +64,7 @@ def sequence_samples(
             if len(found) == 8:
                 at_7()
 
-    followed = running.follow(board, StopRequest(), starting(board, key), take)
+    followed = run(board, key, take)
     assert followed.end.ending == "finished"
     assert found == [(run, index) for run in range(1, followed.end.cycle + 1) for index in range(4)]
     return followed
@@ -98,9 +104,8 @@ def test_a_watcher_sees_a_sequence_as_a_motion(tmp_path: Path) -> None:
     encoded = EncodedSequence(key.name, arm, (leg,), rows, board.fetch(key.name))
     folder = recording.new_run(tmp_path / "runs", encoded, "pipe", board)
     seen, states = Counting(), list[str]()
-    start = starting(board, key, lambda state: states.append(state.ending))
     with recording.repetition(board, encoded, folder, seen) as recorder:
-        recorder.end_rows(running.follow(board, StopRequest(), start, recorder.take))
+        recorder.end_rows(run(board, key, recorder.take, lambda state: states.append(state.ending)))
     assert seen.samples == [(index, leg.trajectory.duration_s) for index in range(4)] * 2
     assert seen.ended == states[-1:] == ["finished"]
     assert [row.passed for row in Run.load(folder.path).rows] == [1, 2, 3, 4, 5]
@@ -123,12 +128,7 @@ def test_nothing_of_a_run_that_nobody_followed_is_taken_for_the_next_ones(tmp_pa
         pipe.wait(0.1)
     board.home([7, 7, 7])
     passed: list[int] = []
-    running.follow(
-        board,
-        StopRequest(),
-        starting(board, key),
-        lambda event: isinstance(event, RowBegun) and passed.append(event.passed),
-    )
+    run(board, key, lambda event: isinstance(event, RowBegun) and passed.append(event.passed))
     assert passed == [1, 2, 3, 4, 5]
 
 

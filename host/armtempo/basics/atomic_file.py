@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -27,6 +28,38 @@ def replace_text(path: Path, text: str, newline: str | None = None) -> None:
             _replace(path.resolve(), text, newline)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {os_reason(error)}", "choose another place") from None
+
+
+def replace_texts(texts: Mapping[Path, str], newline: str | None = None) -> None:
+    """Give files new texts: all of them, or none if one cannot be written.
+
+    Each file is complete at any time, as with ``replace_text``; if the power fails in between, some are new and some
+    old. ``newline``: as in ``open``. Raises InputError if one cannot be written; all old files are kept.
+    """
+    new: dict[Path, Path] = {}
+    old: dict[Path, Path] = {}
+    at = Path()
+    try:
+        for at, text in texts.items():
+            file = at.resolve()
+            new[file] = _aside(file, "new")
+            _write(new[file], text, newline)
+            old[file] = _aside(file, "old")
+            shutil.copy2(file, old[file])  # going back must not need space on the disk
+        for at in list(new):
+            os.replace(new[at], at)
+            del new[at]
+            _sync_folder(at.parent)
+    except OSError as error:
+        for file, before in old.items():
+            if file not in new:
+                os.replace(before, file)
+        raise InputError(
+            f"{at}: cannot be written: {os_reason(error)}; no file was changed", "make it writable"
+        ) from None
+    finally:
+        for left in (*new.values(), *old.values()):
+            left.unlink(missing_ok=True)
 
 
 def check_not_input(target: Path, inputs: Iterable[Path | str]) -> None:
@@ -66,18 +99,27 @@ def os_reason(error: Exception) -> str:
 
 
 def _replace(path: Path, text: str, newline: str | None) -> None:
-    aside = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.new")
+    aside = _aside(path, "new")
     try:
-        with aside.open("w", encoding="utf-8", newline=newline) as file:
-            file.write(text)
-            file.flush()
-            _sync(file.fileno())  # otherwise the name may reach the disk before the content does
+        _write(aside, text, newline)
         os.replace(aside, path)
         _sync_folder(path.parent)
     except OSError:
         if aside.is_file():
             aside.unlink()
         raise
+
+
+def _aside(path: Path, kind: str) -> Path:
+    """The name of a temporary file beside another, of this thread alone."""
+    return path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.{kind}")
+
+
+def _write(path: Path, text: str, newline: str | None) -> None:
+    with path.open("w", encoding="utf-8", newline=newline) as file:
+        file.write(text)
+        file.flush()
+        _sync(file.fileno())  # otherwise the name may reach the disk before the content does
 
 
 def _sync(file: int) -> None:

@@ -27,7 +27,6 @@ from armtempo.model.tool_pose import BASE, Pose
 from armtempo.planning import point_to_point, via_points
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
-from armtempo.robot.store import withdraw_old_default
 
 
 @click.command("goto", cls=options.TakesNumbers)
@@ -131,8 +130,6 @@ def home(where: str, switches: bool, joint: str | None, job_path: Path | None, g
         else:
             board.home(arm, angles_deg)
         print_position(board, given.as_json)
-        if old := withdraw_old_default(board.client, arm):
-            results.remark(old)
         if not switches:
             _remark_on_backlash(arm, unknown)
 

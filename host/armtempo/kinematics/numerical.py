@@ -9,12 +9,16 @@ from functools import cached_property
 
 import numpy as np
 
+from armtempo.basics.arrays import Array
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.descent import PoseProblem, Posture, descend
+from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.rejection import Rejection, out_of_range, table
 from armtempo.model.arm import Arm
+from armtempo.model.joint_unit import DEG, MM
+from armtempo.model.pose import to_rpy_deg
 from armtempo.model.tool_pose import Pose
 
 LEAST_STARTS, MOST_STARTS = 40, 240
@@ -26,6 +30,9 @@ SAME_RAD = 1e-4
 
 BOUNDED_STARTS = 12
 """Starts within the ranges for the posture nearest to an unreachable target."""
+
+_NEARLY = 10.0
+"""A miss of fewer tolerances than this can be allowed; a larger one is a pose out of reach."""
 
 MOST_SOLUTIONS = 16
 """Largest number of isolated postures of six revolute joints for a complete pose; more means redundancy."""
@@ -214,18 +221,37 @@ def _least_miss(arm: MovingArm, target: Pose, previous: list[float], seed: int) 
 
 
 def why_not(answer: NumericalSolutions) -> str:
-    """Why no posture is usable, and what to do."""
+    """Why no posture is usable, how near the arm comes, and what to do."""
     target, miss = answer.target, answer.nearest.miss
     where = " within the joint ranges" if answer.solutions else ""
     return (
         f"no posture{where} reaches this pose within {target.tolerance_mm:g} mm and {target.tolerance_deg:g} deg: the "
-        f"nearest one that was found misses it by {miss}; {_next_step(answer)}"
+        f"nearest one that was found misses it by {miss}{_ends(answer)}; {_next_step(answer)}"
     )
 
 
+def _ends(answer: NumericalSolutions) -> str:
+    """The joints of the nearest posture that are at an end of their ranges."""
+    found = []
+    for joint, (low, high) in zip(answer.arm.moving, answer.arm.bounds, strict=True):
+        angle = answer.nearest.angles_rad[joint]
+        for end in {low, high} if low < high else ():
+            if abs(angle - end) < SAME_RAD:
+                unit = MM if joint in answer.arm.ranges.slides else DEG
+                found.append(f"joint {joint + 1} at the end of its range, {math.degrees(end):g} {unit.name}")
+    return f", with {' and '.join(found)}" if found else ""
+
+
 def _next_step(answer: NumericalSolutions) -> str:
-    target, joints = answer.target, len(answer.arm.moving)
-    step = "bring the pose nearer to the arm, or allow more by tolerance_mm and tolerance_deg"
+    target, joints, miss = answer.target, len(answer.arm.moving), answer.nearest.miss
+    if target.fixed and (turned := _turned(answer)) is not None:
+        roll, pitch, yaw = (round(value, 1) + 0.0 for value in to_rpy_deg(turned))
+        step = f"its position is reached with roll {roll:g}, pitch {pitch:g}, yaw {yaw:g} deg"
+    else:
+        x, y, z = np.round(_tool(answer.arm, answer.nearest)[:3, 3], 1) + 0.0
+        step = f"bring the pose nearer to the arm, which comes to x {x:g}, y {y:g}, z {z:g} mm in the base"
+    if max(miss.position_mm / target.tolerance_mm, miss.rotation_deg / target.tolerance_deg) < _NEARLY:
+        step += ", or allow more by tolerance_mm and tolerance_deg"
     if target.constraints <= joints or not target.fixed:
         return step
     moving = f"{joints} joints move" if joints > 1 else "1 joint moves"
@@ -233,6 +259,17 @@ def _next_step(answer: NumericalSolutions) -> str:
         f"{step}; as it asks for {target.constraints} numbers and {moving}, ask for less: "
         f"{FITTING.get(joints, 'the position only')}"
     )
+
+
+def _turned(answer: NumericalSolutions) -> Array | None:
+    """The tool, (4, 4), at the position of the target in another orientation; None if none was found."""
+    arm, nearest = answer.arm, answer.nearest.angles_rad
+    found = descents(arm, replace(answer.target, fixed=()), nearest, [nearest])
+    return _tool(arm, found[0]) if found else None
+
+
+def _tool(arm: MovingArm, solution: NumericalSolution) -> Array:
+    return forward(arm.geometry, solution.angles_rad)
 
 
 FITTING = {4: "position and pitch", 5: "position and approach, or position, roll and pitch"}

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import tomlkit
 
 from armtempo.basics import toml_table
-from armtempo.basics.atomic_file import replace_text
+from armtempo.basics.atomic_file import replace_text, replace_texts
 from armtempo.basics.errors import InputError
 from armtempo.model import frame, posture, taught, tool
 from armtempo.model.arm import Arm
@@ -28,51 +29,115 @@ def uses(content: Mapping[str, Any], kind: str, name: str) -> list[str]:
     return [where for where, _ in _places(content, kind, name)]
 
 
-def users(file: Path, folder: Path, kind: str, name: str) -> list[str]:
-    """The other tables of an arm file, and the jobs, sequences and programs of a folder, that use a name.
+@dataclass(frozen=True)
+class Use:
+    """A line that uses a name."""
 
-    Files that cannot be read are left out. Raises InputError if the arm file cannot be read.
+    file: Path
+    line: int
+    """From 1."""
+    text: str
+    """Of the line."""
+    follows: bool
+    """Whether ``rename`` changes it; not in a program, or a file that cannot be read as TOML."""
+
+
+def uses_in_files(file: Path, folder: Path, kind: str, name: str) -> list[Use]:
+    """The lines of an arm file, and of the jobs, sequences and programs of a folder, that use a name.
+
+    Other arms have names of their own and are left out. Raises InputError if the arm file cannot be read.
     """
-    found = [
-        where.rpartition(".")[0] for where in uses(taught.parsed(taught.read_text(file), file), kind, name)
-    ]
-    for path in sorted([*folder.glob("*.toml"), *folder.glob("*.py")]):
-        if path.resolve() != file.resolve() and _is_used_in(path, kind, name):
-            found.append(path.name)
-    return found
+    taught.parsed(taught.read_text(file), file)
+    return [one for path in (file, *_others(file, folder)) for one in _uses_in(path, kind, name)]
 
 
-def _is_used_in(path: Path, kind: str, name: str) -> bool:
+def _others(file: Path, folder: Path) -> list[Path]:
+    """The files of a folder that may use a name of an arm file."""
+    paths = sorted([*folder.glob("*.toml"), *folder.glob("*.py")])
+    return [path for path in paths if path.resolve() != file.resolve() and not _is_arm(path)]
+
+
+def _is_arm(path: Path) -> bool:
     try:
-        text = taught.read_text(path)
-        return bool(re.search(rf"[\"']{re.escape(name)}[\"']", text)) and (
-            path.suffix == ".py" or bool(uses(taught.content(text), kind, name))
-        )
+        return path.suffix == ".toml" and "joint" in taught.content(taught.read_text(path))
     except (InputError, ValueError):
         return False
 
 
-def rename(file: Path, kind: str, name: str, new: str) -> Arm:
-    """Give a table another name, also where the arm file uses it; what other files say stays.
+def _uses_in(path: Path, kind: str, name: str) -> list[Use]:
+    try:
+        text = taught.read_text(path)
+    except InputError:
+        return []
+    quoted = re.compile(rf"[\"']{re.escape(name)}[\"']")
+    if not quoted.search(text):
+        return []
+    lines = text.splitlines()
+    try:
+        changed = renamed(text, kind, name, f"{name}-").splitlines() if path.suffix == ".toml" else []
+    except InputError:
+        changed = []
+    follows = len(changed) == len(lines)
+    marked = zip(lines, changed, strict=True) if follows else ((line, quoted.sub("", line)) for line in lines)
+    return [
+        Use(path, number, line.strip(), follows)
+        for number, (line, other) in enumerate(marked, 1)
+        if line != other
+    ]
 
-    Everything else in the arm file stays as it is written. Raises InputError, without writing, for a name that is
-    not allowed or taken, or a table that is written in another way than [KIND.NAME].
+
+def renamed(text: str, kind: str, name: str, new: str) -> str:
+    """A TOML text with another name where it uses ``name``; everything else as it is written.
+
+    Raises InputError if it is no TOML, or written in a way that cannot be changed.
+    """
+    try:
+        wanted = taught.content(text)
+        changed = _changed(text, kind, name, new)
+        for _, change in list(_places(wanted, kind, name)):
+            change(new)
+        same = taught.content(changed) == wanted
+    except ValueError:
+        same = False
+    if not same:
+        raise InputError(f"the {kind} {name!r} is used in a way that cannot be changed here", "edit the file")
+    return changed
+
+
+def _changed(text: str, kind: str, name: str, new: str) -> str:
+    mark = taught.MARK if text.startswith(taught.MARK) else ""
+    document = tomlkit.parse(text.removeprefix(taught.MARK))
+    places = list(_places(document, kind, name))
+    for _, change in places:
+        change(new)
+    return mark + tomlkit.dumps(document) if places else text
+
+
+def rename(file: Path, kind: str, name: str, new: str, folder: Path | None = None) -> Arm:
+    """Give a table another name, also where the arm file uses it.
+
+    With a ``folder`` its jobs and sequences follow: ``Use.follows`` says which lines; the others stay. Everything else
+    stays as it is written, and all files are written, or none. Raises InputError, without writing, for a name that is
+    not allowed or taken, a table that is written in another way than [KIND.NAME], or a file that cannot be written.
     """
     _check_name(kind, new)
     if new in taught.names(file, kind):
         raise InputError(f"there is a {kind} {new!r} already", "choose another name")
     text = taught.read_text(file)
-    document = tomlkit.parse(text.removeprefix(taught.MARK))
-    for _, change in list(_places(document, kind, name)):
-        change(new)
     header = re.compile(rf"(?m)^(\s*\[\s*{kind}\s*\.\s*)([\"']?){re.escape(name)}\2(?=\s*[\].])")
-    changed = header.sub(rf"\g<1>{new}", tomlkit.dumps(document))
+    changed = header.sub(rf"\g<1>{new}", _changed(text, kind, name, new))
     wanted = taught.parsed(text, file)
     for _, change in list(_places(wanted, kind, name)):
         change(new)
     tables = wanted[kind]
     wanted[kind] = {new if key == name else key: value for key, value in tables.items()}
-    return _write(file, text, changed, wanted, f"{kind} {name!r}")
+    arm = _checked(file, changed, wanted, f"{kind} {name!r}")
+    texts = {file: changed}
+    for path in _others(file, folder) if folder else ():
+        if any(one.follows for one in _uses_in(path, kind, name)):
+            texts[path] = renamed(taught.read_text(path), kind, name, new)
+    replace_texts(texts, newline="")
+    return arm
 
 
 def remove(file: Path, kind: str, name: str) -> Arm:
@@ -86,7 +151,10 @@ def remove(file: Path, kind: str, name: str) -> Arm:
     if places := uses(wanted, kind, name):
         raise InputError(f"{', '.join(places)}: uses the {kind} {name!r}", "change that first")
     wanted[kind] = {key: value for key, value in wanted[kind].items() if key != name}
-    return _write(file, text, _without(text, kind, name), wanted, f"{kind} {name!r}")
+    changed = _without(text, kind, name)
+    arm = _checked(file, changed, wanted, f"{kind} {name!r}")
+    replace_text(file, changed, newline="")
+    return arm
 
 
 def _without(text: str, kind: str, name: str) -> str:
@@ -113,7 +181,8 @@ def _is_above_header(lines: list[str], at: int) -> bool:
     return False
 
 
-def _write(file: Path, before: str, changed: str, wanted: dict[str, Any], what: str) -> Arm:
+def _checked(file: Path, changed: str, wanted: dict[str, Any], what: str) -> Arm:
+    """The arm of a changed text; raises InputError if it does not say what is wanted."""
     try:
         same = _filled(taught.content(changed)) == _filled(wanted)
     except ValueError:
@@ -122,10 +191,7 @@ def _write(file: Path, before: str, changed: str, wanted: dict[str, Any], what: 
         raise InputError(
             f"{file}: its {what} is written in a way that cannot be changed here", "edit the file"
         )
-    arm = Arm.of_table(toml_table.parse(changed.removeprefix(taught.MARK), str(file)))
-    mark = taught.MARK if before.startswith(taught.MARK) else ""
-    replace_text(file, mark + changed.removeprefix(taught.MARK), newline="")
-    return arm
+    return Arm.of_table(toml_table.parse(changed.removeprefix(taught.MARK), str(file)))
 
 
 def _filled(content: dict[str, Any]) -> dict[str, Any]:

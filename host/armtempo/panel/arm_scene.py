@@ -43,7 +43,9 @@ _VIA_NAME = "via "
 FOLLOW = "follow"
 """The view that keeps the tool in the middle."""
 EYES = {"side": (0.0, -1.4, 0.25), "top": (0.0, -0.001, 1.6), "free": (0.7, -0.85, 0.6)}
-"""Where the views look from; from above x is to the right and y up."""
+"""Where the views look from, from the arm's middle; from above x is to the right and y up."""
+_TARGET = (0.0, 0.0, 0.15)
+"""What they look at, from there."""
 _SLOW_TO_FAST = ((0.20, 0.35, 0.75), (0.13, 0.55, 0.35), (0.85, 0.65, 0.10), (0.85, 0.15, 0.25))
 """Colours of a path, red, green and blue, seen on light and dark: blue where it is slow, red where it is fastest."""
 
@@ -59,13 +61,25 @@ class Obstacle(NamedTuple):
 
 
 class ArmShape:
-    """Poses of an arm's parts at joint angles; lengths as fractions of the reach."""
+    """Poses of an arm's parts at joint angles; lengths as fractions of the reach about ``middle``."""
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self.reach_mm = sum(abs(joint.d_mm) + abs(joint.a_mm) for joint in arm.joints)
-        self.reach_mm += sum(max(map(abs, joint.range_deg)) for joint in arm.joints if joint.slides)
+        middle_mm = np.zeros(3)
+        frames = all_frames(self._geometry, np.radians(all_angles_deg(arm, np.array(arm.home_deg))).tolist())
+        turns = False
+        for row, joint in enumerate(arm.joints):
+            low, high = joint.range_deg
+            turns |= row in arm.driven_indices and not joint.slides
+            if joint.slides and not turns:  # it carries the whole arm to and fro
+                self.reach_mm += (high - low) / 2
+                middle_mm += frames[row][:3, 2] * (low + high) / 2
+            elif joint.slides:
+                self.reach_mm += max(abs(low), abs(high))
         self.reach_mm = self.reach_mm or 1.0
+        self.middle = middle_mm / self.reach_mm
+        """What the arm's base is next to when each rail that carries it is in the middle of its range, (3,)."""
 
     def outline(self, angles_deg: Array) -> Array:
         """Points of the arm's line, (K, 3), for driven angles (J,)."""
@@ -172,9 +186,10 @@ class ArmShape:
             low, high = np.array(box.low_mm), np.array(box.high_mm)
             below, above = low <= -FAR_MM, high >= FAR_MM
             low, high = np.where(below & ~above, high, low), np.where(above & ~below, low, high)
-            low, high = np.clip(np.array((low, high)) / self.reach_mm, -_SHOWN, _SHOWN)
             axes = np.array(box.axes)
             axes[:3, 3] /= self.reach_mm
+            seen = axes[:3, :3].T @ (self.middle - axes[:3, 3])
+            low, high = np.clip(np.array((low, high)) / self.reach_mm, seen - _SHOWN, seen + _SHOWN)
             found.append(Obstacle(low, high, axes))
         return found
 
@@ -251,8 +266,8 @@ class ArmScene:
         self._walls: list[Object3D] = []
         self.draw_workspace()
         self.draw_frames()
-        self._dots: list[tuple[Object3D, Object3D]] = []
-        """A ball for each via point, and its name."""
+        self._dots: list[Object3D] = []
+        """A ball for each via point, which the page's script names."""
         self.look("free")
 
     def _body(self, colour: str, colour_of_joints: str, opacity: float) -> list[str]:
@@ -310,7 +325,10 @@ class ArmScene:
     def look(self, view: str) -> None:
         """Look from the side, from above, from in front and above, or follow the tool."""
         if view != FOLLOW:
-            self.scene.move_camera(*EYES[view], 0, 0, 0.15, duration=0.3)
+            names = ("x", "y", "z", "look_at_x", "look_at_y", "look_at_z")
+            eye, target = self._shape.middle + EYES[view], self._shape.middle + _TARGET
+            places = dict(zip(names, (*eye.tolist(), *target.tolist()), strict=True))
+            self.scene.move_camera(**places, duration=0.3)
         ui.run_javascript(f"armtempo.follow = {json.dumps(view == FOLLOW)}")
 
     def draw(self, name: str, points_mm: Array, colour: str | Array) -> None:
@@ -326,18 +344,16 @@ class ArmScene:
         """Draw a ball at each via point, (N, 3), that can be clicked and dragged."""
         points = (np.asarray(points_mm) / self._shape.reach_mm).tolist()
         while len(self._dots) > len(points):
-            for one in self._dots.pop():
-                one.delete()
+            self._dots.pop().delete()
         with self.scene:
             while len(self._dots) < len(points):
                 number = len(self._dots)
                 ball = self.scene.sphere(_DOT, 16, 12).material(VIA).with_name(f"{_VIA_NAME}{number}")
-                label = self.scene.text(f"P{number}", "font-size: 0.75rem; pointer-events: none;")
-                self._dots.append((ball.draggable(), label))
-        for (dot, name), (x, y, z) in zip(self._dots, points, strict=True):
-            dot.move(x, y, z)
-            name.move(x, y, z + 2 * _DOT)
-        ui.run_javascript("armtempo.changes += 1")
+                self._dots.append(ball.draggable())
+        for dot, place in zip(self._dots, points, strict=True):
+            dot.move(*place)
+        names = json.dumps([[x, y, z + 2 * _DOT] for x, y, z in points])
+        ui.run_javascript(f"armtempo.vias = {names}; armtempo.changes += 1")
 
     def _clicked(self, event: SceneClickEventArguments) -> object:
         numbers = [_via_number(hit.object_name) for hit in event.hits]

@@ -129,7 +129,7 @@ class BoardTab:
             if motion.program:
                 operator.board.run_program(name, operator.say)
             elif motion.sequence:
-                operator.board.run_sequence(name, operator.live.take_sequence, out=operator.runs)
+                operator.run_sequence(name)
             else:
                 operator.board.run(name, 1, operator.runs, operator.part)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -185,6 +186,20 @@ class FileEditor(ABC):
             undone = self._undo[:-1]
             self._set(self._undo[-1])
             self._undo = undone
+
+    def rewritten(self, change: Callable[[str], str]) -> Callable[[], None]:
+        """Change the text, what was saved of it, and what can be undone, as another part of the panel changes the file.
+
+        Errors of ``change`` come at once; nothing is changed until what is returned is called.
+        """
+        text, saved, undo = change(self.text), change(self._saved), list(map(change, self._undo))
+
+        def take() -> None:
+            if text != self.text:
+                self._set(text)
+            self._saved, self._undo = saved, undo
+
+        return take
 
     def _change(self, text: str) -> None:
         before = [*self._undo[-_MOST_UNDONE:], self.text]

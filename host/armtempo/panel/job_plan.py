@@ -1,28 +1,26 @@
-"""The plan of the panel's job: made, cancelled, played on the model, with its curves."""
+"""The plan of the panel's job: made, played on the model, with its curves."""
 
 from __future__ import annotations
 
-import asyncio
 import time
-from collections.abc import Awaitable
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from nicegui import run, ui
+from nicegui import ui
 
 from armtempo import pipeline
-from armtempo.basics.errors import ArmtempoError, InputError
-from armtempo.model.job import Job
 from armtempo.panel import words
 from armtempo.panel.charts import CurveChart
 from armtempo.panel.fields import in_words
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
+from armtempo.panel.plan_row import PlanRow
 
 if TYPE_CHECKING:
+    from armtempo.basics.progress import Progress
     from armtempo.model.plan import Plan
     from armtempo.panel.panel_page import PanelPage
-    from armtempo.panel.press import Press
 
 _POINTS = 200
 _SLIDER = 1000
@@ -38,61 +36,23 @@ class JobPlan:
         self._page = page
         self._operator = page.operator
         self._jobs = page.operator.jobs
-        self._planning = self._cancelled = False
         self._played: Plan | None = None
         self._marked_s = 0.0
-        self._plan_row()
+        with ui.row():
+            PlanRow(page, self._begin, Needs.CONTROL, str, lambda error: words.of_job(str(error)))
+            self._result = ui.label("").props('role="status"')
         self._play_row()
         self._charts = [
             CurveChart(page.operator.arm, title, order)
             for order, title in enumerate((words.ANGLE, words.SPEED, words.ACCELERATION, words.JERK))
         ]
 
-    def _plan_row(self) -> None:
-        page = self._page
-        with ui.row():
-            page.button(words.PLAN, self._plan, Needs.CONTROL, self._why_no_plan, look=" icon=insights")
-            self._stop = ui.button(words.CANCEL, on_click=self._cancel).props("flat no-caps")
-            self._stop.set_visibility(False)
-            self._result = ui.label("").props('role="status"')
-        self._bar = ui.linear_progress(0.0, show_value=False).classes("full-width")
-        self._bar.set_visibility(False)
-
-    def _why_no_plan(self) -> str:
-        return words.BUSY.format(what=words.PLAN) if self._planning else ""
-
-    def _plan(self, press: Press) -> Awaitable[None]:
-        self._operator.check(self._page.client, press, Needs.CONTROL)
+    def _begin(self) -> Callable[[Progress], object]:
+        """What plans the job as it is now."""
         with in_words(words.of_job):
-            job = self._jobs.job()
-        return self._make_plan(job, self._jobs.version)
-
-    async def _make_plan(self, job: Job, version: int) -> None:
-        try:
-            self._show_planning(True)
-            plan = await run.io_bound(pipeline.plan, self._jobs.arm, job, self._progress)
-            if plan is not None:  # it is None if the panel ends meanwhile
-                self._jobs.planned(plan, version)
-        except ArmtempoError as error:
-            ui.notify(words.of_job(str(error)), type="negative", multi_line=True, timeout=8000)
-        except asyncio.CancelledError:
-            pass
-        finally:
-            self._show_planning(False)
-
-    def _show_planning(self, planning: bool) -> None:
-        self._planning, self._cancelled = planning, False
-        self._bar.set_visibility(planning)
-        self._stop.set_visibility(planning)
-        self._page.refresh()
-
-    def _progress(self, done: float, whole: float) -> None:
-        if self._cancelled:
-            raise InputError(words.CANCELLED, words.PLAN_AGAIN)
-        self._bar.value = done / whole if whole else 0.0
-
-    def _cancel(self) -> None:
-        self._cancelled = True
+            job, version = self._jobs.job(), self._jobs.version
+        arm = self._jobs.arm
+        return lambda progress: self._jobs.planned(pipeline.plan(arm, job, progress), version)
 
     # on the model
 

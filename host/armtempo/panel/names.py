@@ -10,6 +10,7 @@ from nicegui import ui
 
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_names, frame, tool
+from armtempo.model.arm_names import Use
 from armtempo.panel import teaching, words
 from armtempo.panel.panel_board import Needs
 
@@ -50,35 +51,59 @@ class Names:
         if not any(named.values()):
             ui.label(words.NO_NAMES).classes("armtempo-note")
 
-    def _users(self, kind: str, name: str) -> list[str]:
-        """What uses the name in the project folder, and in what is edited and not saved."""
+    def _uses(self, kind: str, name: str) -> list[Use]:
+        """The lines that use a name; of what is edited and not saved, its keys."""
         operator = self._operator
-        found = arm_names.users(teaching.arm_file(operator.arm), Path(), kind, name)
+        found = arm_names.uses_in_files(teaching.arm_file(operator.arm), Path(), kind, name)
         for editor in (operator.jobs, operator.sequences):
-            shown = editor.target.name
-            if shown not in found and arm_names.uses(editor.content, kind, name):
-                found.append(shown)
+            if not editor.is_saved:
+                places = arm_names.uses(editor.content, kind, name)
+                found += [Use(editor.target, 0, place, follows=True) for place in places]
         return found
 
-    def _used(self, kind: str, name: str) -> str:
-        users = self._users(kind, name)
-        return words.USED_BY.format(users=", ".join(users)) if users else words.NOT_USED
+    def _list_uses(self, title: str, uses: list[Use]) -> None:
+        if uses:
+            ui.label(title)
+            with ui.element("div").classes("armtempo-uses"):
+                for use in uses:
+                    line = words.USE.format(line=use.line) if use.line else words.UNSAVED
+                    ui.label(words.plain(f"{use.file.name}, {line}: {use.text}"))
 
     def _ask_rename(self, kind: str, name: str, _: Press) -> None:
+        file, uses = teaching.arm_file(self._operator.arm), self._uses(kind, name)
+
         def rename(press: Press) -> None:
             self._check(press)
-            new = str(wanted.value or "").strip()
-            arm = arm_names.rename(teaching.arm_file(self._operator.arm), kind, name, new)
-            chosen = self._operator.tool
-            self._operator.arm_changed(arm, new if kind == tool.KIND and chosen == name else chosen)
-            self._page.refresh()
+            self._rename(kind, name, str(wanted.value or "").strip(), follow.value)
 
         question = words.SURE_RENAME.format(kind=words.NAMED_KINDS[kind], name=name)
-        asked = self._page.ask(words.plain(f"{question} {self._used(kind, name)}"), words.RENAME, rename)
-        with asked.place:
+        with self._page.ask(words.plain(question), words.RENAME, rename).place:
             wanted = ui.input(words.NEW_NAME, value=name).props("dense outlined")
+            self._list_uses(words.USED_IN, [use for use in uses if use.follows])
+            follow = ui.switch(words.FOLLOW, value=True)
+            follow.set_visibility(any(use.follows and use.file != file for use in uses))
+            self._list_uses(words.BY_YOURSELF, [use for use in uses if not use.follows])
+            if not uses:
+                ui.label(words.NOT_USED)
+
+    def _rename(self, kind: str, name: str, new: str, follow: bool) -> None:
+        """Give a name in the arm file; with ``follow`` in the jobs and sequences, and in what is edited, too."""
+        operator = self._operator
+        editors = (operator.jobs, operator.sequences) if follow else ()
+        rewritten = [
+            editor.rewritten(lambda text: arm_names.renamed(text, kind, name, new)) for editor in editors
+        ]
+        arm = arm_names.rename(teaching.arm_file(operator.arm), kind, name, new, Path() if follow else None)
+        for take in rewritten:
+            take()
+        chosen = operator.tool
+        operator.arm_changed(arm, new if kind == tool.KIND and chosen == name else chosen)
+        operator.say(words.RENAMED.format(kind=words.NAMED_KINDS[kind], name=name, new=new))
+        self._page.refresh()
 
     def _ask_remove(self, kind: str, name: str, _: Press) -> None:
+        uses = self._uses(kind, name)
+
         def remove(press: Press) -> None:
             self._check(press)
             if kind == tool.KIND and self._operator.tool == name:
@@ -88,7 +113,10 @@ class Names:
             self._page.refresh()
 
         question = words.SURE_REMOVE_NAME.format(kind=words.NAMED_KINDS[kind], name=name)
-        self._page.ask(words.plain(f"{question} {self._used(kind, name)}"), words.REMOVE, remove)
+        with self._page.ask(words.plain(question), words.REMOVE, remove).place:
+            self._list_uses(words.USED_IN, uses)
+            if not uses:
+                ui.label(words.NOT_USED)
 
     def _check(self, press: Press) -> None:
         """Nothing moves meanwhile: what it moves by would be another one."""

@@ -18,6 +18,8 @@ window.armtempo = {
   lines: {}, // three.js objects by name
   dials: [], // ranges of the joints
   tool: null, // its frame and shape
+  vias: [], // where the names of the via points are
+  names: [], // three.js objects: the names
   named: [], // the arm's frames
   framed: [undefined, undefined], // what was drawn of them
   frames: null, // three.js objects: of the base, the tool and the named ones
@@ -154,7 +156,7 @@ window.armtempo = {
   },
 
   remove(parent, frame) {
-    frame.children.forEach((label) => label.element.remove()); // which three.js leaves in the page
+    frame.traverse((one) => one.element?.remove()); // which three.js leaves in the page
     parent.remove(frame);
   },
 
@@ -182,8 +184,51 @@ window.armtempo = {
       const state = [size, scene.objects.size, this.changes, ...camera.matrix.elements].join();
       if (state === shown && performance.now() - drawn < 1000) return;
       [shown, drawn] = [state, performance.now()];
+      this.name_vias(scene, camera);
       render(what, camera);
     };
+  },
+
+  // the numbers of via points: as one where they would cover each other
+  name_vias(scene, camera) {
+    if (!this.THREE || !(this.vias.length || this.names.length)) return;
+    const canvas = scene.renderer.domElement;
+    const places = this.vias.map((via) => {
+      const { x, y } = new this.THREE.Vector3(...via).project(camera);
+      return [(x * canvas.clientWidth) / 2, (y * canvas.clientHeight) / 2];
+    });
+    const found = this.merged(places);
+    while (this.names.length > found.length) this.remove(scene.scene, this.names.pop());
+    found.forEach(({ text, first }, i) => {
+      if (!this.names[i]) {
+        const element = Object.assign(document.createElement("div"), { className: "armtempo-via" });
+        scene.scene.add((this.names[i] = new this.Label(element)));
+      }
+      this.names[i].position.set(...this.vias[first]);
+      if (this.names[i].element.textContent !== text) this.names[i].element.textContent = text;
+    });
+  },
+
+  // texts for numbers at places in pixels, none over another: "P0", "P3–5, 8" at the first of them
+  merged(places) {
+    const WIDTH = 7, HEIGHT = 14; // of a letter, pixels
+    const text = (numbers) => {
+      const runs = [];
+      for (const one of numbers) one === runs.at(-1)?.[1] + 1 ? (runs.at(-1)[1] = one) : runs.push([one, one]);
+      return "P" + runs.map(([low, high]) => (low === high ? low : `${low}–${high}`)).join(", ");
+    };
+    const made = (numbers) => ({ numbers, text: text(numbers), first: numbers[0] });
+    const covers = (one, other) => {
+      const [dx, dy] = [0, 1].map((axis) => Math.abs(places[one.first][axis] - places[other.first][axis]));
+      return dy < HEIGHT && dx < ((one.text.length + other.text.length) * WIDTH) / 2;
+    };
+    const found = [];
+    for (let left = places.map((_, number) => made([number])); left.length; ) {
+      const one = left.shift(), at = found.findIndex((other) => covers(one, other));
+      if (at < 0) found.push(one);
+      else left.unshift(made([...found.splice(at, 1)[0].numbers, ...one.numbers].sort((a, b) => a - b)));
+    }
+    return found.sort((one, other) => one.first - other.first);
   },
 
   place(scene, ids, poses) {

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, MutableSequence
 from enum import Flag, auto
+from functools import partial
 from pathlib import Path
 from threading import Event as ThreadEvent
 from threading import Lock, Thread
@@ -16,6 +17,7 @@ from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link.traffic import Chunk, Sink
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
+from armtempo.model.sequence_plan import SequencePlan
 from armtempo.panel import words
 from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.live import Lines, LiveArm
@@ -27,7 +29,7 @@ from armtempo.robot import goto
 from armtempo.robot.board import Board
 from armtempo.robot.goto import MovePace, Where, posture_deg
 from armtempo.robot.jog import HeldJog
-from armtempo.robot.stop_request import Stopped
+from armtempo.robot.stop_request import Stopped, StopRequest
 
 LOOK_S = 0.25
 """Interval of status requests while there are no samples."""
@@ -121,6 +123,8 @@ class PanelBoard:
         """Text: why the last command failed; "" after the next one has begun."""
         self.guiding = False
         """Whether the arm is guided by hand."""
+        self._stop = StopRequest()
+        """Asks the running command for its end, also while it plans or stores before anything moves."""
         self._stop_s: float | None = None
         """When a stop was asked for, until the arm is known to rest."""
         self._stop_sent_s = 0.0
@@ -285,14 +289,18 @@ class PanelBoard:
             before()
             self.busy, self.progress, self.failure = what, 0.0, ""
             self.live.plan = None
-        Thread(target=self._work, args=(what, call), name=f"armtempo panel: {what}", daemon=True).start()
+            self._stop = request = StopRequest()
+            stops: MutableSequence[StopRequest] = self._board.stops if self._board is not None else []
+            stops.append(request)
+        work = partial(self._work, what, call, lambda: stops.remove(request))
+        Thread(target=work, name=f"armtempo panel: {what}", daemon=True).start()
 
     def go(self, where: Where, pace: MovePace | None = None) -> None:
         """Go to a posture, which is ``target_deg`` meanwhile."""
         pace = pace or MovePace()
         self.live.target_deg = posture_deg(where, self.arm)
         try:
-            self.board.goto(where, progress=self.part, speed=pace.speed, line=pace.line)
+            self.board.goto(where, self.part, self._stop, pace.speed, pace.line)
         finally:
             self.live.target_deg = None
 
@@ -321,7 +329,7 @@ class PanelBoard:
         if joint is None:  # else the others may still be elsewhere
             self.live.doubt = ""
 
-    def _work(self, what: str, call: Callable[[], object]) -> None:
+    def _work(self, what: str, call: Callable[[], object], ended: Callable[[], None]) -> None:
         try:
             call()
             self.say(words.DONE.format(what=what))
@@ -333,6 +341,7 @@ class PanelBoard:
             _LOG.exception("panel: %s", what)
             self._fail(f"{what}: {type(error).__name__}: {error}")
         finally:
+            ended()
             self.busy = ""
             self.ended += 1
 
@@ -348,7 +357,12 @@ class PanelBoard:
         """Load a plan and run it; its report is made when it is asked for."""
         self.upload(plan)
         self.live.plan = plan
-        self.board.run(plan, times, self.runs, self.part)
+        self.board.run(plan, times, self.runs, self.part, stop=self._stop)
+
+    def run_sequence(self, sequence: SequencePlan | str) -> None:
+        """Run a planned sequence, stored in the place of another one of its name; or the stored one of that name."""
+        take = self.live.take_sequence
+        take(self.board.run_sequence(sequence, take, self._stop, replace=True, out=self.runs))
 
     def deploy(self) -> None:
         """Put this version's program on the board."""
@@ -364,8 +378,13 @@ class PanelBoard:
         """Store the progress of the running command."""
         self.progress = done / whole if whole else 0.0
 
+    def preparing(self, done: float, whole: float) -> None:
+        """As ``part``, of what is done before something moves: it ends, with Stopped, if a stop was asked for."""
+        self._stop.check()
+        self.part(done, whole)
+
     def stop(self, by: str = words.PANEL) -> None:
-        """Brake along the path. Allowed for all clients."""
+        """Brake along the path; a command that has not moved anything yet will not. Allowed for all clients."""
         self.guiding = False
         if self._stop_s is None:
             self._stop_s = time.monotonic()

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from armtempo_shared.sequence import ENDINGS, FINISHED, MOVE, WAIT
-from nicegui import run, ui
+from nicegui import ui
 
 from armtempo import pipeline
-from armtempo.basics.errors import ArmtempoError
 from armtempo.model.steps import position, whole_cycles
 from armtempo.panel import words
 from armtempo.panel.fields import Fields, in_words
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import build_rows, named
+from armtempo.panel.plan_row import PlanRow
 from armtempo.panel.sequence_editor import KINDS, kind_of
 
 if TYPE_CHECKING:
     from armtempo.basics.arrays import Array
+    from armtempo.basics.progress import Progress
     from armtempo.link.board_messages import SequenceState
     from armtempo.model.sequence_plan import SequencePlan
     from armtempo.panel.panel_page import PanelPage
@@ -44,15 +45,16 @@ class SequenceTab:
         self._rows: list[ui.row] = []
         self._times: list[ui.label] = []
         self._timed: SequencePlan | None = None
-        self._planning = False
         self._file = FileRow(page, self._editor, words.SEQUENCE_FILE, words.of_sequence)
         with ui.row():
-            for text, call, needs, look in (
-                (words.PLAN, self._plan_it, Needs.IDLE, "outline icon=insights"),
-                (words.TO_START, self._to_start, Needs.MOVE, "outline icon=start"),
-                (words.RUN, self._run, Needs.MOVE, "icon=play_arrow"),
+            self._plan_row = PlanRow(
+                page, lambda: self._planned, Needs.IDLE, self._why_nothing, words.of_error
+            )
+            for text, call, look in (
+                (words.TO_START, self._to_start, "outline icon=start"),
+                (words.RUN, self._run, "icon=play_arrow"),
             ):
-                page.button(text, call, needs, self._why_not, look=look)
+                page.button(text, call, Needs.MOVE, self._why_not, look=look)
             play = ui.button(words.PLAY, on_click=self._play).props("outline no-caps icon=smart_display")
             page.control(play, None, self._why_no_play)
         self._total = ui.label("").props('role="status"')
@@ -69,10 +71,11 @@ class SequenceTab:
         """What the fields are built for: their values may change without building them anew."""
         return self._editor.file, [kind_of(step) for step in self._editor.steps], self._editor.depths
 
-    def _why_not(self) -> str:
-        if self._planning:
-            return words.BUSY.format(what=words.PLAN)
+    def _why_nothing(self) -> str:
         return "" if self._editor.is_open else words.NO_SEQUENCE_OPEN
+
+    def _why_not(self) -> str:
+        return self._plan_row.why_not() or self._why_nothing()
 
     def _why_no_play(self) -> str:
         return "" if self._editor.plan else words.NO_PLAN
@@ -176,33 +179,14 @@ class SequenceTab:
 
     # plan, play, run
 
-    def _planned(self) -> SequencePlan:
+    def _planned(self, progress: Progress) -> SequencePlan:
         """The plan of the present steps."""
         if (plan := self._editor.plan) is None:
             version = self._editor.version
             with in_words(words.of_sequence):
-                plan = pipeline.plan_sequence(self._editor.arm, self._editor.sequence(), self._operator.part)
+                plan = pipeline.plan_sequence(self._editor.arm, self._editor.sequence(), progress)
             self._editor.planned(plan, version)
         return plan
-
-    def _plan_it(self, press: Press) -> Awaitable[None]:
-        self._operator.check(self._page.client, press, Needs.IDLE)
-        return self._make_plan()
-
-    async def _make_plan(self) -> None:
-        self._show_planning(True)
-        try:
-            await run.io_bound(self._planned)
-        except ArmtempoError as error:
-            ui.notify(words.of_error(error), type="negative", multi_line=True, timeout=8000)
-        finally:
-            self._show_planning(False)
-
-    def _show_planning(self, planning: bool) -> None:
-        self._planning = planning
-        self._total.set_text(words.PLANNING if planning else "")
-        self._timed = None  # what is shown is written over
-        self._page.refresh()
 
     async def _play(self) -> None:
         """Play every motion on the model, each once; pressed again, stop it."""
@@ -217,17 +201,15 @@ class SequenceTab:
         page.show_ghost(None)
 
     def _to_start(self, press: Press) -> None:
-        self._page.do(press, words.TO_START, lambda: self._operator.go(self._planned()))
+        self._page.do(
+            press, words.TO_START, lambda: self._operator.go(self._planned(self._operator.preparing))
+        )
 
     def _run(self, press: Press) -> None:
         operator = self._operator
 
         def run_it() -> None:
-            plan = self._planned()
-            board = operator.board
-            operator.live.take_sequence(
-                board.run_sequence(plan, operator.live.take_sequence, replace=True, out=operator.runs)
-            )
+            operator.run_sequence(self._planned(operator.preparing))
 
         self._page.do(press, words.RUN, run_it)
 

@@ -90,10 +90,11 @@ SURE_RENAME, SURE_REMOVE_NAME = (
     "{kind} {name}: give it another name?",
     "{kind} {name}: remove it from the arm file?",
 )
-USED_BY = (
-    "It is used by {users}: what the arm file says of it follows a new name, other files have to be changed."
-)
-NOT_USED = "Nothing in the project folder uses it."
+USED_IN, NOT_USED = "It is used here:", "Nothing in the project folder uses it."
+USE, UNSAVED = "line {line}", "not saved"
+FOLLOW = "Change these lines of jobs and sequences too"
+BY_YOURSELF = "Change these lines yourself, after the new name is given:"
+RENAMED = "{kind} {name} is called {new} now."
 TOOL_IS_ON, CHOOSE_NO_TOOL = "The tool {name} is jogged now", "choose another one first"
 OTHER_TOOL = "The other points were taken with another tool: choose that again, or begin anew."
 INTO_RANGE = "move the arm into its ranges"
@@ -234,7 +235,6 @@ STEP_KEYS = {
     "reverse": "from the last",
 }
 ADD_HERE = "Add where the arm is"
-PLANNING = "Planning…"
 TOTAL_TIME, CYCLE_TIME = "{time:.2f} s in all, without waits for inputs", "{time:.2f} s a cycle"
 
 STATE_KEYS = {

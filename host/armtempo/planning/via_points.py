@@ -237,7 +237,7 @@ def _searched(
     reasons = table(candidate.rejections for candidate in choice.candidates) if choice else ""
     raise PlanError(
         f"{where}: {answer.reason}{reasons}",
-        "move the pose, widen its tolerance, or ask for less of its orientation",
+        "move or turn the pose, or ask for less of its orientation",
     )
 
 

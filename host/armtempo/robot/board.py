@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, MutableSequence
 from contextlib import ExitStack, contextmanager
 from functools import wraps
 from pathlib import Path
@@ -109,8 +109,9 @@ class Board:
         self._shared.arm = arm
 
     @property
-    def stops(self) -> Sequence[StopRequest]:
-        """The stop requests of running calls of this object."""
+    def stops(self) -> MutableSequence[StopRequest]:
+        """The stop requests of running calls of this object; one that is added hears of every stop too, for work
+        before a motion."""
         return self._shared.stops
 
     @property

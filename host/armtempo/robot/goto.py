@@ -24,7 +24,7 @@ from armtempo.model.sequence_plan import AnyPlan, load_plan
 from armtempo.planning import point_to_point, via_points, workspace_check
 from armtempo.ports.names import is_sim
 from armtempo.robot import arm_state
-from armtempo.robot.running import follow, put_once, raise_fault
+from armtempo.robot.running import attended, follow, nothing, put_once, raise_fault
 from armtempo.robot.stop_request import StopRequest
 from armtempo.splines.trajectory import Trajectory
 
@@ -83,7 +83,7 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
 
 
 def move_once(
-    client: Client, data: bytes, stop: StopRequest, take: Callable[[Followed], object] = lambda _: None
+    client: Client, data: bytes, stop: StopRequest, take: Callable[[Followed], object] = nothing
 ) -> None:
     """Run a motion record once, from the board's memory; raises BoardError if a fault ends it.
 
@@ -96,7 +96,8 @@ def move_once(
     else:
         key = put_once(client, data)
     try:
-        end = follow(client, stop, lambda: MotionFollower(client, client.start(key.name, key.crc)), take).end
+        with attended(client, stop):
+            end = follow(client, stop, MotionFollower(client, client.start(key.name, key.crc)), take).end
     finally:
         if stored:
             with suppress(LinkError):  # do not hide the earlier error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 from pathlib import Path
 from typing import cast
 
@@ -214,14 +215,11 @@ class Motions:
             if stop.wanted:
                 return
             with recording.repetition(client, encoded, folder, watcher) as recorder:
-                end = running.follow(
-                    client,
-                    stop,
-                    lambda: MotionFollower(client, client.start(key.name, key.crc)),
-                    recorder.take,
-                ).end
-                recorder.end(end, stop.wanted)
-            running.raise_fault(end)
+                with running.attended(client, stop):
+                    follower = MotionFollower(client, client.start(key.name, key.crc))
+                    running.follow(client, stop, follower, recorder.take)
+                recorder.end(follower.end, stop.wanted)
+            running.raise_fault(follower.end)
 
     def _is_sequence(self, name: str) -> bool:
         found = self._board.client.find(stored_name(name))
@@ -263,22 +261,23 @@ class Motions:
                 key = encoded.key
                 self._take_start(encoded, wanted)
 
-            def start() -> SequenceFollower:
-                return SequenceFollower(client, key.name, client.start(key.name, key.crc), on_state)
-
-            if out is None:
-                followed = running.follow(client, wanted, start)
-            else:
-                if isinstance(sequence, str):
-                    encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
-                folder = self._new_folder(encoded, Path(out))
-                self._last_sequence = folder.path
-                watcher.begin(encoded, folder)
-                with recording.repetition(client, encoded, folder, watcher) as recorder:
-                    followed = running.follow(client, wanted, start, recorder.take)
-                    recorder.end_rows(followed)
-            running.raise_sequence_failure(client, followed.end)
-            return followed.end
+            recorder = None
+            with ExitStack() as recorded:
+                if out is not None:
+                    if isinstance(sequence, str):
+                        encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
+                    folder = self._new_folder(encoded, Path(out))
+                    self._last_sequence = folder.path
+                    watcher.begin(encoded, folder)
+                    recorder = recorded.enter_context(recording.repetition(client, encoded, folder, watcher))
+                with running.attended(client, wanted):
+                    before = client.start(key.name, key.crc)
+                    follower = SequenceFollower(client, key.name, before, on_state)
+                    running.follow(client, wanted, follower, recorder.take if recorder else running.nothing)
+                if recorder:
+                    recorder.end_rows(follower)
+            running.raise_sequence_failure(client, follower.end)
+            return follower.end
 
     def _stored_sequence(self, name: str) -> MotionKey:
         """The key of a sequence on the board; a virtual arm is at home."""

@@ -148,11 +148,8 @@ class Programs:
                     listener(event.text)
 
             name = key.name + SUFFIX  # the board's name of it
-            end = running.follow(
-                client,
-                wanted,
-                lambda: SequenceFollower(client, name, client.start(key.name, key.crc), watcher),
-                take,
-            ).end
-            running.raise_sequence_failure(client, end, program=True)
-            return end
+            with running.attended(client, wanted):
+                follower = SequenceFollower(client, name, client.start(key.name, key.crc), watcher)
+                running.follow(client, wanted, follower, take)
+            running.raise_sequence_failure(client, follower.end, program=True)
+            return follower.end

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 from armtempo_shared import wire
@@ -34,42 +34,54 @@ def put_once(client: Client, data: bytes) -> MotionKey:
     return MotionKey(ONCE_NAME, client.put_once(data))
 
 
-def follow(
-    client: Client,
-    stop: StopRequest,
-    start: Callable[[], _Follower],
-    take: Callable[[Followed], object] = lambda _: None,
-) -> _Follower:
-    """Start something and follow it to its end; a stop request makes the board brake. Any error stops the board.
+def nothing(event: Followed) -> None:
+    """What is done with samples and other events that nobody asked for."""
 
-    ``start`` starts it, by ``Client.start``; ``take`` is called with its samples and other events. If the cable is
-    pulled or the board falls silent, it is waited for up to RECONNECT_S, or STOPPING_RECONNECT_S if the stop is
-    wanted; a sequence goes on meanwhile. Raises Stopped if the stop was wanted before, LinkError if the board cannot be
-    reached any more, and what ``start`` raises.
+
+@contextmanager
+def attended(client: Client, stop: StopRequest) -> Iterator[None]:
+    """A context in which something is started, by ``Client.start``, and followed to its end, by ``follow``.
+
+    If the cable is pulled, the board is waited for up to RECONNECT_S, or STOPPING_RECONNECT_S if the stop is wanted; a
+    sequence goes on meanwhile. Raises Stopped if the stop was wanted before.
     """
     session = client.session
-    brake = Brake(client, stop)
     with session.on_loss(OnLoss(stopping=lambda: stop.wanted)), stop.waking(session.wake):
         stop.check()
         session.events.clear()  # of earlier runs, such as one by the button
-        follower = start()
-        while True:
-            try:
-                for event in follower.events(brake):
-                    take(event)
-                return follower
-            except OtherBoardError as error:
-                raise LinkError(
-                    f"{error.problem}; what happened after the last sample is not known", f"{error.hint}"
-                ) from error
-            except NoAnswerError as error:  # silent although its port exists: treated like a pulled cable
-                if not stop.wanted:  # otherwise the stop continues until it is abandoned
-                    if session.clock() - follower.heard_s > RECONNECT_S:
-                        raise
-                    session.reconnect(error)
-            except BaseException as error:
-                _stop_after(client, error)
-                raise
+        yield
+
+
+def follow(
+    client: Client,
+    stop: StopRequest,
+    follower: _Follower,
+    take: Callable[[Followed], object] = nothing,
+) -> _Follower:
+    """Follow what was started to its end; a stop request makes the board brake. Any error stops the board.
+
+    ``take`` is called with its samples and other events. A board that falls silent is waited for like a pulled cable,
+    see ``attended``. Raises LinkError if the board cannot be reached any more.
+    """
+    session = client.session
+    brake = Brake(client, stop)
+    while True:
+        try:
+            for event in follower.events(brake):
+                take(event)
+            return follower
+        except OtherBoardError as error:
+            raise LinkError(
+                f"{error.problem}; what happened after the last sample is not known", f"{error.hint}"
+            ) from error
+        except NoAnswerError as error:  # silent although its port exists: treated like a pulled cable
+            if not stop.wanted:  # otherwise the stop continues until it is abandoned
+                if session.clock() - follower.heard_s > RECONNECT_S:
+                    raise
+                session.reconnect(error)
+        except BaseException as error:
+            _stop_after(client, error)
+            raise
 
 
 def _stop_after(client: Client, error: BaseException) -> None:

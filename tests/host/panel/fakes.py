@@ -17,6 +17,7 @@ from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.press import Press
 from armtempo.robot.board_state import BoardState, JointState
+from armtempo.robot.stop_request import StopRequest
 
 ARM = Arm.paper()
 ME, OTHER = "me", "other"
@@ -102,7 +103,9 @@ class Board:
             "Client", (), {"session": Session(), "drivers": staticmethod(self._noted("drivers"))}
         )()
         self.jog = Jog()
-        self.stops: list[tuple[bool, str]] = []
+        self.asked: list[tuple[bool, str]] = []
+        """The stops."""
+        self.stops: list[StopRequest] = []
         self.moves = True
         self.homes: list[object] = []
         """What was declared to be at home: None for all joints."""
@@ -137,7 +140,9 @@ class Board:
         progress(f"{joint}: switch seen", 1, 2)
 
     def request_stop(self, now: bool, by: str) -> bool:
-        self.stops.append((now, by))
+        self.asked.append((now, by))
+        for one in self.stops:
+            one.ask(by)
         return self.moves
 
 

@@ -82,6 +82,25 @@ def test_a_sliding_joint_is_drawn_as_its_rail_and_has_no_dial() -> None:
     assert [any(dial) for dial in shape.dials(np.array(arm.home_deg))] == [False, True, True, True]
 
 
+@pytest.mark.parametrize(("low", "high"), [(-300.0, 300.0), (0.0, 2000.0)])
+def test_the_views_hold_an_arm_anywhere_on_its_rail(low: float, high: float) -> None:
+    """Its reach about the middle of the rail, which need not be the base."""
+    rail = Arm.of("community_rail")
+    arm = replace(
+        rail,
+        joints=tuple(
+            replace(joint, range_deg=(low, high), home_deg=low) if joint.slides else joint
+            for joint in rail.joints
+        ),
+    )
+    shape = ArmShape(arm)
+    assert shape.reach_mm == pytest.approx(ArmShape(Arm.of("community")).reach_mm + (high - low) / 2)
+    assert shape.middle * shape.reach_mm == pytest.approx([0.0, (low + high) / 2, 0.0], abs=1e-6)
+    for place in (low, high):
+        away = shape.outline(np.array([place, *arm.home_deg[1:]])) - shape.middle
+        assert np.linalg.norm(away, axis=1).max() <= 1.0
+
+
 def test_the_view_from_above_is_aligned_with_the_axes() -> None:
     x, y, z = arm_scene.EYES["top"]
     assert x == 0.0

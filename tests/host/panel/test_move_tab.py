@@ -38,6 +38,8 @@ def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
     with pytest.raises(PlanError, match="why not") as refused:
         teaching.nearest(ar4, from_rpy((900.0, 0.0, 474.0), (0.0, 90.0, 0.0)), np.array(ar4.home_deg))
     assert "misses it by" in (said := words.of_error(refused.value))
+    assert "which comes to x " in said
+    assert "tolerance" not in said
     assert said.endswith("or ask for less of its orientation")
     assert "why not" not in said  # a table for the terminal
 

@@ -48,7 +48,7 @@ def test_an_error_of_a_command_is_logged_and_ends_nothing(operator: PanelBoard) 
 def test_a_second_stop_brakes_again_and_only_an_arm_that_does_not_rest_is_frozen(
     operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stops = operator.board.stops  # type: ignore[attr-defined]
+    stops = operator.board.asked  # type: ignore[attr-defined]
     operator.freeze()  # nothing was stopped
     operator.stop()
     operator.stop()  # a double click
@@ -61,6 +61,34 @@ def test_a_second_stop_brakes_again_and_only_an_arm_that_does_not_rest_is_frozen
     assert "steps may be lost" in operator.live.doubt  # it stays, until the arm is homed
     operator.home()
     assert operator.live.doubt == ""
+
+
+@pytest.mark.parametrize("by_panel", [True, False])
+def test_a_command_that_is_stopped_before_anything_moves_moves_nothing(
+    operator: PanelBoard, by_panel: bool
+) -> None:
+    """A sequence that is still planned, say: also by a stop of another program."""
+    board: Any = operator.board
+    began, stopped, reached = threading.Event(), threading.Event(), threading.Event()
+
+    def work() -> None:
+        began.set()
+        stopped.wait(60)
+        operator.preparing(1, 2)
+        reached.set()
+
+    do(operator, words.RUN, ME, work)
+    began.wait(60)
+    operator.stop() if by_panel else board.request_stop(False, "another program")
+    stopped.set()
+    wait(lambda: not operator.busy)
+    assert not reached.is_set()
+    assert "Run: stopped: " in operator.log.last[-1]
+    assert not board.stops
+    do(operator, words.GO_TO, ME, lambda: operator.go("home"))  # the next one moves
+    wait(lambda: not operator.busy)
+    ((_, _, _, stop, *_),) = [call for call in board.calls if call[0] == "goto"]
+    assert not stop.wanted
 
 
 def test_a_stop_of_an_arm_at_rest_is_no_stop_to_freeze_after(operator: PanelBoard) -> None:

@@ -233,24 +233,34 @@ def test_a_name_is_changed_or_removed_after_a_question_that_says_what_uses_it(
     file = tmp_path / "arm.toml"
     text = file.read_text(encoding="utf-8")
     (tmp_path / "feed.toml").write_text(JOB)
+    (tmp_path / "turn.py").write_text('cell.frame("tray")\n')
     operator.jobs.load(tmp_path / "feed.toml")
     operator.jobs.set_option("tool", "pen")  # not saved
     with pages(operator) as page:
         choose(page, "pen")
         page.unfold(words.NAMES)
         page.press("Rename frame tray")
-        assert any("It is used by feed.toml" in said for said in page.texts())
+        assert 'feed.toml, line 5: frame = "tray"' in page.texts()
+        assert 'turn.py, line 1: cell.frame("tray")' in page.texts()
         page.answer(words.RENAME)  # to the same name
         assert file.read_text(encoding="utf-8") == text
         page.named(words.NEW_NAME).value = "plate"
         page.answer(words.RENAME)
         assert file.read_text(encoding="utf-8") == text.replace("[frame.tray]", "[frame.plate]")
+        assert (tmp_path / "feed.toml").read_text() == JOB.replace('"tray"', '"plate"')
+        assert operator.jobs.text == JOB.replace('"tray"', '"plate"').replace(
+            '"feed"', '"feed"\ntool = "pen"', 1
+        )
         page.press("Rename tool pen")
-        assert any("It is used by feed.toml" in said for said in page.texts())
+        assert "feed.toml, not saved: tool" in page.texts()
         new = [one for one in page.elements(ui.input) if one.props.get("label") == words.NEW_NAME]
         new[-1].value = "nib"  # of this dialog
         page.answer(words.RENAME)
         assert operator.tool == page.named(words.TOOL).value == "nib"  # it stays on the arm
+        assert operator.jobs.option("tool") == "nib"
+        operator.jobs.undo()  # of the edited option alone
+        assert operator.jobs.text == (tmp_path / "feed.toml").read_text()
+        assert operator.jobs.is_saved
         page.press("Remove tool nib")
         page.answer(words.REMOVE)
         assert operator.tool == "nib"  # which is jogged

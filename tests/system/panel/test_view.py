@@ -80,6 +80,22 @@ def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> N
     assert page.evaluate(keys) == 2 * ["armtempo-stop"]  # which the server may hear all the same
 
 
+@pytest.mark.parametrize(
+    ("places", "texts"),
+    [
+        ([[0, 0], [100, 0], [0, 50]], ["P0", "P1", "P2"]),
+        ([[0, 0], [4, 3], [8, 3], [300, 0]], ["P0–2", "P3"]),
+        ([[0, 0], [200, 0], [3, 0]], ["P0, 2", "P1"]),
+        ([[0, 0], [20, 0], [33, 0]], ["P0–2"]),  # the second and third as one, longer, would cover the first
+        ([], []),
+    ],
+)
+def test_names_of_via_points_that_would_cover_each_other_are_one(
+    page: Any, places: list[list[float]], texts: list[str]
+) -> None:
+    assert page.evaluate("places => armtempo.merged(places).map(one => one.text)", places) == texts
+
+
 def test_escape_answers_a_question_with_no(page: Any) -> None:
     show(page, "Job")
     panels.press(page, page.get_by_role("button", name="New…", exact=True))
