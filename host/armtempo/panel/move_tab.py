@@ -12,7 +12,7 @@ from nicegui import ui
 
 from armtempo.model.frame import TOOL
 from armtempo.model.tool_pose import BASE
-from armtempo.panel import floor, homing, names, targets, teach_points, teaching, words
+from armtempo.panel import floor, homing, live_texts, names, targets, teach_points, teaching, words
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import PanelPage, named
 from armtempo.planning.jog.jog_line import axis_of
@@ -96,7 +96,7 @@ class MoveTab:
             low, high = joint.range_deg
             with ui.element("div").classes("armtempo-jog"):
                 self._pair(joint.name, JogMove(math.inf, joint=number))
-                ui.label("").classes("armtempo-number").props(f'id="armtempo-angle-{number + 1}"')
+                live_texts.label(self._operator, f"armtempo-angle-{number + 1}").classes("armtempo-number")
                 sign = joint.unit.sign
                 ui.label(f"{low:g}{sign} … {high:g}{sign}").classes("armtempo-note")
 

@@ -101,6 +101,7 @@ class Panel:
         if client in self._new:
             self._new.discard(client)
             self._offer_control(client)
+            Client.instances[client].run_javascript(self._hear())
 
     def _offer_control(self, client: str) -> None:
         """Give control to a page that comes while no connected page has it."""
@@ -125,13 +126,17 @@ class Panel:
             if not any(client.has_socket_connection for client in Client.instances.values()):
                 continue
             try:
-                code = f"armtempo.hear({json.dumps(layout.message(self._operator, self._shape))})"
+                code = self._hear()
             except Exception:  # a bug: logged; the next message is sent; meanwhile the pages show an overlay
                 _LOG.exception("panel: the message to the pages")
                 continue
             for client in list(Client.instances.values()):
                 if client.has_socket_connection:
                     client.run_javascript(code)
+
+    def _hear(self) -> str:
+        """The message to a page, as its script takes it."""
+        return f"armtempo.hear({json.dumps(layout.message(self._operator, self._shape))})"
 
     async def _mesh(self, number: int) -> Any:
         """The mesh of a row of the arm, 0 for the base."""

@@ -64,6 +64,10 @@ def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> N
     }"""
     assert page.evaluate(silent, 1000 - page.evaluate("armtempo.LOOK_MS"))
     page.wait_for_selector("body:not(.lost)")  # it hears again
+    first = "ms => { armtempo.is_first = true; return (" + silent + ")(ms); }"  # a page that never connects
+    assert not page.evaluate(first, page.evaluate("armtempo.FIRST_MS") - 5000)
+    assert page.evaluate(first, page.evaluate("armtempo.FIRST_MS"))
+    page.wait_for_selector("body:not(.lost)")
     keys = """() => {
       const sent = [], emit = window.emitEvent;
       window.emitEvent = (name) => sent.push(name);
