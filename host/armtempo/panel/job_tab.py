@@ -18,10 +18,11 @@ from armtempo.model.job import DEGREES, PATHS, TIMINGS
 from armtempo.panel import words
 from armtempo.panel.fields import Fields
 from armtempo.panel.file_row import FileRow
-from armtempo.panel.job_editor import ANGLES, OPTIONS, POSE, WAY_KEYS, Via
+from armtempo.panel.job_editor import OPTIONS
 from armtempo.panel.job_plan import JobPlan
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import build_rows, named
+from armtempo.panel.via_rows import ANGLES, POSE, WAY_KEYS, Via
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
